@@ -1,0 +1,204 @@
+//! Meshes: nodes, cells and named sets. Geometry only; a mesh knows no unknowns and no physics.
+//!
+//! | file | what |
+//! |---|---|
+//! | `generate.rs` | line, rectangle and box with cut-outs and grading |
+//! | `gmsh.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
+//! | `vtk.rs` | VTK and VTU as meshio writes them |
+//! | `quality.rs` | checks that refuse a mesh no element can live on |
+//! | `boundary.rs` | boundary facets, and which bonds they cut |
+
+use std::collections::BTreeMap;
+
+use crate::tensor::Vector;
+
+/// The shapes of cells. Node order is that of VTK (and, for these shapes, of Gmsh).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum CellShape {
+    /// A single point; only in output, where each peridynamic point is one.
+    Vertex,
+    /// Two-node line.
+    Line2,
+    /// Three-node triangle.
+    Tri3,
+    /// Four-node quadrilateral, counter-clockwise.
+    Quad4,
+    /// Four-node tetrahedron.
+    Tet4,
+    /// Eight-node hexahedron: bottom face counter-clockwise, then top face.
+    Hex8,
+}
+
+impl CellShape {
+    /// Number of nodes.
+    pub fn node_count(self) -> usize {
+        match self {
+            Self::Vertex => 1,
+            Self::Line2 => 2,
+            Self::Tri3 => 3,
+            Self::Quad4 | Self::Tet4 => 4,
+            Self::Hex8 => 8,
+        }
+    }
+
+    /// Topological dimension.
+    pub fn dimension(self) -> usize {
+        match self {
+            Self::Vertex => 0,
+            Self::Line2 => 1,
+            Self::Tri3 | Self::Quad4 => 2,
+            Self::Tet4 | Self::Hex8 => 3,
+        }
+    }
+
+    /// Local node numbers of each facet (point, edge or face), ordered so that the facet's normal points outwards.
+    pub fn facets(self) -> &'static [&'static [usize]] {
+        match self {
+            Self::Vertex => &[],
+            Self::Line2 => &[&[0], &[1]],
+            Self::Tri3 => &[&[0, 1], &[1, 2], &[2, 0]],
+            Self::Quad4 => &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]],
+            Self::Tet4 => &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[0, 3, 2]],
+            Self::Hex8 => &[
+                &[0, 3, 2, 1],
+                &[4, 5, 6, 7],
+                &[0, 1, 5, 4],
+                &[1, 2, 6, 5],
+                &[2, 3, 7, 6],
+                &[3, 0, 4, 7],
+            ],
+        }
+    }
+}
+
+/// A facet of the mesh: its nodes, one in 1D, two in 2D, three or four in 3D.
+pub type Facet = Vec<u32>;
+
+/// A mesh of `D`-dimensional cells with named sets.
+///
+/// Shapes: `shapes` and `offsets` describe cell `c` by `connectivity[offsets[c]..offsets[c + 1]]`.
+/// Units: whatever the scene uses for length, throughout.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh<const D: usize> {
+    /// Node positions.
+    pub nodes: Vec<Vector<D>>,
+    /// Shape of each cell.
+    pub shapes: Vec<CellShape>,
+    /// Start of each cell in `connectivity`; one entry more than cells.
+    pub offsets: Vec<u32>,
+    /// Node numbers of all cells, one after another.
+    pub connectivity: Vec<u32>,
+    /// Named sets of cells.
+    pub cell_sets: BTreeMap<String, Vec<u32>>,
+    /// Named sets of facets (points in 1D, edges in 2D, faces in 3D).
+    pub facet_sets: BTreeMap<String, Vec<Facet>>,
+    /// Named sets of single nodes.
+    pub node_sets: BTreeMap<String, Vec<u32>>,
+}
+
+impl<const D: usize> Default for Mesh<D> {
+    fn default() -> Self {
+        Self {
+            nodes: Vec::new(),
+            shapes: Vec::new(),
+            offsets: vec![0],
+            connectivity: Vec::new(),
+            cell_sets: BTreeMap::new(),
+            facet_sets: BTreeMap::new(),
+            node_sets: BTreeMap::new(),
+        }
+    }
+}
+
+impl<const D: usize> Mesh<D> {
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.shapes.len()
+    }
+
+    /// Node numbers of cell `c`.
+    pub fn cell(&self, c: usize) -> &[u32] {
+        &self.connectivity[self.offsets[c] as usize..self.offsets[c + 1] as usize]
+    }
+
+    /// Appends a cell.
+    pub fn push_cell(&mut self, shape: CellShape, nodes: &[u32]) {
+        debug_assert_eq!(nodes.len(), shape.node_count());
+        self.shapes.push(shape);
+        self.connectivity.extend_from_slice(nodes);
+        self.offsets.push(self.connectivity.len() as u32);
+    }
+
+    /// Mean of the positions of the nodes of cell `c`.
+    pub fn centroid(&self, c: usize) -> Vector<D> {
+        let nodes = self.cell(c);
+        nodes
+            .iter()
+            .map(|&n| self.nodes[n as usize])
+            .sum::<Vector<D>>()
+            / nodes.len() as f64
+    }
+
+    /// Smallest and largest coordinates.
+    pub fn bounds(&self) -> (Vector<D>, Vector<D>) {
+        let mut lo: Vector<D> = Vector::repeat(f64::INFINITY);
+        let mut hi: Vector<D> = Vector::repeat(f64::NEG_INFINITY);
+        for x in &self.nodes {
+            lo = lo.inf(x);
+            hi = hi.sup(x);
+        }
+        (lo, hi)
+    }
+
+    /// For each node, the cells that it belongs to: offsets and cell numbers.
+    pub fn node_cells(&self) -> (Vec<u32>, Vec<u32>) {
+        let mut offsets = vec![0u32; self.nodes.len() + 1];
+        for &n in &self.connectivity {
+            offsets[n as usize + 1] += 1;
+        }
+        for i in 0..self.nodes.len() {
+            offsets[i + 1] += offsets[i];
+        }
+        let mut next = offsets.clone();
+        let mut cells = vec![0u32; self.connectivity.len()];
+        for c in 0..self.cell_count() {
+            for &n in self.cell(c) {
+                cells[next[n as usize] as usize] = c as u32;
+                next[n as usize] += 1;
+            }
+        }
+        (offsets, cells)
+    }
+
+    /// The nodes of a named set: of a node set, or all nodes of a facet or cell set of that name; sorted, without repeats.
+    pub fn nodes_of_set(&self, name: &str) -> Option<Vec<u32>> {
+        let mut nodes: Vec<u32> = if let Some(set) = self.node_sets.get(name) {
+            set.clone()
+        } else if let Some(set) = self.facet_sets.get(name) {
+            set.iter().flatten().copied().collect()
+        } else if let Some(set) = self.cell_sets.get(name) {
+            set.iter()
+                .flat_map(|&c| self.cell(c as usize).iter().copied())
+                .collect()
+        } else {
+            return None;
+        };
+        nodes.sort_unstable();
+        nodes.dedup();
+        Some(nodes)
+    }
+
+    /// The names of all sets, for messages.
+    pub fn set_names(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self
+            .cell_sets
+            .keys()
+            .chain(self.facet_sets.keys())
+            .chain(self.node_sets.keys())
+            .map(String::as_str)
+            .collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+}

@@ -1,0 +1,108 @@
+//! The seam between models and solvers: what a solver may know of a (coupled) model.
+//!
+//! A solver sees sites with positions, a block-sparse stiffness `K` with `K u = f`, and whether `K` is symmetric.
+//! It never learns that coupling exists.
+
+use rayon::prelude::*;
+
+/// Whether the tangent of a system is symmetric; solvers choose by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Symmetry {
+    /// `K = Kᵀ` to round-off: Cholesky and conjugate gradients are valid.
+    Symmetric,
+    /// `K ≠ Kᵀ` (splice, blending and partial stress): LU and GMRES are valid, plain CG is wrong.
+    Unsymmetric,
+}
+
+/// A square block-sparse matrix by rows; each entry is a dense `block × block` matrix, row-major.
+///
+/// Shapes: `row_offsets` has one entry more than block rows; `columns[e]` and
+/// `values[e · block² ..][..block²]` are entry `e`. Columns are sorted within a row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BlockCsr {
+    /// Unknowns per site (the dimension).
+    pub block: usize,
+    /// Start of each block row.
+    pub row_offsets: Vec<usize>,
+    /// Block column of each entry.
+    pub columns: Vec<u32>,
+    /// Dense blocks, row-major, one after another.
+    pub values: Vec<f64>,
+}
+
+impl BlockCsr {
+    /// Number of block rows (sites).
+    pub fn rows(&self) -> usize {
+        self.row_offsets.len().saturating_sub(1)
+    }
+
+    /// Number of scalar unknowns.
+    pub fn dofs(&self) -> usize {
+        self.rows() * self.block
+    }
+
+    /// Number of stored scalars.
+    pub fn nonzeros(&self) -> usize {
+        self.values.len()
+    }
+
+    /// The block columns and the blocks of row `i`.
+    pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
+        let (a, b) = (self.row_offsets[i], self.row_offsets[i + 1]);
+        let s = self.block * self.block;
+        (&self.columns[a..b], &self.values[a * s..b * s])
+    }
+
+    /// `y = K x`, threaded over rows; the same bits for any number of threads.
+    pub fn multiply_into(&self, x: &[f64], y: &mut [f64]) {
+        let d = self.block;
+        y.par_chunks_mut(d).enumerate().for_each(|(i, yi)| {
+            yi.fill(0.0);
+            let (columns, blocks) = self.row(i);
+            for (e, &c) in columns.iter().enumerate() {
+                let xj = &x[c as usize * d..][..d];
+                let k = &blocks[e * d * d..][..d * d];
+                for a in 0..d {
+                    for b in 0..d {
+                        yi[a] += k[a * d + b] * xj[b];
+                    }
+                }
+            }
+        });
+    }
+
+    /// `K x`.
+    pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; self.dofs()];
+        self.multiply_into(x, &mut y);
+        y
+    }
+
+    /// `‖K − Kᵀ‖_F / ‖K‖_F`.
+    pub fn asymmetry(&self) -> f64 {
+        let d = self.block;
+        let (mut diff, mut norm) = (0.0, 0.0);
+        for i in 0..self.rows() {
+            let (columns, blocks) = self.row(i);
+            for (e, &c) in columns.iter().enumerate() {
+                let (other, other_blocks) = self.row(c as usize);
+                let t = other.binary_search(&(i as u32)).ok();
+                for a in 0..d {
+                    for b in 0..d {
+                        let k = blocks[e * d * d + a * d + b];
+                        let kt = t.map_or(0.0, |t| other_blocks[t * d * d + b * d + a]);
+                        // an entry without its mirror would be met once only, hence counted twice
+                        diff += (k - kt) * (k - kt) * if t.is_none() { 2.0 } else { 1.0 };
+                        norm += k * k;
+                    }
+                }
+            }
+        }
+        if norm == 0.0 {
+            0.0
+        } else {
+            (diff / norm).sqrt()
+        }
+    }
+}

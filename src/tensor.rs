@@ -1,0 +1,109 @@
+//! Small tensors, const generic in the dimension `D` (1, 2 or 3); the only home of their helpers.
+
+use nalgebra::{SMatrix, SVector};
+
+/// A vector of `D` components: a position, bond, displacement or force.
+pub type Vector<const D: usize> = SVector<f64, D>;
+
+/// A second-order tensor of `D × D` components.
+pub type Tensor<const D: usize> = SMatrix<f64, D, D>;
+
+/// A fourth-order tensor `C_ijkl`, stored as `D × D` second-order tensors `[i][j](k, l)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tensor4<const D: usize>(pub [[Tensor<D>; D]; D]);
+
+impl<const D: usize> Tensor4<D> {
+    /// The tensor whose components are all zero.
+    pub fn zeros() -> Self {
+        Self([[Tensor::zeros(); D]; D])
+    }
+
+    /// `C_ijkl = λ δ_ij δ_kl + μ (δ_ik δ_jl + δ_il δ_jk)`; `lambda`, `mu` are the Lamé parameters [Pa].
+    pub fn isotropic(lambda: f64, mu: f64) -> Self {
+        let mut c = Self::zeros();
+        for i in 0..D {
+            for j in 0..D {
+                for k in 0..D {
+                    for l in 0..D {
+                        let d = |a: usize, b: usize| f64::from(u8::from(a == b));
+                        c.0[i][j][(k, l)] = lambda * d(i, j) * d(k, l)
+                            + mu * (d(i, k) * d(j, l) + d(i, l) * d(j, k));
+                    }
+                }
+            }
+        }
+        c
+    }
+
+    /// The component `C_ijkl`.
+    pub fn get(&self, i: usize, j: usize, k: usize, l: usize) -> f64 {
+        self.0[i][j][(k, l)]
+    }
+
+    /// Adds `scale · ξ ⊗ ξ ⊗ ξ ⊗ ξ`, one bond's share of a fourth moment.
+    pub fn add_fourth_power(&mut self, scale: f64, xi: &Vector<D>) {
+        let xx = xi * xi.transpose();
+        for i in 0..D {
+            for j in 0..D {
+                self.0[i][j] += xx * (scale * xx[(i, j)]);
+            }
+        }
+    }
+
+    /// `self + scale · other`.
+    pub fn add_scaled(&mut self, scale: f64, other: &Self) {
+        for i in 0..D {
+            for j in 0..D {
+                self.0[i][j] += other.0[i][j] * scale;
+            }
+        }
+    }
+
+    /// `self · scale`.
+    pub fn scaled(&self, scale: f64) -> Self {
+        let mut c = Self::zeros();
+        c.add_scaled(scale, self);
+        c
+    }
+
+    /// `(C : G)_ij = C_ijkl G_kl`.
+    pub fn contract(&self, g: &Tensor<D>) -> Tensor<D> {
+        Tensor::from_fn(|i, j| self.0[i][j].component_mul(g).sum())
+    }
+
+    /// `A_ik = a_j C_ijkl b_l`: the block that two gradients `a`, `b` make of a stiffness.
+    pub fn between(&self, a: &Vector<D>, b: &Vector<D>) -> Tensor<D> {
+        Tensor::from_fn(|i, k| {
+            let mut s = 0.0;
+            for j in 0..D {
+                for l in 0..D {
+                    s += a[j] * self.0[i][j][(k, l)] * b[l];
+                }
+            }
+            s
+        })
+    }
+
+    /// The largest component by magnitude.
+    pub fn amax(&self) -> f64 {
+        self.0
+            .iter()
+            .flatten()
+            .map(|t| t.amax())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// The infinitesimal strain `ε = ½ (G + Gᵀ)` of a displacement gradient `G`.
+pub fn strain<const D: usize>(g: &Tensor<D>) -> Tensor<D> {
+    (g + g.transpose()) * 0.5
+}
+
+/// Pads a `D`-vector with zeros to three components, for output.
+pub fn padded<const D: usize>(v: &Vector<D>) -> [f64; 3] {
+    let mut p = [0.0; 3];
+    for i in 0..D {
+        p[i] = v[i];
+    }
+    p
+}
