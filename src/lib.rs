@@ -6,6 +6,7 @@ pub mod material;
 pub mod mesh;
 pub mod observe;
 pub mod peridynamics;
+pub mod progress;
 pub mod scene;
 pub mod shape;
 pub mod solve;

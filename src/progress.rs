@@ -1,0 +1,31 @@
+//! What a long computation tells the person who waits for it.
+//!
+//! Assembly and solvers report to a [`Progress`]; they do not know whether anybody watches. The terminal bar lives in
+//! `observe`, so that nothing below it writes to a stream.
+
+/// A listener to the stages of a computation.
+///
+/// Calls come in the order `stage`, any number of `advance`, `stage`, …, `finish`; a new stage ends the one before it.
+/// `advance` may be called from several threads.
+pub trait Progress: Sync {
+    /// Begins a stage; `total` is the number of steps it will `advance` by, where that is known.
+    fn stage(&self, name: &str, total: Option<u64>);
+
+    /// Reports `by` further steps of the current stage.
+    fn advance(&self, by: u64);
+
+    /// Ends the last stage.
+    fn finish(&self);
+}
+
+/// Listens to nothing: for libraries, tests and `--json`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn stage(&self, _name: &str, _total: Option<u64>) {}
+
+    fn advance(&self, _by: u64) {}
+
+    fn finish(&self) {}
+}
