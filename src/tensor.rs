@@ -107,3 +107,61 @@ pub fn padded<const D: usize>(v: &Vector<D>) -> [f64; 3] {
     }
     p
 }
+
+/// The determinant of a tensor.
+pub fn determinant<const D: usize>(t: &Tensor<D>) -> f64 {
+    match D {
+        1 => t[(0, 0)],
+        2 => t[(0, 0)] * t[(1, 1)] - t[(0, 1)] * t[(1, 0)],
+        _ => (0..3).map(|j| t[(0, j)] * cofactor(t, 0, j)).sum(),
+    }
+}
+
+/// The inverse and the determinant of a tensor; `None` if the determinant is zero or not a number.
+pub fn inverse<const D: usize>(t: &Tensor<D>) -> Option<(Tensor<D>, f64)> {
+    let det = determinant(t);
+    if det == 0.0 || !det.is_finite() {
+        return None;
+    }
+    let inverse = match D {
+        1 => Tensor::from_element(1.0 / det),
+        2 => Tensor::from_fn(|i, j| {
+            let t = t[(1 - j, 1 - i)] / det;
+            if i == j { t } else { -t }
+        }),
+        _ => Tensor::from_fn(|i, j| cofactor(t, j, i) / det),
+    };
+    Some((inverse, det))
+}
+
+/// The cofactor `(i, j)` of a tensor of three dimensions.
+fn cofactor<const D: usize>(t: &Tensor<D>, i: usize, j: usize) -> f64 {
+    // cyclic indices carry the sign
+    let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+    let (c, d) = ((j + 1) % 3, (j + 2) % 3);
+    t[(a, c)] * t[(b, d)] - t[(a, d)] * t[(b, c)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inverts<const D: usize>() {
+        let t = Tensor::<D>::from_fn(|i, j| {
+            ((5 * i + 3 * j + 1) as f64).sin() + if i == j { 2.0 } else { 0.0 }
+        });
+        let (inverse, det) = inverse(&t).unwrap();
+        assert!((t * inverse - Tensor::identity()).amax() < 1e-14);
+        assert!((determinant(&inverse) * det - 1.0).abs() < 1e-14);
+        assert!(super::inverse(&Tensor::<D>::zeros()).is_none());
+    }
+
+    #[test]
+    fn inverse_times_tensor_is_identity() {
+        inverts::<1>();
+        inverts::<2>();
+        inverts::<3>();
+        let t = Tensor::<2>::new(1.0, 2.0, 3.0, 4.0);
+        assert_eq!(determinant(&t), -2.0);
+    }
+}

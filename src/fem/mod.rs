@@ -1,1 +1,83 @@
-//! fem
+//! Finite elements: cells, quadrature, the element kernel, loads, and where a point lies in a mesh.
+//!
+//! # Weak form
+//!
+//! Find u, equal to the prescribed displacement where one is prescribed, such that for every test field v that
+//! vanishes there
+//!
+//! ```text
+//!   ∫ ∇v : σ(∇u) dV  =  ∫ v · b dV + ∫ v · t dA          σ = C : ∇u
+//! ```
+//!
+//! With `u = Σ_b u_b N_b` and `v = e_i N_a` this is `K u = f`:
+//!
+//! ```text
+//!   K_ab,ik = ∫ ∂N_a/∂x_j C_ijkl ∂N_b/∂x_l dV      f_a = ∫ N_a b dV + ∫ N_a t dA
+//! ```
+//!
+//! The integrals are sums over quadrature points `x_q = Σ N_a(ξ_q) x_a` of weight `|det J| w_q`, `J = ∂x/∂ξ`, and
+//! `∂N_a/∂x = J⁻ᵀ ∂N_a/∂ξ`. The internal force of a node is `−Σ_b K_ab u_b`: the force that the body exerts on it.
+//!
+//! # Notation
+//!
+//! | symbol | code | meaning | unit |
+//! |---|---|---|---|
+//! | ξ | `reference`, `xi` | reference coordinates of a cell | 1 |
+//! | N_a | `shape[a]` | shape function of local node a | 1 |
+//! | ∂N_a/∂x | `gradient[a]` | its gradient in space | 1/m |
+//! | `abs(det J) w` | `weight` | quadrature weight | m^D |
+//! | G | `gradient` | displacement gradient `G_ij = ∂u_i/∂x_j` | 1 |
+//! | C | `tangent` | stiffness tensor of the law | Pa |
+//! | b, t | | body force per volume, traction | N/m^D, Pa |
+//!
+//! # Files
+//!
+//! | file | what |
+//! |---|---|
+//! | `cell.rs` | what a cell tells of itself |
+//! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one cell each |
+//! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
+//! | `load.rs` | consistent nodal forces of tractions and body forces |
+//! | `locate.rs` | from a point in space to a cell and its shape functions |
+//! | `body.rs` | a whole body: checks, stiffness, lumped volumes and masses |
+//!
+//! A new cell is one file, one line in [`CELLS`], and its variant of [`CellShape`].
+
+mod body;
+mod cell;
+mod element;
+mod hex8;
+mod line2;
+mod load;
+mod locate;
+mod quad4;
+mod tet4;
+mod tri3;
+
+#[cfg(test)]
+mod sample;
+
+pub use body::{FemError, assemble, check, internal_force, lumped_mass, nodal_volumes};
+pub use cell::{ReferenceCell, Rule, RulePoint};
+pub use element::{
+    QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at_centre,
+    for_each_point, quadrature, quadrature_of, row, row_at, shape_values, stiffness,
+};
+pub use load::{FacetPoint, body_force_vector, facet_area, facet_points, traction_vector};
+pub use locate::{Located, Locator, reference_of};
+
+use crate::mesh::CellShape;
+
+/// Every cell that an element can live on.
+pub static CELLS: &[&ReferenceCell] = &[
+    &line2::CELL,
+    &tri3::CELL,
+    &quad4::CELL,
+    &tet4::CELL,
+    &hex8::CELL,
+];
+
+/// The cell of a shape; `None` for a shape on which no element lives (a vertex).
+pub fn reference_cell(shape: CellShape) -> Option<&'static ReferenceCell> {
+    CELLS.iter().copied().find(|cell| cell.shape == shape)
+}

@@ -1,0 +1,72 @@
+//! Small meshes for the tests of this folder, with closed-form geometry.
+
+use crate::mesh::{CellShape, Mesh};
+use crate::tensor::Vector;
+
+/// A number in [-1, 1] that depends on its arguments only.
+pub fn noise(a: usize, b: usize) -> f64 {
+    let x = ((a * 131 + b * 71 + 17) as f64 * 12.9898).sin() * 43758.5453;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+/// `n^D` cells of shape `shape` on the unit box; inner nodes are moved by up to `jitter` spacings.
+pub fn unit_box<const D: usize>(shape: CellShape, n: usize, jitter: f64) -> Mesh<D> {
+    let h = 1.0 / n as f64;
+    let mut mesh = Mesh::default();
+    let m = n + 1;
+    for number in 0..m.pow(D as u32) {
+        let index = [number % m, number / m % m, number / m / m];
+        let inner = (0..D).all(|i| index[i] > 0 && index[i] < n);
+        mesh.nodes.push(Vector::from_fn(|i, _| {
+            let shift = if inner {
+                jitter * noise(number, i)
+            } else {
+                0.0
+            };
+            (index[i] as f64 + shift) * h
+        }));
+    }
+    let at = |i: usize, j: usize, k: usize| ((k * m + j) * m + i) as u32;
+    for number in 0..n.pow(D as u32) {
+        let (i, j, k) = (number % n, number / n % n, number / n / n);
+        let hex = [
+            at(i, j, k),
+            at(i + 1, j, k),
+            at(i + 1, j + 1, k),
+            at(i, j + 1, k),
+            at(i, j, k + 1),
+            at(i + 1, j, k + 1),
+            at(i + 1, j + 1, k + 1),
+            at(i, j + 1, k + 1),
+        ];
+        let picks: &[&[usize]] = match shape {
+            CellShape::Tri3 => &[&[0, 1, 2], &[0, 2, 3]],
+            // six tetrahedra around the diagonal from node 0 to node 6
+            CellShape::Tet4 => &[
+                &[0, 1, 2, 6],
+                &[0, 2, 3, 6],
+                &[0, 3, 7, 6],
+                &[0, 7, 4, 6],
+                &[0, 4, 5, 6],
+                &[0, 5, 1, 6],
+            ],
+            CellShape::Line2 => &[&[0, 1]],
+            CellShape::Quad4 => &[&[0, 1, 2, 3]],
+            _ => &[&[0, 1, 2, 3, 4, 5, 6, 7]],
+        };
+        for pick in picks {
+            let nodes: Vec<u32> = pick.iter().map(|&p| hex[p]).collect();
+            mesh.push_cell(shape, &nodes);
+        }
+    }
+    mesh
+}
+
+/// A jittered unit box of every shape that has dimension `D`.
+pub fn boxes<const D: usize>(n: usize, jitter: f64) -> Vec<Mesh<D>> {
+    super::CELLS
+        .iter()
+        .filter(|cell| cell.shape.dimension() == D)
+        .map(|cell| unit_box(cell.shape, n, jitter))
+        .collect()
+}
