@@ -1,1 +1,126 @@
-//! observe
+//! What leaves a computation: fields for ParaView, tables, summaries, pictures and progress. The only writers.
+//!
+//! | file | what |
+//! |---|---|
+//! | `vtu.rs` | FE cells and PD points in one VTU, and a PVD over several |
+//! | `csv.rs` | values along a line or at probes, row by row |
+//! | `report.rs` | rows with a verdict, their table for people and their JSON |
+//! | `summary.rs` | what one run did: sizes, choices, timings, balance |
+//! | `progress.rs` | a bar on standard error, if that is a terminal |
+//! | `file.rs` | whole files or none: written beside, then renamed |
+
+pub mod csv;
+mod file;
+pub mod progress;
+pub mod report;
+pub mod summary;
+pub mod vtu;
+
+use std::path::PathBuf;
+
+/// Why something could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ObserveError {
+    /// The folder of an output is missing and cannot be made.
+    #[error("cannot create the folder {}: {source}; {}", path.display(), remedy(source))]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {}: {source}; {}", path.display(), remedy(source))]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The encoder refused the data.
+    #[error("cannot encode {} as VTU: {message}; please report this with the scene", path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// What the encoder said.
+        message: String,
+    },
+    /// A field has the wrong number of values.
+    #[error("the field `{field}` for {} has {found} values where {expected} are needed (entries times components); \
+             give one value per component of every point or cell", path.display())]
+    FieldLength {
+        /// The file.
+        path: PathBuf,
+        /// The field.
+        field: String,
+        /// Entries times components.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+    /// Two fields of one kind (point or cell) have the same name, so that a reader would see one only.
+    #[error("two fields for {} are called `{field}`; rename one", path.display())]
+    FieldTwice {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        field: String,
+    },
+    /// A value is NaN or infinite.
+    #[error("`{field}` for {} is {value} at entry {entry}; the solution is not usable there: \
+             look at the residual, the supports and the material parameters", path.display())]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// The field.
+        field: String,
+        /// The point, cell or row, from 0.
+        entry: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The cells do not fit the points.
+    #[error("the cells for {} do not fit its points: {message}; build them with `Snapshot::push_cell`", path.display())]
+    Cells {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// There is nothing to write.
+    #[error("nothing to write into {}: {what}; select at least one", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        what: &'static str,
+    },
+    /// A row of a table has the wrong number of entries.
+    #[error("a row of {} has {found} entries where its header has {expected}; give one per column", path.display())]
+    RowLength {
+        /// The file.
+        path: PathBuf,
+        /// Columns.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
+}
+
+/// What the user can do about an error of the operating system.
+fn remedy(error: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    match error.kind() {
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "make the folder writable or choose another output folder"
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "free some space, choose an output folder on another disk, or write fewer fields"
+        }
+        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
+            "a part of the path is a file: choose another output folder"
+        }
+        ErrorKind::IsADirectory => "the path is a folder: give the name of a file",
+        _ => "check the path or choose another output folder",
+    }
+}

@@ -1,0 +1,198 @@
+//! A progress bar with the name of the stage and the time left, on standard error if that is a terminal.
+
+use std::io::IsTerminal;
+use std::sync::{PoisonError, RwLock};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+
+use crate::progress::Progress;
+
+/// Draws each stage as one line: a bar with the time left where the number of steps is known, else a spinner.
+#[derive(Debug)]
+pub struct TerminalProgress {
+    /// The bar of the current stage; none when nobody watches.
+    bar: RwLock<Option<ProgressBar>>,
+    target: Target,
+}
+
+#[derive(Debug)]
+enum Target {
+    StandardError,
+    Nowhere,
+    #[cfg(test)]
+    Memory(tests::Screen),
+}
+
+impl TerminalProgress {
+    /// Draws on standard error if that is a terminal, else nowhere.
+    pub fn on_stderr() -> Self {
+        Self::with(if std::io::stderr().is_terminal() {
+            Target::StandardError
+        } else {
+            Target::Nowhere
+        })
+    }
+
+    fn with(target: Target) -> Self {
+        Self {
+            bar: RwLock::new(None),
+            target,
+        }
+    }
+
+    fn draw_target(&self) -> Option<ProgressDrawTarget> {
+        match &self.target {
+            Target::StandardError => Some(ProgressDrawTarget::stderr()),
+            Target::Nowhere => None,
+            #[cfg(test)]
+            Target::Memory(screen) => Some(ProgressDrawTarget::term_like(Box::new(screen.clone()))),
+        }
+    }
+
+    fn replace(&self, next: Option<ProgressBar>) {
+        // a bar that a panicking thread left behind can still be finished
+        let mut bar = self.bar.write().unwrap_or_else(PoisonError::into_inner);
+        if let Some(old) = std::mem::replace(&mut *bar, next) {
+            old.finish();
+        }
+    }
+}
+
+/// The style of a stage; the templates are fixed, so they always parse.
+fn style(total: Option<u64>) -> ProgressStyle {
+    let (template, plain) = match total {
+        Some(_) => (
+            "{prefix:<24} [{bar:30}] {percent:>3} %  {elapsed} gone, {eta} left",
+            ProgressStyle::default_bar(),
+        ),
+        None => (
+            "{prefix:<24} {spinner} {pos} steps  {elapsed} gone",
+            ProgressStyle::default_spinner(),
+        ),
+    };
+    plain
+        .clone()
+        .template(template)
+        .unwrap_or(plain)
+        .progress_chars("=> ")
+}
+
+impl Progress for TerminalProgress {
+    fn stage(&self, name: &str, total: Option<u64>) {
+        let next = self.draw_target().map(|target| {
+            let bar = ProgressBar::with_draw_target(total, target)
+                .with_style(style(total))
+                .with_prefix(name.to_owned())
+                .with_finish(ProgressFinish::AndLeave);
+            bar.tick();
+            if matches!(self.target, Target::StandardError) {
+                // a long step still shows that time passes
+                bar.enable_steady_tick(Duration::from_millis(200));
+            }
+            bar
+        });
+        self.replace(next);
+    }
+
+    fn advance(&self, by: u64) {
+        let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(bar) = &*bar {
+            bar.inc(by);
+        }
+    }
+
+    fn finish(&self) {
+        self.replace(None);
+    }
+}
+
+impl Drop for TerminalProgress {
+    fn drop(&mut self) {
+        self.replace(None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::{Arc, Mutex};
+
+    /// A terminal that keeps every line drawn on it.
+    #[derive(Clone, Debug, Default)]
+    pub(super) struct Screen(Arc<Mutex<String>>);
+
+    impl Screen {
+        fn text(&self) -> String {
+            self.0.lock().unwrap().clone()
+        }
+
+        fn put(&self, text: &str) -> std::io::Result<()> {
+            self.0.lock().unwrap().push_str(text);
+            Ok(())
+        }
+    }
+
+    impl indicatif::TermLike for Screen {
+        fn width(&self) -> u16 {
+            100
+        }
+        fn move_cursor_up(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_down(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_right(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_left(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn write_line(&self, text: &str) -> std::io::Result<()> {
+            self.put(text)?;
+            self.put("\n")
+        }
+        fn write_str(&self, text: &str) -> std::io::Result<()> {
+            self.put(text)
+        }
+        fn clear_line(&self) -> std::io::Result<()> {
+            self.put("\r")
+        }
+        fn flush(&self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn stages_are_drawn_with_their_names_and_shares() {
+        let screen = Screen::default();
+        let progress = TerminalProgress::with(Target::Memory(screen.clone()));
+        progress.stage("neighbours", Some(8));
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| progress.advance(1));
+            }
+        });
+        progress.stage("factorise", None);
+        progress.advance(3);
+        progress.finish();
+        let text = screen.text();
+        let half = text.split("factorise").next().unwrap();
+        assert!(half.contains("neighbours"), "{text}");
+        assert!(half.contains(" 50 %") || half.contains("100 %"), "{text}");
+        assert!(
+            text.contains("factorise") && text.contains("gone"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn nobody_watching_costs_no_bar() {
+        let progress = TerminalProgress::with(Target::Nowhere);
+        progress.stage("solve", Some(2));
+        progress.advance(1);
+        assert!(progress.bar.read().unwrap().is_none());
+        progress.finish();
+    }
+}

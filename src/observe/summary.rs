@@ -1,0 +1,380 @@
+//! What one run did: sizes, choices made, seconds per stage, memory, balance of forces.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::report::{aligned, number};
+
+/// Seconds of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stage {
+    /// What was done.
+    pub name: String,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// Seconds of all stages, in the order in which they first ran.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Timings {
+    /// The stages.
+    pub stages: Vec<Stage>,
+}
+
+impl Timings {
+    /// Adds seconds to a stage; a new name starts a new stage.
+    pub fn add(&mut self, name: &str, seconds: f64) {
+        match self.stages.iter_mut().find(|s| s.name == name) {
+            Some(stage) => stage.seconds += seconds,
+            None => self.stages.push(Stage {
+                name: name.to_owned(),
+                seconds,
+            }),
+        }
+    }
+
+    /// Runs `work` and adds its time to a stage.
+    pub fn measure<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        self.add(name, start.elapsed().as_secs_f64());
+        result
+    }
+
+    /// Seconds of a stage; zero if it never ran.
+    pub fn seconds(&self, name: &str) -> f64 {
+        self.stages
+            .iter()
+            .find(|s| s.name == name)
+            .map_or(0.0, |s| s.seconds)
+    }
+
+    /// Seconds of all stages together.
+    pub fn total(&self) -> f64 {
+        self.stages.iter().map(|s| s.seconds).sum()
+    }
+}
+
+/// Splits the time since its start into laps.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopwatch {
+    last: Instant,
+}
+
+impl Default for Stopwatch {
+    fn default() -> Self {
+        Self::start()
+    }
+}
+
+impl Stopwatch {
+    /// Starts now.
+    pub fn start() -> Self {
+        Self {
+            last: Instant::now(),
+        }
+    }
+
+    /// Adds the seconds since the start or the last lap to a stage.
+    pub fn lap(&mut self, timings: &mut Timings, name: &str) {
+        let now = Instant::now();
+        timings.add(name, (now - self.last).as_secs_f64());
+        self.last = now;
+    }
+}
+
+/// The most memory that this process has held so far, in bytes; `None` where the system does not tell (it does on Linux).
+///
+/// It never falls, so a figure for one of several computations in one process is only an upper bound.
+pub fn peak_memory_bytes() -> Option<u64> {
+    peak_in_status(&std::fs::read_to_string("/proc/self/status").ok()?)
+}
+
+fn peak_in_status(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes * 1024)
+}
+
+/// How large the model is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Sizes {
+    /// FE nodes of the mesh.
+    pub nodes: usize,
+    /// FE cells of the mesh.
+    pub cells: usize,
+    /// Places with unknowns: nodes and points that take part.
+    pub sites: usize,
+    /// PD points.
+    pub points: usize,
+    /// Bonds that are not cut, each direction counted.
+    pub bonds: usize,
+    /// Scalar unknowns before conditions.
+    pub dofs: usize,
+    /// Stored scalars of the tangent.
+    pub nonzeros: usize,
+}
+
+/// A decision that the scene left open.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Choice {
+    /// What was chosen.
+    pub choice: String,
+    /// For which reason.
+    pub why: String,
+}
+
+/// The force with which a condition holds the body.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reaction {
+    /// The condition, as the scene names it.
+    pub condition: String,
+    /// Force, one component per dimension. Units: N (per thickness in 2D, per section in 1D).
+    pub force: Vec<f64>,
+}
+
+/// What one run did, for `run --json` and for people.
+///
+/// Units: those of the scene; with SI units forces are in N and energies in J (per metre of thickness in 2D, per square
+/// metre of section in 1D).
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunSummary {
+    /// The scene's name or file.
+    pub scene: String,
+    /// Space dimension.
+    pub dimension: usize,
+    /// Coupling method, as the scene names it.
+    pub coupling: String,
+    /// How large the model is.
+    pub sizes: Sizes,
+    /// Decisions that the scene left open.
+    pub choices: Vec<Choice>,
+    /// Seconds per stage.
+    pub timings: Timings,
+    /// Seconds of all stages.
+    pub total_seconds: f64,
+    /// Most memory held, in bytes; `null` where the system does not tell.
+    pub peak_memory_bytes: Option<u64>,
+    /// Norm of the residual on free unknowns over that of the applied (or reaction) forces.
+    pub residual: f64,
+    /// Sum of all internal forces, one component per dimension; zero in a model without ghost forces at rest.
+    pub out_of_balance_force: Vec<f64>,
+    /// Its norm over that of the applied (or reaction) forces.
+    pub out_of_balance_relative: f64,
+    /// Forces of the displacement conditions.
+    pub reactions: Vec<Reaction>,
+    /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
+    pub energy: Option<f64>,
+    /// Files written.
+    pub files: Vec<PathBuf>,
+}
+
+impl RunSummary {
+    /// The summary as JSON; numbers that are not finite become `null`.
+    ///
+    /// # Errors
+    /// Only if a path is not Unicode.
+    pub fn json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self)
+    }
+}
+
+/// Bytes in the unit that a person would use.
+pub fn bytes_text(bytes: u64) -> String {
+    let mib = bytes as f64 / f64::from(1 << 20);
+    if mib < 1024.0 {
+        format!("{mib:.0} MiB")
+    } else {
+        format!("{:.2} GiB", mib / 1024.0)
+    }
+}
+
+/// A whole number in groups of three digits.
+pub fn grouped(value: usize) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(c);
+    }
+    text
+}
+
+impl fmt::Display for RunSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} ({}D, coupling: {})\n",
+            self.scene, self.dimension, self.coupling
+        )?;
+        let s = &self.sizes;
+        let mut grid = vec![vec!["size".to_owned(), "number".to_owned()]];
+        for (name, value) in [
+            ("FE nodes", s.nodes),
+            ("FE cells", s.cells),
+            ("PD points", s.points),
+            ("bonds", s.bonds),
+            ("sites", s.sites),
+            ("unknowns", s.dofs),
+            ("non-zeros", s.nonzeros),
+        ] {
+            grid.push(vec![name.to_owned(), grouped(value)]);
+        }
+        writeln!(f, "{}", aligned(&grid))?;
+        if !self.choices.is_empty() {
+            for c in &self.choices {
+                writeln!(f, "chosen: {} ({})", c.choice, c.why)?;
+            }
+            writeln!(f)?;
+        }
+        let mut grid = vec![vec!["stage".to_owned(), "seconds".to_owned()]];
+        for stage in &self.timings.stages {
+            grid.push(vec![stage.name.clone(), format!("{:.3}", stage.seconds)]);
+        }
+        grid.push(vec![
+            "total".to_owned(),
+            format!("{:.3}", self.total_seconds),
+        ]);
+        writeln!(f, "{}", aligned(&grid))?;
+        if let Some(bytes) = self.peak_memory_bytes {
+            writeln!(f, "peak memory            {}", bytes_text(bytes))?;
+        }
+        writeln!(f, "relative residual      {}", number(self.residual))?;
+        writeln!(
+            f,
+            "out-of-balance force   {} relative to the applied force ({})",
+            number(self.out_of_balance_relative),
+            components(&self.out_of_balance_force)
+        )?;
+        if let Some(energy) = self.energy {
+            writeln!(f, "stored energy          {}", number(energy))?;
+        }
+        for r in &self.reactions {
+            writeln!(
+                f,
+                "reaction               {}: {}",
+                r.condition,
+                components(&r.force)
+            )?;
+        }
+        for file in &self.files {
+            writeln!(f, "wrote                  {}", file.display())?;
+        }
+        Ok(())
+    }
+}
+
+fn components(force: &[f64]) -> String {
+    let words: Vec<String> = force.iter().map(|&v| number(v)).collect();
+    words.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn timings_add_up_by_name() {
+        let mut timings = Timings::default();
+        timings.add("assemble", 1.5);
+        timings.add("solve", 2.0);
+        timings.add("assemble", 0.25);
+        let names: Vec<&str> = timings.stages.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, ["assemble", "solve"]);
+        assert_eq!(timings.seconds("assemble"), 1.75);
+        assert_eq!(timings.seconds("absent"), 0.0);
+        assert_eq!(timings.total(), 3.75);
+    }
+
+    #[test]
+    fn laps_cover_the_time_that_passed() {
+        let mut timings = Timings::default();
+        let begun = Instant::now();
+        let mut watch = Stopwatch::start();
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        watch.lap(&mut timings, "first");
+        let answer = timings.measure("second", || {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+            42
+        });
+        watch.lap(&mut timings, "third");
+        let passed = begun.elapsed().as_secs_f64();
+        assert_eq!(answer, 42);
+        assert!(timings.seconds("first") >= 0.02 && timings.seconds("second") >= 0.01);
+        let laps = timings.seconds("first") + timings.seconds("third");
+        assert!(laps <= passed && laps >= 0.03);
+    }
+
+    #[test]
+    fn peak_memory_is_read_in_bytes() {
+        let status = "Name:\tx\nVmPeak:\t  999 kB\nVmHWM:\t   20480 kB\nVmRSS:\t 1 kB\n";
+        assert_eq!(peak_in_status(status), Some(20 * 1024 * 1024));
+        assert_eq!(peak_in_status("Name:\tx\n"), None);
+        assert_eq!(peak_in_status("VmHWM:\t many kB\n"), None);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn peak_memory_sees_an_allocation() {
+        let before = peak_memory_bytes().unwrap();
+        let block = vec![1u8; 64 << 20];
+        let after = peak_memory_bytes().unwrap();
+        assert_eq!(block.iter().map(|&b| u64::from(b)).sum::<u64>(), 64 << 20);
+        assert!(after >= 64 << 20 && after >= before);
+    }
+
+    #[test]
+    fn json_and_text_tell_the_same() {
+        let mut summary = RunSummary {
+            scene: "slit.toml".into(),
+            dimension: 2,
+            coupling: "splice".into(),
+            sizes: Sizes {
+                bonds: 1_234_567,
+                ..Sizes::default()
+            },
+            choices: vec![Choice {
+                choice: "LU".into(),
+                why: "the tangent is not symmetric".into(),
+            }],
+            total_seconds: 1.5,
+            peak_memory_bytes: Some(3 << 29),
+            residual: f64::NAN,
+            out_of_balance_force: vec![1e-3, -2.0],
+            out_of_balance_relative: 2.5e-6,
+            reactions: vec![Reaction {
+                condition: "left".into(),
+                force: vec![-1.0, 0.0],
+            }],
+            ..RunSummary::default()
+        };
+        summary.timings.add("assemble", 1.5);
+        let json: serde_json::Value = serde_json::from_str(&summary.json().unwrap()).unwrap();
+        assert_eq!(json["sizes"]["bonds"], 1_234_567);
+        assert_eq!(json["timings"][0]["name"], "assemble");
+        assert_eq!(json["residual"], serde_json::Value::Null);
+        assert_eq!(json["reactions"][0]["force"][0], -1.0);
+        let text = summary.to_string();
+        for part in [
+            "1 234 567",
+            "chosen: LU (the tangent is not symmetric)",
+            "1.50 GiB",
+            "2.500e-6 relative",
+            "left: -1, 0",
+        ] {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_in_groups() {
+        let texts = [0, 12, 123, 1234, 123_456, 1_234_567].map(grouped);
+        assert_eq!(texts, ["0", "12", "123", "1 234", "123 456", "1 234 567"]);
+    }
+}
