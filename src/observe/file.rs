@@ -60,6 +60,55 @@ pub(super) fn write_whole(
     })
 }
 
+/// Passes bytes on and puts `insert` behind the first `after`: vtkio writes no field data, where VTK looks for the time.
+pub(super) struct Inserting<'a, W> {
+    inner: W,
+    head: Vec<u8>,
+    after: &'static [u8],
+    insert: &'a [u8],
+    done: bool,
+}
+
+impl<'a, W> Inserting<'a, W> {
+    /// Wraps a writer; with an empty `insert` bytes pass unchanged.
+    pub(super) fn new(inner: W, after: &'static [u8], insert: &'a [u8]) -> Self {
+        Self {
+            inner,
+            head: Vec::new(),
+            after,
+            insert,
+            done: insert.is_empty(),
+        }
+    }
+}
+
+impl<W: Write> Write for Inserting<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        if self.done {
+            return self.inner.write(bytes);
+        }
+        self.head.extend_from_slice(bytes);
+        let found = self
+            .head
+            .windows(self.after.len())
+            .position(|w| w == self.after);
+        if let Some(at) = found {
+            let cut = at + self.after.len();
+            self.inner.write_all(&self.head[..cut])?;
+            self.inner.write_all(self.insert)?;
+            self.inner.write_all(&self.head[cut..])?;
+            self.head = Vec::new();
+            self.done = true;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.inner.write_all(&std::mem::take(&mut self.head))?;
+        self.inner.flush()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,5 +148,18 @@ mod tests {
         );
         let error = write_whole(folder.path(), |_| Ok(())).unwrap_err();
         assert!(matches!(error, ObserveError::Write { .. }), "{error:?}");
+    }
+
+    #[test]
+    fn an_insert_finds_its_place_across_pieces() {
+        for pieces in [&["<a><b>x"][..], &["<a", "><", "b>", "x"], &["<a><b>", "x"]] {
+            let mut out = Vec::new();
+            let mut writer = Inserting::new(&mut out, b"<b>", b"NEW");
+            for piece in pieces {
+                writer.write_all(piece.as_bytes()).unwrap();
+            }
+            writer.flush().unwrap();
+            assert_eq!(out, b"<a><b>NEWx");
+        }
     }
 }

@@ -7,10 +7,13 @@
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs` | what one run did: sizes, choices, timings, balance |
 //! | `progress.rs` | a bar on standard error, if that is a terminal |
+//! | `figure.rs`, `map.rs` | line plots and coloured fields as SVG |
 //! | `file.rs` | whole files or none: written beside, then renamed |
 
 pub mod csv;
+pub mod figure;
 mod file;
+pub mod map;
 pub mod progress;
 pub mod report;
 pub mod summary;

@@ -11,14 +11,14 @@ use vtkio::model;
 use vtkio::xml::Compressor;
 
 use super::ObserveError;
-use super::file::write_whole;
+use super::file::{Inserting, write_whole};
 use crate::mesh::{CellShape, Mesh};
 use crate::tensor::{Tensor, Vector, padded};
 
 /// How arrays are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
-    /// As they are: about three times larger, about twice as fast to write.
+    /// As they are: about four times larger, about five times as fast to write.
     Plain,
     /// zlib at a low level; higher levels cost several times the time for a few per cent.
     #[default]
@@ -254,42 +254,6 @@ fn attribute(field: &Field) -> model::Attribute {
     }
 }
 
-/// Passes bytes on and puts `insert` behind the first `after`; vtkio writes no field data, where VTK looks for the time.
-struct Inserting<'a, W> {
-    inner: W,
-    head: Vec<u8>,
-    after: &'static [u8],
-    insert: &'a [u8],
-    done: bool,
-}
-
-impl<W: Write> Write for Inserting<'_, W> {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        if self.done {
-            return self.inner.write(bytes);
-        }
-        self.head.extend_from_slice(bytes);
-        let found = self
-            .head
-            .windows(self.after.len())
-            .position(|w| w == self.after);
-        if let Some(at) = found {
-            let cut = at + self.after.len();
-            self.inner.write_all(&self.head[..cut])?;
-            self.inner.write_all(self.insert)?;
-            self.inner.write_all(&self.head[cut..])?;
-            self.head = Vec::new();
-            self.done = true;
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.inner.write_all(&std::mem::take(&mut self.head))?;
-        self.inner.flush()
-    }
-}
-
 /// Writes a snapshot; makes the folder if it is missing.
 ///
 /// Shapes: as [`Snapshot`] says. Units: those of the scene; VTU knows none.
@@ -353,13 +317,8 @@ pub fn write_vtu(
         )
     });
     write_whole(path, |out| {
-        let mut writer = Inserting {
-            inner: out,
-            head: Vec::new(),
-            after: b"<UnstructuredGrid>",
-            insert: time.as_deref().unwrap_or("").as_bytes(),
-            done: time.is_none(),
-        };
+        let insert = time.as_deref().unwrap_or("");
+        let mut writer = Inserting::new(out, b"<UnstructuredGrid>", insert.as_bytes());
         file.write(&mut writer).map_err(|e| match e {
             vtkio::xml::Error::IO(e) => e,
             other => std::io::Error::other(other.to_string()),
@@ -368,7 +327,8 @@ pub fn write_vtu(
     })
 }
 
-/// Level of zlib: low levels are several times faster than high ones and hardly larger on reals.
+/// Level of zlib. 512 000 points with as many hexahedra, 13 reals per point, 132 MB plain in 1.3 s: level 1 gives 36 MB in
+/// 6.9 s, 3 gives 34 MB in 7.2 s, 6 gives 34 MB in 8.9 s.
 const ZLIB_LEVEL: u32 = 3;
 
 /// Writes a collection of VTU files, which ParaView opens as one; the files are named relative to the collection.

@@ -1,0 +1,387 @@
+//! Line plots as SVG.
+//!
+//! SVG only: text in a bitmap needs a font of the system, and a program that fails for want of a font is no use.
+
+use std::path::Path;
+
+use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
+use plotters::prelude::{
+    ChartBuilder, Circle, DashedLineSeries, EmptyElement, IntoDrawingArea, IntoLogRange,
+    LineSeries, PathElement, RGBColor, SVGBackend, SeriesLabelPosition, WHITE,
+};
+use plotters::style::{Color, ShapeStyle};
+
+use super::ObserveError;
+use super::file::write_whole;
+
+/// How an axis is divided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scale {
+    /// In equal steps.
+    #[default]
+    Linear,
+    /// In equal factors; values that are not positive are left out.
+    Log,
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stroke {
+    /// A line.
+    #[default]
+    Line,
+    /// A dashed line, for a reference.
+    Dashed,
+    /// A dot per point.
+    Dots,
+    /// A line with a dot per point, for measured figures.
+    LineAndDots,
+}
+
+/// A named series of points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// What the legend says.
+    pub name: String,
+    /// Points in the order in which a line joins them.
+    pub points: Vec<(f64, f64)>,
+    /// How it is drawn.
+    pub stroke: Stroke,
+}
+
+impl Series {
+    /// A series of points.
+    pub fn new(name: impl Into<String>, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
+        Self {
+            name: name.into(),
+            points,
+            stroke,
+        }
+    }
+}
+
+/// A plot of several series over one pair of axes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LinePlot {
+    /// Above the plot.
+    pub title: String,
+    /// Below the horizontal axis, with its unit.
+    pub x_label: String,
+    /// Beside the vertical axis, with its unit.
+    pub y_label: String,
+    /// Division of the horizontal axis.
+    pub x_scale: Scale,
+    /// Division of the vertical axis.
+    pub y_scale: Scale,
+    /// What is drawn, later ones on top.
+    pub series: Vec<Series>,
+}
+
+/// Colours that stay apart for colour-blind readers (Okabe and Ito).
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(60, 60, 60),
+];
+
+/// Width and height in pixels.
+const SIZE: (u32, u32) = (800, 500);
+
+impl LinePlot {
+    /// Writes the plot; makes the folder if it is missing.
+    ///
+    /// Points that are not finite, or not positive on a logarithmic axis, are left out and break their line.
+    ///
+    /// # Errors
+    /// [`ObserveError::Empty`] if no point is left, [`ObserveError::Folder`], [`ObserveError::Write`].
+    pub fn write(&self, path: &Path) -> Result<(), ObserveError> {
+        let svg = self.svg(path)?;
+        write_whole(path, |out| std::io::Write::write_all(out, svg.as_bytes()))
+    }
+
+    fn drawable(&self, (x, y): (f64, f64)) -> bool {
+        let fits = |v: f64, scale| v.is_finite() && (scale == Scale::Linear || v > 0.0);
+        fits(x, self.x_scale) && fits(y, self.y_scale)
+    }
+
+    fn svg(&self, path: &Path) -> Result<String, ObserveError> {
+        let points = || {
+            self.series
+                .iter()
+                .flat_map(|s| &s.points)
+                .copied()
+                .filter(|&p| self.drawable(p))
+        };
+        let (Some(x), Some(y)) = (
+            range(points().map(|p| p.0), self.x_scale),
+            range(points().map(|p| p.1), self.y_scale),
+        ) else {
+            return Err(ObserveError::Empty {
+                path: path.to_path_buf(),
+                what: "no point of the plot can be drawn (finite, and positive on a logarithmic axis)",
+            });
+        };
+        let (lx, ly) = (x.start..x.end, y.start..y.end);
+        match (self.x_scale, self.y_scale) {
+            (Scale::Linear, Scale::Linear) => self.draw(x, y),
+            (Scale::Log, Scale::Linear) => self.draw(lx.log_scale(), y),
+            (Scale::Linear, Scale::Log) => self.draw(x, ly.log_scale()),
+            (Scale::Log, Scale::Log) => self.draw(lx.log_scale(), ly.log_scale()),
+        }
+        .map_err(|message| ObserveError::Encode {
+            path: path.to_path_buf(),
+            message,
+        })
+    }
+
+    fn draw<X, Y>(&self, x: X, y: Y) -> Result<String, String>
+    where
+        X: AsRangedCoord<Value = f64>,
+        Y: AsRangedCoord<Value = f64>,
+        X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+        Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    {
+        let mut svg = String::new();
+        {
+            let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+            root.fill(&WHITE).map_err(|e| e.to_string())?;
+            let mut chart = ChartBuilder::on(&root)
+                .margin(14)
+                .caption(&self.title, ("sans-serif", 20))
+                .x_label_area_size(46)
+                .y_label_area_size(74)
+                .build_cartesian_2d(x, y)
+                .map_err(|e| e.to_string())?;
+            chart
+                .configure_mesh()
+                .x_desc(&self.x_label)
+                .y_desc(&self.y_label)
+                .axis_desc_style(("sans-serif", 15))
+                .label_style(("sans-serif", 13))
+                .light_line_style(RGBColor(244, 244, 244))
+                .bold_line_style(RGBColor(225, 225, 225))
+                .x_label_formatter(&|v| tick(*v))
+                .y_label_formatter(&|v| tick(*v))
+                .draw()
+                .map_err(|e| e.to_string())?;
+            for (i, series) in self.series.iter().enumerate() {
+                let colour = COLOURS[i % COLOURS.len()];
+                let line = colour.stroke_width(2);
+                let mut named = false;
+                let runs = series.points.split(|&p: &(f64, f64)| !self.drawable(p));
+                for run in runs.filter(|run| !run.is_empty()) {
+                    let run = run.to_vec();
+                    let entry = match series.stroke {
+                        Stroke::Line => chart.draw_series(LineSeries::new(run, line)),
+                        Stroke::Dashed => chart.draw_series(DashedLineSeries::new(run, 7, 5, line)),
+                        Stroke::Dots | Stroke::LineAndDots => {
+                            let dots: Vec<_> = run
+                                .iter()
+                                .map(|&p| Circle::new(p, 3, colour.filled()))
+                                .collect();
+                            if series.stroke == Stroke::LineAndDots {
+                                chart
+                                    .draw_series(LineSeries::new(run, line))
+                                    .map_err(|e| e.to_string())?;
+                            }
+                            chart.draw_series(dots)
+                        }
+                    }
+                    .map_err(|e| e.to_string())?;
+                    if !named {
+                        named = true;
+                        let stroke = series.stroke;
+                        entry
+                            .label(&series.name)
+                            .legend(move |at| legend(at, stroke, line));
+                    }
+                }
+            }
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .background_style(WHITE.mix(0.85))
+                .border_style(RGBColor(200, 200, 200))
+                .label_font(("sans-serif", 14))
+                .draw()
+                .map_err(|e| e.to_string())?;
+            root.present().map_err(|e| e.to_string())?;
+        }
+        Ok(svg)
+    }
+}
+
+/// The sample of a stroke in the legend: two dashes and a dot, of which a stroke shows what it has.
+fn legend<'e, 'b: 'e>(
+    at: (i32, i32),
+    stroke: Stroke,
+    line: ShapeStyle,
+) -> impl plotters::element::IntoDynElement<'e, SVGBackend<'b>, (i32, i32)> {
+    let (first, second) = match stroke {
+        Stroke::Line | Stroke::LineAndDots => (0..10, 10..20),
+        Stroke::Dashed => (0..8, 12..20),
+        Stroke::Dots => (10..10, 10..10),
+    };
+    let radius = match stroke {
+        Stroke::Line | Stroke::Dashed => 0,
+        Stroke::Dots | Stroke::LineAndDots => 3,
+    };
+    let dash = |r: std::ops::Range<i32>| PathElement::new(vec![(r.start, 0), (r.end, 0)], line);
+    EmptyElement::at(at)
+        + dash(first)
+        + dash(second)
+        + Circle::new((10, 0), radius, line.color.filled())
+}
+
+/// The range of an axis with a margin; none without values.
+pub(super) fn range(
+    values: impl Iterator<Item = f64>,
+    scale: Scale,
+) -> Option<std::ops::Range<f64>> {
+    let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
+        (lo.min(v), hi.max(v))
+    });
+    if lo > hi {
+        return None;
+    }
+    match scale {
+        Scale::Linear => {
+            // a constant needs room too, more than its own rounding
+            let margin = (0.04 * (hi - lo)).max(1e-9 * lo.abs().max(hi.abs()));
+            let margin = if margin > 0.0 { margin } else { 1.0 };
+            Some(lo - margin..hi + margin)
+        }
+        Scale::Log => {
+            let factor = (hi / lo).powf(0.04).max(1.2);
+            Some(lo / factor..hi * factor)
+        }
+    }
+}
+
+/// A number beside a tick: no more digits than it has.
+pub(super) fn tick(value: f64) -> String {
+    let size = value.abs();
+    if size < 1e-300 {
+        return "0".to_owned();
+    }
+    let trimmed = |text: &str| text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    if (1e-3..1e5).contains(&size) {
+        return trimmed(&format!("{value:.6}"));
+    }
+    let text = format!("{value:.4e}");
+    match text.split_once('e') {
+        Some((digits, power)) => format!("{}e{power}", trimmed(digits)),
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plot(x_scale: Scale, y_scale: Scale) -> LinePlot {
+        LinePlot {
+            title: "Error < 1 & falling".into(),
+            x_label: "h [m]".into(),
+            y_label: "error".into(),
+            x_scale,
+            y_scale,
+            series: [
+                Stroke::Line,
+                Stroke::Dashed,
+                Stroke::Dots,
+                Stroke::LineAndDots,
+            ]
+            .iter()
+            .enumerate()
+            .map(|(i, &stroke)| {
+                let points = (0..5).map(|k| (0.1 * (k as f64), 10f64.powi(-k) * (i + 1) as f64));
+                Series::new(format!("series {i}"), stroke, points.collect())
+            })
+            .collect(),
+        }
+    }
+
+    #[test]
+    fn every_scale_draws_every_series_and_label() {
+        let folder = tempfile::tempdir().unwrap();
+        for x in [Scale::Linear, Scale::Log] {
+            for y in [Scale::Linear, Scale::Log] {
+                let path = folder.path().join(format!("new/{x:?}{y:?}.svg"));
+                plot(x, y).write(&path).unwrap();
+                let svg = std::fs::read_to_string(&path).unwrap();
+                assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
+                for part in [
+                    "h [m]",
+                    "error",
+                    "series 0",
+                    "series 3",
+                    "&lt; 1 &amp; falling",
+                ] {
+                    assert!(svg.contains(part), "{part} is missing for {x:?} {y:?}");
+                }
+                // x = 0 has no logarithm: one dot fewer in each of the two series with dots (legend: four circles)
+                let dots = svg.matches("<circle").count() - 4;
+                assert_eq!(dots, if x == Scale::Log { 8 } else { 10 });
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_error() {
+        let path = Path::new("never.svg");
+        let mut empty = plot(Scale::Linear, Scale::Log);
+        for series in &mut empty.series {
+            series.points = vec![(1.0, -1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)];
+        }
+        assert!(matches!(empty.write(path), Err(ObserveError::Empty { .. })));
+        empty.series.clear();
+        assert!(matches!(empty.write(path), Err(ObserveError::Empty { .. })));
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_gap_and_a_constant_are_drawn() {
+        let mut p = plot(Scale::Linear, Scale::Linear);
+        p.series.truncate(1);
+        p.series[0].points = vec![
+            (0.0, 3e7),
+            (1.0, 3e7),
+            (2.0, f64::NAN),
+            (3.0, 3e7),
+            (4.0, 3e7),
+        ];
+        let gap = p.svg(Path::new("")).unwrap();
+        p.series[0].points.remove(2);
+        let whole = p.svg(Path::new("")).unwrap();
+        assert_eq!(
+            gap.matches("<polyline").count(),
+            whole.matches("<polyline").count() + 1
+        );
+        p.series[0].points = vec![(0.0, 0.0)];
+        assert!(p.svg(Path::new("")).is_ok());
+    }
+
+    #[test]
+    fn ticks_have_no_idle_digits() {
+        let texts = [
+            0.0,
+            0.30000000000000004,
+            -2.0,
+            1e-5,
+            2.5e-7,
+            1e6,
+            1500.0,
+            0.001,
+        ]
+        .map(tick);
+        assert_eq!(
+            texts,
+            ["0", "0.3", "-2", "1e-5", "2.5e-7", "1e6", "1500", "0.001"]
+        );
+    }
+}
