@@ -3,12 +3,26 @@
 //! | file | what |
 //! |---|---|
 //! | `generate.rs` | line, rectangle and box with cut-outs and grading |
+//! | `read.rs` | one entry for all files, and what all readers share |
 //! | `gmsh.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
 //! | `vtk.rs` | VTK and VTU as meshio writes them |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
-//! | `boundary.rs` | boundary facets, and which bonds they cut |
+//! | `boundary.rs` | boundary and interface facets, distances to them |
+//! | `cutter.rs` | which bonds leave the mesh |
+//! | `error.rs` | what can be wrong |
 
 use std::collections::BTreeMap;
+
+pub mod boundary;
+pub mod cutter;
+mod error;
+pub mod generate;
+pub mod gmsh;
+pub mod quality;
+pub mod read;
+pub mod vtk;
+
+pub use error::{MeshError, Place};
 
 use crate::tensor::Vector;
 
@@ -186,6 +200,41 @@ impl<const D: usize> Mesh<D> {
         nodes.sort_unstable();
         nodes.dedup();
         Some(nodes)
+    }
+
+    /// Removes nodes that no cell uses (and what node and facet sets say of them); the others keep their order.
+    pub fn drop_unused_nodes(&mut self) {
+        const UNUSED: u32 = u32::MAX;
+        let mut new_number = vec![UNUSED; self.nodes.len()];
+        for &n in &self.connectivity {
+            new_number[n as usize] = 0;
+        }
+        let mut kept = Vec::with_capacity(self.nodes.len());
+        for (number, x) in new_number.iter_mut().zip(&self.nodes) {
+            if *number != UNUSED {
+                *number = kept.len() as u32;
+                kept.push(*x);
+            }
+        }
+        self.nodes = kept;
+        for n in &mut self.connectivity {
+            *n = new_number[*n as usize];
+        }
+        for facet in self.facet_sets.values_mut().flatten() {
+            for n in facet {
+                *n = new_number[*n as usize];
+            }
+        }
+        for set in self.facet_sets.values_mut() {
+            set.retain(|facet| !facet.contains(&UNUSED));
+        }
+        for set in self.node_sets.values_mut() {
+            *set = set
+                .iter()
+                .map(|&n| new_number[n as usize])
+                .filter(|&n| n != UNUSED)
+                .collect();
+        }
     }
 
     /// The names of all sets, for messages.

@@ -1,0 +1,374 @@
+//! Facets at the boundary of a set of cells or between two sets, their normals, and distances to them.
+
+use std::collections::HashMap;
+
+use super::{Facet, Mesh, MeshError};
+use crate::tensor::Vector;
+
+/// A facet seen from one of its cells.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BoundaryFacet {
+    /// Its nodes, ordered so that its normal points out of `cell` (in 1D a single node).
+    pub nodes: Facet,
+    /// The cell that it belongs to.
+    pub cell: u32,
+    /// Its number in [`CellShape::facets`](super::CellShape::facets) of that cell.
+    pub local: u8,
+}
+
+/// A facet between cells of two classes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InterfaceFacet {
+    /// Seen from the cell of the first class: the normal points to the second.
+    pub first: BoundaryFacet,
+    /// Seen from the cell of the second class.
+    pub second: BoundaryFacet,
+}
+
+/// Sorted node numbers of a facet, padded: the same for all cells that share it.
+fn key(nodes: &[u32]) -> [u32; 4] {
+    let mut k = [u32::MAX; 4];
+    for (k, &n) in k.iter_mut().zip(nodes) {
+        *k = n;
+    }
+    k.sort_unstable();
+    k
+}
+
+impl<const D: usize> Mesh<D> {
+    /// The facets of cell `c`, normals outwards.
+    pub fn facets_of_cell(&self, c: usize) -> impl Iterator<Item = BoundaryFacet> + '_ {
+        let nodes = self.cell(c);
+        self.shapes[c]
+            .facets()
+            .iter()
+            .enumerate()
+            .map(move |(local, places)| BoundaryFacet {
+                nodes: places.iter().map(|&i| nodes[i]).collect(),
+                cell: c as u32,
+                local: local as u8,
+            })
+    }
+
+    /// The facets that belong to exactly one of `cells`, in the order of the cells, normals outwards.
+    pub fn boundary_facets(&self, cells: impl IntoIterator<Item = u32>) -> Vec<BoundaryFacet> {
+        let mut found: Vec<Option<BoundaryFacet>> = Vec::new();
+        let mut open: HashMap<[u32; 4], usize> = HashMap::new();
+        for c in cells {
+            for facet in self.facets_of_cell(c as usize) {
+                match open.remove(&key(&facet.nodes)) {
+                    Some(other) => found[other] = None,
+                    None => {
+                        open.insert(key(&facet.nodes), found.len());
+                        found.push(Some(facet));
+                    }
+                }
+            }
+        }
+        found.into_iter().flatten().collect()
+    }
+
+    /// The facets that belong to exactly one cell of the whole mesh.
+    pub fn outer_facets(&self) -> Vec<BoundaryFacet> {
+        self.boundary_facets(0..self.cell_count() as u32)
+    }
+
+    /// The facets between a cell of class `first` and one of class `second`; `class` gives each cell's class.
+    ///
+    /// Shapes: `class` has one entry per cell.
+    pub fn interface_facets<C: PartialEq>(
+        &self,
+        class: &[C],
+        first: &C,
+        second: &C,
+    ) -> Vec<InterfaceFacet> {
+        let mut waiting: HashMap<[u32; 4], BoundaryFacet> = HashMap::new();
+        let mut found = Vec::new();
+        for c in 0..self.cell_count() {
+            if class[c] != *first && class[c] != *second {
+                continue;
+            }
+            for facet in self.facets_of_cell(c) {
+                let key = key(&facet.nodes);
+                let Some(other) = waiting.remove(&key) else {
+                    waiting.insert(key, facet);
+                    continue;
+                };
+                if class[other.cell as usize] == class[c] {
+                    continue;
+                }
+                found.push(if class[c] == *first {
+                    InterfaceFacet {
+                        first: facet,
+                        second: other,
+                    }
+                } else {
+                    InterfaceFacet {
+                        first: other,
+                        second: facet,
+                    }
+                });
+            }
+        }
+        found
+    }
+
+    /// The cell of each facet of a set, with the facet turned so that its normal points out of that cell.
+    ///
+    /// A facet between two cells is seen from the one with the lower number.
+    ///
+    /// # Errors
+    /// [`MeshError::LooseFacet`] for a facet that belongs to no cell.
+    pub fn locate_facets(&self, facets: &[Facet]) -> Result<Vec<BoundaryFacet>, MeshError> {
+        let mut wanted: HashMap<[u32; 4], Option<BoundaryFacet>> =
+            facets.iter().map(|f| (key(f), None)).collect();
+        for c in 0..self.cell_count() {
+            for facet in self.facets_of_cell(c) {
+                if let Some(slot @ None) = wanted.get_mut(&key(&facet.nodes)) {
+                    *slot = Some(facet);
+                }
+            }
+        }
+        facets
+            .iter()
+            .map(|f| {
+                wanted[&key(f)]
+                    .clone()
+                    .ok_or_else(|| MeshError::LooseFacet { nodes: f.clone() })
+            })
+            .collect()
+    }
+
+    /// Outward normal of a facet times its area [length^(D−1)]; `±1` in 1D.
+    ///
+    /// For a warped quadrilateral the integral of the normal, `½ (x₂ − x₀) × (x₃ − x₁)`, which is exact.
+    pub fn facet_normal_area(&self, facet: &BoundaryFacet) -> Vector<D> {
+        let x = |i: usize| self.nodes[facet.nodes[i] as usize];
+        if facet.nodes.len() == 1 {
+            let out = x(0) - self.centroid(facet.cell as usize);
+            return out / out.norm();
+        }
+        normal_area(
+            &facet
+                .nodes
+                .iter()
+                .map(|&n| self.nodes[n as usize])
+                .collect::<Vec<_>>(),
+        )
+    }
+
+    /// Area of a facet of a set (length in 2D, 1 in 1D), by two triangles for a quadrilateral.
+    pub fn facet_area(&self, nodes: &[u32]) -> f64 {
+        let x: Vec<Vector<D>> = nodes.iter().map(|&n| self.nodes[n as usize]).collect();
+        match x.as_slice() {
+            [_] => 1.0,
+            [_, _] | [_, _, _] => normal_area(&x).norm(),
+            [a, b, c, d] => normal_area(&[*a, *b, *c]).norm() + normal_area(&[*a, *c, *d]).norm(),
+            _ => 0.0,
+        }
+    }
+
+    /// Distance from `x` to a facet: a point, an edge, a triangle, or a quadrilateral as two triangles.
+    pub fn distance_to_facet(&self, x: &Vector<D>, nodes: &[u32]) -> f64 {
+        let p = |i: usize| self.nodes[nodes[i] as usize];
+        let to = |corners: &[Vector<D>]| (x - closest_point(x, corners).0).norm();
+        match nodes.len() {
+            4 => to(&[p(0), p(1), p(2)]).min(to(&[p(0), p(2), p(3)])),
+            n => to(&(0..n).map(p).collect::<Vec<_>>()),
+        }
+    }
+}
+
+/// Normal times area of an edge (2D), triangle or quadrilateral (3D); zero where there is none.
+pub(super) fn normal_area<const D: usize>(x: &[Vector<D>]) -> Vector<D> {
+    let mut n = Vector::zeros();
+    match (D, x) {
+        (2, [a, b]) => {
+            n[0] = b[1] - a[1];
+            n[1] = a[0] - b[0];
+        }
+        (3, [a, b, c, rest @ ..]) => {
+            let (p, q) = match rest {
+                [] => (b - a, c - a),
+                [d, ..] => (c - a, d - b),
+            };
+            for k in 0..3 {
+                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+                n[k] = 0.5 * (p[i] * q[j] - p[j] * q[i]);
+            }
+        }
+        _ => {}
+    }
+    n
+}
+
+/// The corners of a simplex that span the feature (corner, edge or face) on which a closest point lies.
+pub(super) type Feature = &'static [usize];
+
+/// The point of a corner, segment or triangle closest to `x`, and the feature that it lies on.
+///
+/// Source: the regions of Voronoi cells of a triangle (Ericson, Real-Time Collision Detection, section 5.1.5).
+pub(super) fn closest_point<const D: usize>(
+    x: &Vector<D>,
+    corners: &[Vector<D>],
+) -> (Vector<D>, Feature) {
+    match corners {
+        [a] => (*a, &[0]),
+        [a, b] => {
+            let e = b - a;
+            let t = (x - a).dot(&e) / e.norm_squared();
+            if t <= 0.0 {
+                (*a, &[0])
+            } else if t >= 1.0 {
+                (*b, &[1])
+            } else {
+                (a + e * t, &[0, 1])
+            }
+        }
+        [a, b, c, ..] => {
+            let (ab, ac) = (b - a, c - a);
+            let (ax, bx, cx) = (x - a, x - b, x - c);
+            let (d1, d2) = (ab.dot(&ax), ac.dot(&ax));
+            if d1 <= 0.0 && d2 <= 0.0 {
+                return (*a, &[0]);
+            }
+            let (d3, d4) = (ab.dot(&bx), ac.dot(&bx));
+            if d3 >= 0.0 && d4 <= d3 {
+                return (*b, &[1]);
+            }
+            let (d5, d6) = (ab.dot(&cx), ac.dot(&cx));
+            if d6 >= 0.0 && d5 <= d6 {
+                return (*c, &[2]);
+            }
+            let vc = d1 * d4 - d3 * d2;
+            if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+                return (a + ab * (d1 / (d1 - d3)), &[0, 1]);
+            }
+            let vb = d5 * d2 - d1 * d6;
+            if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+                return (a + ac * (d2 / (d2 - d6)), &[0, 2]);
+            }
+            let va = d3 * d6 - d5 * d4;
+            if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+                let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+                return (b + (c - b) * w, &[1, 2]);
+            }
+            let sum = va + vb + vc;
+            (a + ab * (vb / sum) + ac * (vc / sum), &[0, 1, 2])
+        }
+        [] => (*x, &[]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::generate::{Axis, Grid};
+    use super::*;
+
+    fn uniform(cells: usize) -> Axis {
+        Axis::Uniform {
+            min: 0.0,
+            max: 1.0,
+            cells,
+        }
+    }
+
+    #[test]
+    fn closed_surface_has_no_net_normal_and_the_right_area() {
+        let mut grid = Grid::new([uniform(3), uniform(4), uniform(5)]);
+        grid.jitter(0.2, 3);
+        for mesh in [grid.clone().mesh(), grid.simplices().mesh()] {
+            let mesh = mesh.unwrap();
+            let facets = mesh.outer_facets();
+            let normals: Vec<Vector<3>> =
+                facets.iter().map(|f| mesh.facet_normal_area(f)).collect();
+            assert!(normals.iter().sum::<Vector<3>>().norm() < 1e-14);
+            assert!((normals.iter().map(|n| n.norm()).sum::<f64>() - 6.0).abs() < 1e-13);
+            for (f, n) in facets.iter().zip(&normals) {
+                let out = mesh.nodes[f.nodes[0] as usize] - Vector::repeat(0.5);
+                assert!(out.dot(n) > 0.0, "outwards");
+                assert!((mesh.facet_area(&f.nodes) - n.norm()).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn interface_of_two_halves() {
+        let mesh = Grid::new([uniform(4), uniform(3)]).mesh().unwrap();
+        let right: Vec<bool> = (0..mesh.cell_count())
+            .map(|c| mesh.centroid(c).x > 0.5)
+            .collect();
+        let interface = mesh.interface_facets(&right, &false, &true);
+        assert_eq!(interface.len(), 3);
+        for facet in &interface {
+            let normal = mesh.facet_normal_area(&facet.first);
+            assert!((normal - Vector::from([1.0 / 3.0, 0.0])).norm() < 1e-15);
+            assert!((mesh.facet_normal_area(&facet.second) + normal).norm() < 1e-15);
+        }
+        let left: Vec<u32> = (0..12u32).filter(|&c| !right[c as usize]).collect();
+        assert_eq!(mesh.boundary_facets(left).len(), 2 * 3 + 2 * 2);
+        assert_eq!(mesh.outer_facets().len(), 14);
+    }
+
+    #[test]
+    fn facets_are_located_and_loose_ones_named() {
+        let mesh = Grid::new([uniform(2), uniform(2)]).mesh().unwrap();
+        let found = mesh.locate_facets(&[vec![1, 0], vec![4, 1]]).unwrap();
+        assert_eq!((found[0].nodes.as_slice(), found[0].cell), (&[0, 1][..], 0));
+        assert_eq!(found[1].cell, 0);
+        assert!((mesh.facet_normal_area(&found[1]) - Vector::from([0.5, 0.0])).norm() < 1e-15);
+        let message = mesh.locate_facets(&[vec![0, 8]]).unwrap_err().to_string();
+        assert!(
+            message.contains("nodes [0, 8] is no facet of any cell"),
+            "{message}"
+        );
+        let line = Grid::new([uniform(3)]).mesh().unwrap();
+        let ends = line.outer_facets();
+        assert_eq!(ends.len(), 2);
+        assert_eq!(line.facet_normal_area(&ends[0])[0], -1.0);
+        assert_eq!(line.facet_normal_area(&ends[1])[0], 1.0);
+    }
+
+    /// Distances by hand, in every Voronoi region of a triangle, and for a quadrilateral.
+    #[test]
+    fn distances_to_facets() {
+        let mut mesh = Mesh::<3> {
+            nodes: [
+                [0.0, 0.0, 0.0],
+                [4.0, 0.0, 0.0],
+                [4.0, 4.0, 0.0],
+                [0.0, 4.0, 0.0],
+            ]
+            .map(Vector::from)
+            .to_vec(),
+            ..Mesh::default()
+        };
+        let x = |a: f64, b: f64, c: f64| Vector::<3>::from([a, b, c]);
+        for (p, d) in [
+            (x(3.0, 1.0, 2.0), 2.0),
+            (x(-3.0, -4.0, 0.0), 5.0),
+            (x(2.0, -3.0, 4.0), 5.0),
+            (x(7.0, -4.0, 0.0), 5.0),
+            (x(7.0, 2.0, 4.0), 5.0),
+            (x(4.0, 8.0, 3.0), 5.0),
+            (x(1.0, 3.0, 0.0), 2.0f64.sqrt()),
+        ] {
+            assert!(
+                (mesh.distance_to_facet(&p, &[0, 1, 2]) - d).abs() < 1e-14,
+                "{p}"
+            );
+            assert!(
+                (mesh.distance_to_facet(&p, &[2, 0, 1]) - d).abs() < 1e-14,
+                "{p}"
+            );
+        }
+        assert_eq!(
+            mesh.distance_to_facet(&x(1.0, 3.0, -1.0), &[0, 1, 2, 3]),
+            1.0
+        );
+        assert_eq!(mesh.distance_to_facet(&x(1.0, 3.0, 0.0), &[0, 1]), 3.0);
+        assert_eq!(mesh.distance_to_facet(&x(3.0, 4.0, 0.0), &[0]), 5.0);
+        mesh.nodes[2] = x(4.0, 4.0, 3.0);
+        assert!((mesh.facet_area(&[0, 1, 2]) - 10.0).abs() < 1e-14);
+    }
+}

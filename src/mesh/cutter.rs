@@ -1,0 +1,1 @@
+//! Which bonds leave the mesh.

@@ -1,0 +1,322 @@
+//! What can be wrong with a mesh or its file.
+
+use std::path::PathBuf;
+
+use super::CellShape;
+
+/// Where in a file something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Line of a text file, counted from 1.
+    Line(usize),
+    /// Byte of a binary file, counted from 0.
+    Byte(usize),
+    /// Nowhere in particular.
+    File,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Line(n) => write!(f, "line {n}"),
+            Self::Byte(n) => write!(f, "byte {n}"),
+            Self::File => write!(f, "whole file"),
+        }
+    }
+}
+
+/// Why a mesh cannot be read, made or used. Every message names place, value and remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshError {
+    /// The file cannot be opened or read.
+    #[error("{}: {source}; check that the file exists and may be read", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file name ends in nothing that a reader knows.
+    #[error("{}: no reader for this file extension; use .msh (Gmsh 4.1 or 2.2), .vtk or .vtu", path.display())]
+    UnknownExtension {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file ends too early.
+    #[error("{}: {place}: the file ends within {section}: {wanted} expected; it is truncated, write it again", path.display())]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Where it ends.
+        place: Place,
+        /// The section that is not complete.
+        section: String,
+        /// What should have followed.
+        wanted: String,
+    },
+    /// Something else stands where the format wants a certain thing.
+    #[error("{}: {place}: {found}, but {wanted} expected; {remedy}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// What stands there.
+        found: String,
+        /// What should stand there.
+        wanted: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A version, encoding or section that is not read.
+    #[error("{}: {place}: {what} is not supported; {remedy}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// What it is.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A cell that is none of ours.
+    #[error("{}: {place}: element {element} is of type {kind} ({name}), which is not supported; {remedy}", path.display())]
+    UnsupportedElement {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// Its number in the file.
+        element: u64,
+        /// The file's number for its type.
+        kind: i64,
+        /// The name of that type.
+        name: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// An element refers to a node that the file does not hold.
+    #[error("{}: {place}: element {element} refers to node {node}, which is not in the file; save the mesh with all its nodes", path.display())]
+    MissingNode {
+        /// The file.
+        path: PathBuf,
+        /// Where the element stands.
+        place: Place,
+        /// Its number in the file.
+        element: u64,
+        /// The node it wants.
+        node: u64,
+    },
+    /// Two nodes have the same tag.
+    #[error("{}: {place}: node {node} was already defined at {first}; renumber the nodes (in Gmsh: gmsh -save)", path.display())]
+    DuplicateTag {
+        /// The file.
+        path: PathBuf,
+        /// Where the second one stands.
+        place: Place,
+        /// The tag.
+        node: u64,
+        /// Where the first one stands.
+        first: Place,
+    },
+    /// A coordinate that is no number.
+    #[error("{}: {place}: coordinate {axis} of node {node} is {value}; every coordinate must be a finite number", path.display())]
+    NonFinite {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// The node's number in the file.
+        node: u64,
+        /// x, y or z.
+        axis: char,
+        /// Its value.
+        value: f64,
+    },
+    /// A node of a 1D or 2D mesh that does not lie in the line or plane.
+    #[error("{}: {place}: node {node} has {axis} = {value}, out of the {dimension}D mesh; flatten the mesh to {axis} = 0 or read it as a mesh of a higher dimension", path.display())]
+    OutOfPlane {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// The node's number in the file.
+        node: u64,
+        /// y or z.
+        axis: char,
+        /// Its value.
+        value: f64,
+        /// Dimension of the mesh.
+        dimension: usize,
+    },
+    /// The same cell stands twice in one group.
+    #[error("{}: {place}: element {element} has the same nodes as element {first}; remove one of them", path.display())]
+    DuplicateElement {
+        /// The file.
+        path: PathBuf,
+        /// Where the second one stands.
+        place: Place,
+        /// Its number in the file.
+        element: u64,
+        /// Number of the first one.
+        first: u64,
+    },
+    /// There are no nodes or no elements.
+    #[error("{}: the mesh is empty ({nodes} nodes, {elements} elements); mesh the geometry before saving it (in Gmsh: gmsh -2 or -3) and save all elements or define physical groups", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// Nodes found.
+        nodes: usize,
+        /// Elements found.
+        elements: usize,
+    },
+    /// The cells are not of the dimension that was asked for.
+    #[error("{}: a mesh of dimension {wanted} was asked for, but the largest cells have dimension {found}; {remedy}", path.display())]
+    WrongDimension {
+        /// The file.
+        path: PathBuf,
+        /// Asked for.
+        wanted: usize,
+        /// Found.
+        found: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A list of coordinates cannot be made from an axis.
+    #[error("axis {axis}: {problem}")]
+    Axis {
+        /// x, y or z.
+        axis: char,
+        /// What is wrong and how to mend it.
+        problem: String,
+    },
+    /// A face of a cut-out lies between grid lines.
+    #[error(
+        "cut-out \"{name}\": its face at {axis} = {value} is not on a grid line; the nearest are {axis} = {below} and {axis} = {above}: move the face or the grid"
+    )]
+    CutOutOffGrid {
+        /// Name of the cut-out.
+        name: String,
+        /// x, y or z.
+        axis: char,
+        /// Where the face is.
+        value: f64,
+        /// Largest grid line below it.
+        below: f64,
+        /// Smallest grid line above it.
+        above: f64,
+    },
+    /// A cut-out that removes nothing, or everything.
+    #[error("cut-out \"{name}\" removes {removed} of {cells} cells; {remedy}")]
+    CutOutEmpty {
+        /// Name of the cut-out.
+        name: String,
+        /// Cells in it.
+        removed: usize,
+        /// Cells of the grid.
+        cells: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A displacement of nodes that would turn cells inside out.
+    #[error("jitter: a fraction of {value} of the spacing can turn cells inside out; use 0 to 0.3")]
+    Jitter {
+        /// The fraction.
+        value: f64,
+    },
+    /// A cell whose nodes run the wrong way round.
+    #[error(
+        "cell {cell} ({shape:?}) with its centroid at {centroid} is inverted: its smallest scaled Jacobian is {value:.3e}; reverse its node order (in Gmsh: reverse the surface or volume, or ReorientMesh)"
+    )]
+    Inverted {
+        /// Number of the cell, from 0.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Where it is.
+        centroid: String,
+        /// Smallest scaled Jacobian at its corners.
+        value: f64,
+    },
+    /// A cell without volume, or folded over at a corner.
+    #[error(
+        "cell {cell} ({shape:?}) with its centroid at {centroid} is degenerate: its smallest scaled Jacobian is {value:.3e}, more than {limit:.0e} is needed; mesh that region again"
+    )]
+    Degenerate {
+        /// Number of the cell, from 0.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Where it is.
+        centroid: String,
+        /// Smallest scaled Jacobian at its corners.
+        value: f64,
+        /// What is needed.
+        limit: f64,
+    },
+    /// Two nodes at one place.
+    #[error(
+        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart); merge them (in Gmsh: Coherence Mesh)"
+    )]
+    CoincidentNodes {
+        /// Number of one, from 0.
+        first: u32,
+        /// Number of the other.
+        second: u32,
+        /// Where they are.
+        position: String,
+        /// How far apart.
+        distance: f64,
+    },
+    /// A node whose position is no number.
+    #[error("node {node} lies at {position}; every coordinate must be a finite number")]
+    NonFiniteNode {
+        /// Number of the node, from 0.
+        node: usize,
+        /// Where it is.
+        position: String,
+    },
+    /// A node that no cell uses.
+    #[error("node {node} at {position} belongs to no cell; remove it (Mesh::drop_unused_nodes)")]
+    IsolatedNode {
+        /// Number of the node, from 0.
+        node: usize,
+        /// Where it is.
+        position: String,
+    },
+    /// A cell or set that refers to nothing.
+    #[error(
+        "{holder} refers to {kind} {number}, but the mesh has only {count}; numbers count from 0"
+    )]
+    OutOfRange {
+        /// The cell or set.
+        holder: String,
+        /// "node" or "cell".
+        kind: &'static str,
+        /// What it refers to.
+        number: u32,
+        /// How many there are.
+        count: usize,
+    },
+    /// A facet of a set that belongs to no cell.
+    #[error(
+        "the facet with nodes {nodes:?} is no facet of any cell; facet sets must lie on the faces of cells"
+    )]
+    LooseFacet {
+        /// Its nodes.
+        nodes: Vec<u32>,
+    },
+}
+
+/// A position as text: `(x, y)`.
+pub(super) fn position(x: &[f64]) -> String {
+    let parts: Vec<String> = x.iter().map(|v| format!("{v:.6}")).collect();
+    format!("({})", parts.join(", "))
+}
+
+/// The name of axis `k`.
+pub(super) fn axis_name(k: usize) -> char {
+    ['x', 'y', 'z'][k.min(2)]
+}

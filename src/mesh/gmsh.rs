@@ -1,0 +1,1 @@
+//! Reading Gmsh MSH files.

@@ -1,0 +1,434 @@
+//! Sizes and shapes of cells, and the checks that refuse a mesh no element can live on.
+
+use super::error::position;
+use super::{CellShape, Mesh, MeshError};
+use crate::tensor::{Tensor, Vector};
+
+/// A corner whose scaled Jacobian is at or below this counts as degenerate.
+///
+/// Round-off in the edges of a flat cell far from the origin leaves about 1e-13; a cell of usable shape has 1e-2 or more.
+pub const SMALLEST_SCALED_JACOBIAN: f64 = 1e-12;
+
+/// Nodes closer than this fraction of the mesh's largest extent lie at one place.
+const COINCIDENT: f64 = 1e-12;
+
+/// What [`check`] measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// Shortest edge of all cells [length].
+    pub shortest_edge: f64,
+    /// Longest edge of all cells [length].
+    pub longest_edge: f64,
+    /// Smallest scaled Jacobian at any corner: 1 for a square corner, 0 for a flat one.
+    pub smallest_scaled_jacobian: f64,
+    /// Volume of all cells (area in 2D, length in 1D) [length^D].
+    pub volume: f64,
+}
+
+/// For each corner, its neighbours along edges, ordered so that their determinant is positive in a good cell.
+fn corners(shape: CellShape) -> &'static [(usize, &'static [usize])] {
+    match shape {
+        CellShape::Vertex => &[],
+        CellShape::Line2 => &[(0, &[1])],
+        CellShape::Tri3 => &[(0, &[1, 2]), (1, &[2, 0]), (2, &[0, 1])],
+        CellShape::Quad4 => &[(0, &[1, 3]), (1, &[2, 0]), (2, &[3, 1]), (3, &[0, 2])],
+        CellShape::Tet4 => &[
+            (0, &[1, 2, 3]),
+            (1, &[2, 0, 3]),
+            (2, &[0, 1, 3]),
+            (3, &[0, 2, 1]),
+        ],
+        CellShape::Hex8 => &[
+            (0, &[1, 3, 4]),
+            (1, &[2, 0, 5]),
+            (2, &[3, 1, 6]),
+            (3, &[0, 2, 7]),
+            (4, &[7, 5, 0]),
+            (5, &[4, 6, 1]),
+            (6, &[5, 7, 2]),
+            (7, &[6, 4, 3]),
+        ],
+    }
+}
+
+/// Determinant of a matrix of at most 3 × 3.
+fn determinant<const D: usize>(m: &Tensor<D>) -> f64 {
+    match D {
+        1 => m[(0, 0)],
+        2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
+        _ => (0..3)
+            .map(|k| {
+                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+                m[(0, k)] * (m[(1, i)] * m[(2, j)] - m[(1, j)] * m[(2, i)])
+            })
+            .sum(),
+    }
+}
+
+impl<const D: usize> Mesh<D> {
+    /// Exact signed volume of cell `c` (area in 2D, length in 1D); negative if its nodes run the wrong way round.
+    ///
+    /// Zero for a cell whose dimension is not `D`. Units: [length^D].
+    pub fn cell_volume(&self, c: usize) -> f64 {
+        let shape = self.shapes[c];
+        if shape.dimension() != D {
+            return 0.0;
+        }
+        let nodes = self.cell(c);
+        let x = |i: usize| self.nodes[nodes[i] as usize];
+        let spanned = |edges: &[Vector<D>]| determinant(&Tensor::<D>::from_columns(edges));
+        match shape {
+            CellShape::Vertex => 0.0,
+            CellShape::Line2 => spanned(&[x(1) - x(0)]),
+            CellShape::Tri3 => spanned(&[x(1) - x(0), x(2) - x(0)]) / 2.0,
+            CellShape::Quad4 => spanned(&[x(2) - x(0), x(3) - x(1)]) / 2.0,
+            CellShape::Tet4 => spanned(&[x(1) - x(0), x(2) - x(0), x(3) - x(0)]) / 6.0,
+            CellShape::Hex8 => {
+                // the Jacobian's determinant is quadratic in each coordinate, hence two Gauss points are exact
+                let g = 0.5 / 3.0f64.sqrt();
+                let mut volume = 0.0;
+                for point in 0..8 {
+                    let at = [0, 1, 2].map(|k| {
+                        if point >> k & 1 == 0 {
+                            0.5 - g
+                        } else {
+                            0.5 + g
+                        }
+                    });
+                    let mut jacobian = Tensor::<D>::zeros();
+                    for i in 0..8 {
+                        // corners in VTK order: x of corners 1, 2, 5, 6; y of 2, 3, 6, 7; z of 4 to 7
+                        let bit = [(i + 1) / 2 % 2, i / 2 % 2, i / 4];
+                        let factor = |k: usize| if bit[k] == 0 { 1.0 - at[k] } else { at[k] };
+                        for k in 0..3 {
+                            let sign = if bit[k] == 0 { -1.0 } else { 1.0 };
+                            let slope = sign * factor((k + 1) % 3) * factor((k + 2) % 3);
+                            let mut column = jacobian.column_mut(k);
+                            column += x(i) * slope;
+                        }
+                    }
+                    volume += determinant(&jacobian) / 8.0;
+                }
+                volume
+            }
+        }
+    }
+
+    /// Smallest determinant of the edges at any corner of cell `c`, divided by their lengths; 0 if an edge has no length.
+    pub fn scaled_jacobian(&self, c: usize) -> f64 {
+        let nodes = self.cell(c);
+        let mut smallest = f64::INFINITY;
+        for (corner, neighbours) in corners(self.shapes[c]) {
+            let mut edges = Tensor::<D>::zeros();
+            if neighbours.len() != D {
+                return 0.0;
+            }
+            for (k, &n) in neighbours.iter().enumerate() {
+                let edge: Vector<D> =
+                    self.nodes[nodes[n] as usize] - self.nodes[nodes[*corner] as usize];
+                let length = edge.norm();
+                if length == 0.0 {
+                    return 0.0;
+                }
+                edges.set_column(k, &(edge / length));
+            }
+            smallest = smallest.min(determinant(&edges));
+        }
+        smallest
+    }
+}
+
+/// Measures a mesh and refuses one that no element can live on.
+///
+/// # Errors
+/// Named by number, place and value: a reference to a node or cell that does not exist, a coordinate that is no number,
+/// a node without a cell, two nodes at one place, an inverted or degenerate cell.
+pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
+    check_references(mesh)?;
+    for (node, x) in mesh.nodes.iter().enumerate() {
+        if !x.iter().all(|v| v.is_finite()) {
+            let position = position(x.as_slice());
+            return Err(MeshError::NonFiniteNode { node, position });
+        }
+    }
+    let mut used = vec![false; mesh.nodes.len()];
+    for &n in &mesh.connectivity {
+        used[n as usize] = true;
+    }
+    if let Some(node) = used.iter().position(|u| !u) {
+        let position = position(mesh.nodes[node].as_slice());
+        return Err(MeshError::IsolatedNode { node, position });
+    }
+    check_coincidence(mesh)?;
+    let mut quality = Quality {
+        shortest_edge: f64::INFINITY,
+        longest_edge: 0.0,
+        smallest_scaled_jacobian: f64::INFINITY,
+        volume: 0.0,
+    };
+    for cell in 0..mesh.cell_count() {
+        let value = mesh.scaled_jacobian(cell);
+        let volume = mesh.cell_volume(cell);
+        let (shape, centroid) = (mesh.shapes[cell], position(mesh.centroid(cell).as_slice()));
+        // a cell folded at one corner is not mended by reversing it
+        if value < -SMALLEST_SCALED_JACOBIAN && volume < 0.0 {
+            return Err(MeshError::Inverted {
+                cell,
+                shape,
+                centroid,
+                value,
+            });
+        }
+        if value <= SMALLEST_SCALED_JACOBIAN || volume <= 0.0 {
+            return Err(MeshError::Degenerate {
+                cell,
+                shape,
+                centroid,
+                value,
+                limit: SMALLEST_SCALED_JACOBIAN,
+            });
+        }
+        let nodes = mesh.cell(cell);
+        for (corner, neighbours) in corners(shape) {
+            for &n in *neighbours {
+                let edge = mesh.nodes[nodes[n] as usize] - mesh.nodes[nodes[*corner] as usize];
+                quality.shortest_edge = quality.shortest_edge.min(edge.norm());
+                quality.longest_edge = quality.longest_edge.max(edge.norm());
+            }
+        }
+        quality.smallest_scaled_jacobian = quality.smallest_scaled_jacobian.min(value);
+        quality.volume += volume;
+    }
+    Ok(quality)
+}
+
+/// Refuses references to nodes or cells that do not exist.
+fn check_references<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
+    let count = mesh.nodes.len();
+    let check = |holder: &dyn Fn() -> String, kind, numbers: &[u32], count: usize| match numbers
+        .iter()
+        .find(|&&n| n as usize >= count)
+    {
+        Some(&number) => Err(MeshError::OutOfRange {
+            holder: holder(),
+            kind,
+            number,
+            count,
+        }),
+        None => Ok(()),
+    };
+    for c in 0..mesh.cell_count() {
+        check(&|| format!("cell {c}"), "node", mesh.cell(c), count)?;
+    }
+    for (name, set) in &mesh.cell_sets {
+        check(
+            &|| format!("cell set \"{name}\""),
+            "cell",
+            set,
+            mesh.cell_count(),
+        )?;
+    }
+    for (name, set) in &mesh.facet_sets {
+        for facet in set {
+            check(&|| format!("facet set \"{name}\""), "node", facet, count)?;
+        }
+    }
+    for (name, set) in &mesh.node_sets {
+        check(&|| format!("node set \"{name}\""), "node", set, count)?;
+    }
+    Ok(())
+}
+
+/// Refuses two nodes at one place, by sorting along a skew line so that grids do not pile up on it.
+fn check_coincidence<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
+    let (lo, hi) = mesh.bounds();
+    let tolerance = COINCIDENT * (hi - lo).amax();
+    let line: Vector<D> = Vector::from_fn(|k, _| [1.0, 0.618_033_988_7, 0.324_717_957_2][k]);
+    let mut order: Vec<(f64, u32)> = mesh
+        .nodes
+        .iter()
+        .enumerate()
+        .map(|(i, x)| (x.dot(&line), i as u32))
+        .collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let reach = tolerance * line.norm();
+    for (k, &(s, i)) in order.iter().enumerate() {
+        for &(t, j) in &order[k + 1..] {
+            if t - s > reach {
+                break;
+            }
+            let distance = (mesh.nodes[i as usize] - mesh.nodes[j as usize]).norm();
+            if distance <= tolerance {
+                return Err(MeshError::CoincidentNodes {
+                    first: i.min(j),
+                    second: i.max(j),
+                    position: position(mesh.nodes[i as usize].as_slice()),
+                    distance,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::generate::{Axis, Grid};
+    use super::*;
+
+    fn unit(cells: usize) -> Axis {
+        Axis::Uniform {
+            min: 0.0,
+            max: 1.0,
+            cells,
+        }
+    }
+
+    fn one_cell<const D: usize>(shape: CellShape, nodes: &[[f64; D]]) -> Mesh<D> {
+        let mut mesh = Mesh {
+            nodes: nodes.iter().map(|x| Vector::from(*x)).collect(),
+            ..Mesh::default()
+        };
+        mesh.push_cell(shape, &(0..nodes.len() as u32).collect::<Vec<_>>());
+        mesh
+    }
+
+    #[test]
+    fn volumes_by_hand() {
+        let line = one_cell(CellShape::Line2, &[[1.0], [3.5]]);
+        assert_eq!(line.cell_volume(0), 2.5);
+        // the area between y = 0 and a roof from (0, 1) to (2, 3)
+        let quad = one_cell(
+            CellShape::Quad4,
+            &[[0.0, 0.0], [2.0, 0.0], [2.0, 3.0], [0.0, 1.0]],
+        );
+        assert_eq!(quad.cell_volume(0), 4.0);
+        let tet = one_cell(
+            CellShape::Tet4,
+            &[
+                [0.0, 0.0, 0.0],
+                [1.0, 0.0, 0.0],
+                [0.0, 2.0, 0.0],
+                [0.0, 0.0, 3.0],
+            ],
+        );
+        assert_eq!(tet.cell_volume(0), 1.0);
+        // a unit square under the roof z = 1 + x y, twisted: its volume is 1 + 1/4
+        let hex = one_cell(
+            CellShape::Hex8,
+            &[
+                [0.0, 0.0, 0.0],
+                [1.0, 0.0, 0.0],
+                [1.0, 1.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [0.0, 0.0, 1.0],
+                [1.0, 0.0, 1.0],
+                [1.0, 1.0, 2.0],
+                [0.0, 1.0, 1.0],
+            ],
+        );
+        assert!((hex.cell_volume(0) - 1.25).abs() < 1e-15);
+    }
+
+    /// Any subdivision of a cube with moved inner nodes still fills the cube.
+    #[test]
+    fn volumes_add_up() {
+        for dimension_cells in [3, 4] {
+            let mut grid = Grid::new([unit(dimension_cells), unit(3), unit(5)]);
+            grid.jitter(0.25, 11);
+            for mesh in [
+                grid.clone().mesh().unwrap(),
+                grid.simplices().mesh().unwrap(),
+            ] {
+                let quality = check(&mesh).unwrap();
+                assert!((quality.volume - 1.0).abs() < 1e-13);
+                assert!(quality.smallest_scaled_jacobian < 0.99);
+                assert!(quality.shortest_edge < 0.2 && quality.longest_edge > 1.0 / 3.0);
+            }
+        }
+    }
+
+    #[test]
+    fn squares_are_perfect() {
+        let quality = check(&Grid::new([unit(4), unit(2)]).mesh().unwrap()).unwrap();
+        assert!((quality.smallest_scaled_jacobian - 1.0).abs() < 1e-15);
+        assert_eq!((quality.shortest_edge, quality.longest_edge), (0.25, 0.5));
+    }
+
+    #[test]
+    fn an_inverted_cell_is_named() {
+        let mut mesh = Grid::new([unit(2), unit(2)]).mesh().unwrap();
+        mesh.connectivity[4..8].reverse();
+        let message = check(&mesh).unwrap_err().to_string();
+        assert!(
+            message.contains("cell 1 (Quad4)")
+                && message.contains("(0.750000, 0.250000)")
+                && message.contains("inverted")
+                && message.contains("-1.000e0")
+                && message.contains("reverse"),
+            "{message}"
+        );
+        let line = one_cell(CellShape::Line2, &[[1.0], [0.5]]);
+        assert!(matches!(
+            check(&line),
+            Err(MeshError::Inverted { cell: 0, .. })
+        ));
+    }
+
+    #[test]
+    fn flat_and_folded_cells_are_named() {
+        let flat = one_cell(CellShape::Tri3, &[[0.0, 0.0], [1.0, 0.1], [2.0, 0.2]]);
+        let message = check(&flat).unwrap_err().to_string();
+        assert!(
+            message.contains("cell 0 (Tri3)") && message.contains("degenerate"),
+            "{message}"
+        );
+        let dart = one_cell(
+            CellShape::Quad4,
+            &[[0.0, 0.0], [2.0, 0.0], [0.5, 0.5], [0.0, 2.0]],
+        );
+        assert!(matches!(check(&dart), Err(MeshError::Degenerate { value, .. }) if value < -0.1));
+    }
+
+    #[test]
+    fn bad_nodes_are_named() {
+        let good = Grid::new([unit(3), unit(3)]).mesh().unwrap();
+        let mut mesh = good.clone();
+        mesh.nodes[5].y = f64::NAN;
+        let message = check(&mesh).unwrap_err().to_string();
+        assert!(
+            message.contains("node 5") && message.contains("NaN"),
+            "{message}"
+        );
+
+        let mut mesh = good.clone();
+        mesh.nodes.push(Vector::from([7.0, 8.0]));
+        let message = check(&mesh).unwrap_err().to_string();
+        assert!(
+            message.contains("node 16 at (7.0") && message.contains("no cell"),
+            "{message}"
+        );
+
+        // the last cell gets a node of its own where it should share node 5
+        let mut mesh = good.clone();
+        mesh.nodes.push(mesh.nodes[15]);
+        for n in &mut mesh.connectivity {
+            *n = if *n == 15 { 16 } else { *n };
+        }
+        mesh.nodes[15] = mesh.nodes[10] + Vector::from([1e-14, 0.0]);
+        mesh.push_cell(CellShape::Tri3, &[5, 15, 9]);
+        let message = check(&mesh).unwrap_err().to_string();
+        assert!(
+            message.contains("nodes 10 and 15 both lie at (0.666667, 0.666667)"),
+            "{message}"
+        );
+
+        let mut mesh = good;
+        mesh.node_sets.insert("pin".into(), vec![3, 99]);
+        let message = check(&mesh).unwrap_err().to_string();
+        assert!(
+            message.contains("node set \"pin\" refers to node 99"),
+            "{message}"
+        );
+    }
+}

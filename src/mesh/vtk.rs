@@ -1,0 +1,1 @@
+//! Reading VTK and VTU files.
