@@ -98,10 +98,10 @@ impl<const D: usize> Mesh<D> {
                     let mut jacobian = Tensor::<D>::zeros();
                     for i in 0..8 {
                         // corners in VTK order: x of corners 1, 2, 5, 6; y of 2, 3, 6, 7; z of 4 to 7
-                        let bit = [(i + 1) / 2 % 2, i / 2 % 2, i / 4];
+                        let bit = [(i & 1) ^ (i >> 1 & 1), i >> 1 & 1, i >> 2];
                         let factor = |k: usize| if bit[k] == 0 { 1.0 - at[k] } else { at[k] };
-                        for k in 0..3 {
-                            let sign = if bit[k] == 0 { -1.0 } else { 1.0 };
+                        for (k, side) in bit.iter().enumerate() {
+                            let sign = if *side == 0 { -1.0 } else { 1.0 };
                             let slope = sign * factor((k + 1) % 3) * factor((k + 2) % 3);
                             let mut column = jacobian.column_mut(k);
                             column += x(i) * slope;
