@@ -108,6 +108,63 @@ impl LinePlot {
         fits(x, self.x_scale) && fits(y, self.y_scale)
     }
 
+    /// The corner in which the legend hides the fewest points and pieces of line.
+    fn emptiest_corner(&self) -> SeriesLabelPosition {
+        let scaled = |v: f64, scale| if scale == Scale::Log { v.ln() } else { v };
+        let runs: Vec<Vec<(f64, f64)>> = self
+            .series
+            .iter()
+            .flat_map(|s| s.points.split(|&p: &(f64, f64)| !self.drawable(p)))
+            .map(|run| {
+                run.iter()
+                    .map(|&(x, y)| (scaled(x, self.x_scale), scaled(y, self.y_scale)))
+                    .collect()
+            })
+            .collect();
+        let all = || runs.iter().flatten();
+        let (Some(x), Some(y)) = (
+            range(all().map(|p| p.0), Scale::Linear),
+            range(all().map(|p| p.1), Scale::Linear),
+        ) else {
+            return SeriesLabelPosition::UpperRight;
+        };
+        let unit = |p: (f64, f64)| {
+            (
+                (p.0 - x.start) / (x.end - x.start),
+                (p.1 - y.start) / (y.end - y.start),
+            )
+        };
+        let mut hidden = [0usize; 4];
+        for run in &runs {
+            for (i, &a) in run.iter().enumerate() {
+                let (a, b) = (unit(a), unit(run[(i + 1).min(run.len() - 1)]));
+                // a long piece of line counts at ten places along it
+                for k in 0..10 {
+                    let t = f64::from(k) / 10.0;
+                    let (u, v) = (a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1));
+                    for (corner, count) in hidden.iter_mut().enumerate() {
+                        let (u, v) = (
+                            if corner % 2 == 0 { 1.0 - u } else { u },
+                            if corner < 2 { 1.0 - v } else { v },
+                        );
+                        *count += usize::from(u < 0.3 && v < 0.3);
+                    }
+                }
+            }
+        }
+        let corners = [
+            SeriesLabelPosition::UpperRight,
+            SeriesLabelPosition::UpperLeft,
+            SeriesLabelPosition::LowerRight,
+            SeriesLabelPosition::LowerLeft,
+        ];
+        corners
+            .into_iter()
+            .zip(hidden)
+            .min_by_key(|c| c.1)
+            .map_or(SeriesLabelPosition::UpperRight, |c| c.0)
+    }
+
     fn svg(&self, path: &Path) -> Result<String, ObserveError> {
         let points = || {
             self.series
@@ -158,6 +215,7 @@ impl LinePlot {
                 .map_err(|e| e.to_string())?;
             chart
                 .configure_mesh()
+                .max_light_lines(0)
                 .x_desc(&self.x_label)
                 .y_desc(&self.y_label)
                 .axis_desc_style(("sans-serif", 15))
@@ -203,7 +261,7 @@ impl LinePlot {
             }
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
+                .position(self.emptiest_corner())
                 .background_style(WHITE.mix(0.85))
                 .border_style(RGBColor(200, 200, 200))
                 .label_font(("sans-serif", 14))
@@ -364,6 +422,28 @@ mod tests {
         );
         p.series[0].points = vec![(0.0, 0.0)];
         assert!(p.svg(Path::new("")).is_ok());
+    }
+
+    #[test]
+    fn the_legend_leaves_the_data_alone() {
+        let mut p = plot(Scale::Linear, Scale::Linear);
+        p.series.truncate(1);
+        // a line from corner to corner leaves the two others
+        p.series[0].points = vec![(0.0, 0.0), (1.0, 1.0)];
+        assert!(matches!(
+            p.emptiest_corner(),
+            SeriesLabelPosition::UpperLeft
+        ));
+        p.series[0].points = vec![(0.0, 1.0), (1.0, 0.0)];
+        assert!(matches!(
+            p.emptiest_corner(),
+            SeriesLabelPosition::UpperRight
+        ));
+        p.series[0].points = vec![(0.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        assert!(matches!(
+            p.emptiest_corner(),
+            SeriesLabelPosition::LowerRight
+        ));
     }
 
     #[test]

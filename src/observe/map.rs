@@ -197,7 +197,7 @@ impl FieldMap {
             escape(&self.title)
         );
         // a hair of the same colour hides the gaps that a renderer leaves between neighbours
-        svg.push_str("<g stroke-width=\"0.4\" stroke-linejoin=\"round\">\n");
+        svg.push_str("<g stroke-width=\"0.8\" stroke-linejoin=\"round\">\n");
         for (level, d) in paths.iter().enumerate().filter(|(_, d)| !d.is_empty()) {
             let fill = if level < LEVELS {
                 colour(level)
