@@ -1,0 +1,211 @@
+//! Tables that hold exactly one key, which is the choice made: `[coupling.splice]`, `[mesh.rectangle]`.
+//!
+//! A choice may also be written as text, `coupling = "splice"`, where the chosen table would be empty. An override that
+//! chooses otherwise replaces the whole choice: `--set coupling=splice` over `[coupling.blending]`.
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::error::{SceneError, SceneErrorKind};
+
+const SHAPES: &[&str] = &[
+    "any",
+    "ball",
+    "box",
+    "everywhere",
+    "near",
+    "point",
+    "polygon",
+    "polyline",
+    "segment",
+    "set",
+    "without",
+];
+const TRANSITIONS: &[&str] = &["any", "around", "ball", "box", "near", "set", "without"];
+const AXES: &[&str] = &["cells", "graded", "spacing"];
+const COUPLINGS: &[&str] = &["blending", "local", "nonlocal", "partial-stress", "splice"];
+const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
+const MATERIALS: &[&str] = &["bond-based", "correspondence", "lps"];
+const CONDITIONS: &[&str] = &["body-force", "displacement", "traction"];
+const POINTS: &[&str] = &["cells", "lattice"];
+const MICROMODULI: &[&str] = &[
+    "constant",
+    "influence",
+    "inverse-distance",
+    "triangular",
+    "uniform",
+];
+
+/// The choices at `path`, if the table there is one of exactly one key.
+pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
+    match path {
+        ["coupling"] => Some(COUPLINGS),
+        ["mesh"] => Some(MESHES),
+        ["mesh", _, "x" | "y" | "z"] => Some(AXES),
+        ["materials", _] => Some(MATERIALS),
+        ["materials", _, _, "micromodulus"] => Some(MICROMODULI),
+        ["peridynamics", "points"] => Some(POINTS),
+        ["conditions", _] => Some(CONDITIONS),
+        ["zones", "transition"] => Some(TRANSITIONS),
+        ["zones", _] | ["conditions", _, _, "inside"] | ["voids", _, "inside"] | ["cracks", _] => {
+            Some(SHAPES)
+        }
+        _ => None,
+    }
+}
+
+/// Choices that may be written as text for an empty table.
+fn as_text(path: &[&str]) -> bool {
+    matches!(path, ["coupling"])
+}
+
+/// Writes `over` into `base`, table by table.
+pub(crate) fn merge<'i>(base: &mut DeTable<'i>, over: DeTable<'i>, path: &mut Vec<String>) {
+    for (key, mut value) in over {
+        path.push(key.get_ref().to_string());
+        text_to_table(&mut value, path);
+        let replaced = match (base.get_mut(key.get_ref().as_ref()), value.get_mut()) {
+            (Some(old), DeValue::Table(new)) => {
+                text_to_table(old, path);
+                match old.get_mut() {
+                    DeValue::Table(old) if !chooses_otherwise(path, old, new) => {
+                        merge(old, std::mem::take(new), path);
+                        false
+                    }
+                    _ => true,
+                }
+            }
+            _ => true,
+        };
+        if replaced {
+            base.remove(key.get_ref().as_ref());
+            base.insert(key, value);
+        }
+        path.pop();
+    }
+}
+
+fn chooses_otherwise(path: &[String], old: &DeTable<'_>, new: &DeTable<'_>) -> bool {
+    let path: Vec<&str> = path.iter().map(String::as_str).collect();
+    options(&path).is_some() && !new.keys().any(|k| old.contains_key(k.get_ref().as_ref()))
+}
+
+fn text_to_table(value: &mut Spanned<DeValue<'_>>, path: &[String]) {
+    let path: Vec<&str> = path.iter().map(String::as_str).collect();
+    if !as_text(&path) {
+        return;
+    }
+    let span = value.span();
+    if let DeValue::String(name) = value.get_mut() {
+        let mut table = DeTable::new();
+        table.insert(
+            Spanned::new(span.clone(), std::mem::take(name)),
+            Spanned::new(span, DeValue::Table(DeTable::new())),
+        );
+        *value.get_mut() = DeValue::Table(table);
+    }
+}
+
+/// Turns choices written as text into tables and checks that every choice is one.
+///
+/// # Errors
+/// [`SceneErrorKind::Choice`] for none or several keys where one is expected.
+pub(crate) fn normalise(table: &mut DeTable<'_>, path: &mut Vec<String>) -> Result<(), SceneError> {
+    for (key, value) in table.iter_mut() {
+        path.push(key.get_ref().to_string());
+        text_to_table(value, path);
+        let span = value.span();
+        if let DeValue::Table(inner) = value.get_mut() {
+            check(path, key.span(), span, inner)?;
+            normalise(inner, path)?;
+        }
+        path.pop();
+    }
+    Ok(())
+}
+
+fn check(
+    path: &[String],
+    key: std::ops::Range<usize>,
+    span: std::ops::Range<usize>,
+    table: &DeTable<'_>,
+) -> Result<(), SceneError> {
+    let borrowed: Vec<&str> = path.iter().map(String::as_str).collect();
+    let Some(options) = options(&borrowed) else {
+        return Ok(());
+    };
+    let place = path.join(".");
+    match table.len() {
+        1 => Ok(()),
+        0 => Err(
+            SceneError::new(SceneErrorKind::Choice, format!("`{place}` is empty"))
+                .label(
+                    if span.is_empty() { key } else { span },
+                    "nothing is chosen",
+                )
+                .help(format!("write exactly one of {}", quoted(options))),
+        ),
+        _ => {
+            let mut keys: Vec<_> = table.keys().collect();
+            keys.sort_by_key(|k| k.span().start);
+            // a key that is no choice at all is the likelier mistake
+            if let Some(stranger) = keys
+                .iter()
+                .find(|k| !options.contains(&k.get_ref().as_ref()))
+            {
+                return Err(unknown(stranger.get_ref(), &place, options)
+                    .label(stranger.span(), "not known here"));
+            }
+            let names: Vec<&str> = keys.iter().map(|k| k.get_ref().as_ref()).collect();
+            let mut error = SceneError::new(
+                SceneErrorKind::Choice,
+                format!("`{place}` holds {} at once", quoted(&names)),
+            )
+            .help(format!(
+                "keep exactly one of {}; `--set {place}={}` replaces the one that stands there",
+                quoted(options),
+                if borrowed == ["coupling"] {
+                    names[0].to_owned()
+                } else {
+                    format!("{{{} = ...}}", names[0])
+                },
+            ));
+            for (i, k) in keys.iter().enumerate() {
+                error = error.label(k.span(), if i == 0 { "one" } else { "and another" });
+            }
+            Err(error)
+        }
+    }
+}
+
+/// The error for a key or name that does not exist at `place`, where `known` do.
+pub(crate) fn unknown(word: &str, place: &str, known: &[&str]) -> SceneError {
+    let at = if place.is_empty() {
+        "at the top of the scene".to_owned()
+    } else {
+        format!("in `{place}`")
+    };
+    let list = if known.is_empty() {
+        "no key is allowed here".to_owned()
+    } else {
+        format!("known here: {}", quoted(known))
+    };
+    let help = match super::error::closest(word, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`? {list}"),
+        None => list,
+    };
+    SceneError::new(
+        SceneErrorKind::UnknownKey,
+        format!("`{word}` is not known {at}"),
+    )
+    .help(help)
+}
+
+/// `` `a`, `b`, `c` ``.
+pub(crate) fn quoted(names: &[&str]) -> String {
+    names
+        .iter()
+        .map(|n| format!("`{n}`"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}

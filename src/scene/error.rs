@@ -1,0 +1,239 @@
+//! What is wrong with a scene: place, value and remedy.
+
+use std::fmt;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+
+use super::source::{Source, Span};
+
+/// What sort of mistake a [`SceneError`] reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SceneErrorKind {
+    /// The text is no TOML.
+    Syntax,
+    /// A key or a name of a choice that does not exist.
+    UnknownKey,
+    /// A table, number or text where another is expected.
+    WrongType,
+    /// A number or expression outside what the model allows.
+    WrongValue,
+    /// A key or table that must be there is not.
+    Missing,
+    /// None or several keys where exactly one is expected.
+    Choice,
+    /// A named set that the mesh does not have.
+    UnknownSet,
+    /// Something given in another dimension than the scene's.
+    Dimension,
+    /// Parts that are right alone and do not go together.
+    Conflict,
+    /// A zone, set or shape that selects nothing.
+    Empty,
+    /// A mesh that cannot be read or used.
+    Mesh,
+    /// A file that cannot be read or written.
+    File,
+    /// Something that is planned and not there yet.
+    Later,
+}
+
+/// A mistake in a scene, with where it stands and what to write instead.
+///
+/// `Display` gives all on one line, `file:line: message; help`. miette, which knows the labels, shows the text
+/// underlined: [`SceneError::report`].
+#[derive(Clone, Debug)]
+pub struct SceneError {
+    kind: SceneErrorKind,
+    message: String,
+    help: Option<String>,
+    labels: Vec<(Span, String)>,
+    shown: Option<Box<Shown>>,
+}
+
+#[derive(Clone, Debug)]
+struct Shown {
+    source: NamedSource<String>,
+    labels: Vec<LabeledSpan>,
+    line: usize,
+}
+
+impl SceneError {
+    /// A mistake without a place yet.
+    pub fn new(kind: SceneErrorKind, message: impl Into<String>) -> Self {
+        Self {
+            kind,
+            message: message.into(),
+            help: None,
+            labels: Vec::new(),
+            shown: None,
+        }
+    }
+
+    /// Adds a place with a few words to write under it.
+    pub fn label(mut self, span: Span, text: impl Into<String>) -> Self {
+        self.labels.push((span, text.into()));
+        self
+    }
+
+    /// Sets the remedy.
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// Attaches the text that the labels point into.
+    pub fn shown_in(mut self, source: &Source) -> Self {
+        let spans: Vec<Span> = self.labels.iter().map(|(s, _)| s.clone()).collect();
+        let (named, local, line) = source.locate(&spans);
+        let labels = local
+            .into_iter()
+            .zip(&self.labels)
+            .filter_map(|(span, (_, text))| span.map(|s| LabeledSpan::at(s, text.clone())))
+            .collect();
+        self.shown = Some(Box::new(Shown {
+            source: named,
+            labels,
+            line: if spans.is_empty() { 0 } else { line },
+        }));
+        self
+    }
+
+    /// What sort of mistake it is.
+    pub fn kind(&self) -> SceneErrorKind {
+        self.kind
+    }
+
+    /// Place and value, without the remedy.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// The remedy.
+    pub fn remedy(&self) -> Option<&str> {
+        self.help.as_deref()
+    }
+
+    /// The text that is underlined.
+    pub fn underlined(&self) -> Vec<&str> {
+        let Some(shown) = &self.shown else {
+            return Vec::new();
+        };
+        shown
+            .labels
+            .iter()
+            .filter_map(|l| shown.source.inner().get(l.offset()..l.offset() + l.len()))
+            .collect()
+    }
+
+    /// The same mistake for a person at a terminal: message, underlined text and remedy.
+    pub fn report(self) -> miette::Report {
+        miette::Report::new(Headline(self))
+    }
+}
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(shown) = &self.shown {
+            match shown.line {
+                0 => write!(f, "{}: ", shown.source.name())?,
+                line => write!(f, "{}:{line}: ", shown.source.name())?,
+            }
+        }
+        f.write_str(&self.message)?;
+        if let Some(help) = &self.help {
+            write!(f, "; {help}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for SceneError {}
+
+impl Diagnostic for SceneError {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|h| Box::new(h) as _)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        let shown = self.shown.as_ref()?;
+        (!shown.labels.is_empty()).then_some(&shown.source as _)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let shown = self.shown.as_ref()?;
+        Some(Box::new(shown.labels.iter().cloned()))
+    }
+}
+
+/// A [`SceneError`] whose `Display` leaves place and remedy to miette.
+#[derive(Debug)]
+struct Headline(SceneError);
+
+impl fmt::Display for Headline {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.message)
+    }
+}
+
+impl std::error::Error for Headline {}
+
+impl Diagnostic for Headline {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Diagnostic::help(&self.0)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.0.source_code()
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        self.0.labels()
+    }
+}
+
+/// The member of `known` that `word` was probably meant to be.
+pub(crate) fn closest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|k| (edits(word, k), k))
+        .filter(|(d, k)| *d <= 1 + k.len().min(word.len()) / 4 && *d < k.len())
+        .min()
+        .map(|(_, k)| k)
+}
+
+/// Levenshtein's distance, ignoring case and taking `_` for `-`.
+fn edits(a: &str, b: &str) -> usize {
+    let plain = |s: &str| -> Vec<char> { s.to_lowercase().replace('_', "-").chars().collect() };
+    let (a, b) = (plain(a), plain(b));
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let change = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = change.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{closest, edits};
+
+    #[test]
+    fn distances() {
+        assert_eq!(edits("kitten", "sitting"), 3);
+        assert_eq!(edits("youngs_modulus", "youngs-modulus"), 0);
+        assert_eq!(edits("", "abc"), 3);
+    }
+
+    #[test]
+    fn suggestions_are_near() {
+        let known = ["horizon", "weights", "points"];
+        assert_eq!(closest("horizn", known), Some("horizon"));
+        assert_eq!(closest("density", known), None);
+        assert_eq!(closest("spilce", ["splice", "blending"]), Some("splice"));
+    }
+}

@@ -1,0 +1,443 @@
+//! Expressions in `x`, `y`, `z`, as scenes write them: `"-1e-3 * x^2"`, `"if(x < 0, 1, exp(-x))"`.
+//!
+//! Precedence is that of written mathematics: `-x^2` is `-(x^2)` and `2^3^2` is `2^(3^2)`. The evaluator crates at hand
+//! read the first as `(-x)^2` or the second as `(2^3)^2`, which would be a wrong boundary condition without a word.
+
+use std::fmt;
+
+use super::source::Span;
+
+/// The deepest nesting that is read; deeper input is refused before it exhausts the stack.
+const DEEPEST: usize = 64;
+
+/// A parsed expression in `x`, `y` and `z`.
+#[derive(Clone)]
+pub struct Expression {
+    /// The expression as typed.
+    pub text: String,
+    /// Where it stands in the scene.
+    pub span: Span,
+    root: Term,
+}
+
+impl fmt::Debug for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Expression({:?})", self.text)
+    }
+}
+
+impl fmt::Display for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// What is wrong with the text of an expression.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("in the expression `{text}`, character {at}: {what}")]
+pub struct ExpressionError {
+    /// The expression.
+    pub text: String,
+    /// The character where reading stopped, counted from one.
+    pub at: usize,
+    /// What was found, and what to write instead.
+    pub what: String,
+}
+
+#[derive(Clone)]
+enum Term {
+    Constant(f64),
+    Variable(usize),
+    Unary(fn(f64) -> f64, Box<Term>),
+    Binary(fn(f64, f64) -> f64, Box<Term>, Box<Term>),
+    If(Box<[Term; 3]>),
+}
+
+/// The functions of one argument, by name.
+const UNARY: &[(&str, fn(f64) -> f64)] = &[
+    ("abs", f64::abs),
+    ("acos", f64::acos),
+    ("asin", f64::asin),
+    ("atan", f64::atan),
+    ("cbrt", f64::cbrt),
+    ("ceil", f64::ceil),
+    ("cos", f64::cos),
+    ("cosh", f64::cosh),
+    ("exp", f64::exp),
+    ("floor", f64::floor),
+    ("ln", f64::ln),
+    ("log10", f64::log10),
+    ("sign", f64::signum),
+    ("sin", f64::sin),
+    ("sinh", f64::sinh),
+    ("sqrt", f64::sqrt),
+    ("tan", f64::tan),
+    ("tanh", f64::tanh),
+];
+
+/// The functions of two arguments, by name.
+const BINARY: &[(&str, fn(f64, f64) -> f64)] = &[
+    ("atan2", f64::atan2),
+    ("hypot", f64::hypot),
+    ("max", f64::max),
+    ("min", f64::min),
+];
+
+impl Expression {
+    /// Reads an expression in `x`, `y` and `z`.
+    ///
+    /// # Errors
+    /// [`ExpressionError`] with the character where the text stops making sense.
+    pub fn parse(text: &str) -> Result<Self, ExpressionError> {
+        let mut parser = Parser {
+            text,
+            at: 0,
+            depth: 0,
+        };
+        let root = parser.comparison()?;
+        parser.skip_blanks();
+        if parser.at < text.len() {
+            return Err(parser.error(
+                "an operator such as `*` is missing here, or this is one bracket too many",
+            ));
+        }
+        Ok(Self {
+            text: text.to_owned(),
+            span: Span::default(),
+            root,
+        })
+    }
+
+    /// The expression that is `value` everywhere.
+    pub fn constant(value: f64) -> Self {
+        Self {
+            text: value.to_string(),
+            span: Span::default(),
+            root: Term::Constant(value),
+        }
+    }
+
+    /// The same expression, found at `span`.
+    pub fn at(mut self, span: Span) -> Self {
+        self.span = span;
+        self
+    }
+
+    /// The value at the position `x` (components beyond the dimension are zero).
+    pub fn eval(&self, x: &[f64; 3]) -> f64 {
+        self.root.eval(x)
+    }
+
+    /// The value, if the expression has no variable.
+    pub fn as_constant(&self) -> Option<f64> {
+        (0..3)
+            .all(|axis| !self.depends_on(axis))
+            .then(|| self.eval(&[0.0; 3]))
+    }
+
+    /// Whether the variable of `axis` (0 for `x`, 1 for `y`, 2 for `z`) appears.
+    pub fn depends_on(&self, axis: usize) -> bool {
+        self.root.depends_on(axis)
+    }
+}
+
+impl Term {
+    fn eval(&self, x: &[f64; 3]) -> f64 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Variable(axis) => x[*axis],
+            Self::Unary(f, a) => f(a.eval(x)),
+            Self::Binary(f, a, b) => f(a.eval(x), b.eval(x)),
+            Self::If(parts) => {
+                let chosen = if parts[0].eval(x) != 0.0 { 1 } else { 2 };
+                parts[chosen].eval(x)
+            }
+        }
+    }
+
+    fn depends_on(&self, axis: usize) -> bool {
+        match self {
+            Self::Constant(_) => false,
+            Self::Variable(a) => *a == axis,
+            Self::Unary(_, a) => a.depends_on(axis),
+            Self::Binary(_, a, b) => a.depends_on(axis) || b.depends_on(axis),
+            Self::If(parts) => parts.iter().any(|p| p.depends_on(axis)),
+        }
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    at: usize,
+    depth: usize,
+}
+
+impl Parser<'_> {
+    fn error(&self, what: impl Into<String>) -> ExpressionError {
+        ExpressionError {
+            text: self.text.to_owned(),
+            at: self.text[..self.at].chars().count() + 1,
+            what: what.into(),
+        }
+    }
+
+    fn rest(&self) -> &str {
+        &self.text[self.at..]
+    }
+
+    fn skip_blanks(&mut self) {
+        let rest = self.rest();
+        self.at += rest.len() - rest.trim_start().len();
+    }
+
+    /// Consumes the first of `tokens` that stands here.
+    fn take<'t>(&mut self, tokens: &[&'t str]) -> Option<&'t str> {
+        self.skip_blanks();
+        let found = tokens
+            .iter()
+            .copied()
+            .find(|t| self.rest().starts_with(t))?;
+        self.at += found.len();
+        Some(found)
+    }
+
+    fn expect(&mut self, token: &str) -> Result<(), ExpressionError> {
+        match self.take(&[token]) {
+            Some(_) => Ok(()),
+            None => Err(self.error(format!("expected `{token}`"))),
+        }
+    }
+
+    fn comparison(&mut self) -> Result<Term, ExpressionError> {
+        let left = self.sum()?;
+        let f: fn(f64, f64) -> f64 = match self.take(&["<=", ">=", "<", ">"]) {
+            None => return Ok(left),
+            Some("<=") => |a, b| f64::from(u8::from(a <= b)),
+            Some(">=") => |a, b| f64::from(u8::from(a >= b)),
+            Some("<") => |a, b| f64::from(u8::from(a < b)),
+            Some(_) => |a, b| f64::from(u8::from(a > b)),
+        };
+        Ok(binary(f, left, self.sum()?))
+    }
+
+    fn sum(&mut self) -> Result<Term, ExpressionError> {
+        let mut left = self.product()?;
+        while let Some(sign) = self.take(&["+", "-"]) {
+            let f: fn(f64, f64) -> f64 = if sign == "+" {
+                |a, b| a + b
+            } else {
+                |a, b| a - b
+            };
+            left = binary(f, left, self.product()?);
+        }
+        Ok(left)
+    }
+
+    fn product(&mut self) -> Result<Term, ExpressionError> {
+        let mut left = self.signed()?;
+        while let Some(sign) = self.take(&["*", "/"]) {
+            let f: fn(f64, f64) -> f64 = if sign == "*" {
+                |a, b| a * b
+            } else {
+                |a, b| a / b
+            };
+            left = binary(f, left, self.signed()?);
+        }
+        Ok(left)
+    }
+
+    fn signed(&mut self) -> Result<Term, ExpressionError> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(self.error("nested too deeply"));
+        }
+        let term = match self.take(&["+", "-"]) {
+            Some("-") => Term::Unary(|a| -a, Box::new(self.signed()?)),
+            Some(_) => self.signed()?,
+            None => self.power()?,
+        };
+        self.depth -= 1;
+        Ok(term)
+    }
+
+    fn power(&mut self) -> Result<Term, ExpressionError> {
+        let base = self.atom()?;
+        if self.take(&["**", "^"]).is_none() {
+            return Ok(base);
+        }
+        let exponent = self.signed()?;
+        // an integer power by multiplication: exact for small bases, and defined for negative ones
+        if let Term::Constant(n) = exponent
+            && n == 2.0
+        {
+            return Ok(Term::Unary(|a| a * a, Box::new(base)));
+        }
+        Ok(binary(f64::powf, base, exponent))
+    }
+
+    fn atom(&mut self) -> Result<Term, ExpressionError> {
+        if self.take(&["("]).is_some() {
+            let inner = self.comparison()?;
+            self.expect(")")?;
+            return Ok(inner);
+        }
+        let first = self.rest().chars().next();
+        match first {
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_alphabetic() || c == '_' => self.name(),
+            Some(c) => Err(self.error(format!(
+                "a number, x, y, z or a bracket is expected, not `{c}`"
+            ))),
+            None => {
+                Err(self
+                    .error("the expression ends where a number, x, y, z or a bracket is expected"))
+            }
+        }
+    }
+
+    fn number(&mut self) -> Result<Term, ExpressionError> {
+        let bytes = self.rest().as_bytes();
+        let digits = |from: usize| {
+            from + bytes[from..]
+                .iter()
+                .take_while(|b| b.is_ascii_digit() || **b == b'.')
+                .count()
+        };
+        let mut end = digits(0);
+        if bytes.get(end).is_some_and(|b| matches!(b, b'e' | b'E')) {
+            let sign = usize::from(bytes.get(end + 1).is_some_and(|b| matches!(b, b'+' | b'-')));
+            let exponent = digits(end + 1 + sign);
+            if exponent > end + 1 + sign {
+                end = exponent;
+            }
+        }
+        let text = &self.rest()[..end];
+        let value = text
+            .parse()
+            .map_err(|_| self.error(format!("`{text}` is no number")))?;
+        self.at += end;
+        Ok(Term::Constant(value))
+    }
+
+    fn name(&mut self) -> Result<Term, ExpressionError> {
+        let rest = self.rest();
+        let length = rest
+            .find(|c: char| !(c.is_alphanumeric() || c == '_'))
+            .unwrap_or(rest.len());
+        let name = rest[..length].to_owned();
+        match name.as_str() {
+            "x" => return Ok(self.advance(length, Term::Variable(0))),
+            "y" => return Ok(self.advance(length, Term::Variable(1))),
+            "z" => return Ok(self.advance(length, Term::Variable(2))),
+            "pi" => return Ok(self.advance(length, Term::Constant(std::f64::consts::PI))),
+            "t" => {
+                return Err(self.error(
+                    "time-dependent conditions arrive with the explicit driver; use x, y, z",
+                ));
+            }
+            _ => {}
+        }
+        let unary = UNARY.iter().find(|(n, _)| *n == name);
+        let two = BINARY.iter().find(|(n, _)| *n == name);
+        if unary.is_none() && two.is_none() && name != "if" {
+            let known = UNARY
+                .iter()
+                .map(|(n, _)| *n)
+                .chain(BINARY.iter().map(|(n, _)| *n))
+                .collect::<Vec<_>>()
+                .join(", ");
+            return Err(self.error(format!(
+                "`{name}` is unknown; the variables are x, y, z, the constant is pi, the functions are {known} and if"
+            )));
+        }
+        self.at += length;
+        self.expect("(")?;
+        let first = self.comparison()?;
+        let term = if let Some((_, f)) = unary {
+            Term::Unary(*f, Box::new(first))
+        } else {
+            self.expect(",")?;
+            let second = self.comparison()?;
+            if let Some((_, f)) = two {
+                binary(*f, first, second)
+            } else {
+                self.expect(",")?;
+                let third = self.comparison()?;
+                Term::If(Box::new([first, second, third]))
+            }
+        };
+        self.expect(")")?;
+        Ok(term)
+    }
+
+    fn advance(&mut self, length: usize, term: Term) -> Term {
+        self.at += length;
+        term
+    }
+}
+
+fn binary(f: fn(f64, f64) -> f64, a: Term, b: Term) -> Term {
+    Term::Binary(f, Box::new(a), Box::new(b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Expression;
+
+    fn value(text: &str) -> f64 {
+        Expression::parse(text).unwrap().eval(&[2.0, 3.0, 5.0])
+    }
+
+    #[test]
+    fn precedence_is_that_of_written_mathematics() {
+        assert_eq!(value("-x^2"), -4.0);
+        assert_eq!(value("2^3^2"), 512.0);
+        assert_eq!(value("2^-x"), 0.25);
+        assert_eq!(value("1 - 2 - 3"), -4.0);
+        assert_eq!(value("12 / 2 / 3"), 2.0);
+        assert_eq!(value("2 * -x^2"), -8.0);
+        assert_eq!(value("1 + x * y ** 2"), 19.0);
+        assert_eq!(value("1.5e-1*z"), 0.75);
+        assert_eq!(value("(-x)^3"), -8.0);
+        assert_eq!(value("1/120"), 1.0 / 120.0);
+    }
+
+    #[test]
+    fn functions_and_choices() {
+        assert_eq!(value("if(x < y, 10, 20)"), 10.0);
+        assert_eq!(value("if(x >= y, 10, 20)"), 20.0);
+        assert_eq!(value("max(x, min(y, z)) + abs(-1)"), 4.0);
+        assert!((value("sin(pi / 2)") - 1.0).abs() < 1e-15);
+        assert_eq!(value("hypot(3, 4)"), 5.0);
+    }
+
+    #[test]
+    fn dependence_is_known() {
+        let e = Expression::parse("1 + y").unwrap();
+        assert!(e.depends_on(1) && !e.depends_on(0));
+        assert_eq!(e.as_constant(), None);
+        assert_eq!(Expression::parse("1/4").unwrap().as_constant(), Some(0.25));
+    }
+
+    #[test]
+    fn wrong_text_is_located() {
+        for (text, at, what) in [
+            ("1 +", 4, "ends where"),
+            ("2 x", 3, "operator"),
+            ("sin x", 5, "expected `(`"),
+            ("(1", 3, "expected `)`"),
+            ("1 + foo", 5, "`foo` is unknown"),
+            ("t", 1, "time-dependent"),
+            ("1..2", 1, "no number"),
+            ("1 # 2", 3, "operator"),
+            ("", 1, "ends where"),
+            ("min(1)", 6, "expected `,`"),
+        ] {
+            let error = Expression::parse(text).unwrap_err();
+            assert_eq!(error.at, at, "{text}: {error}");
+            assert!(error.to_string().contains(what), "{text}: {error}");
+        }
+        assert!(Expression::parse(&"(".repeat(100_000)).is_err());
+        assert!(Expression::parse(&"-".repeat(100_000)).is_err());
+    }
+}

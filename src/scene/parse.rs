@@ -1,0 +1,226 @@
+//! From text to [`SceneSpec`], and from a deserialiser's complaint to place, value and remedy.
+
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, ValueDeserializer};
+
+use super::choice;
+use super::error::{SceneError, SceneErrorKind};
+use super::source::{Source, Span};
+use super::spec::SceneSpec;
+
+impl SceneSpec {
+    /// Reads a scene.
+    ///
+    /// # Errors
+    /// A [`SceneError`] that underlines the token at fault.
+    pub fn parse(source: &Source) -> Result<Self, SceneError> {
+        let table = source.merged()?;
+        let places = table.get_ref().clone();
+        let root = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
+        Self::deserialize(ValueDeserializer::from(root))
+            .map_err(|error| translate(&error, &places).shown_in(source))
+    }
+}
+
+/// What stands at a span: its path, and whether the span is that of the key.
+struct Place {
+    path: Vec<String>,
+    is_key: bool,
+}
+
+impl Place {
+    fn dotted(&self) -> String {
+        self.path.join(".")
+    }
+
+    /// The path of the table around.
+    fn parent(&self) -> String {
+        self.path[..self.path.len().saturating_sub(1)].join(".")
+    }
+}
+
+fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
+    let message = error.message().lines().next().unwrap_or_default();
+    let span = error.span().unwrap_or_default();
+    let mut path = Vec::new();
+    let place = find(places, &span, &mut path).unwrap_or(Place {
+        path: Vec::new(),
+        is_key: false,
+    });
+    let names = ticked(message);
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
+        let (word, known) = names.split_first().map_or(("", &[][..]), |(w, k)| (*w, k));
+        let at = if place.is_key {
+            place.parent()
+        } else {
+            place.dotted()
+        };
+        return choice::unknown(word, &at, known).label(span, "not known here");
+    }
+    if message.starts_with("missing field") {
+        let key = names.first().copied().unwrap_or_default();
+        let at = place.dotted();
+        let (message, help) = missing(key, &at);
+        let error = SceneError::new(SceneErrorKind::Missing, message).help(help);
+        // the span of a whole file says nothing; that of a table is its header
+        return if at.is_empty() {
+            error.label(0..0, "not found in this scene")
+        } else {
+            error.label(span, format!("`{key}` belongs here"))
+        };
+    }
+    let at = if place.path.is_empty() {
+        "the scene".to_owned()
+    } else {
+        format!("`{}`", place.dotted())
+    };
+    if let Some(rest) = message.strip_prefix("in the expression ") {
+        return SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("{at}: in the expression {rest}"),
+        )
+        .label(span, "this expression")
+        .help(
+            "expressions know + - * / ^, comparisons, brackets and functions such as sin(pi * x)",
+        );
+    }
+    if let Some(rest) = message.strip_prefix("invalid type: ") {
+        let (found, expected) = rest
+            .split_once(", expected ")
+            .unwrap_or((rest, "another type"));
+        return SceneError::new(
+            SceneErrorKind::WrongType,
+            format!("{at} is {}", plain(found)),
+        )
+        .label(span, format!("not {}", plain(expected)))
+        .help(format!("write {} here", plain(expected)));
+    }
+    if message.starts_with("wanted") {
+        let path: Vec<&str> = place.path.iter().map(String::as_str).collect();
+        return SceneError::new(
+            SceneErrorKind::WrongType,
+            format!("{at} must make exactly one choice"),
+        )
+        .label(span, "a table of one key belongs here")
+        .help(match choice::options(&path) {
+            Some(options) => format!(
+                "write {{ key = ... }} with one of {}",
+                choice::quoted(options)
+            ),
+            None => "see `bondline schema` for the choices".to_owned(),
+        });
+    }
+    SceneError::new(SceneErrorKind::WrongValue, format!("{at}: {message}"))
+        .label(span, "this value")
+        .help("see `bondline schema` for what belongs here")
+}
+
+/// What to say of a key that must be there.
+fn missing(key: &str, at: &str) -> (String, String) {
+    let place = if at.is_empty() {
+        "the scene".to_owned()
+    } else {
+        format!("`{at}`")
+    };
+    let help = match (at, key) {
+        ("", "kinematics") => {
+            "add kinematics = \"bar\", \"plane-stress\", \"plane-strain\" or \"solid\""
+        }
+        ("", "mesh") => "add [mesh.line], [mesh.rectangle], [mesh.box] or [mesh.file]",
+        ("", "materials") => {
+            "add a material, for example [materials.steel.lps] with youngs-modulus and poisson-ratio"
+        }
+        ("", "coupling") => {
+            "add coupling = \"splice\", \"blending\", \"partial-stress\", \"local\" or \"nonlocal\""
+        }
+        ("peridynamics", "horizon") => {
+            "add horizon = 0.05, three to six times the spacing of the points"
+        }
+        (_, "poisson-ratio") => {
+            "add poisson-ratio = 0.25, or use a bond-based material, which has its own"
+        }
+        _ => {
+            return (
+                format!("{place} lacks `{key}`"),
+                format!("add `{key} = ...` to {place}"),
+            );
+        }
+    };
+    (format!("{place} lacks `{key}`"), help.to_owned())
+}
+
+/// A deserialiser's words in those of a scene.
+fn plain(text: &str) -> String {
+    let text = text
+        .replace("string", "text")
+        .replace("floating point", "number")
+        .replace("boolean", "truth value")
+        .replace("a sequence", "a list")
+        .replace("sequence", "a list")
+        .replace("map", "a table");
+    match text.split_once(' ') {
+        Some(("struct" | "enum", name)) if name.ends_with("Spec") => "a table".to_owned(),
+        _ => text,
+    }
+}
+
+/// The words between backticks.
+fn ticked(message: &str) -> Vec<String> {
+    message
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The deepest key or value at `span`.
+fn find(table: &DeTable<'_>, span: &Span, path: &mut Vec<String>) -> Option<Place> {
+    let mut found = None;
+    for (key, value) in table.iter() {
+        path.push(key.get_ref().to_string());
+        if key.span() == *span {
+            found = Some(Place {
+                path: path.clone(),
+                is_key: true,
+            });
+        }
+        if value.span() == *span && found.is_none() {
+            found = Some(Place {
+                path: path.clone(),
+                is_key: false,
+            });
+        }
+        if let Some(deeper) = find_in_value(value, span, path) {
+            found = Some(deeper);
+        }
+        path.pop();
+        if found.is_some() {
+            break;
+        }
+    }
+    found
+}
+
+fn find_in_value(
+    value: &Spanned<DeValue<'_>>,
+    span: &Span,
+    path: &mut Vec<String>,
+) -> Option<Place> {
+    match value.get_ref() {
+        DeValue::Table(inner) => find(inner, span, path),
+        DeValue::Array(items) => items.iter().enumerate().find_map(|(i, item)| {
+            path.push((i + 1).to_string());
+            let here = (item.span() == *span).then(|| Place {
+                path: path.clone(),
+                is_key: false,
+            });
+            let found = find_in_value(item, span, path).or(here);
+            path.pop();
+            found
+        }),
+        _ => None,
+    }
+}

@@ -1,0 +1,145 @@
+//! The text of a scene with its overrides, and positions in it.
+//!
+//! The file and every `--set` stand one after another on one axis of byte positions, so that an error in an override is
+//! underlined in the override and one in the file in the file.
+
+use miette::NamedSource;
+use toml::Spanned;
+use toml::de::DeTable;
+
+use super::choice;
+use super::error::{SceneError, SceneErrorKind};
+
+/// A range of bytes of a [`Source`].
+pub type Span = std::ops::Range<usize>;
+
+/// The text of a scene file and of the overrides typed after it.
+#[derive(Clone, Debug)]
+pub struct Source {
+    pieces: Vec<Piece>,
+}
+
+#[derive(Clone, Debug)]
+struct Piece {
+    start: usize,
+    name: String,
+    text: String,
+    /// What is parsed; empty for the file, which is parsed as it is.
+    toml: String,
+}
+
+impl Source {
+    /// A scene's text, named `name` (its path) in messages.
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self {
+            pieces: vec![Piece {
+                start: 0,
+                name: name.into(),
+                text: text.into(),
+                toml: String::new(),
+            }],
+        }
+    }
+
+    /// Appends an override `key=value`, as typed after `--set`. A value that is no TOML is taken as text.
+    ///
+    /// # Errors
+    /// [`SceneErrorKind::Syntax`] if there is no `=`.
+    pub fn push_override(&mut self, text: &str) -> Result<(), SceneError> {
+        let start = self.pieces.last().map_or(0, |p| p.start + p.text.len() + 1);
+        let mut text = text.to_owned();
+        let equals = text.find('=');
+        if let Some(equals) = equals
+            && DeTable::parse(&text).is_err()
+        {
+            let value = toml::Value::String(text[equals + 1..].trim().to_owned());
+            text = format!("{}={value}", &text[..equals]);
+        }
+        let piece = Piece {
+            start,
+            name: "--set".to_owned(),
+            // blanks in front move all spans to where the override stands on the common axis
+            toml: " ".repeat(start) + &text,
+            text,
+        };
+        let span = piece.start..piece.start + piece.text.len();
+        let message = format!("the override `{}` has no `=`", piece.text);
+        self.pieces.push(piece);
+        match equals {
+            Some(_) => Ok(()),
+            None => Err(SceneError::new(SceneErrorKind::Syntax, message)
+                .label(span, "no value")
+                .help("write --set key=value, for example --set coupling=splice")
+                .shown_in(self)),
+        }
+    }
+
+    /// The name of the scene file.
+    pub fn name(&self) -> &str {
+        &self.pieces[0].name
+    }
+
+    /// What miette shows, and `spans` relative to it; labels of other pieces than the first label's are left out.
+    pub(crate) fn locate(&self, spans: &[Span]) -> (NamedSource<String>, Vec<Option<Span>>, usize) {
+        let first = spans.first().map_or(0, |s| s.start);
+        let piece = self
+            .pieces
+            .iter()
+            .rev()
+            .find(|p| p.start <= first)
+            .unwrap_or(&self.pieces[0]);
+        let end = piece.start + piece.text.len();
+        let local = spans
+            .iter()
+            .map(|s| {
+                (s.start >= piece.start && s.start <= end)
+                    .then(|| s.start - piece.start..s.end.min(end).max(s.start) - piece.start)
+            })
+            .collect();
+        let line = piece.text[..(first - piece.start).min(piece.text.len())]
+            .bytes()
+            .filter(|b| *b == b'\n')
+            .count()
+            + 1;
+        (
+            NamedSource::new(&piece.name, piece.text.clone()),
+            local,
+            line,
+        )
+    }
+
+    /// The tables of the scene with all overrides applied, every key and value with its span.
+    ///
+    /// # Errors
+    /// [`SceneErrorKind::Syntax`] where the text is no TOML, [`SceneErrorKind::Choice`] where a table that must hold exactly one
+    /// key holds none or several.
+    pub(crate) fn merged(&self) -> Result<Spanned<DeTable<'_>>, SceneError> {
+        let mut root = self.parse(&self.pieces[0])?;
+        for piece in &self.pieces[1..] {
+            choice::merge(
+                root.get_mut(),
+                self.parse(piece)?.into_inner(),
+                &mut Vec::new(),
+            );
+        }
+        choice::normalise(root.get_mut(), &mut Vec::new()).map_err(|e| e.shown_in(self))?;
+        Ok(root)
+    }
+
+    fn parse<'a>(&self, piece: &'a Piece) -> Result<Spanned<DeTable<'a>>, SceneError> {
+        let text = if piece.start == 0 {
+            &piece.text
+        } else {
+            &piece.toml
+        };
+        DeTable::parse(text).map_err(|error| {
+            SceneError::new(
+                SceneErrorKind::Syntax,
+                format!("this is not TOML: {}", error.message()),
+            )
+            .label(error.span().unwrap_or(piece.start..piece.start), "here")
+            .help("a line reads `key = value` or `[table]`; text needs quotes")
+            .shown_in(self)
+        })
+    }
+}

@@ -1,0 +1,91 @@
+//! Conditions and voids of a scene.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::scene::expression::Expression;
+use crate::scene::spec::region::ShapeSpec;
+use crate::scene::value::Text;
+
+/// What is prescribed somewhere.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ConditionSpec {
+    /// Displacement, component by component; components left out stay free.
+    Displacement(DisplacementSpec),
+    /// Force per area (per length of thickness 1 in 2D; a force in 1D) on a set of facets.
+    Traction(TractionSpec),
+    /// Force per volume.
+    BodyForce(BodyForceSpec),
+}
+
+/// Prescribed displacement: exactly one of `on` and `inside`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct DisplacementSpec {
+    /// A named set of the mesh. Where peridynamics meets the set, points in a layer one horizon deep follow it.
+    #[serde(default)]
+    pub on: Option<Text>,
+    /// All sites inside a shape.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// Displacement along x.
+    #[serde(default)]
+    pub x: Option<Expression>,
+    /// Displacement along y.
+    #[serde(default)]
+    pub y: Option<Expression>,
+    /// Displacement along z.
+    #[serde(default)]
+    pub z: Option<Expression>,
+}
+
+/// A traction on a set of facets.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct TractionSpec {
+    /// A named set of facets of the mesh.
+    pub on: Text,
+    /// Traction along x.
+    #[serde(default)]
+    pub x: Option<Expression>,
+    /// Traction along y.
+    #[serde(default)]
+    pub y: Option<Expression>,
+    /// Traction along z.
+    #[serde(default)]
+    pub z: Option<Expression>,
+}
+
+/// A force per volume.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BodyForceSpec {
+    /// Where; everywhere if left out.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// Force along x.
+    #[serde(default)]
+    pub x: Option<Expression>,
+    /// Force along y.
+    #[serde(default)]
+    pub y: Option<Expression>,
+    /// Force along z.
+    #[serde(default)]
+    pub z: Option<Expression>,
+}
+
+/// An empty region.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct VoidSpec {
+    /// Its shape.
+    pub inside: ShapeSpec,
+    /// Whether bonds across it are cut. Left uncut, an opening comes out several times too small.
+    #[serde(default = "yes")]
+    pub cut_bonds: bool,
+}
+
+fn yes() -> bool {
+    true
+}

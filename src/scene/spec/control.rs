@@ -1,0 +1,95 @@
+//! Solver and output of a scene.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::scene::value::{Coordinates, Count, Number, Text};
+
+/// The linear solver.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SolverSpec {
+    /// Which solver.
+    #[serde(default)]
+    pub method: MethodSpec,
+    /// Relative residual at which the iteration stops; 1e-10 if left out.
+    #[serde(default)]
+    pub tolerance: Option<Number>,
+    /// Most iterations; 500 if left out.
+    #[serde(default)]
+    pub max_iterations: Option<Count>,
+    /// Elimination order of the direct solver.
+    #[serde(default)]
+    pub ordering: OrderingSpec,
+}
+
+/// Which solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MethodSpec {
+    /// By size and symmetry.
+    #[default]
+    Auto,
+    /// Sparse factorisation.
+    Direct,
+    /// Krylov iteration (conjugate gradients if symmetric, GMRES if not) with algebraic multigrid.
+    Krylov,
+}
+
+/// Elimination order of the direct solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrderingSpec {
+    /// The best known for the size.
+    #[default]
+    Auto,
+    /// Nested dissection by coordinates.
+    Coordinates,
+    /// Nested dissection by METIS' method on the graph.
+    Metis,
+    /// Approximate minimum degree.
+    Amd,
+}
+
+/// What is written, and where.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct OutputSpec {
+    /// Folder for all files, relative to where the command runs; "out" if left out.
+    #[serde(default)]
+    pub directory: Option<Text>,
+    /// Beginning of all file names; the scene's file name if left out.
+    #[serde(default)]
+    pub name: Option<Text>,
+    /// Whether a VTU file is written; true if left out.
+    #[serde(default)]
+    pub vtu: Option<bool>,
+    /// Straight lines along which a CSV file samples the solution, by name.
+    #[serde(default)]
+    pub lines: BTreeMap<Text, LineSpec>,
+    /// Points at which a CSV file gives the solution, by name.
+    #[serde(default)]
+    pub probes: BTreeMap<Text, ProbeSpec>,
+}
+
+/// A line of samples.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LineSpec {
+    /// First sample.
+    pub from: Coordinates,
+    /// Last sample.
+    pub to: Coordinates,
+    /// Number of samples, both ends included; at least 2.
+    pub samples: Count,
+}
+
+/// A point of interest.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ProbeSpec {
+    /// Its position.
+    pub at: Coordinates,
+}

@@ -1,0 +1,295 @@
+//! Materials, peridynamics and coupling of a scene.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::Deserialize;
+use serde::de::{self, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
+
+use crate::scene::expression::Expression;
+use crate::scene::value::{Coordinates, Count, Number, Text};
+
+/// A material: its peridynamic law, beside which the local law is linear elasticity with the same constants.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaterialSpec {
+    /// Bonds that act alone; Poisson's ratio follows (1/3 in plane stress, 1/4 in plane strain and solids).
+    BondBased(BondBasedSpec),
+    /// Linearised ordinary state-based law (linear peridynamic solid), any Poisson ratio.
+    Lps(StateBasedSpec),
+    /// Elastic correspondence: the local law applied to a deformation gradient averaged over the family.
+    Correspondence(CorrespondenceSpec),
+}
+
+/// The constants of a bond-based material.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BondBasedSpec {
+    /// Young's modulus E.
+    pub youngs_modulus: Number,
+    /// Density.
+    #[serde(default)]
+    pub density: Option<Number>,
+    /// How the stiffness of a bond depends on its length.
+    #[serde(default)]
+    pub micromodulus: MicromodulusSpec,
+    /// The set of cells that this material fills.
+    #[serde(default)]
+    pub cells: Option<Text>,
+}
+
+/// The constants of a state-based material.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct StateBasedSpec {
+    /// Young's modulus E.
+    pub youngs_modulus: Number,
+    /// Poisson's ratio.
+    pub poisson_ratio: Number,
+    /// Density.
+    #[serde(default)]
+    pub density: Option<Number>,
+    /// The set of cells that this material fills.
+    #[serde(default)]
+    pub cells: Option<Text>,
+}
+
+/// The constants of a correspondence material.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CorrespondenceSpec {
+    /// Young's modulus E.
+    pub youngs_modulus: Number,
+    /// Poisson's ratio.
+    pub poisson_ratio: Number,
+    /// Density.
+    #[serde(default)]
+    pub density: Option<Number>,
+    /// Strength of the stabilising bond force, relative to that of an LPS; 1 if left out, 0 switches it off.
+    #[serde(default)]
+    pub stabilisation: Option<Number>,
+    /// The set of cells that this material fills.
+    #[serde(default)]
+    pub cells: Option<Text>,
+}
+
+/// Stiffness of a bond over its length, up to a factor that Young's modulus and the horizon fix.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MicromodulusSpec {
+    /// `λ = c / |ξ|³`: force proportional to stretch (SAND2015-7998 section 3.4).
+    #[default]
+    InverseDistance,
+    /// `λ = c / |ξ|²`.
+    Constant,
+    /// `λ = c`.
+    Uniform,
+    /// `λ = c (1 - |ξ|/δ) / |ξ|³`.
+    Triangular,
+    /// `λ = c ω(|ξ|) / |ξ|²` with an influence function (SAND2015-7998 eq. 5.13a).
+    Influence(InfluenceSpec),
+}
+
+/// An influence function: `{ degree = 3, alpha = 0 }`, or "gaussian".
+#[derive(Clone, Debug)]
+pub enum InfluenceSpec {
+    /// `P_n / |ξ|^α` (SAND2015-7998 eq. 5.8).
+    Polynomial(PolynomialSpec),
+    /// `exp(-|ξ|²/δ²)`.
+    Gaussian,
+}
+
+/// Degree and exponent of a polynomial influence function.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct PolynomialSpec {
+    /// Degree n of P_n: 0, 1, 3, 5 or 7.
+    pub degree: Count,
+    /// Exponent α: 0 or 1.
+    #[serde(default)]
+    pub alpha: Count,
+}
+
+impl<'de> Deserialize<'de> for InfluenceSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Influences;
+        impl<'de> Visitor<'de> for Influences {
+            type Value = InfluenceSpec;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("`{ degree = 3, alpha = 0 }` or \"gaussian\"")
+            }
+
+            fn visit_str<E: de::Error>(self, v: &str) -> Result<InfluenceSpec, E> {
+                match v {
+                    "gaussian" => Ok(InfluenceSpec::Gaussian),
+                    _ => Err(E::unknown_variant(v, &["gaussian"])),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<InfluenceSpec, A::Error> {
+                PolynomialSpec::deserialize(MapAccessDeserializer::new(map))
+                    .map(InfluenceSpec::Polynomial)
+            }
+        }
+        deserializer.deserialize_any(Influences)
+    }
+}
+
+impl JsonSchema for InfluenceSpec {
+    fn schema_name() -> Cow<'static, str> {
+        "InfluenceSpec".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let polynomial = generator.subschema_for::<PolynomialSpec>();
+        json_schema!({
+            "description": "An influence function: { degree = 3, alpha = 0 } for P_n / |ξ|^α, or \"gaussian\".",
+            "anyOf": [polynomial, { "const": "gaussian" }]
+        })
+    }
+}
+
+/// Horizon, points and weights of the peridynamic region.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct PeridynamicsSpec {
+    /// Horizon δ: a number, or an expression in x, y, z.
+    pub horizon: Expression,
+    /// Bond weights.
+    #[serde(default)]
+    pub weights: WeightsSpec,
+    /// Influence function of state-based laws; `{ degree = 3, alpha = 0 }` if left out.
+    #[serde(default)]
+    pub influence: Option<InfluenceSpec>,
+    /// Where the points are.
+    #[serde(default)]
+    pub points: PointsSpec,
+    /// Whether the mesh's own boundary (a hole, a notch) cuts bonds.
+    #[serde(default)]
+    pub surfaces: SurfacesSpec,
+}
+
+/// Weights of bonds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum WeightsSpec {
+    /// One weight per shell of bonds, so that the lattice carries exactly the typed elastic constants.
+    #[default]
+    Isotropic,
+    /// Volumes as they are, as in the papers; the lattice's stiffness is then not quite the typed one.
+    Plain,
+    /// Fitted family by family to the typed elastic constants; for points that are no lattice.
+    Fitted,
+}
+
+/// Where the peridynamic points are.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PointsSpec {
+    /// One at the centroid of each cell of the zone.
+    #[default]
+    Cells,
+    /// A regular lattice that fills the zone.
+    Lattice(LatticeSpec),
+}
+
+/// A regular lattice of points.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LatticeSpec {
+    /// Distance of neighbours h.
+    pub spacing: Number,
+    /// Any point of the lattice; half a spacing inside the mesh's smallest corner if left out.
+    #[serde(default)]
+    pub origin: Option<Coordinates>,
+}
+
+/// Whether the boundary of the mesh cuts bonds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfacesSpec {
+    /// Bonds that leave the body are cut.
+    #[default]
+    Cut,
+    /// Bonds reach across holes.
+    Uncut,
+}
+
+/// How finite elements and peridynamics are joined.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CouplingSpec {
+    /// Each site takes the whole force of its own model (SAND2015-7998 eq. 2.30).
+    Splice(NoOptionsSpec),
+    /// Forces blended by β over the transition zone (eq. 3.9 to 3.14).
+    Blending(BlendingSpec),
+    /// Partial stress in the transition zone (eq. 2.19 to 2.29).
+    PartialStress(PartialStressSpec),
+    /// Finite elements everywhere.
+    Local(NoOptionsSpec),
+    /// Peridynamics everywhere.
+    Nonlocal(NoOptionsSpec),
+}
+
+/// A coupling without options.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoOptionsSpec {}
+
+/// Force-based blending.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BlendingSpec {
+    /// Shape of β from 1 at the nonlocal zone to 0 at the local one.
+    #[serde(default)]
+    pub beta: BetaSpec,
+}
+
+/// Shape of the blending function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BetaSpec {
+    /// One half throughout the transition zone.
+    Constant,
+    /// Straight.
+    Linear,
+    /// The cubic `3 s² - 2 s³`.
+    #[default]
+    Smooth,
+}
+
+/// Partial stress.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct PartialStressSpec {
+    /// How the divergence of the partial stress is taken.
+    #[serde(default)]
+    pub form: FormSpec,
+    /// Order of the least-squares constraint where mesh and points meet.
+    #[serde(default)]
+    pub interface: InterfaceSpec,
+}
+
+/// How the divergence of the partial stress is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FormSpec {
+    /// Finite elements whose stress is the partial stress at their Gauss points (SAND2015-7998 section 7.3).
+    #[default]
+    Elements,
+    /// Points, through the shape tensor (section 7.2).
+    Meshfree,
+}
+
+/// Order of the constraint where mesh and points meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum InterfaceSpec {
+    /// Affine fields pass exactly.
+    Affine,
+    /// Quadratic fields pass exactly.
+    #[default]
+    Quadratic,
+}

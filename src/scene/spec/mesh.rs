@@ -1,0 +1,149 @@
+//! The mesh of a scene.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::scene::value::{Coordinates, Count, Number, Text};
+
+/// A generated mesh or one from a file.
+///
+/// Generated meshes carry the facet sets `left`, `right` (x), `bottom`, `top` (y), `back`, `front` (z).
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MeshSpec {
+    /// A line of two-node cells (1D).
+    Line(LineMeshSpec),
+    /// A rectangle of quadrilaterals or triangles (2D).
+    Rectangle(RectangleMeshSpec),
+    /// A box of hexahedra or tetrahedra (3D).
+    Box(BoxMeshSpec),
+    /// A Gmsh (`.msh`, 2.2 or 4.1) or VTK (`.vtk`, `.vtu`) file; physical groups become named sets.
+    File(FileMeshSpec),
+}
+
+/// A line of two-node cells.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LineMeshSpec {
+    /// Left end.
+    pub min: Coordinates,
+    /// Right end.
+    pub max: Coordinates,
+    /// How the line is divided.
+    pub x: AxisSpec,
+    /// Intervals left out, by name.
+    #[serde(default)]
+    pub cutouts: BTreeMap<Text, CutoutSpec>,
+}
+
+/// A rectangle of quadrilaterals or triangles.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RectangleMeshSpec {
+    /// Smallest corner.
+    pub min: Coordinates,
+    /// Largest corner.
+    pub max: Coordinates,
+    /// How the x axis is divided.
+    pub x: AxisSpec,
+    /// How the y axis is divided.
+    pub y: AxisSpec,
+    /// Shape of the cells.
+    #[serde(default)]
+    pub cell: PlaneCellSpec,
+    /// Boxes left out, by name; their edges become facet sets of that name. Cells whose centroid lies inside are removed.
+    #[serde(default)]
+    pub cutouts: BTreeMap<Text, CutoutSpec>,
+}
+
+/// A box of hexahedra or tetrahedra.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BoxMeshSpec {
+    /// Smallest corner.
+    pub min: Coordinates,
+    /// Largest corner.
+    pub max: Coordinates,
+    /// How the x axis is divided.
+    pub x: AxisSpec,
+    /// How the y axis is divided.
+    pub y: AxisSpec,
+    /// How the z axis is divided.
+    pub z: AxisSpec,
+    /// Shape of the cells.
+    #[serde(default)]
+    pub cell: SolidCellSpec,
+    /// Boxes left out, by name; their faces become facet sets of that name.
+    #[serde(default)]
+    pub cutouts: BTreeMap<Text, CutoutSpec>,
+}
+
+/// A mesh from a file.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct FileMeshSpec {
+    /// The file, relative to the scene.
+    pub path: Text,
+}
+
+/// A box that a generated mesh leaves out.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CutoutSpec {
+    /// Smallest corner.
+    pub min: Coordinates,
+    /// Largest corner.
+    pub max: Coordinates,
+}
+
+/// How an axis of a generated mesh is divided.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AxisSpec {
+    /// This many equal cells.
+    Cells(Count),
+    /// Equal cells of about this size; the length is divided by the nearest whole number.
+    Spacing(Number),
+    /// Fine in one interval, growing away from it.
+    Graded(GradedSpec),
+}
+
+/// A fine interval with cells that grow away from it.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct GradedSpec {
+    /// Both ends of the fine interval.
+    pub fine: Coordinates,
+    /// Cell size in the fine interval.
+    pub spacing: Number,
+    /// Ratio of neighbouring cell sizes outside, at least 1.
+    #[serde(default)]
+    pub growth: Option<Number>,
+    /// The largest cell size.
+    #[serde(default)]
+    pub largest: Option<Number>,
+}
+
+/// Cells of a plane mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlaneCellSpec {
+    /// Four-node quadrilaterals.
+    #[default]
+    Quad4,
+    /// Three-node triangles, two in each quadrilateral.
+    Tri3,
+}
+
+/// Cells of a solid mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolidCellSpec {
+    /// Eight-node hexahedra.
+    #[default]
+    Hex8,
+    /// Four-node tetrahedra, six in each hexahedron.
+    Tet4,
+}

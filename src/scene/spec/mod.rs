@@ -1,0 +1,88 @@
+//! What a scene file holds, as typed. The JSON Schema is made from these types and their comments.
+//!
+//! Every choice is a table of one key (`[coupling.splice]`), so that an error is underlined at its own token.
+
+mod condition;
+mod control;
+mod material;
+mod mesh;
+mod region;
+
+pub use condition::{BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VoidSpec};
+pub use control::{LineSpec, MethodSpec, OrderingSpec, OutputSpec, ProbeSpec, SolverSpec};
+pub use material::{
+    BetaSpec, BlendingSpec, BondBasedSpec, CorrespondenceSpec, CouplingSpec, FormSpec,
+    InfluenceSpec, InterfaceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec, NoOptionsSpec,
+    PartialStressSpec, PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec,
+    WeightsSpec,
+};
+pub use mesh::{
+    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
+    PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
+};
+pub use region::{
+    BallSpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, TransitionSpec, WithoutSpec, ZonesSpec,
+};
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::value::Text;
+
+/// A scene of bondline: one static problem of a body that is finite elements here and peridynamics there.
+///
+/// Units are the user's own, consistent throughout (m, N, Pa; or mm, N, MPa). Every number may also be a constant
+/// expression in quotes, "1/120".
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[schemars(title = "bondline scene")]
+pub struct SceneSpec {
+    /// A line that says what the scene is; appears in reports.
+    #[serde(default)]
+    pub title: Option<String>,
+    /// How the body stands for a three-dimensional solid; fixes the dimension.
+    pub kinematics: KinematicsSpec,
+    /// The mesh: generated, or read from a file.
+    pub mesh: MeshSpec,
+    /// The materials by name. At most one of several may be without `cells`: it fills what the others leave.
+    pub materials: BTreeMap<Text, MaterialSpec>,
+    /// Horizon, points and weights of the peridynamic region; needed unless the coupling is `local`.
+    #[serde(default)]
+    pub peridynamics: Option<PeridynamicsSpec>,
+    /// Where the body is nonlocal and where the two models overlap; all else is local.
+    #[serde(default)]
+    pub zones: ZonesSpec,
+    /// How the two models are joined; also as text where no option is set, `coupling = "splice"`.
+    pub coupling: CouplingSpec,
+    /// Displacements, tractions and body forces by name.
+    #[serde(default)]
+    pub conditions: BTreeMap<Text, ConditionSpec>,
+    /// Empty regions by name: points inside are removed, and bonds across are cut.
+    #[serde(default)]
+    pub voids: BTreeMap<Text, VoidSpec>,
+    /// Cracks by name: surfaces without thickness that cut the bonds across them.
+    #[serde(default)]
+    pub cracks: BTreeMap<Text, ShapeSpec>,
+    /// The linear solver.
+    #[serde(default)]
+    pub solver: SolverSpec,
+    /// What is written, and where.
+    #[serde(default)]
+    pub output: OutputSpec,
+}
+
+/// How a body of one, two or three dimensions stands for a solid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum KinematicsSpec {
+    /// One dimension: uniaxial stress.
+    Bar,
+    /// Two dimensions: a thin plate.
+    PlaneStress,
+    /// Two dimensions: a long body.
+    PlaneStrain,
+    /// Three dimensions.
+    Solid,
+}

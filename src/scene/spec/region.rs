@@ -1,0 +1,129 @@
+//! Shapes and zones of a scene.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::scene::value::{Coordinates, Number, Text};
+
+/// Where the body is nonlocal, and where the two models overlap. All else is local.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ZonesSpec {
+    /// Peridynamics only. Cells whose centroid lies inside.
+    #[serde(default)]
+    pub nonlocal: Option<ShapeSpec>,
+    /// Both models at once (blending, partial stress). Cells whose centroid lies inside and that are not nonlocal.
+    #[serde(default)]
+    pub transition: Option<TransitionSpec>,
+}
+
+/// A region of space or a named set of cells.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ShapeSpec {
+    /// An axis-parallel box (an interval in 1D, a rectangle in 2D).
+    Box(BoxSpec),
+    /// All points within a radius of a centre.
+    Ball(BallSpec),
+    /// A point; of use in 1D cracks and within `near`.
+    Point(Coordinates),
+    /// A straight line.
+    Segment(SegmentSpec),
+    /// Straight lines from each point to the next.
+    Polyline(Vec<Coordinates>),
+    /// A closed polygon: its area in 2D, a plane surface in 3D.
+    Polygon(Vec<Coordinates>),
+    /// All points within a distance of another shape, such as a crack line.
+    Near(NearSpec),
+    /// A named set of cells of the mesh.
+    Set(Text),
+    /// The whole body.
+    Everywhere(bool),
+    /// All points of any of several shapes.
+    Any(Vec<ShapeSpec>),
+    /// A shape without another.
+    Without(Box<WithoutSpec>),
+}
+
+/// The region where both models overlap.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TransitionSpec {
+    /// All cells within this distance of the nonlocal zone.
+    Around(Number),
+    /// An axis-parallel box.
+    Box(BoxSpec),
+    /// All points within a radius of a centre.
+    Ball(BallSpec),
+    /// All points within a distance of a shape.
+    Near(NearSpec),
+    /// A named set of cells of the mesh.
+    Set(Text),
+    /// All points of any of several shapes.
+    Any(Vec<ShapeSpec>),
+    /// A shape without another.
+    Without(Box<WithoutSpec>),
+}
+
+/// An axis-parallel box.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BoxSpec {
+    /// Smallest corner.
+    pub min: Coordinates,
+    /// Largest corner.
+    pub max: Coordinates,
+}
+
+/// All points within `radius` of `center`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BallSpec {
+    /// Centre.
+    pub center: Coordinates,
+    /// Radius.
+    pub radius: Number,
+}
+
+/// A straight line from one point to another.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SegmentSpec {
+    /// Start.
+    pub from: Coordinates,
+    /// End.
+    pub to: Coordinates,
+}
+
+/// All points within a distance of a shape: exactly one shape beside `within`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct NearSpec {
+    /// The distance.
+    pub within: Number,
+    /// A point.
+    #[serde(default)]
+    pub point: Option<Coordinates>,
+    /// A straight line.
+    #[serde(default)]
+    pub segment: Option<SegmentSpec>,
+    /// Straight lines from each point to the next.
+    #[serde(default)]
+    pub polyline: Option<Vec<Coordinates>>,
+    /// A closed polygon.
+    #[serde(default)]
+    pub polygon: Option<Vec<Coordinates>>,
+    /// An axis-parallel box.
+    #[serde(default, rename = "box")]
+    pub cuboid: Option<BoxSpec>,
+}
+
+/// A shape without another.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct WithoutSpec {
+    /// What remains.
+    pub from: ShapeSpec,
+    /// What is taken away.
+    pub removed: ShapeSpec,
+}

@@ -1,0 +1,311 @@
+//! Single values of a scene, each with the place where it was typed: numbers, counts, texts, coordinates, expressions.
+
+use std::borrow::{Borrow, Cow};
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::{self, Deserialize, Deserializer, SeqAccess, Visitor};
+use toml::Spanned;
+
+use super::expression::Expression;
+use super::source::Span;
+
+/// A number, typed as `0.05` or as a constant expression in quotes, `"6/120"`.
+#[derive(Clone, Debug, Default)]
+pub struct Number {
+    /// The value.
+    pub value: f64,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A whole number that is not negative.
+#[derive(Clone, Debug, Default)]
+pub struct Count {
+    /// The value.
+    pub value: usize,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A piece of text: a path, the name of a set, or a key that the user chose.
+#[derive(Clone, Debug, Default)]
+pub struct Text {
+    /// The text.
+    pub value: String,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// One, two or three coordinates, `[x, y, z]`; in 1D also a plain number.
+#[derive(Clone, Debug, Default)]
+pub struct Coordinates {
+    /// The coordinates.
+    pub values: Vec<f64>,
+    /// Where they stand.
+    pub span: Span,
+}
+
+impl PartialEq for Text {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
+    }
+}
+
+impl Eq for Text {}
+
+impl PartialOrd for Text {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Text {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.value.cmp(&other.value)
+    }
+}
+
+impl Borrow<str> for Text {
+    fn borrow(&self) -> &str {
+        &self.value
+    }
+}
+
+impl fmt::Display for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.value)
+    }
+}
+
+/// Reads a number or text into an expression; checks inside, where the deserialiser still knows the place.
+#[derive(Clone, Copy)]
+enum Scalars {
+    /// Any expression.
+    Field,
+    /// One without variables.
+    Constant,
+    /// One without variables that is a whole number.
+    Whole,
+}
+
+impl Scalars {
+    fn check<E: de::Error>(self, expression: Expression) -> Result<Expression, E> {
+        if matches!(self, Self::Field) {
+            return Ok(expression);
+        }
+        match expression.as_constant() {
+            None => Err(E::custom(format!(
+                "`{expression}` has a variable where a constant is expected"
+            ))),
+            Some(v) if !v.is_finite() => Err(E::custom(format!(
+                "`{expression}` is {v}, not a finite number"
+            ))),
+            // 2^53: beyond it whole numbers are not exact
+            Some(v)
+                if matches!(self, Self::Whole)
+                    && (v.fract() != 0.0 || !(0.0..=9_007_199_254_740_992.0).contains(&v)) =>
+            {
+                Err(E::custom(format!(
+                    "{v} is not a whole number of at least 0"
+                )))
+            }
+            Some(_) => Ok(expression),
+        }
+    }
+}
+
+impl Visitor<'_> for Scalars {
+    type Value = Expression;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Field => "a number, or an expression in quotes",
+            Self::Constant => "a number",
+            Self::Whole => "a whole number",
+        })
+    }
+
+    fn visit_i64<E: de::Error>(self, v: i64) -> Result<Expression, E> {
+        self.check(Expression::constant(v as f64))
+    }
+
+    fn visit_u64<E: de::Error>(self, v: u64) -> Result<Expression, E> {
+        self.check(Expression::constant(v as f64))
+    }
+
+    fn visit_f64<E: de::Error>(self, v: f64) -> Result<Expression, E> {
+        if v.is_finite() {
+            self.check(Expression::constant(v))
+        } else {
+            Err(E::custom(format!("{v} is not a finite number")))
+        }
+    }
+
+    fn visit_str<E: de::Error>(self, v: &str) -> Result<Expression, E> {
+        self.check(Expression::parse(v).map_err(E::custom)?)
+    }
+}
+
+struct Scalar(Expression);
+
+impl<'de> Deserialize<'de> for Scalar {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Scalars::Field).map(Self)
+    }
+}
+
+struct Constant(f64);
+
+impl<'de> Deserialize<'de> for Constant {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let expression = deserializer.deserialize_any(Scalars::Constant)?;
+        Ok(Self(expression.eval(&[0.0; 3])))
+    }
+}
+
+struct Whole(usize);
+
+impl<'de> Deserialize<'de> for Whole {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let expression = deserializer.deserialize_any(Scalars::Whole)?;
+        Ok(Self(expression.eval(&[0.0; 3]) as usize))
+    }
+}
+
+impl<'de> Deserialize<'de> for Expression {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<Scalar>::deserialize(deserializer)?;
+        let span = spanned.span();
+        Ok(spanned.into_inner().0.at(span))
+    }
+}
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<Constant>::deserialize(deserializer)?;
+        Ok(Self {
+            span: spanned.span(),
+            value: spanned.into_inner().0,
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Count {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<Whole>::deserialize(deserializer)?;
+        Ok(Self {
+            span: spanned.span(),
+            value: spanned.into_inner().0,
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Text {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<String>::deserialize(deserializer)?;
+        Ok(Self {
+            span: spanned.span(),
+            value: spanned.into_inner(),
+        })
+    }
+}
+
+/// One number or a list of them.
+struct List(Vec<f64>);
+
+impl<'de> Deserialize<'de> for List {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Lists;
+        impl<'de> Visitor<'de> for Lists {
+            type Value = Vec<f64>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("coordinates such as [0.1, 0.2]")
+            }
+
+            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Vec<f64>, E> {
+                Ok(vec![v as f64])
+            }
+
+            fn visit_f64<E: de::Error>(self, v: f64) -> Result<Vec<f64>, E> {
+                if v.is_finite() {
+                    Ok(vec![v])
+                } else {
+                    Err(E::custom(format!("{v} is not a finite number")))
+                }
+            }
+
+            fn visit_str<E: de::Error>(self, v: &str) -> Result<Vec<f64>, E> {
+                let constant = Scalars::Constant.visit_str::<E>(v)?;
+                Ok(vec![constant.eval(&[0.0; 3])])
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Vec<f64>, A::Error> {
+                let mut values = Vec::new();
+                while let Some(v) = seq.next_element::<Constant>()? {
+                    values.push(v.0);
+                }
+                Ok(values)
+            }
+        }
+        deserializer.deserialize_any(Lists).map(List)
+    }
+}
+
+impl<'de> Deserialize<'de> for Coordinates {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<List>::deserialize(deserializer)?;
+        Ok(Self {
+            span: spanned.span(),
+            values: spanned.into_inner().0,
+        })
+    }
+}
+
+macro_rules! schema {
+    ($type:ty, $name:literal, $($json:tt)+) => {
+        impl JsonSchema for $type {
+            fn schema_name() -> Cow<'static, str> {
+                $name.into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!($($json)+)
+            }
+        }
+    };
+}
+
+schema!(Number, "Number", {
+    "description": "A number, or a constant expression in quotes such as \"1/120\".",
+    "type": ["number", "string"]
+});
+schema!(Count, "Count", {
+    "description": "A whole number, or a constant expression in quotes.",
+    "type": ["integer", "string"],
+    "minimum": 0
+});
+schema!(Expression, "Expression", {
+    "description": "A number, or an expression in x, y, z in quotes such as \"1e-3 * x^2\".",
+    "type": ["number", "string"]
+});
+schema!(Coordinates, "Coordinates", {
+    "description": "One coordinate per dimension, such as [0.1, 0.2]; in one dimension also a plain number.",
+    "type": ["array", "number", "string"],
+    "items": { "type": ["number", "string"] }
+});
+
+impl JsonSchema for Text {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Text".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string" })
+    }
+}
