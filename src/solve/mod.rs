@@ -3,6 +3,7 @@
 
 pub mod direct;
 mod front;
+mod multifrontal;
 pub mod ordering;
 mod singular;
 pub mod statics;

@@ -293,11 +293,9 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
         }
     }
     let (mut post, mut stack) = (Vec::with_capacity(n), Vec::new());
-    for root in 0..n {
-        if parent[root] != NONE {
-            continue;
-        }
-        stack.push(root as u32);
+    let roots = (0..n as u32).filter(|&j| parent[j as usize] == NONE);
+    for root in roots {
+        stack.push(root);
         while let Some(&j) = stack.last() {
             match head[j as usize] {
                 NONE => {
