@@ -1,10 +1,10 @@
 //! A progress bar with the name of the stage and the time left, on standard error if that is a terminal.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
 use std::sync::{PoisonError, RwLock};
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::progress::Progress;
 
@@ -50,13 +50,41 @@ impl TerminalProgress {
         }
     }
 
-    fn replace(&self, next: Option<ProgressBar>) {
-        // a bar that a panicking thread left behind can still be finished
+    /// Puts a plain line in place of the current bar, then begins the next; in the other order the two would overwrite
+    /// each other.
+    fn replace(&self, next: impl FnOnce() -> Option<ProgressBar>) {
+        // a bar that a panicking thread left behind can still be ended
         let mut bar = self.bar.write().unwrap_or_else(PoisonError::into_inner);
-        if let Some(old) = std::mem::replace(&mut *bar, next) {
-            old.finish();
+        if let Some(old) = bar.take() {
+            // clearing moves the bar to its end, so the record is taken before
+            let line = record(&old);
+            old.finish_and_clear();
+            self.write_line(&line);
+        }
+        *bar = next();
+    }
+
+    fn write_line(&self, line: &str) {
+        match &self.target {
+            // a terminal that has gone away is no reason to stop the computation
+            Target::StandardError => drop(writeln!(std::io::stderr(), "{line}")),
+            Target::Nowhere => {}
+            #[cfg(test)]
+            Target::Memory(screen) => screen.put(line),
         }
     }
+}
+
+/// What stays of a stage: its name, its seconds, and its share where it stopped short.
+fn record(bar: &ProgressBar) -> String {
+    let seconds = bar.elapsed().as_secs_f64();
+    let done = match bar.length() {
+        Some(total) if bar.position() < total => {
+            format!("  ({} of {total} steps)", bar.position())
+        }
+        _ => String::new(),
+    };
+    format!("{:<24} {seconds:8.2} s{done}", bar.prefix())
 }
 
 /// The style of a stage; the templates are fixed, so they always parse.
@@ -80,19 +108,18 @@ fn style(total: Option<u64>) -> ProgressStyle {
 
 impl Progress for TerminalProgress {
     fn stage(&self, name: &str, total: Option<u64>) {
-        let next = self.draw_target().map(|target| {
+        self.replace(|| {
+            let target = self.draw_target()?;
             let bar = ProgressBar::with_draw_target(total, target)
                 .with_style(style(total))
-                .with_prefix(name.to_owned())
-                .with_finish(ProgressFinish::AndLeave);
+                .with_prefix(name.to_owned());
             bar.tick();
             if matches!(self.target, Target::StandardError) {
                 // a long step still shows that time passes
                 bar.enable_steady_tick(Duration::from_millis(200));
             }
-            bar
+            Some(bar)
         });
-        self.replace(next);
     }
 
     fn advance(&self, by: u64) {
@@ -103,13 +130,13 @@ impl Progress for TerminalProgress {
     }
 
     fn finish(&self) {
-        self.replace(None);
+        self.replace(|| None);
     }
 }
 
 impl Drop for TerminalProgress {
     fn drop(&mut self) {
-        self.replace(None);
+        self.replace(|| None);
     }
 }
 
@@ -127,9 +154,8 @@ mod tests {
             self.0.lock().unwrap().clone()
         }
 
-        fn put(&self, text: &str) -> std::io::Result<()> {
+        pub(super) fn put(&self, text: &str) {
             self.0.lock().unwrap().push_str(text);
-            Ok(())
         }
     }
 
@@ -150,14 +176,17 @@ mod tests {
             Ok(())
         }
         fn write_line(&self, text: &str) -> std::io::Result<()> {
-            self.put(text)?;
-            self.put("\n")
+            self.put(text);
+            self.put("\n");
+            Ok(())
         }
         fn write_str(&self, text: &str) -> std::io::Result<()> {
-            self.put(text)
+            self.put(text);
+            Ok(())
         }
         fn clear_line(&self) -> std::io::Result<()> {
-            self.put("\r")
+            self.put("\r");
+            Ok(())
         }
         fn flush(&self) -> std::io::Result<()> {
             Ok(())
@@ -180,7 +209,10 @@ mod tests {
         let text = screen.text();
         let half = text.split("factorise").next().unwrap();
         assert!(half.contains("neighbours"), "{text}");
-        assert!(half.contains(" 50 %") || half.contains("100 %"), "{text}");
+        assert!(
+            half.contains("left") && half.contains("(4 of 8 steps)"),
+            "{text}"
+        );
         assert!(
             text.contains("factorise") && text.contains("gone"),
             "{text}"

@@ -488,6 +488,19 @@ mod tests {
     }
 
     #[test]
+    fn plane_vectors_and_tensors_are_filled_up_by_rows() {
+        let v = Field::vector(
+            "u",
+            &[Vector::<2>::new(1.0, 2.0), Vector::<2>::new(3.0, 4.0)],
+        );
+        let vector = vec![1.0, 2.0, 0.0, 3.0, 4.0, 0.0];
+        assert_eq!((v.components, v.values), (3, Values::Real(vector)));
+        let t = Field::tensor("s", &[Tensor::<2>::new(1.0, 2.0, 3.0, 4.0)]);
+        let rows = vec![1.0, 2.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!((t.components, t.values), (9, Values::Real(rows)));
+    }
+
+    #[test]
     fn zlib_is_smaller() {
         let folder = tempfile::tempdir().unwrap();
         let size = |compression| {
