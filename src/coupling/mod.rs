@@ -1,1 +1,128 @@
-//! coupling
+//! Couplings of a finite-element region to a peridynamic region, behind one seam.
+//!
+//! | file | method | source |
+//! |---|---|---|
+//! | `single.rs` | pure FE, pure PD: ordinary values of the same switch | |
+//! | `splice.rs` | each site takes the equation of its own model | [SAND2015-7998] eq. (2.30) |
+//! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
+//! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
+//! | `model.rs`, `points.rs` | shared: sites, PD points, families, what completes them | |
+//! | `row.rs`, `derivative.rs`, `edge.rs` | shared: places through sites, least squares, distances | |
+//!
+//! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
+//! every affine field, whatever its neighbours' rows are, makes the patch test pass; so all that a seam must provide is (a) complete families and complete patches of
+//! cells around every site and (b) places outside a site's own region whose displacement is interpolated exactly for affine fields.
+//! A method is one file with a [`Coupling`], one line here and its entry in the scene.
+
+pub mod blending;
+pub mod derivative;
+pub mod edge;
+pub mod model;
+pub mod partial_stress;
+pub mod points;
+pub mod row;
+pub mod single;
+pub mod splice;
+
+pub use blending::{Blending, BlendingFunction};
+pub use derivative::FitDegree;
+pub use model::{Model, ModelError, Peridynamics, PointSource, Problem, Site, SiteKind};
+pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
+pub use single::{Local, Nonlocal};
+pub use splice::Splice;
+
+use crate::{coupling::row::Row, mesh::Mesh, peridynamics::BondLaw, system::Symmetry};
+
+/// The model that a scene asks for in a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Zone {
+    /// Classical elasticity by finite elements, `B_0`.
+    Local,
+    /// Between the two: blending region `B_b` or partial-stress region `B_ps`.
+    Transition,
+    /// Peridynamics, `B_pd`.
+    Nonlocal,
+}
+
+/// What a coupling makes of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CellRole {
+    /// A finite element with the local law.
+    Element,
+    /// A finite element whose stress is the partial stress at its Gauss points.
+    StressElement,
+    /// Filled with peridynamic points.
+    Points,
+}
+
+/// How far families have to be complete around the sites that are peridynamic points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// Their own families.
+    Own,
+    /// The families of their neighbours too: force states or stresses of the neighbours enter the row.
+    Neighbours,
+}
+
+/// Which nodes of finite elements at the seam are sites, and which follow the sites around them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// Nodes of the seam are sites; the elements overlap into the peridynamic zone by one cell, whose far nodes follow the PD points around them.
+    Overlap,
+    /// Nodes of the seam follow a least-squares fit to the sites within a horizon, [SAND2015-7998] section 7.3.
+    Constrained(FitDegree),
+}
+
+/// A method that couples both regions.
+pub trait Coupling<const D: usize>: Send + Sync {
+    /// Its usual name.
+    fn name(&self) -> &'static str;
+
+    /// Whether the stiffness is symmetric.
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Unsymmetric
+    }
+
+    /// What becomes of each cell, given the zones that the scene asks for.
+    fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole>;
+
+    /// How far families have to be complete.
+    fn reach(&self, law: &dyn BondLaw<D>) -> Reach {
+        if law.is_pairwise() {
+            Reach::Own
+        } else {
+            Reach::Neighbours
+        }
+    }
+
+    /// The treatment of nodes at the seam.
+    fn interface(&self) -> Interface {
+        Interface::Overlap
+    }
+
+    /// Prepares what the rows need.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the method cannot be applied to this model, with the remedy.
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
+}
+
+/// The rows of a coupled model.
+pub trait Operator<const D: usize>: Sync {
+    /// Adds the internal force of a site, times −1 (`K u = f`).
+    fn add_row(&self, site: usize, row: &mut Row<D>);
+
+    /// The blending function β of a site: 1 where it is peridynamic, 0 where it is local.
+    fn beta(&self, site: usize) -> f64;
+
+    /// Number of directed bonds that the method adds to those of the peridynamic body (Gauss points).
+    fn additional_bonds(&self) -> usize {
+        0
+    }
+
+    /// The mean partial stress of a cell whose stress is the partial stress at its Gauss points.
+    fn cell_stress(&self, _cell: usize, _u: &[f64]) -> Option<crate::tensor::Tensor<D>> {
+        None
+    }
+}

@@ -1,1 +1,2 @@
 //! verify
+pub mod patch;

@@ -1,0 +1,252 @@
+//! Force-based blending of peridynamics and classical elasticity.
+
+use rayon::prelude::*;
+
+use crate::{
+    coupling::{
+        CellRole, Coupling, Model, ModelError, Operator, Zone,
+        derivative::{self, DerivativeWeights},
+        edge::Edge,
+        row::Row,
+    },
+    mesh::Mesh,
+    peridynamics::PdBody,
+    tensor::{Tensor, Vector},
+};
+
+/// The blending function `β̂` of the blending region, from 0 at its local side to 1 at its peridynamic side.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlendingFunction {
+    /// `β̂ = ½`, as in [SAND2015-7998] section 3.4.
+    Constant,
+    /// Linear in the distance across the region.
+    Linear,
+    /// The cubic `3 s² − 2 s³` of the relative distance `s`: flat at both sides.
+    Smooth,
+}
+
+impl BlendingFunction {
+    /// `β̂` at the relative distance `s` from the local side.
+    pub fn value(self, s: f64) -> f64 {
+        match self {
+            Self::Constant => 0.5,
+            Self::Linear => s,
+            Self::Smooth => s * s * (3.0 - 2.0 * s),
+        }
+    }
+}
+
+/// Force-based blending, [SAND2015-7998] eq. (3.9)–(3.14), and the same idea carried to state-based laws.
+///
+/// The transition zone of the scene is the blending region `B_b`. Points fill it and a collar of one horizon around it, since a bond is weighted by
+/// `w = (β(x) + β(x′))/2`, which is not 0 there. What the weights `w` take from the force state is given back through the Taylor expansion of the
+/// force state at the point itself: first and second derivatives by compact least squares on the points around it.
+///
+/// For a state-based law `T⟨ξ⟩ = p ξ(ξ·η) + ω (𝓜:Ḡ) ξ` the expansion takes `Ḡ ≈ ∇u K` and, at the other end of the bond, `Ḡ′ ≈ (∇u + ξ·∇∇u) K`.
+#[derive(Clone, Copy, Debug)]
+pub struct Blending {
+    /// β in the blending region.
+    pub function: BlendingFunction,
+}
+
+impl<const D: usize> Coupling<D> for Blending {
+    fn name(&self) -> &'static str {
+        "blending"
+    }
+
+    fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {
+        let mut roles: Vec<CellRole> = zones
+            .iter()
+            .map(|zone| match zone {
+                Zone::Local => CellRole::Element,
+                Zone::Transition | Zone::Nonlocal => CellRole::Points,
+            })
+            .collect();
+        // the collar: local cells within a horizon of the region where β > 0
+        let edge = Edge::of(mesh, |c| zones[c] != Zone::Local);
+        for c in 0..mesh.cell_count() {
+            if zones[c] == Zone::Local {
+                let near = mesh
+                    .cell(c)
+                    .iter()
+                    .any(|&n| edge.within(&mesh.nodes[n as usize], largest_horizon * (1.0 - 1e-9)));
+                if near {
+                    roles[c] = CellRole::Points;
+                }
+            }
+        }
+        roles
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        let Some(body) = model.body() else {
+            return Ok(Box::new(super::single::OwnModel { model }));
+        };
+        let horizon = body.cloud.horizon.first().copied().unwrap_or(0.0);
+        if body
+            .cloud
+            .horizon
+            .iter()
+            .any(|&d| (d - horizon).abs() > 1e-9 * horizon)
+        {
+            return Err(ModelError::Unsupported {
+                what: "force-based blending with a horizon that varies",
+                remedy: "give one horizon, or use splice or partial-stress",
+            });
+        }
+        let beta = self.at_points(model, body);
+        let derivatives = (0..body.cloud.position.len())
+            .into_par_iter()
+            .map(|i| {
+                let family = body.families.of(i);
+                if family.iter().all(|&j| beta[i] + beta[j as usize] == 2.0) {
+                    return Ok(None);
+                }
+                let neighbours: Vec<(u32, Vector<D>)> = family
+                    .iter()
+                    .map(|&j| (j, body.bond(i, j as usize)))
+                    .collect();
+                match derivative::quadratic(model.spacing(), &neighbours) {
+                    Some(weights) => Ok(Some(weights)),
+                    None => Err(ModelError::Derivative {
+                        position: body.cloud.position[i].iter().copied().collect(),
+                        bonds: family.len(),
+                    }),
+                }
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Box::new(Blended {
+            model,
+            body,
+            beta,
+            derivatives,
+        }))
+    }
+}
+
+impl Blending {
+    /// β at every point of the cloud.
+    fn at_points<const D: usize>(&self, model: &Model<D>, body: &PdBody<D>) -> Vec<f64> {
+        let (mesh, zones) = (&model.mesh, &model.zones);
+        let outer = Edge::of(mesh, |c| zones[c] == Zone::Local);
+        let inner = Edge::of(mesh, |c| zones[c] == Zone::Nonlocal);
+        (0..body.cloud.position.len())
+            .map(|p| match model.zone_of_point(p) {
+                Zone::Local => 0.0,
+                Zone::Nonlocal => 1.0,
+                Zone::Transition => {
+                    let x = &body.cloud.position[p];
+                    let (to_local, to_nonlocal) = (outer.distance(x), inner.distance(x));
+                    let s = match (to_local.is_finite(), to_nonlocal.is_finite()) {
+                        (true, true) => to_local / (to_local + to_nonlocal),
+                        (true, false) => 0.0,
+                        _ => 1.0,
+                    };
+                    self.function.value(s)
+                }
+            })
+            .collect()
+    }
+}
+
+struct Blended<'a, const D: usize> {
+    model: &'a Model<D>,
+    body: &'a PdBody<D>,
+    beta: Vec<f64>,
+    /// For each point some of whose bonds are weighted.
+    derivatives: Vec<Option<DerivativeWeights<D>>>,
+}
+
+impl<const D: usize> Operator<D> for Blended<'_, D> {
+    fn add_row(&self, site: usize, row: &mut Row<D>) {
+        let Some((_, i)) = self.model.point_of(site) else {
+            self.model.add_element_rows(site, row);
+            return;
+        };
+        let beta = &self.beta;
+        let weight = |j: usize| 0.5 * (beta[i] + beta[j]);
+        self.body.add_force_row(i, weight, row);
+        if let Some(derivatives) = &self.derivatives[i] {
+            self.add_remainder(i, &weight, derivatives, row);
+        }
+    }
+
+    fn beta(&self, site: usize) -> f64 {
+        self.model.point_of(site).map_or(0.0, |(_, i)| self.beta[i])
+    }
+}
+
+impl<const D: usize> Blended<'_, D> {
+    /// Adds what the weights took away, expanded at the point: the second and third terms of [SAND2015-7998] eq. (3.14).
+    fn add_remainder(
+        &self,
+        i: usize,
+        weight: &dyn Fn(usize) -> f64,
+        at: &DerivativeWeights<D>,
+        row: &mut Row<D>,
+    ) {
+        let body = self.body;
+        let (pair, omega) = body.kernel(i);
+        let state = body.state(i);
+        // moments of the remainder: force_c = first[b]_ce ∂_b u_e + second[b][d]_ce ∂_b ∂_d u_e
+        let mut first = [Tensor::<D>::zeros(); D];
+        let mut second = [[Tensor::<D>::zeros(); D]; D];
+        let family = body.families.of(i);
+        for (k, &j) in family.iter().enumerate() {
+            let j = j as usize;
+            let xi = body.bond(i, j);
+            let rest = (1.0 - weight(j)) * body.cloud.volume[j];
+            if rest == 0.0 {
+                continue;
+            }
+            let mut block = xi * xi.transpose() * (2.0 * rest * pair[k]);
+            if let Some(state) = state {
+                block += Tensor::identity() * (2.0 * state.stabilisation * omega[k] * rest);
+                // (𝓜 : (G K)) ξ from both ends, and the change of G along the bond from the far end
+                for b in 0..D {
+                    let mut column = Tensor::<D>::zeros();
+                    for a in 0..D {
+                        for g in 0..D {
+                            for c in 0..D {
+                                for e in 0..D {
+                                    column[(c, e)] += state.modulus.get(c, a, e, g)
+                                        * state.shape[(b, g)]
+                                        * xi[a]
+                                        * omega[k]
+                                        * rest;
+                                }
+                            }
+                        }
+                    }
+                    first[b] += column * 2.0;
+                    for d in 0..D {
+                        second[b][d] += column * xi[d];
+                    }
+                }
+            }
+            for b in 0..D {
+                first[b] += block * xi[b];
+                for d in 0..D {
+                    second[b][d] += block * (0.5 * xi[b] * xi[d]);
+                }
+            }
+        }
+        let mut own = Tensor::zeros();
+        for (n, &j) in at.neighbours.iter().enumerate() {
+            let mut block = Tensor::zeros();
+            for b in 0..D {
+                block -= first[b] * at.gradient[n][b];
+                for d in 0..D {
+                    block -= second[b][d] * at.hessian[n][(b, d)];
+                }
+            }
+            block *= body.cloud.volume[i];
+            own -= block;
+            row.add(&body.cloud.transfer, j as usize, &block);
+        }
+        row.add(&body.cloud.transfer, i, &own);
+    }
+}

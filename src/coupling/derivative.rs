@@ -1,0 +1,141 @@
+//! First and second derivatives at a point of a cloud, by weighted least squares on its nearest neighbours.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::tensor::{Tensor, Vector};
+
+/// Weights of the derivatives of a field at a point: `∂_b u ≈ Σ_n gradient[n][b] (u_n − u_0)`, likewise the Hessian.
+///
+/// Exact for quadratic fields.
+pub struct DerivativeWeights<const D: usize> {
+    /// The neighbours used, as given.
+    pub neighbours: Vec<u32>,
+    /// Weights of the gradient, one vector per neighbour \[1/m\].
+    pub gradient: Vec<Vector<D>>,
+    /// Weights of the Hessian, one symmetric tensor per neighbour \[1/m²\].
+    pub hessian: Vec<Tensor<D>>,
+}
+
+/// Number of monomials of degree 1 and 2 in `D` variables.
+const fn monomials(d: usize) -> usize {
+    d + d * (d + 1) / 2
+}
+
+/// Derivatives from the nearest neighbours; the ring grows until a quadratic is determined.
+///
+/// `neighbours` gives bond vectors and names. The nearest ring on a lattice is its `3^D − 1` neighbours; their weights fall off as `|ξ|⁻⁸`, so that the stencil
+/// is close to the standard compact differences, which have no short-wave mechanism.
+///
+/// Returns `None` where no ring determines a quadratic (collinear points).
+pub fn quadratic<const D: usize>(
+    spacing: f64,
+    neighbours: &[(u32, Vector<D>)],
+) -> Option<DerivativeWeights<D>> {
+    let columns = monomials(D);
+    for ring in [1.01 * (D as f64).sqrt(), 2.3, 3.3, 4.5] {
+        let near: Vec<_> = neighbours
+            .iter()
+            .filter(|(_, xi)| xi.norm() <= ring * spacing)
+            .collect();
+        if near.len() < columns {
+            continue;
+        }
+        let mut a = DMatrix::zeros(near.len(), columns);
+        let mut w = DVector::zeros(near.len());
+        for (r, (_, xi)) in near.iter().enumerate() {
+            let x = xi / spacing;
+            w[r] = x.norm_squared().powi(-2);
+            for (c, value) in monomial_row(&x).into_iter().enumerate() {
+                a[(r, c)] = w[r] * value;
+            }
+        }
+        let svd = a.svd(true, true);
+        if svd.singular_values.min() < 1e-8 * svd.singular_values.max() {
+            continue;
+        }
+        let inverse = svd.pseudo_inverse(0.0).ok()?;
+        let mut result = DerivativeWeights {
+            neighbours: Vec::new(),
+            gradient: Vec::new(),
+            hessian: Vec::new(),
+        };
+        for (r, (name, _)) in near.iter().enumerate() {
+            let coefficient = |c: usize| inverse[(c, r)] * w[r];
+            result.neighbours.push(*name);
+            result
+                .gradient
+                .push(Vector::from_fn(|b, _| coefficient(b) / spacing));
+            let mut hessian = Tensor::zeros();
+            let mut c = D;
+            for b in 0..D {
+                for d in b..D {
+                    hessian[(b, d)] = coefficient(c) / (spacing * spacing);
+                    hessian[(d, b)] = hessian[(b, d)];
+                    c += 1;
+                }
+            }
+            result.hessian.push(hessian);
+        }
+        return Some(result);
+    }
+    None
+}
+
+/// `x_b`, then `x_b x_d` (halved on the diagonal) for `b ≤ d`: the Taylor monomials.
+fn monomial_row<const D: usize>(x: &Vector<D>) -> Vec<f64> {
+    let mut row: Vec<f64> = x.iter().copied().collect();
+    for b in 0..D {
+        for d in b..D {
+            row.push(if b == d { 0.5 } else { 1.0 } * x[b] * x[d]);
+        }
+    }
+    row
+}
+
+/// Weights of a moving least-squares fit of degree 1 (`affine`) or 2 at `x`, over data at `data`; they reproduce polynomials of that degree.
+///
+/// Source: the constraint of [SAND2015-7998] section 7.3 (there quadratic). The weight of a datum at distance `r` is `(1 − (r/R)²)²`, `R` just beyond the farthest datum.
+/// Returns `None` if the data do not determine the polynomial.
+pub fn fit<const D: usize>(
+    x: &Vector<D>,
+    data: &[Vector<D>],
+    degree: FitDegree,
+) -> Option<Vec<f64>> {
+    let columns = match degree {
+        FitDegree::Affine => 1 + D,
+        FitDegree::Quadratic => 1 + monomials(D),
+    };
+    if data.len() < columns {
+        return None;
+    }
+    let radius = data.iter().map(|p| (p - x).norm()).fold(0.0, f64::max) * 1.1;
+    let mut a = DMatrix::zeros(data.len(), columns);
+    let mut w = Vec::with_capacity(data.len());
+    for (r, p) in data.iter().enumerate() {
+        let d = (p - x) / radius;
+        let weight = 1.0 - d.norm_squared();
+        w.push(weight);
+        a[(r, 0)] = weight;
+        for (c, value) in monomial_row(&d).into_iter().take(columns - 1).enumerate() {
+            a[(r, c + 1)] = weight * value;
+        }
+    }
+    let svd = a.svd(true, true);
+    if svd.singular_values.min() < 1e-7 * svd.singular_values.max() {
+        return None;
+    }
+    let inverse = svd.pseudo_inverse(0.0).ok()?;
+    Some((0..data.len()).map(|r| inverse[(0, r)] * w[r]).collect())
+}
+
+/// Degree of a least-squares fit.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitDegree {
+    /// Reproduces affine fields.
+    Affine,
+    /// Reproduces quadratic fields, as in the report.
+    Quadratic,
+}

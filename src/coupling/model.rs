@@ -1,0 +1,650 @@
+//! What all couplings share: sites, peridynamic points, their families, and the places at the seam that follow sites.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use thiserror::Error;
+
+use crate::{
+    coupling::{
+        CellRole, Coupling, FitDegree, Interface, Reach, Zone, derivative,
+        points::{self, LatticeFactors, PointCloud},
+        row::{self, Row, Transfer},
+    },
+    fem,
+    mesh::{CellShape, Mesh},
+    peridynamics::{
+        BondLaw, BondWeights, Cloud, Ends, Factors, Families, PdBody, PointError, TIE_TOLERANCE,
+    },
+    progress::Progress,
+    shape::Barrier,
+    system::{BlockCsr, Symmetry},
+    tensor::{Tensor, Tensor4, Vector},
+};
+
+/// A scalar field of position.
+pub type ScalarField<const D: usize> = Arc<dyn Fn(&Vector<D>) -> f64 + Send + Sync>;
+
+/// Where peridynamic points come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PointSource<const D: usize> {
+    /// One point per cell, at its centroid, with its volume.
+    Cells,
+    /// The points of a lattice that lie in the zone; the volume of each is what its cell of the lattice shares with the body.
+    Lattice {
+        /// Distance h of neighbouring points \[m\].
+        spacing: f64,
+        /// Any point of the lattice.
+        origin: Vector<D>,
+    },
+}
+
+/// The peridynamic part of a problem.
+pub struct Peridynamics<const D: usize> {
+    /// The law.
+    pub law: Box<dyn BondLaw<D>>,
+    /// Horizon δ as a field \[m\].
+    pub horizon: ScalarField<D>,
+    /// Where the points come from.
+    pub points: PointSource<D>,
+    /// How bonds are weighted.
+    pub weights: BondWeights,
+    /// Voids and cracks that cut bonds.
+    pub barriers: Vec<Barrier<D>>,
+    /// Shapes whose interior holds no points although the mesh may cover it.
+    pub voids: Vec<crate::shape::Shape<D>>,
+    /// Whether bonds that leave the mesh are cut (holes of a mesh that no barrier describes).
+    pub surfaces: Surfaces,
+}
+
+/// What becomes of bonds that cross the boundary of the mesh.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Surfaces {
+    /// They are cut.
+    Cut,
+    /// They are kept.
+    Uncut,
+}
+
+/// Everything that makes a coupled model, before it is assembled.
+pub struct Problem<const D: usize> {
+    /// The mesh of the whole part.
+    pub mesh: Mesh<D>,
+    /// The zone of each cell.
+    pub zones: Vec<Zone>,
+    /// Local elastic tensors \[Pa\], one per material.
+    pub tensors: Vec<Tensor4<D>>,
+    /// The material of each cell, an index into `tensors`.
+    pub cell_material: Vec<u16>,
+    /// The material that peridynamic points have, an index into `tensors`.
+    pub peridynamic_material: u16,
+    /// The peridynamic part; none in a purely local problem.
+    pub peridynamics: Option<Peridynamics<D>>,
+    /// The method.
+    pub coupling: Box<dyn Coupling<D>>,
+}
+
+/// What keeps degrees of freedom at a site.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SiteKind {
+    /// A node of finite elements, by its number in the mesh.
+    Node(u32),
+    /// A peridynamic point, by its number in the cloud.
+    Point(u32),
+}
+
+/// A place where a body keeps degrees of freedom.
+#[derive(Clone, Copy, Debug)]
+pub struct Site<const D: usize> {
+    /// Reference position \[m\].
+    pub position: Vector<D>,
+    /// Node or point.
+    pub kind: SiteKind,
+    /// Volume that the site stands for \[m^D\]: the point's, or the integral of the node's shape function.
+    pub volume: f64,
+}
+
+/// Why a model cannot be built.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// A zone has no cell.
+    #[error(
+        "the {zone} zone is empty: no cell of the mesh has its centroid in it; enlarge the zone, refine the mesh there, or choose coupling.local"
+    )]
+    EmptyZone {
+        /// Which zone.
+        zone: &'static str,
+    },
+    /// A zone holds no peridynamic point.
+    #[error(
+        "the nonlocal zone holds no peridynamic point: its smallest extent is below the spacing {spacing}; enlarge the zone or refine the lattice"
+    )]
+    NoPoints {
+        /// Spacing of the lattice \[m\].
+        spacing: f64,
+    },
+    /// The horizon is too small or not a number.
+    #[error("the horizon is {horizon} at ({}): it must be finite and at least the spacing of the points, {spacing}, or no point has a neighbour", join(.position))]
+    Horizon {
+        /// Where.
+        position: Vec<f64>,
+        /// Its value \[m\].
+        horizon: f64,
+        /// Spacing of the points \[m\].
+        spacing: f64,
+    },
+    /// A family cannot carry the law.
+    #[error("{what} at ({}) has a family of {bonds} bonds that cannot carry the material: {source}", join(.position))]
+    Family {
+        /// Point or Gauss point.
+        what: &'static str,
+        /// Where.
+        position: Vec<f64>,
+        /// Number of intact bonds.
+        bonds: usize,
+        /// Why.
+        #[source]
+        source: crate::peridynamics::PdError,
+    },
+    /// A node at the seam cannot be fitted.
+    #[error("node {node} at ({}) lies at the seam, but the {found} sites around it do not determine an affine fit: make the peridynamic zone at least three points thick there", join(.position))]
+    Fit {
+        /// Number of the node.
+        node: u32,
+        /// Where.
+        position: Vec<f64>,
+        /// Number of sites found.
+        found: usize,
+    },
+    /// Derivatives cannot be taken at a point of the blending region.
+    #[error("the point at ({}) lies where the models are blended, but its {bonds} bonds do not determine a quadratic field: widen the horizon or the body there", join(.position))]
+    Derivative {
+        /// Where.
+        position: Vec<f64>,
+        /// Number of intact bonds.
+        bonds: usize,
+    },
+    /// The points do not make families.
+    #[error(transparent)]
+    Families(#[from] crate::peridynamics::FamilyError),
+    /// Weights of the lattice's shells cannot be made isotropic.
+    #[error(transparent)]
+    Shells(#[from] crate::peridynamics::ShellError),
+    /// A combination that is not offered.
+    #[error("{what} is not offered: {remedy}")]
+    Unsupported {
+        /// What was asked for.
+        what: &'static str,
+        /// What to do instead.
+        remedy: &'static str,
+    },
+}
+
+fn join(position: &[f64]) -> String {
+    position
+        .iter()
+        .map(|x| format!("{x}"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+impl ModelError {
+    fn family<const D: usize>(what: &'static str, e: PointError<D>) -> Self {
+        Self::Family {
+            what,
+            position: e.position.iter().copied().collect(),
+            bonds: e.bonds,
+            source: e.source,
+        }
+    }
+
+    /// The error of a family of a Gauss point.
+    pub fn gauss_point<const D: usize>(e: PointError<D>) -> Self {
+        Self::family("the Gauss point", e)
+    }
+}
+
+const NONE: u32 = u32::MAX;
+
+/// A problem with its sites and families; a coupling turns it into rows.
+pub struct Model<const D: usize> {
+    /// The mesh of the whole part.
+    pub mesh: Mesh<D>,
+    /// The zone of each cell.
+    pub zones: Vec<Zone>,
+    /// What the coupling makes of each cell.
+    pub roles: Vec<CellRole>,
+    /// Sites: nodes first, then points.
+    pub sites: Vec<Site<D>>,
+    /// Every node through sites; no weights for a node that no equation uses.
+    pub node_transfer: Transfer,
+    /// The peridynamic part of the problem.
+    pub peridynamics: Option<Peridynamics<D>>,
+    tensors: Vec<Tensor4<D>>,
+    cell_material: Vec<u16>,
+    body: Option<PdBody<D>>,
+    point_zone: Vec<Zone>,
+    node_cells: (Vec<u32>, Vec<u32>),
+    spacing: f64,
+    volumes: points::Volumes,
+}
+
+impl<const D: usize> Model<D> {
+    /// Lays out sites and families.
+    ///
+    /// # Errors
+    /// [`ModelError`], each with place and remedy.
+    pub fn new(
+        problem: Problem<D>,
+        progress: &dyn Progress,
+    ) -> Result<(Self, Box<dyn Coupling<D>>), ModelError> {
+        let Problem {
+            mesh,
+            zones,
+            tensors,
+            cell_material,
+            peridynamic_material,
+            peridynamics,
+            coupling,
+        } = problem;
+        let largest = peridynamics.as_ref().map_or(0.0, |p| {
+            (0..mesh.cell_count())
+                .map(|c| (p.horizon)(&mesh.centroid(c)))
+                .fold(0.0, f64::max)
+        });
+        let roles = coupling.roles(&mesh, &zones, largest);
+        let node_cells = mesh.node_cells();
+        let mut model = Self {
+            node_transfer: Transfer::new(),
+            mesh,
+            zones,
+            roles,
+            sites: Vec::new(),
+            peridynamics,
+            tensors,
+            cell_material,
+            body: None,
+            point_zone: Vec::new(),
+            node_cells,
+            spacing: 0.0,
+            volumes: points::Volumes::default(),
+        };
+        let has_points = model.roles.contains(&CellRole::Points);
+        if has_points && model.peridynamics.is_none() {
+            return Err(ModelError::Unsupported {
+                what: "a peridynamic zone without a peridynamic material",
+                remedy: "add [peridynamics], or use coupling.local",
+            });
+        }
+        progress.stage("sites", None);
+        let cloud = match &model.peridynamics {
+            Some(p) if has_points => Some(points::place(
+                &model.mesh,
+                &model.zones,
+                &model.roles,
+                p,
+                coupling.reach(p.law.as_ref()),
+            )?),
+            _ => None,
+        };
+        let node_site = model.place_nodes(coupling.interface());
+        if let Some(cloud) = cloud {
+            model.place_points(
+                cloud,
+                &node_site,
+                coupling.as_ref(),
+                peridynamic_material,
+                progress,
+            )?;
+        } else {
+            model.node_transfer = Transfer::from_rows(
+                node_site
+                    .iter()
+                    .map(|&s| if s == NONE { vec![] } else { vec![(s, 1.0)] }),
+            );
+        }
+        Ok((model, coupling))
+    }
+
+    /// Makes sites of the nodes of finite elements; returns the site of each node.
+    fn place_nodes(&mut self, interface: Interface) -> Vec<u32> {
+        let mut element = vec![false; self.mesh.nodes.len()];
+        let mut points = vec![false; self.mesh.nodes.len()];
+        for c in 0..self.mesh.cell_count() {
+            let flags = if self.roles[c] == CellRole::Points {
+                &mut points
+            } else {
+                &mut element
+            };
+            for &n in self.mesh.cell(c) {
+                flags[n as usize] = true;
+            }
+        }
+        let volumes = fem::nodal_volumes(&self.mesh, 0..self.mesh.cell_count());
+        let mut node_site = vec![NONE; self.mesh.nodes.len()];
+        for n in 0..self.mesh.nodes.len() {
+            let constrained = matches!(interface, Interface::Constrained(_)) && points[n];
+            if element[n] && !constrained {
+                node_site[n] = self.sites.len() as u32;
+                self.sites.push(Site {
+                    position: self.mesh.nodes[n],
+                    kind: SiteKind::Node(n as u32),
+                    volume: volumes[n],
+                });
+            }
+        }
+        node_site
+    }
+
+    /// Makes sites of points, completes families, and expresses every other place through sites.
+    fn place_points(
+        &mut self,
+        cloud: PointCloud<D>,
+        node_site: &[u32],
+        coupling: &dyn Coupling<D>,
+        peridynamic_material: u16,
+        progress: &dyn Progress,
+    ) -> Result<(), ModelError> {
+        let Some(p) = self.peridynamics.take() else {
+            return Ok(());
+        };
+        let result = self.place_points_of(
+            &p,
+            cloud,
+            node_site,
+            coupling,
+            peridynamic_material,
+            progress,
+        );
+        self.peridynamics = Some(p);
+        result
+    }
+
+    fn place_points_of(
+        &mut self,
+        p: &Peridynamics<D>,
+        mut cloud: PointCloud<D>,
+        node_site: &[u32],
+        coupling: &dyn Coupling<D>,
+        peridynamic_material: u16,
+        progress: &dyn Progress,
+    ) -> Result<(), ModelError> {
+        self.spacing = cloud.spacing;
+        self.volumes = cloud.volumes;
+        for (x, &horizon) in cloud.position.iter().zip(&cloud.horizon) {
+            if !(horizon.is_finite() && horizon >= cloud.spacing * (1.0 - 1e-9)) {
+                return Err(ModelError::Horizon {
+                    position: x.iter().copied().collect(),
+                    horizon,
+                    spacing: cloud.spacing,
+                });
+            }
+        }
+        if cloud.element.iter().all(Option::is_some) {
+            return Err(ModelError::NoPoints {
+                spacing: cloud.spacing,
+            });
+        }
+        progress.stage("families", None);
+        let constant = cloud
+            .horizon
+            .iter()
+            .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
+        let mut families = Families::search(&cloud.position, &cloud.horizon, TIE_TOLERANCE)?;
+        self.cut_bonds(&cloud.position, &mut families);
+        // which points need a family of their own, and which only complete those of others
+        let reach = match coupling.reach(p.law.as_ref()) {
+            Reach::Own if constant => Reach::Own,
+            _ => Reach::Neighbours,
+        };
+        let keep = cloud.prune(&families, reach);
+        let families = families.restrict(&keep.renumbered, &keep.active);
+        cloud.retain(&keep.renumbered);
+
+        let mut point_site = vec![NONE; cloud.position.len()];
+        for (i, element) in cloud.element.iter().enumerate() {
+            if element.is_none() {
+                point_site[i] = self.sites.len() as u32;
+                self.sites.push(Site {
+                    position: cloud.position[i],
+                    kind: SiteKind::Point(i as u32),
+                    volume: cloud.volume[i],
+                });
+            }
+        }
+        progress.stage("seam", None);
+        self.node_transfer = self.fit_nodes(node_site, coupling.interface(), &cloud)?;
+        let transfer = Transfer::from_rows((0..cloud.position.len()).map(|i| {
+            match &cloud.element[i] {
+                None => vec![(point_site[i], 1.0)],
+                Some((cell, shape)) => self
+                    .mesh
+                    .cell(*cell as usize)
+                    .iter()
+                    .zip(shape)
+                    .filter(|&(_, &s)| s != 0.0)
+                    .flat_map(|(&n, &s)| {
+                        self.node_transfer
+                            .row(n as usize)
+                            .map(move |(site, w)| (site, w * s))
+                            .collect::<Vec<_>>()
+                    })
+                    .collect(),
+            }
+        }));
+        progress.stage("bonds", None);
+        let lattice = LatticeFactors::new(p, &cloud)?;
+        let shells = |horizon: f64, xi: &Vector<D>| lattice.factor(horizon, xi);
+        let factors = match (p.weights, lattice.is_lattice()) {
+            (BondWeights::Isotropic, true) => Factors::Shells(&shells),
+            (BondWeights::Fitted, _) => Factors::Fitted,
+            _ => Factors::Plain,
+        };
+        let ends = if constant && p.weights != BondWeights::Fitted {
+            Ends::Alike
+        } else {
+            Ends::Differ
+        };
+        if p.weights == BondWeights::Plain
+            && let Some(tensor) = lattice.tensor(p, cloud.horizon[0])?
+        {
+            // the local side carries the stiffness of the peridynamic quadrature, or the seam would be a jump of material
+            self.tensors[peridynamic_material as usize] = tensor;
+        }
+        self.point_zone = cloud.zone;
+        let cloud = Cloud {
+            position: cloud.position,
+            volume: cloud.volume,
+            horizon: cloud.horizon,
+            transfer,
+        };
+        let body = PdBody::new(cloud, families, p.law.as_ref(), &factors, ends)
+            .map_err(|e| ModelError::family("the point", e))?;
+        self.body = Some(body);
+        Ok(())
+    }
+
+    /// Expresses nodes at the seam, that are no sites, through the sites around them.
+    fn fit_nodes(
+        &self,
+        node_site: &[u32],
+        interface: Interface,
+        cloud: &PointCloud<D>,
+    ) -> Result<Transfer, ModelError> {
+        let mut wanted = vec![false; self.mesh.nodes.len()];
+        for c in 0..self.mesh.cell_count() {
+            let cell = self.mesh.cell(c);
+            if self.roles[c] != CellRole::Points
+                || cell.iter().any(|&n| node_site[n as usize] != NONE)
+            {
+                for &n in cell {
+                    wanted[n as usize] |= node_site[n as usize] == NONE;
+                }
+            }
+        }
+        let (degree, with_nodes) = match interface {
+            Interface::Overlap => (FitDegree::Quadratic, false),
+            Interface::Constrained(degree) => (degree, true),
+        };
+        let largest = cloud.horizon.iter().copied().fold(0.0, f64::max);
+        let data: Vec<(u32, Vector<D>)> = (0..self.sites.len() as u32)
+            .map(|s| (s, self.sites[s as usize].position))
+            .filter(|&(s, _)| {
+                with_nodes || matches!(self.sites[s as usize].kind, SiteKind::Point(_))
+            })
+            .collect();
+        let positions: Vec<Vector<D>> = data.iter().map(|d| d.1).collect();
+        let rows = (0..self.mesh.nodes.len())
+            .into_par_iter()
+            .map(|n| {
+                if node_site[n] != NONE {
+                    return Ok(vec![(node_site[n], 1.0)]);
+                }
+                if !wanted[n] {
+                    return Ok(vec![]);
+                }
+                let x = self.mesh.nodes[n];
+                let distance = |k: &usize| (positions[*k] - x).norm();
+                let widest = (6.0 * cloud.spacing).max(3.0 * largest);
+                let near: Vec<usize> = (0..positions.len())
+                    .filter(|k| distance(k) <= widest)
+                    .collect();
+                if let Some(&k) = near.iter().find(|k| distance(k) <= 1e-9 * cloud.spacing) {
+                    return Ok(vec![(data[k].0, 1.0)]);
+                }
+                let start = if with_nodes {
+                    largest
+                } else {
+                    1.8 * cloud.spacing
+                };
+                for degree in [degree, FitDegree::Affine] {
+                    for factor in [1.0, 1.3, 1.7, 2.2, 3.0] {
+                        let radius = start * factor * (1.0 + 1e-9);
+                        let chosen: Vec<usize> = near
+                            .iter()
+                            .copied()
+                            .filter(|k| distance(k) <= radius)
+                            .collect();
+                        let at: Vec<Vector<D>> = chosen.iter().map(|&k| positions[k]).collect();
+                        if let Some(weights) = derivative::fit(&x, &at, degree) {
+                            return Ok(chosen
+                                .iter()
+                                .zip(weights)
+                                .map(|(&k, w)| (data[k].0, w))
+                                .collect());
+                        }
+                    }
+                }
+                Err(ModelError::Fit {
+                    node: n as u32,
+                    position: x.iter().copied().collect(),
+                    found: near.len(),
+                })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Transfer::from_rows(rows))
+    }
+
+    /// Removes the bonds that voids, cracks or the boundary of the mesh cut.
+    pub fn cut_bonds(&self, position: &[Vector<D>], families: &mut Families) {
+        let Some(p) = &self.peridynamics else { return };
+        points::cut(p, &self.mesh, position, families);
+    }
+
+    /// The peridynamic body, if there is one.
+    pub fn body(&self) -> Option<&PdBody<D>> {
+        self.body.as_ref()
+    }
+
+    /// The peridynamic body and the point of a site; `None` if the site is a node.
+    pub fn point_of(&self, site: usize) -> Option<(&PdBody<D>, usize)> {
+        match self.sites[site].kind {
+            SiteKind::Point(p) => self.body.as_ref().map(|b| (b, p as usize)),
+            SiteKind::Node(_) => None,
+        }
+    }
+
+    /// The zone of a point of the cloud.
+    pub fn zone_of_point(&self, point: usize) -> Zone {
+        self.point_zone[point]
+    }
+
+    /// The volume of a point whose cell is whole \[m^D\].
+    pub fn typical_volume(&self) -> f64 {
+        self.spacing.powi(D as i32)
+    }
+
+    /// Spacing h of the points \[m\]; 0 without points.
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Volumes of the peridynamic zone and of the points in it.
+    pub fn volumes(&self) -> points::Volumes {
+        self.volumes
+    }
+
+    /// The local elastic tensor of a cell.
+    pub fn tensor_of_cell(&self, cell: usize) -> &Tensor4<D> {
+        &self.tensors[self.cell_material[cell] as usize]
+    }
+
+    /// The cells around a site that is a node, with the node's number within each.
+    pub fn cells_of_site(&self, site: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let node = match self.sites[site].kind {
+            SiteKind::Node(n) => Some(n),
+            SiteKind::Point(_) => None,
+        };
+        node.into_iter().flat_map(move |n| {
+            let (offsets, cells) = &self.node_cells;
+            cells[offsets[n as usize] as usize..offsets[n as usize + 1] as usize]
+                .iter()
+                .filter_map(move |&c| {
+                    self.mesh
+                        .cell(c as usize)
+                        .iter()
+                        .position(|&m| m == n)
+                        .map(|a| (c as usize, a))
+                })
+        })
+    }
+
+    /// Adds the finite-element row of a node: all cells around it but those whose stress is a partial stress.
+    pub fn add_element_rows(&self, site: usize, row: &mut Row<D>) {
+        let mut blocks = [Tensor::zeros(); 8];
+        for (c, local) in self.cells_of_site(site) {
+            if self.roles[c] == CellRole::StressElement {
+                continue;
+            }
+            fem::row(&self.mesh, c, self.tensor_of_cell(c), local, &mut blocks);
+            for (b, &n) in self.mesh.cell(c).iter().enumerate() {
+                row.add(&self.node_transfer, n as usize, &blocks[b]);
+            }
+        }
+    }
+
+    /// Whether a cell belongs to the finite elements of the model (as opposed to holding points).
+    pub fn is_element(&self, cell: usize) -> bool {
+        self.roles[cell] != CellRole::Points && self.mesh.shapes[cell] != CellShape::Vertex
+    }
+
+    /// Assembles the stiffness.
+    pub fn assemble(&self, operator: &dyn super::Operator<D>, progress: &dyn Progress) -> BlockCsr {
+        progress.stage("assembly", Some(self.sites.len() as u64));
+        let matrix = row::assemble(
+            self.sites.len(),
+            |by| progress.advance(by),
+            |site, row| operator.add_row(site, row),
+        );
+        progress.finish();
+        matrix
+    }
+
+    /// The symmetry of the coupled stiffness.
+    pub fn symmetry(coupling: &dyn Coupling<D>) -> Symmetry {
+        coupling.symmetry()
+    }
+}

@@ -1,0 +1,278 @@
+//! Partial stress: transition regions whose stress is the peridynamic partial stress, meshfree or in finite elements.
+
+use crate::{
+    coupling::{
+        CellRole, Coupling, FitDegree, Interface, Model, ModelError, Operator, Reach, Zone,
+        row::{Row, Transfer},
+    },
+    fem::{self, QuadraturePoint},
+    mesh::Mesh,
+    peridynamics::{BondLaw, Cloud, Ends, Factors, Families, Influence, PdBody, TIE_TOLERANCE},
+    tensor::{Tensor, Vector},
+};
+
+/// Partial stress with a meshfree divergence.
+///
+/// Source: [SAND2015-7998] eq. (2.29) and section 7.2: in the transition zone
+/// `L(x) = Tr(∇ν^ps) = Σ ω {ν(x′) − ν(x)} K⁻¹ ξ V`, with `K = Σ ω ξ⊗ξ V`; peridynamic in the nonlocal zone, finite elements in the local zone.
+/// The horizon may vary in the transition zone.
+#[derive(Clone, Copy, Debug)]
+pub struct PartialStressMeshfree {
+    /// ω of the divergence.
+    pub influence: Influence,
+}
+
+impl<const D: usize> Coupling<D> for PartialStressMeshfree {
+    fn name(&self) -> &'static str {
+        "partial stress (meshfree)"
+    }
+
+    fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
+        zones
+            .iter()
+            .map(|zone| match zone {
+                Zone::Local => CellRole::Element,
+                Zone::Transition | Zone::Nonlocal => CellRole::Points,
+            })
+            .collect()
+    }
+
+    fn reach(&self, _law: &dyn BondLaw<D>) -> Reach {
+        Reach::Neighbours
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        Ok(Box::new(Meshfree {
+            model,
+            influence: self.influence,
+        }))
+    }
+}
+
+struct Meshfree<'a, const D: usize> {
+    model: &'a Model<D>,
+    influence: Influence,
+}
+
+impl<const D: usize> Operator<D> for Meshfree<'_, D> {
+    fn add_row(&self, site: usize, row: &mut Row<D>) {
+        let Some((body, i)) = self.model.point_of(site) else {
+            self.model.add_element_rows(site, row);
+            return;
+        };
+        if self.model.zone_of_point(i) == Zone::Nonlocal {
+            body.add_force_row(i, |_| 1.0, row);
+        } else {
+            self.add_divergence_row(body, i, row);
+        }
+    }
+
+    fn beta(&self, site: usize) -> f64 {
+        match self.model.point_of(site) {
+            Some((_, i)) if self.model.zone_of_point(i) == Zone::Nonlocal => 1.0,
+            Some(_) => 0.5,
+            None => 0.0,
+        }
+    }
+}
+
+impl<const D: usize> Meshfree<'_, D> {
+    fn add_divergence_row(&self, body: &PdBody<D>, i: usize, row: &mut Row<D>) {
+        let horizon = body.cloud.horizon[i];
+        let weigh = |j: usize, xi: &Vector<D>| {
+            self.influence.value(xi.norm(), horizon) * body.cloud.volume[j]
+        };
+        let mut shape = Tensor::<D>::zeros();
+        for &j in body.families.of(i) {
+            let xi = body.bond(i, j as usize);
+            shape += xi * xi.transpose() * weigh(j as usize, &xi);
+        }
+        // a family whose law could be evaluated has a regular shape tensor (checked in `operator`'s model)
+        let Some(inverse) = shape.try_inverse() else {
+            return;
+        };
+        let mut own = Vector::zeros();
+        for &j in body.families.of(i) {
+            let j = j as usize;
+            let xi = body.bond(i, j);
+            // K u = f is minus the internal force
+            let a = inverse * xi * (-weigh(j, &xi) * body.cloud.volume[i]);
+            own -= a;
+            body.add_partial_stress(j, &a, row);
+        }
+        if own.amax() > 1e-15 * body.cloud.volume[i] / horizon {
+            body.add_partial_stress(i, &own, row);
+        }
+    }
+}
+
+/// Partial stress in finite elements.
+///
+/// Source: [SAND2015-7998] section 7.3: the cells of the transition zone are finite elements; the material points at their Gauss points are peridynamic points,
+/// whose families hold the Gauss points of the cells around and the points of the peridynamic zone. Their partial stress, eq. (2.19), is the element's stress. Nodes
+/// at the seam to the peridynamic zone follow a least-squares fit.
+///
+/// Families of Gauss points are irregular; unless the law is exact there, bond weights are fitted to the fourth moments, so that `ν^ps` is exact for affine fields.
+#[derive(Clone, Copy, Debug)]
+pub struct PartialStressElements {
+    /// Degree of the least-squares fit (the report says quadratic).
+    pub fit: FitDegree,
+}
+
+impl<const D: usize> Coupling<D> for PartialStressElements {
+    fn name(&self) -> &'static str {
+        "partial stress (elements)"
+    }
+
+    fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
+        zones
+            .iter()
+            .map(|zone| match zone {
+                Zone::Local => CellRole::Element,
+                Zone::Transition => CellRole::StressElement,
+                Zone::Nonlocal => CellRole::Points,
+            })
+            .collect()
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Constrained(self.fit)
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        Elements::new(model).map(|operator| Box::new(operator) as _)
+    }
+}
+
+struct Elements<'a, const D: usize> {
+    model: &'a Model<D>,
+    /// Points of the peridynamic zone, then Gauss points.
+    body: PdBody<D>,
+    /// First Gauss point of each cell in `body`; `u32::MAX` for a cell that is no stress element.
+    first: Vec<u32>,
+}
+
+impl<'a, const D: usize> Elements<'a, D> {
+    fn new(model: &'a Model<D>) -> Result<Self, ModelError> {
+        let mesh = &model.mesh;
+        let Some((pd, peridynamics)) = model.body().zip(model.peridynamics.as_ref()) else {
+            return Err(ModelError::Unsupported {
+                what: "partial stress without a peridynamic material",
+                remedy: "add [peridynamics], or use coupling.local",
+            });
+        };
+        let mut cloud = Cloud {
+            transfer: Transfer::new(),
+            ..Cloud::default()
+        };
+        for (site, s) in model.sites.iter().enumerate() {
+            if let Some((_, p)) = model.point_of(site) {
+                cloud.position.push(s.position);
+                cloud.volume.push(pd.cloud.volume[p]);
+                cloud.horizon.push(pd.cloud.horizon[p]);
+                cloud.transfer.push(&[(site as u32, 1.0)]);
+            }
+        }
+        let points = cloud.position.len();
+        let mut first = vec![u32::MAX; mesh.cell_count()];
+        let mut active = vec![false; points];
+        let mut quadrature: Vec<QuadraturePoint<D>> = Vec::new();
+        for c in 0..mesh.cell_count() {
+            if model.roles[c] == CellRole::Points {
+                continue;
+            }
+            fem::quadrature(mesh, c, &mut quadrature);
+            let stress = model.roles[c] == CellRole::StressElement;
+            if stress {
+                first[c] = cloud.position.len() as u32;
+            }
+            for g in &quadrature {
+                let mut weights = Vec::new();
+                for (a, &n) in mesh.cell(c).iter().enumerate() {
+                    for (site, w) in model.node_transfer.row(n as usize) {
+                        weights.push((site, w * g.shape[a]));
+                    }
+                }
+                cloud.position.push(g.position);
+                cloud.volume.push(g.weight);
+                cloud.horizon.push((peridynamics.horizon)(&g.position));
+                cloud.transfer.push(&weights);
+                active.push(stress);
+            }
+        }
+        let centres: Vec<u32> = (0..active.len() as u32)
+            .filter(|&i| active[i as usize])
+            .collect();
+        let horizons: Vec<f64> = centres.iter().map(|&i| cloud.horizon[i as usize]).collect();
+        let rows = Families::search_centres(&cloud.position, &centres, &horizons, TIE_TOLERANCE)?;
+        let mut families = rows.spread(&centres, cloud.position.len());
+        model.cut_bonds(&cloud.position, &mut families);
+        let body = PdBody::new(
+            cloud,
+            families,
+            peridynamics.law.as_ref(),
+            &Factors::Fitted,
+            Ends::Alike,
+        )
+        .map_err(ModelError::gauss_point)?;
+        Ok(Self { model, body, first })
+    }
+}
+
+impl<const D: usize> Operator<D> for Elements<'_, D> {
+    fn add_row(&self, site: usize, row: &mut Row<D>) {
+        if let Some((body, i)) = self.model.point_of(site) {
+            body.add_force_row(i, |_| 1.0, row);
+            return;
+        }
+        self.model.add_element_rows(site, row);
+        let mut quadrature = Vec::new();
+        for (c, local) in self.model.cells_of_site(site) {
+            if self.first[c] == u32::MAX {
+                continue;
+            }
+            fem::quadrature(&self.model.mesh, c, &mut quadrature);
+            for (q, g) in quadrature.iter().enumerate() {
+                let a = g.gradient[local] * g.weight;
+                self.body
+                    .add_partial_stress(self.first[c] as usize + q, &a, row);
+            }
+        }
+    }
+
+    fn beta(&self, site: usize) -> f64 {
+        if self.model.point_of(site).is_some() {
+            1.0
+        } else if self
+            .model
+            .cells_of_site(site)
+            .any(|(c, _)| self.first[c] != u32::MAX)
+        {
+            0.5
+        } else {
+            0.0
+        }
+    }
+
+    fn additional_bonds(&self) -> usize {
+        self.body.bond_count()
+    }
+
+    fn cell_stress(&self, cell: usize, u: &[f64]) -> Option<Tensor<D>> {
+        if self.first[cell] == u32::MAX {
+            return None;
+        }
+        let mut quadrature = Vec::new();
+        fem::quadrature(&self.model.mesh, cell, &mut quadrature);
+        let volume: f64 = quadrature.iter().map(|g| g.weight).sum();
+        Some(
+            quadrature
+                .iter()
+                .enumerate()
+                .map(|(q, g)| {
+                    self.body.partial_stress(self.first[cell] as usize + q, u) * (g.weight / volume)
+                })
+                .sum(),
+        )
+    }
+}

@@ -1,0 +1,69 @@
+//! One model everywhere: pure finite elements and pure peridynamics, as couplings that have nothing to couple.
+
+use crate::{
+    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, row::Row},
+    mesh::Mesh,
+    system::Symmetry,
+};
+
+/// Finite elements everywhere.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Local;
+
+/// Peridynamics everywhere.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Nonlocal;
+
+impl<const D: usize> Coupling<D> for Local {
+    fn name(&self) -> &'static str {
+        "local"
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Symmetric
+    }
+
+    fn roles(&self, mesh: &Mesh<D>, _zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
+        vec![CellRole::Element; mesh.cell_count()]
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        Ok(Box::new(OwnModel { model }))
+    }
+}
+
+impl<const D: usize> Coupling<D> for Nonlocal {
+    fn name(&self) -> &'static str {
+        "nonlocal"
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Symmetric
+    }
+
+    fn roles(&self, mesh: &Mesh<D>, _zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
+        vec![CellRole::Points; mesh.cell_count()]
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        Ok(Box::new(OwnModel { model }))
+    }
+}
+
+/// Each site takes the equation of its own model.
+pub(super) struct OwnModel<'a, const D: usize> {
+    pub(super) model: &'a Model<D>,
+}
+
+impl<const D: usize> Operator<D> for OwnModel<'_, D> {
+    fn add_row(&self, site: usize, row: &mut Row<D>) {
+        match self.model.point_of(site) {
+            Some((body, point)) => body.add_force_row(point, |_| 1.0, row),
+            None => self.model.add_element_rows(site, row),
+        }
+    }
+
+    fn beta(&self, site: usize) -> f64 {
+        f64::from(u8::from(self.model.point_of(site).is_some()))
+    }
+}

@@ -1,0 +1,34 @@
+//! Splice: each site takes the equation of its own model, and sees across the seam the continuation of that model.
+
+use crate::{
+    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, single::OwnModel},
+    mesh::Mesh,
+};
+
+/// The splice of a local and a peridynamic region.
+///
+/// Source: [SAND2015-7998] eq. (2.30): `L = L^pd` in `B_pd`, `L = L^0` in `B_0`. A transition zone, if the scene has one, is local.
+/// A peridynamic family that reaches into `B_0` is completed by points interpolated from finite elements, and an element that reaches into `B_pd` by nodes fitted to
+/// peridynamic points; hence no ghost forces, and no symmetry.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Splice;
+
+impl<const D: usize> Coupling<D> for Splice {
+    fn name(&self) -> &'static str {
+        "splice"
+    }
+
+    fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
+        zones
+            .iter()
+            .map(|zone| match zone {
+                Zone::Nonlocal => CellRole::Points,
+                Zone::Transition | Zone::Local => CellRole::Element,
+            })
+            .collect()
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        Ok(Box::new(OwnModel { model }))
+    }
+}

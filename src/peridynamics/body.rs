@@ -1,0 +1,399 @@
+//! The peridynamic body: points, families, and the kernel that turns a law's coefficients into stiffness rows and partial stresses.
+//!
+//! A body may contain points that are no sites (points interpolated from finite elements that complete a family, or Gauss points); its [`Transfer`]
+//! expresses all of them through sites.
+
+use rayon::prelude::*;
+
+use crate::{
+    coupling::row::{Row, Transfer},
+    peridynamics::{
+        BondLaw, Bound, Families, Family, PdError, PointError, Reversed, StatePart,
+        collapsed_tensor, weights,
+    },
+    tensor::{Tensor, Tensor4, Vector},
+};
+
+/// How bonds are weighted relative to the plain kernel.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum BondWeights {
+    /// The kernel as the papers have it. On a lattice the elastic tensor is then not isotropic.
+    Plain,
+    /// The smallest change of the weights, shell by shell of the lattice, that makes the fourth moments those of the typed material.
+    Isotropic,
+    /// The smallest change of each family's own weights that meets all fourth-moment conditions; for families that are no lattice.
+    Fitted,
+}
+
+/// Positions, volumes and horizons of quadrature points, with what expresses their displacement.
+///
+/// Shapes: one entry per point in each. Units: \[m\], \[m^D\], \[m\].
+#[derive(Clone, Debug, Default)]
+pub struct Cloud<const D: usize> {
+    /// Positions.
+    pub position: Vec<Vector<D>>,
+    /// Volumes.
+    pub volume: Vec<f64>,
+    /// Horizons.
+    pub horizon: Vec<f64>,
+    /// Displacement of each point through sites.
+    pub transfer: Transfer,
+}
+
+/// Points with families and the coefficients of one law.
+pub struct PdBody<const D: usize> {
+    /// The points.
+    pub cloud: Cloud<D>,
+    /// Families over the cloud; empty for points that only complete the families of others.
+    pub families: Families,
+    reversed: Option<Reversed>,
+    pair: Vec<f64>,
+    omega: Vec<f64>,
+    state: Vec<Option<StatePart<D>>>,
+    pairwise: bool,
+}
+
+/// The kernel factors of a body's bonds.
+pub enum Factors<'a, const D: usize> {
+    /// All 1.
+    Plain,
+    /// A function of the horizon and the bond vector.
+    Shells(&'a (dyn Fn(f64, &Vector<D>) -> f64 + Sync)),
+    /// Fitted to the fourth moments, family by family.
+    Fitted,
+}
+
+impl<const D: usize> PdBody<D> {
+    /// Builds the coefficients of all bonds.
+    ///
+    /// `mirrored`: a pairwise law gives both ends of a bond the same coefficient, so bonds are visited from one end only.
+    ///
+    /// # Errors
+    /// [`PointError`] with the point whose family is empty, degenerate or cannot be fitted.
+    pub fn new(
+        cloud: Cloud<D>,
+        families: Families,
+        law: &dyn BondLaw<D>,
+        factors: &Factors<'_, D>,
+        ends: Ends,
+    ) -> Result<Self, PointError<D>> {
+        let bonds = families.neighbours.len();
+        let pairwise = law.is_pairwise();
+        let mut pair = vec![0.0; bonds];
+        let mut omega = vec![0.0; if pairwise { 0 } else { bonds }];
+        let points = cloud.position.len();
+        let mut pair_rows = split_rows(&mut pair, &families.offsets);
+        let mut omega_rows = if pairwise {
+            (0..points).map(|_| &mut [] as &mut [f64]).collect()
+        } else {
+            split_rows(&mut omega, &families.offsets)
+        };
+        let state: Vec<Option<StatePart<D>>> = pair_rows
+            .par_iter_mut()
+            .zip(omega_rows.par_iter_mut())
+            .enumerate()
+            .map(|(i, (pair, omega))| {
+                if pair.is_empty() {
+                    return Ok(None);
+                }
+                let at = |source: PdError| PointError {
+                    point: i,
+                    position: cloud.position[i],
+                    bonds: families.of(i).len(),
+                    source,
+                };
+                let horizon = cloud.horizon[i];
+                let (xi, volumes): (Vec<_>, Vec<_>) = families
+                    .of(i)
+                    .iter()
+                    .map(|&j| {
+                        (
+                            cloud.position[j as usize] - cloud.position[i],
+                            cloud.volume[j as usize],
+                        )
+                    })
+                    .unzip();
+                let weight = match factors {
+                    Factors::Plain => vec![1.0; xi.len()],
+                    Factors::Shells(f) => xi.iter().map(|xi| f(horizon, xi)).collect(),
+                    Factors::Fitted => {
+                        let bonds: Vec<(Vector<D>, f64)> =
+                            xi.iter().copied().zip(volumes.iter().copied()).collect();
+                        fitted(law, &bonds, horizon).map_err(at)?
+                    }
+                };
+                law.coefficients(
+                    &Family {
+                        bonds: &xi,
+                        volumes: &volumes,
+                        factors: &weight,
+                        horizon,
+                    },
+                    pair,
+                    omega,
+                )
+                .map_err(at)
+            })
+            .collect::<Result<_, _>>()?;
+        let reversed = match ends {
+            Ends::Alike if pairwise => None,
+            _ => Some(families.reversed(points)),
+        };
+        Ok(Self {
+            cloud,
+            families,
+            reversed,
+            pair,
+            omega,
+            state,
+            pairwise,
+        })
+    }
+
+    /// Number of directed bonds.
+    pub fn bond_count(&self) -> usize {
+        self.families.neighbours.len()
+    }
+
+    /// The bond vector from point `i` to point `j`.
+    #[inline]
+    pub fn bond(&self, i: usize, j: usize) -> Vector<D> {
+        self.cloud.position[j] - self.cloud.position[i]
+    }
+
+    /// The coefficients `p` and `ω` (0 for a pairwise law) of the bonds of point `i`.
+    pub fn kernel(&self, i: usize) -> (&[f64], &[f64]) {
+        let range = self.families.offsets[i]..self.families.offsets[i + 1];
+        (
+            &self.pair[range.clone()],
+            if self.pairwise {
+                &[]
+            } else {
+                &self.omega[range]
+            },
+        )
+    }
+
+    /// The state part of point `i`, if its law has one.
+    pub fn state(&self, i: usize) -> Option<&StatePart<D>> {
+        self.state[i].as_ref()
+    }
+
+    /// The classical tensor that the family of point `i` carries, [SAND2015-7998] eq. (2.10).
+    pub fn collapsed_tensor(&self, i: usize) -> Tensor4<D> {
+        let (xi, volumes): (Vec<_>, Vec<_>) = self
+            .families
+            .of(i)
+            .iter()
+            .map(|&j| (self.bond(i, j as usize), self.cloud.volume[j as usize]))
+            .unzip();
+        let family = Family {
+            bonds: &xi,
+            volumes: &volumes,
+            factors: &[],
+            horizon: self.cloud.horizon[i],
+        };
+        collapsed_tensor(&family, self.kernel(i).0, self.state(i))
+    }
+
+    /// Adds the row of the internal force of point `i`, times `−1` (so that `K u = f`), each bond weighted by `weight(j)`.
+    ///
+    /// Source: [SAND2015-7998] eq. (2.5) times the point's volume: `Σ_j w_ij V_i V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)`.
+    /// The second sum runs over the points whose families contain `i`, so horizons may differ.
+    pub fn add_force_row(&self, i: usize, weight: impl Fn(usize) -> f64, row: &mut Row<D>) {
+        let transfer = &self.cloud.transfer;
+        let volume = self.cloud.volume[i];
+        let (pair, omega) = self.kernel(i);
+        let both = if self.reversed.is_none() { 2.0 } else { 1.0 };
+        let q = self.state(i).map_or(0.0, |s| s.stabilisation);
+        let mut own = Tensor::zeros();
+        let mut first = Vector::<D>::zeros();
+        for (k, &j) in self.families.of(i).iter().enumerate() {
+            let j = j as usize;
+            let xi = self.bond(i, j);
+            let vv = volume * self.cloud.volume[j] * weight(j);
+            let mut block = xi * xi.transpose() * (both * vv * pair[k]);
+            if !self.pairwise {
+                block += Tensor::identity() * (q * omega[k] * vv);
+                first += xi * (omega[k] * vv);
+            }
+            own += block;
+            row.add(transfer, j, &(-block));
+        }
+        if let Some(state) = self.state(i) {
+            // a full family has Σ ω ξ V = 0; what is left of it is a surface or a weight that changes in space
+            if first.amax() > 1e-15 * volume * state.shape.trace() {
+                self.add_weighted_gradient(i, &along(&state.modulus, &first, -1.0), row);
+            }
+        }
+        if let Some(reversed) = &self.reversed {
+            for (j, bond) in reversed.of(i) {
+                let j = j as usize;
+                let xi = self.bond(j, i);
+                let vv = volume * self.cloud.volume[j] * weight(j);
+                let mut block = xi * xi.transpose() * (vv * self.pair[bond]);
+                if let Some(state) = self.state(j) {
+                    let omega = self.omega[bond];
+                    block += Tensor::identity() * (state.stabilisation * omega * vv);
+                    let c = along(&state.modulus, &(xi * (omega * vv)), 1.0);
+                    self.add_weighted_gradient(j, &c, row);
+                }
+                own += block;
+                row.add(transfer, j, &(-block));
+            }
+        }
+        row.add(transfer, i, &own);
+    }
+
+    /// Adds the row of `A : Ḡ_j`, where `a[b]` is the block that multiplies column `b` of `Ḡ_j = Σ ω η ⊗ ξ V`.
+    fn add_weighted_gradient(&self, j: usize, a: &[Tensor<D>; D], row: &mut Row<D>) {
+        let (_, omega) = self.kernel(j);
+        let mut own = Tensor::zeros();
+        for (k, &l) in self.families.of(j).iter().enumerate() {
+            let l = l as usize;
+            let xi = self.bond(j, l) * (omega[k] * self.cloud.volume[l]);
+            let mut block = Tensor::zeros();
+            for b in 0..D {
+                block += a[b] * xi[b];
+            }
+            own -= block;
+            row.add(&self.cloud.transfer, l, &block);
+        }
+        row.add(&self.cloud.transfer, j, &own);
+    }
+
+    /// Adds the row of `ν^ps(x_j) · a`, the partial stress of point `j` on a direction (or a shape-function gradient) `a`.
+    ///
+    /// Source: [SAND2015-7998] eq. (2.19), `ν^ps = Σ T⟨ξ⟩ ⊗ ξ V`.
+    pub fn add_partial_stress(&self, j: usize, a: &Vector<D>, row: &mut Row<D>) {
+        let (pair, omega) = self.kernel(j);
+        let state = self.state(j);
+        let mut own = Tensor::zeros();
+        for (k, &l) in self.families.of(j).iter().enumerate() {
+            let l = l as usize;
+            let xi = self.bond(j, l);
+            let s = xi.dot(a) * self.cloud.volume[l];
+            let mut block = xi * xi.transpose() * (pair[k] * s);
+            if let Some(state) = state {
+                block += Tensor::identity() * (state.stabilisation * omega[k] * s);
+            }
+            own -= block;
+            row.add(&self.cloud.transfer, l, &block);
+        }
+        row.add(&self.cloud.transfer, j, &own);
+        if let Some(state) = state {
+            self.add_weighted_gradient(j, &along(&state.modulus, &(state.shape * a), 1.0), row);
+        }
+    }
+
+    /// The partial stress of point `j` under displacements `u` of the sites.
+    pub fn partial_stress(&self, j: usize, u: &[f64]) -> Tensor<D> {
+        let transfer = &self.cloud.transfer;
+        let (pair, omega) = self.kernel(j);
+        let here: Vector<D> = transfer.displacement(j, u);
+        let mut stress = Tensor::zeros();
+        let mut gradient = Tensor::zeros();
+        for (k, &l) in self.families.of(j).iter().enumerate() {
+            let l = l as usize;
+            let xi = self.bond(j, l);
+            let eta = transfer.displacement::<D>(l, u) - here;
+            let v = self.cloud.volume[l];
+            stress += xi * xi.transpose() * (pair[k] * xi.dot(&eta) * v);
+            if !self.pairwise {
+                gradient += eta * xi.transpose() * (omega[k] * v);
+            }
+        }
+        if let Some(state) = self.state(j) {
+            stress +=
+                gradient * state.stabilisation + state.modulus.contract(&gradient) * state.shape;
+        }
+        stress
+    }
+}
+
+/// Whether the two ends of a bond give it the same coefficient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// One horizon, one spacing: they do, for a pairwise law.
+    Alike,
+    /// They may not.
+    Differ,
+}
+
+/// `a[b]_ce = s Σ_a 𝓜_caeb x_a`: contracts the second index of a modulus with a vector.
+fn along<const D: usize>(modulus: &Tensor4<D>, x: &Vector<D>, s: f64) -> [Tensor<D>; D] {
+    std::array::from_fn(|b| {
+        Tensor::from_fn(|c, e| s * (0..D).map(|a| modulus.get(c, a, e, b) * x[a]).sum::<f64>())
+    })
+}
+
+/// The factors of one irregular family: not negative where the moments allow it, else of any sign.
+fn fitted<const D: usize>(
+    law: &dyn BondLaw<D>,
+    bonds: &[(Vector<D>, f64)],
+    horizon: f64,
+) -> Result<Vec<f64>, PdError> {
+    let Some((base, conditions)) = law.moment_conditions(bonds, horizon) else {
+        return Ok(vec![1.0; bonds.len()]);
+    };
+    let fit = weights::fit(bonds, &base, &conditions, Bound::AtLeast(0.0))
+        .or_else(|_| weights::fit(bonds, &base, &conditions, Bound::Free))?;
+    Ok(fit
+        .values
+        .iter()
+        .zip(&base)
+        .map(|(g, b)| if *b > 0.0 { g / b } else { 1.0 })
+        .collect())
+}
+
+fn split_rows<'a>(mut values: &'a mut [f64], offsets: &[usize]) -> Vec<&'a mut [f64]> {
+    let mut rows = Vec::with_capacity(offsets.len().saturating_sub(1));
+    for pair in offsets.windows(2) {
+        let (head, tail) = values.split_at_mut(pair[1] - pair[0]);
+        rows.push(head);
+        values = tail;
+    }
+    rows
+}
+
+impl Families {
+    /// The same families with points renumbered (`u32::MAX` for a point that is dropped); only `active` points, by old number, keep theirs.
+    pub fn restrict(&self, renumbered: &[u32], active: &[bool]) -> Self {
+        let mut result = Self {
+            offsets: vec![0],
+            neighbours: Vec::new(),
+        };
+        for i in 0..self.len() {
+            if renumbered[i] == u32::MAX {
+                continue;
+            }
+            if active[i] {
+                result
+                    .neighbours
+                    .extend(self.of(i).iter().map(|&j| renumbered[j as usize]));
+            }
+            result.offsets.push(result.neighbours.len());
+        }
+        result
+    }
+
+    /// Families of some points of a cloud of `points`, row `r` that of point `centres[r]` (ascending), as families of all points, the rest empty.
+    pub fn spread(&self, centres: &[u32], points: usize) -> Self {
+        let mut offsets = Vec::with_capacity(points + 1);
+        offsets.push(0);
+        let mut row = 0;
+        for i in 0..points {
+            if row < centres.len() && centres[row] as usize == i {
+                row += 1;
+            }
+            offsets.push(self.offsets[row]);
+        }
+        Self {
+            offsets,
+            neighbours: self.neighbours.clone(),
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Elastic correspondence: a classical stress through the family's deformation gradient.
+
+use crate::{
+    peridynamics::{
+        BondLaw, Conditions, Family, Influence, PdError, ShellTarget, StatePart,
+        invert_shape_tensor,
+    },
+    tensor::{Tensor, Tensor4, Vector},
+};
+
+/// Linear elastic correspondence material, stabilised against zero-energy modes.
+///
+/// Source: [SAND2015-7998] section 7.2 (after Silling et al. 2007): `F̄ = Ḡ K⁻¹`, `T⟨ξ⟩ = ω σ(F̄) K⁻¹ ξ`. The stabilising term
+/// `q ω (η − F̄ ξ)` (Silling 2017) vanishes for affine fields and leaves the partial stress as it is; without it an alternating displacement costs no energy.
+#[derive(Clone, Debug)]
+pub struct Correspondence<const D: usize> {
+    /// The influence function ω.
+    pub influence: Influence,
+    /// Strength of the stabilising term relative to `D (D+2) μ / m`, that of the pairwise part of an LPS; 0 switches it off.
+    pub stabilisation: f64,
+    shear: f64,
+    tensor: Tensor4<D>,
+}
+
+impl<const D: usize> Correspondence<D> {
+    /// A correspondence material with the Lamé parameters of `D` dimensions \[Pa\].
+    pub fn new(influence: Influence, lambda: f64, mu: f64, stabilisation: f64) -> Self {
+        Self {
+            influence,
+            stabilisation,
+            shear: mu,
+            tensor: Tensor4::isotropic(lambda, mu),
+        }
+    }
+}
+
+impl<const D: usize> BondLaw<D> for Correspondence<D> {
+    fn name(&self) -> &'static str {
+        "correspondence"
+    }
+
+    fn is_pairwise(&self) -> bool {
+        false
+    }
+
+    fn tensor(&self) -> &Tensor4<D> {
+        &self.tensor
+    }
+
+    fn kernel(&self, r: f64, horizon: f64) -> f64 {
+        self.influence.value(r, horizon) / (r * r)
+    }
+
+    fn shell_target(&self) -> Option<ShellTarget> {
+        None
+    }
+
+    fn moment_conditions(
+        &self,
+        _bonds: &[(Vector<D>, f64)],
+        _horizon: f64,
+    ) -> Option<(Vec<f64>, Conditions<D>)> {
+        None
+    }
+
+    fn coefficients(
+        &self,
+        family: &Family<'_, D>,
+        pair: &mut [f64],
+        omega: &mut [f64],
+    ) -> Result<Option<StatePart<D>>, PdError> {
+        let mut shape = Tensor::<D>::zeros();
+        for (k, xi) in family.bonds.iter().enumerate() {
+            pair[k] = 0.0;
+            omega[k] = self.influence.value(xi.norm(), family.horizon);
+            shape += xi * xi.transpose() * (omega[k] * family.volumes[k]);
+        }
+        let inverse = invert_shape_tensor(&shape, family.bonds.len())?;
+        let d = D as f64;
+        let q = self.stabilisation * d * (d + 2.0) * self.shear / shape.trace();
+        let mut modulus = Tensor4::zeros();
+        for i in 0..D {
+            for a in 0..D {
+                let mut t = Tensor::<D>::zeros();
+                for j in 0..D {
+                    t += self.tensor.0[i][j] * inverse * inverse[(j, a)];
+                }
+                for b in 0..D {
+                    t[(i, b)] -= q * inverse[(a, b)];
+                }
+                modulus.0[i][a] = t;
+            }
+        }
+        Ok(Some(StatePart {
+            modulus,
+            stabilisation: q,
+            shape,
+        }))
+    }
+}

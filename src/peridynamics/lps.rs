@@ -1,0 +1,104 @@
+//! The linearised linear peridynamic solid (LPS), any Poisson ratio.
+
+use crate::{
+    peridynamics::{
+        BondLaw, Conditions, Family, Influence, PdError, ShellTarget, StatePart, weights,
+    },
+    tensor::{Tensor, Tensor4, Vector},
+};
+
+/// Linearised ordinary state-based linear peridynamic solid.
+///
+/// Source: [SAND2015-7998] eq. (5.16)–(5.18), for `D` dimensions with `k` the bulk modulus of `D` dimensions (`λ + 2μ/D`):
+///
+/// ```text
+/// T⟨ξ⟩ = (D k − (D+2) μ)/m  ω θ ξ  +  D(D+2) μ/m  ω  ξ (ξ·η)/|ξ|² ,     θ = D/m Σ ω ξ·η V ,   m = Σ ω |ξ|² V
+/// ```
+///
+/// Differs from it by: nothing in 3D (3K − 5G, 15G, 3/m).
+#[derive(Clone, Debug)]
+pub struct LinearPeridynamicSolid<const D: usize> {
+    /// The influence function ω.
+    pub influence: Influence,
+    bulk: f64,
+    shear: f64,
+    tensor: Tensor4<D>,
+}
+
+impl<const D: usize> LinearPeridynamicSolid<D> {
+    /// An LPS with the Lamé parameters of `D` dimensions \[Pa\].
+    pub fn new(influence: Influence, lambda: f64, mu: f64) -> Self {
+        Self {
+            influence,
+            bulk: lambda + 2.0 * mu / D as f64,
+            shear: mu,
+            tensor: Tensor4::isotropic(lambda, mu),
+        }
+    }
+}
+
+impl<const D: usize> BondLaw<D> for LinearPeridynamicSolid<D> {
+    fn name(&self) -> &'static str {
+        "linear peridynamic solid"
+    }
+
+    fn is_pairwise(&self) -> bool {
+        false
+    }
+
+    fn tensor(&self) -> &Tensor4<D> {
+        &self.tensor
+    }
+
+    fn kernel(&self, r: f64, horizon: f64) -> f64 {
+        self.influence.value(r, horizon) / (r * r)
+    }
+
+    fn shell_target(&self) -> Option<ShellTarget> {
+        Some(ShellTarget::Isotropy)
+    }
+
+    fn moment_conditions(
+        &self,
+        bonds: &[(Vector<D>, f64)],
+        horizon: f64,
+    ) -> Option<(Vec<f64>, Conditions<D>)> {
+        let omega: Vec<f64> = bonds
+            .iter()
+            .map(|(xi, _)| self.influence.value(xi.norm(), horizon))
+            .collect();
+        let m = weights::weighted_volume(bonds, &omega);
+        Some((omega, Conditions::lps(m)))
+    }
+
+    fn coefficients(
+        &self,
+        family: &Family<'_, D>,
+        pair: &mut [f64],
+        omega: &mut [f64],
+    ) -> Result<Option<StatePart<D>>, PdError> {
+        let mut shape = Tensor::<D>::zeros();
+        for (k, xi) in family.bonds.iter().enumerate() {
+            omega[k] = family.factors[k] * self.influence.value(xi.norm(), family.horizon);
+            shape += xi * xi.transpose() * (omega[k] * family.volumes[k]);
+        }
+        let m = shape.trace();
+        if !(m > 0.0) {
+            return Err(PdError::EmptyFamily);
+        }
+        let d = D as f64;
+        for (k, xi) in family.bonds.iter().enumerate() {
+            pair[k] = d * (d + 2.0) * self.shear / m * omega[k] / xi.norm_squared();
+        }
+        let factor = (d * self.bulk - (d + 2.0) * self.shear) / m * d / m;
+        let mut modulus = Tensor4::zeros();
+        for i in 0..D {
+            modulus.0[i][i] = Tensor::identity() * factor;
+        }
+        Ok(Some(StatePart {
+            modulus,
+            stabilisation: 0.0,
+            shape,
+        }))
+    }
+}
