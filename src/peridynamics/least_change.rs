@@ -1,6 +1,6 @@
 //! The smallest weighted change that meets linear conditions: the core of all bond weights.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
 /// Eigenvalues of the scaled normal equations below this fraction of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
@@ -73,10 +73,12 @@ pub(super) fn least_change(
     let mut mu = DVector::zeros(conditions);
     let mut best: Option<(f64, Vec<f64>)> = None;
     let mut full_rank = 0;
+    // The normal equations, kept while the same bonds are off the bound.
+    let mut solved_for: Option<(Vec<bool>, Normal)> = None;
     for step in 0..MOST_STEPS {
         let mut change = vec![0.0; shares.len()];
         let mut residual = missing.clone();
-        let mut normal = DMatrix::zeros(conditions, conditions);
+        let mut off = vec![false; shares.len()];
         for (k, &d) in shares.iter().enumerate() {
             if d == 0.0 {
                 continue;
@@ -85,9 +87,7 @@ pub(super) fn least_change(
             change[k] = t.max(limit);
             let b = rows.column(k);
             residual.axpy(-d * change[k], &b, 1.0);
-            if t > limit {
-                normal.ger(d, &b, &b, 1.0);
-            }
+            off[k] = t > limit;
         }
         let miss = residual.component_div(&scales).amax();
         let previous = best.as_ref().map(|(m, _)| *m);
@@ -99,14 +99,24 @@ pub(super) fn least_change(
         if miss == 0.0 || stalled {
             break;
         }
-        let (direction, rank) = solve_normal(&normal, &residual);
-        if step == 0 {
-            full_rank = rank;
+        if !solved_for.as_ref().is_some_and(|(o, _)| *o == off) {
+            let Some(normal) = Normal::new(rows, shares, &off) else {
+                break;
+            };
+            if step == 0 {
+                full_rank = normal.rank();
+            }
+            solved_for = Some((off, normal));
         }
-        let slope = residual.dot(&direction);
-        let start = dual(&mu);
+        let Some((_, normal)) = &solved_for else {
+            break;
+        };
+        let direction = normal.solve(&residual);
         let mut length = 1.0;
+        // Near the solution rounding hides the fall of the dual, and the full step is right.
         if bound != Bound::Free && miss > 1e-8 {
+            let slope = residual.dot(&direction);
+            let start = dual(&mu);
             while length > 1e-6
                 && dual(&(&mu + &direction * length)) > start - 1e-4 * length * slope
             {
@@ -128,28 +138,68 @@ pub(super) fn least_change(
     }
 }
 
-/// The least-squares solution of least norm of the symmetric positive semi-definite `normal · x = rhs`, and its rank.
-fn solve_normal(normal: &DMatrix<f64>, rhs: &DVector<f64>) -> (DVector<f64>, usize) {
-    let n = rhs.len();
-    if n == 0 {
-        return (DVector::zeros(0), 0);
-    }
-    // Unit diagonal, so that the rank does not hang on the units of a condition.
-    let scale = DVector::from_fn(n, |c, _| {
-        let d = normal[(c, c)];
-        if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
-    });
-    let scaled = DMatrix::from_fn(n, n, |a, b| normal[(a, b)] * scale[a] * scale[b]);
-    let eigen = SymmetricEigen::new(scaled);
-    let largest = eigen.eigenvalues.amax();
-    let mut x = DVector::zeros(n);
-    let mut rank = 0;
-    let projected = eigen.eigenvectors.tr_mul(&rhs.component_mul(&scale));
-    for (e, &value) in eigen.eigenvalues.iter().enumerate() {
-        if value > RANK_TOLERANCE * largest {
-            rank += 1;
-            x.axpy(projected[e] / value, &eigen.eigenvectors.column(e), 1.0);
+/// The pseudo-inverse of the symmetric positive semi-definite normal equations `Σ d b bᵀ` of the bonds off the bound.
+struct Normal {
+    /// Makes the diagonal one, so that the rank does not hang on the units of a condition.
+    scale: DVector<f64>,
+    eigen: SymmetricEigen<f64, Dyn>,
+    /// Below this, an eigenvalue counts as zero.
+    least: f64,
+}
+
+impl Normal {
+    /// `None` if a bond's share or row overflows.
+    fn new(rows: &DMatrix<f64>, shares: &[f64], off: &[bool]) -> Option<Self> {
+        let n = rows.nrows();
+        let mut normal = DMatrix::zeros(n, n);
+        for (k, &d) in shares.iter().enumerate() {
+            if off[k] {
+                let b = rows.column(k);
+                normal.ger(d, &b, &b, 1.0);
+            }
         }
+        let scale = DVector::from_fn(n, |c, _| {
+            let d = normal[(c, c)];
+            if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
+        });
+        let scaled = DMatrix::from_fn(n, n, |a, b| normal[(a, b)] * scale[a] * scale[b]);
+        if !scaled.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let eigen = SymmetricEigen::new(scaled);
+        let least = RANK_TOLERANCE * eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
+        Some(Self {
+            scale,
+            eigen,
+            least,
+        })
     }
-    (x.component_mul(&scale), rank)
+
+    /// Number of independent conditions.
+    fn rank(&self) -> usize {
+        self.eigen
+            .eigenvalues
+            .iter()
+            .filter(|v| **v > self.least)
+            .count()
+    }
+
+    /// The least-squares solution of least norm.
+    fn solve(&self, rhs: &DVector<f64>) -> DVector<f64> {
+        let projected = self
+            .eigen
+            .eigenvectors
+            .tr_mul(&rhs.component_mul(&self.scale));
+        let mut x = DVector::zeros(rhs.len());
+        for (e, &value) in self.eigen.eigenvalues.iter().enumerate() {
+            if value > self.least {
+                x.axpy(
+                    projected[e] / value,
+                    &self.eigen.eigenvectors.column(e),
+                    1.0,
+                );
+            }
+        }
+        x.component_mul(&self.scale)
+    }
 }
