@@ -99,7 +99,7 @@ pub(super) fn least_change(
         if miss == 0.0 || stalled {
             break;
         }
-        if !solved_for.as_ref().is_some_and(|(o, _)| *o == off) {
+        if solved_for.as_ref().is_none_or(|(o, _)| *o != off) {
             let Some(normal) = Normal::new(rows, shares, &off) else {
                 break;
             };
