@@ -241,3 +241,175 @@ pub fn displacement_gradient_at_centre<const D: usize>(
     let centre = point_at(cell, &origin, &x, &cell.centre, 1.0);
     displacement_gradient(&centre, |a| displacement(mesh.cell(c)[a] as usize))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample::{boxes, noise, unit_box};
+    use super::*;
+    use crate::material::{Elastic, Kinematics};
+    use crate::mesh::CellShape;
+
+    fn tangent<const D: usize>(e: f64, nu: f64) -> Tensor4<D> {
+        let kinematics = [Kinematics::Bar, Kinematics::PlaneStress, Kinematics::Solid][D - 1];
+        Elastic::new(e, nu, 0.0)
+            .unwrap()
+            .stiffness(kinematics)
+            .unwrap()
+    }
+
+    #[test]
+    fn unit_square_in_plane_stress_has_its_published_stiffness() {
+        // Sigmund, "A 99 line topology optimization code written in Matlab", 2001: the matrix in closed form
+        let nu = 0.3;
+        let k = [
+            0.5 - nu / 6.0,
+            0.125 + nu / 8.0,
+            -0.25 - nu / 12.0,
+            -0.125 + 3.0 * nu / 8.0,
+            -0.25 + nu / 12.0,
+            -0.125 - nu / 8.0,
+            nu / 6.0,
+            0.125 - 3.0 * nu / 8.0,
+        ];
+        let pattern = [
+            [1, 2, 3, 4, 5, 6, 7, 8],
+            [2, 1, 8, 7, 6, 5, 4, 3],
+            [3, 8, 1, 6, 7, 4, 5, 2],
+            [4, 7, 6, 1, 8, 3, 2, 5],
+            [5, 6, 7, 8, 1, 2, 3, 4],
+            [6, 5, 4, 3, 2, 1, 8, 7],
+            [7, 4, 5, 2, 3, 8, 1, 6],
+            [8, 3, 2, 5, 4, 7, 6, 1],
+        ];
+        let mesh = unit_box::<2>(CellShape::Quad4, 1, 0.0);
+        let rows = stiffness(&mesh, 0, &tangent::<2>(1.0, nu));
+        for (p, line) in pattern.iter().enumerate() {
+            for (q, entry) in line.iter().enumerate() {
+                // the box numbers its nodes by rows, the cell counter-clockwise
+                let found = rows[p / 2][q / 2][(p % 2, q % 2)];
+                let expected = k[entry - 1] / (1.0 - nu * nu);
+                assert!((found - expected).abs() < 1e-15, "{p} {q}");
+            }
+        }
+    }
+
+    #[test]
+    fn unit_cube_line_and_triangle_have_their_published_stiffness() {
+        // Liu and Tovar, "An efficient 3D topology optimization code written in Matlab", 2014: first two entries
+        let nu = 0.3;
+        let mesh = unit_box::<3>(CellShape::Hex8, 1, 0.0);
+        let rows = stiffness(&mesh, 0, &tangent::<3>(1.0, nu));
+        let factor = 1.0 / ((1.0 + nu) * (1.0 - 2.0 * nu) * 144.0);
+        assert!((rows[0][0][(0, 0)] - factor * (32.0 - 48.0 * nu)).abs() < 1e-15);
+        assert!((rows[0][0][(0, 1)] - factor * 6.0).abs() < 1e-15);
+        // E A / L
+        let mesh = unit_box::<1>(CellShape::Line2, 4, 0.0);
+        let rows = stiffness(&mesh, 2, &tangent::<1>(3.0, nu));
+        assert!((rows[0][0][(0, 0)] - 12.0).abs() < 1e-13);
+        assert!((rows[0][1][(0, 0)] + 12.0).abs() < 1e-13);
+        // constant-strain triangle: with b_a = y_b − y_c, c_a = x_c − x_b, K_ab,xx = t (C11 b_a b_b + C33 c_a c_b) / (4A)
+        let mut mesh = Mesh::<2>::default();
+        mesh.nodes = [[0.3, 0.1], [2.1, 0.4], [0.8, 1.7]]
+            .map(|x| Vector::<2>::new(x[0], x[1]))
+            .to_vec();
+        mesh.push_cell(CellShape::Tri3, &[0, 1, 2]);
+        let rows = stiffness(&mesh, 0, &tangent::<2>(1.0, nu));
+        let (b, c) = (
+            [0.4 - 1.7, 1.7 - 0.1, 0.1 - 0.4],
+            [0.8 - 2.1, 0.3 - 0.8, 2.1 - 0.3],
+        );
+        let twice_area = 1.8 * 1.6 - 0.5 * 0.3;
+        let (c11, c12, c33) = (1.0 / 0.91, 0.3 / 0.91, 0.35 / 0.91);
+        for p in 0..3 {
+            for q in 0..3 {
+                let xx = (c11 * b[p] * b[q] + c33 * c[p] * c[q]) / (2.0 * twice_area);
+                let xy = (c12 * b[p] * c[q] + c33 * c[p] * b[q]) / (2.0 * twice_area);
+                assert!((rows[p][q][(0, 0)] - xx).abs() < 1e-14);
+                assert!((rows[p][q][(0, 1)] - xy).abs() < 1e-14);
+            }
+        }
+    }
+
+    fn kernel_is_right<const D: usize>() {
+        for mesh in boxes::<D>(3, 0.3) {
+            let c = mesh.cell_count() / 2;
+            let tangent = tangent::<D>(1.0, 0.3);
+            let rows = stiffness(&mesh, c, &tangent);
+            let nodes = mesh.cell(c).len();
+            // rows one by one and all together
+            for (a, expected) in rows.iter().enumerate().take(nodes) {
+                let mut blocks = [Tensor::repeat(7.0); 8];
+                row(&mesh, c, &tangent, a, &mut blocks);
+                assert_eq!(&blocks, expected);
+            }
+            // as many zero modes as there are rigid ones, and no negative one
+            let n = nodes * D;
+            let k = nalgebra::DMatrix::from_fn(n, n, |p, q| rows[p / D][q / D][(p % D, q % D)]);
+            let values = k.symmetric_eigenvalues();
+            let top = values.amax();
+            let free = values.iter().filter(|v| v.abs() < 1e-12 * top).count();
+            assert_eq!(free, D * (D + 1) / 2, "{:?}", mesh.shapes[c]);
+            assert!(values.iter().all(|&v| v > -1e-12 * top));
+            // gradients reproduce an affine field and add up to zero
+            let g = Tensor::<D>::from_fn(|i, j| noise(i, j));
+            let shift = Vector::<D>::repeat(0.3);
+            let mut points = Vec::new();
+            quadrature(&mesh, c, &mut points);
+            for p in &points {
+                let sum: Vector<D> = p.gradient.iter().sum();
+                assert!(sum.amax() < 1e-14);
+                let at = |a: usize| g * mesh.nodes[mesh.cell(c)[a] as usize] + shift;
+                assert!((displacement_gradient(p, at) - g).amax() < 1e-13);
+            }
+            let centre = displacement_gradient_at_centre(&mesh, c, |n| g * mesh.nodes[n] + shift);
+            assert!((centre - g).amax() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn kernels_are_right_on_distorted_cells() {
+        kernel_is_right::<1>();
+        kernel_is_right::<2>();
+        kernel_is_right::<3>();
+    }
+
+    /// `∫ f` over an affine image `x = A y + c` of the unit box, by the cells' rules.
+    fn integrals<const D: usize>() {
+        let a = Tensor::<D>::from_fn(|i, j| 0.3 * noise(i, j) + if i == j { 1.0 } else { 0.0 });
+        for mut mesh in boxes::<D>(2, 0.0) {
+            for x in &mut mesh.nodes {
+                *x = a * *x + Vector::repeat(0.7);
+            }
+            let det = crate::tensor::determinant(&a);
+            let volume: f64 = (0..mesh.cell_count()).map(|c| cell_volume(&mesh, c)).sum();
+            assert!((volume - det).abs() < 1e-14);
+            // x_0 = Σ_j a_0j y_j + 0.7 with independent uniform y: E[x²] = var + mean²
+            let mean = 0.7 + 0.5 * a.row(0).sum();
+            let variance = a.row(0).norm_squared() / 12.0;
+            let (mut first, mut second) = (0.0, 0.0);
+            let mut points = Vec::new();
+            for c in 0..mesh.cell_count() {
+                quadrature_of(&mesh, c, Rule::Mass, &mut points);
+                second += points
+                    .iter()
+                    .map(|p| p.weight * p.position[0].powi(2))
+                    .sum::<f64>();
+                quadrature(&mesh, c, &mut points);
+                first += points.iter().map(|p| p.weight * p.position[0]).sum::<f64>();
+            }
+            assert!((first - det * mean).abs() < 1e-14, "{:?}", mesh.shapes[0]);
+            assert!(
+                (second - det * (variance + mean * mean)).abs() < 1e-13,
+                "{:?}",
+                mesh.shapes[0]
+            );
+        }
+    }
+
+    #[test]
+    fn rules_are_exact_on_affine_images() {
+        integrals::<1>();
+        integrals::<2>();
+        integrals::<3>();
+    }
+}

@@ -1,6 +1,7 @@
 //! Small meshes for the tests of this folder, with closed-form geometry.
 
 use crate::mesh::{CellShape, Mesh};
+use crate::system::BlockCsr;
 use crate::tensor::Vector;
 
 /// A number in [-1, 1] that depends on its arguments only.
@@ -69,4 +70,27 @@ pub fn boxes<const D: usize>(n: usize, jitter: f64) -> Vec<Mesh<D>> {
         .filter(|cell| cell.shape.dimension() == D)
         .map(|cell| unit_box(cell.shape, n, jitter))
         .collect()
+}
+
+/// Solves `K u = f` by dense LU with some unknowns prescribed.
+pub fn solve(k: &BlockCsr, f: &[f64], fixed: &[(usize, f64)]) -> Vec<f64> {
+    let (n, d) = (k.dofs(), k.block);
+    let mut a = nalgebra::DMatrix::<f64>::zeros(n, n);
+    let mut b = nalgebra::DVector::from_column_slice(f);
+    for i in 0..k.rows() {
+        let (columns, blocks) = k.row(i);
+        for (e, &c) in columns.iter().enumerate() {
+            for p in 0..d {
+                for q in 0..d {
+                    a[(i * d + p, c as usize * d + q)] = blocks[(e * d + p) * d + q];
+                }
+            }
+        }
+    }
+    for &(i, value) in fixed {
+        a.row_mut(i).fill(0.0);
+        a[(i, i)] = 1.0;
+        b[i] = value;
+    }
+    a.lu().solve(&b).unwrap().iter().copied().collect()
 }
