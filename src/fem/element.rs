@@ -155,9 +155,9 @@ pub fn row_at<const D: usize>(
     // a_j C_ijkl is common to all blocks of the row; contracting it first halves the work in 3D and more
     let ga = point.gradient[local_node] * point.weight;
     let mut half = [Tensor::<D>::zeros(); D];
-    for i in 0..D {
-        for j in 0..D {
-            half[i] += tangent.0[i][j] * ga[j];
+    for (half, c) in half.iter_mut().zip(&tangent.0) {
+        for (c, g) in c.iter().zip(ga.iter()) {
+            *half += c * *g;
         }
     }
     for (block, gb) in blocks.iter_mut().zip(&point.gradient).take(point.nodes) {

@@ -17,6 +17,9 @@ pub fn reference_of<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> 
     let cell = reference(mesh, c)?;
     let (origin, nodes) = relative_nodes(mesh, c);
     let target = x - origin;
+    if !target.iter().all(|t| t.is_finite()) {
+        return None;
+    }
     let mut xi = Vector::from_fn(|i, _| cell.centre[i]);
     for _ in 0..30 {
         let at = padded(&xi);
@@ -31,7 +34,7 @@ pub fn reference_of<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> 
         if step.amax() < 1e-9 {
             return Some(xi);
         }
-        if !(xi.amax() < 1e6) {
+        if xi.amax() > 1e6 {
             return None;
         }
     }
@@ -79,7 +82,8 @@ impl<const D: usize> Locator<D> {
             mean += (b - a) / selected.len() as f64;
             largest = largest.max((b - a).amax());
         }
-        let mut bin: Vector<D> = mean;
+        // flat cells have no extent along an axis, and bins of none would be without number
+        let mut bin: Vector<D> = mean.sup(&((high - low) * 1e-6));
         let mut counts = [1usize; D];
         // far-flung cells must not ask for more bins than there are cells to put in them
         while !selected.is_empty() {
@@ -334,6 +338,16 @@ mod tests {
         let x = |y: f64| Vector::<2>::new(0.55, y);
         assert!(locator.locate(&mesh, &x(0.31), 1e-9).is_none());
         assert_eq!(locator.locate(&mesh, &x(0.71), 1e-9).unwrap().cell, 75);
+        assert!(reference_of(&mesh, 0, &x(f64::NAN)).is_none());
+        // two flat cells at different heights: refused by `check`, but no reason to search for ever
+        let mut flat = unit_box::<2>(CellShape::Quad4, 1, 0.0);
+        flat.nodes = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
+            .map(|x| Vector::<2>::new(x[0], x[1]))
+            .to_vec();
+        flat.push_cell(CellShape::Quad4, &[0, 1, 1, 0]);
+        flat.push_cell(CellShape::Quad4, &[2, 3, 3, 2]);
+        let locator = Locator::new(&flat, 1..3);
+        assert!(locator.locate(&flat, &x(0.5), 1e-9).is_none());
         assert!(
             Locator::new(&mesh, std::iter::empty())
                 .locate(&mesh, &x(0.5), 1e-9)
