@@ -119,7 +119,7 @@ mod tests {
     fn monomial(shape: CellShape, powers: [usize; 3]) -> f64 {
         let factorial = |n: usize| (1..=n).product::<usize>() as f64;
         let even = |p: usize| {
-            if p % 2 == 0 {
+            if p.is_multiple_of(2) {
                 2.0 / (p + 1) as f64
             } else {
                 0.0

@@ -163,8 +163,10 @@ mod tests {
 
     #[test]
     fn edge_forces_of_a_linear_traction_are_those_of_the_textbook() {
-        let mut mesh = Mesh::<2>::default();
-        mesh.nodes = vec![Vector::<2>::new(1.0, 1.0), Vector::<2>::new(4.0, 5.0)];
+        let mesh = Mesh::<2> {
+            nodes: vec![Vector::<2>::new(1.0, 1.0), Vector::<2>::new(4.0, 5.0)],
+            ..Mesh::default()
+        };
         // t grows from p to q along an edge of length 5: f = L (2p + q) / 6 and L (p + 2q) / 6
         let t = |x: &Vector<2>| Vector::<2>::new(2.0 + 3.0 * (x[0] - 1.0) / 3.0, 0.0);
         let f = traction_vector(&mesh, &[0, 1], t);
@@ -176,13 +178,15 @@ mod tests {
 
     #[test]
     fn face_forces_add_up_to_force_and_moment() {
-        let mut mesh = Mesh::<3>::default();
-        mesh.nodes = vec![
-            Vector::<3>::new(0.0, 0.0, 1.0),
-            Vector::<3>::new(2.0, 0.0, 1.0),
-            Vector::<3>::new(2.0, 3.0, 1.0),
-            Vector::<3>::new(0.0, 3.0, 1.0),
-        ];
+        let mesh = Mesh::<3> {
+            nodes: vec![
+                Vector::<3>::new(0.0, 0.0, 1.0),
+                Vector::<3>::new(2.0, 0.0, 1.0),
+                Vector::<3>::new(2.0, 3.0, 1.0),
+                Vector::<3>::new(0.0, 3.0, 1.0),
+            ],
+            ..Mesh::default()
+        };
         // pressure x^3 y on a 2 by 3 rectangle: total 4 * 4.5, first moment in x 32/5 * 4.5
         let t = |x: &Vector<3>| Vector::<3>::new(0.0, 0.0, x[0].powi(3) * x[1]);
         let sums = |f: &[(u32, Vector<3>)]| {

@@ -274,14 +274,14 @@ mod tests {
                 }
                 let (shape, n) = shape_values(&mesh, c, &xi);
                 let mut x = Vector::zeros();
-                for a in 0..n {
-                    x += mesh.nodes[mesh.cell(c)[a] as usize] * shape[a];
+                for (&node, weight) in mesh.cell(c).iter().zip(&shape) {
+                    x += mesh.nodes[node as usize] * *weight;
                 }
                 assert!((reference_of(&mesh, c, &x).unwrap() - xi).amax() < 1e-13);
                 let found = locator.locate(&mesh, &x, 1e-9).unwrap();
                 assert_eq!((found.cell, found.nodes), (c, n));
-                for a in 0..8 {
-                    assert!((found.shape[a] - shape[a]).abs() < 1e-13);
+                for (found, weight) in found.shape.iter().zip(&shape) {
+                    assert!((found - weight).abs() < 1e-13);
                 }
             }
             for (node, x) in mesh.nodes.iter().enumerate() {
