@@ -1,1 +1,615 @@
-//! Reading Gmsh MSH files.
+//! Gmsh MSH files of versions 4.1 and 2.x, ASCII and binary of either byte order.
+//!
+//! Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Physical groups become
+//! sets under their names, or `physical_N` where group `N` has none. Sections that say nothing of the mesh itself
+//! (`$NodeData`, `$Periodic`, `$Comments`, …) are skipped; those that would change its meaning are refused.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use super::read::{Encoding, RawElement, RawMesh, RawNode, Source};
+use super::{CellShape, MeshError};
+
+/// What a wrong word in a text file calls for.
+const REWRITE: &str = "correct it or write the file again with Gmsh";
+
+/// Our shape for Gmsh's number, or its name and a remedy.
+fn shape(kind: i64) -> Result<CellShape, (&'static str, &'static str)> {
+    const ORDER: &str =
+        "only first-order elements are read: set Mesh.ElementOrder = 1 and mesh again";
+    const KIND: &str = "supported are points, lines, triangles, quadrilaterals, tetrahedra and hexahedra: mesh without it";
+    Ok(match kind {
+        1 => CellShape::Line2,
+        2 => CellShape::Tri3,
+        3 => CellShape::Quad4,
+        4 => CellShape::Tet4,
+        5 => CellShape::Hex8,
+        15 => CellShape::Vertex,
+        6 => return Err(("prism", KIND)),
+        7 => return Err(("pyramid", KIND)),
+        8 => return Err(("second-order line", ORDER)),
+        9 => return Err(("second-order triangle", ORDER)),
+        10 | 16 => return Err(("second-order quadrilateral", ORDER)),
+        11 => return Err(("second-order tetrahedron", ORDER)),
+        12 | 17 => return Err(("second-order hexahedron", ORDER)),
+        13 | 18 => return Err(("second-order prism", ORDER)),
+        14 | 19 => return Err(("second-order pyramid", ORDER)),
+        20..=31 | 36..=66 | 71..=93 => return Err(("element of a higher order", ORDER)),
+        _ => return Err(("unknown", KIND)),
+    })
+}
+
+/// Parses a file.
+pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(RawMesh, Source<'a>), MeshError> {
+    let mut reader = Reader {
+        source: Source {
+            path: path.into(),
+            bytes,
+            encoding: Encoding::Text,
+        },
+        at: 0,
+        section: "$MeshFormat".into(),
+        version: Version::Four,
+        swapped: false,
+        size_bytes: 8,
+        names: HashMap::new(),
+        entities: HashMap::new(),
+        lists: HashMap::new(),
+        raw: RawMesh::default(),
+    };
+    reader.file()?;
+    Ok((reader.raw, reader.source))
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Version {
+    Two,
+    Four,
+}
+
+struct Reader<'a> {
+    source: Source<'a>,
+    at: usize,
+    section: String,
+    version: Version,
+    /// Whether binary numbers have the other byte order than this machine.
+    swapped: bool,
+    /// Bytes of a `size_t` in the file.
+    size_bytes: usize,
+    /// Names of physical groups by dimension and tag.
+    names: HashMap<(usize, i64), String>,
+    /// Physical groups of each entity, by dimension and tag.
+    entities: HashMap<(usize, i64), Vec<i64>>,
+    /// Lists of groups that already have a number in `raw.groups`.
+    lists: HashMap<(usize, Vec<i64>), u32>,
+    raw: RawMesh,
+}
+
+impl<'a> Reader<'a> {
+    fn file(&mut self) -> Result<(), MeshError> {
+        let mut seen: Vec<String> = Vec::new();
+        loop {
+            self.skip_space();
+            if self.at == self.source.bytes.len() {
+                break;
+            }
+            let start = self.at;
+            let line = self.line();
+            let Some(name) = line.strip_prefix('$').map(str::to_owned) else {
+                return Err(self.syntax_at(start, line, "a section such as $Nodes"));
+            };
+            self.section = format!("${name}");
+            if seen.is_empty() && name != "MeshFormat" {
+                return Err(self.syntax_at(start, &format!("${name}"), "$MeshFormat"));
+            }
+            if ["Nodes", "Elements", "Entities"].contains(&name.as_str()) && seen.contains(&name) {
+                return Err(self.unsupported(
+                    start,
+                    &format!("a second ${name} section"),
+                    "write one mesh per file",
+                ));
+            }
+            match name.as_str() {
+                "MeshFormat" => self.format()?,
+                "PhysicalNames" => self.physical_names()?,
+                "Entities" if self.version == Version::Four => self.entities()?,
+                "Nodes" if self.version == Version::Four => self.nodes_4()?,
+                "Nodes" => self.nodes_2()?,
+                "Elements" if self.version == Version::Four => self.elements_4()?,
+                "Elements" => self.elements_2()?,
+                "PartitionedEntities" => {
+                    return Err(self.unsupported(
+                        start,
+                        "a partitioned mesh ($PartitionedEntities)",
+                        "write it without partitions (in Gmsh: Mesh > Unpartition)",
+                    ));
+                }
+                "ParametricNodes" => {
+                    return Err(self.unsupported(
+                        start,
+                        "$ParametricNodes",
+                        "write it without parametric coordinates (Mesh.SaveParametric = 0)",
+                    ));
+                }
+                _ => self.skip_section(&name)?,
+            }
+            self.end_of_section(&name)?;
+            seen.push(name);
+        }
+        for wanted in ["MeshFormat", "Nodes", "Elements"] {
+            if !seen.iter().any(|name| name == wanted) {
+                self.section = "the file".into();
+                return Err(self.truncated(&format!("a section ${wanted}")));
+            }
+        }
+        Ok(())
+    }
+
+    fn format(&mut self) -> Result<(), MeshError> {
+        let at = self.at;
+        let line = self.line();
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let [version, file_type, size] = words[..] else {
+            return Err(self.syntax_at(at, line, "version, file type and data size"));
+        };
+        self.version = match version {
+            "4.1" => Version::Four,
+            "2" | "2.0" | "2.1" | "2.2" => Version::Two,
+            _ => {
+                return Err(self.unsupported(
+                    at,
+                    &format!("version {version} of the format"),
+                    "write version 4.1 or 2.2 (gmsh -format msh41 or msh22)",
+                ));
+            }
+        };
+        self.size_bytes = match (size, file_type, self.version) {
+            ("8", ..) => 8,
+            ("4", "1", Version::Four) => 4,
+            _ => {
+                return Err(self.unsupported(
+                    at,
+                    &format!("data size {size}"),
+                    "write it with 8-byte numbers, as Gmsh does",
+                ));
+            }
+        };
+        match file_type {
+            "0" => {}
+            "1" => {
+                self.source.encoding = Encoding::Binary;
+                let at = self.at;
+                let one = self.bytes::<4>("the integer 1 that tells the byte order")?;
+                self.swapped = match i32::from_ne_bytes(one) {
+                    1 => false,
+                    n if n.swap_bytes() == 1 => true,
+                    n => return Err(self.syntax_at(at, &n.to_string(), "the integer 1")),
+                };
+            }
+            _ => return Err(self.syntax_at(at, file_type, "file type 0 (ASCII) or 1 (binary)")),
+        }
+        Ok(())
+    }
+
+    /// Text in both encodings.
+    fn physical_names(&mut self) -> Result<(), MeshError> {
+        let at = self.at;
+        let line = self.line();
+        let count: usize = line
+            .parse()
+            .map_err(|_| self.syntax_at(at, line, "the number of names"))?;
+        for _ in 0..count {
+            self.skip_space();
+            let at = self.at;
+            let line = self.line();
+            if line.is_empty() {
+                return Err(self.truncated("the name of a physical group"));
+            }
+            let mut parts = line.splitn(3, char::is_whitespace);
+            let dimension = parts.next().and_then(|w| w.parse().ok());
+            let tag = parts.next().and_then(|w| w.parse().ok());
+            let name = parts.next().map(str::trim).and_then(|n| {
+                n.strip_prefix('"')
+                    .and_then(|n| n.strip_suffix('"'))
+                    .filter(|n| !n.is_empty())
+            });
+            let (Some(dimension), Some(tag), Some(name)) = (dimension, tag, name) else {
+                return Err(self.syntax_at(at, line, "dimension, tag and \"name\""));
+            };
+            self.names.insert((dimension, tag), name.into());
+        }
+        Ok(())
+    }
+
+    fn entities(&mut self) -> Result<(), MeshError> {
+        let mut counts = [0; 4];
+        for count in &mut counts {
+            *count = self.size("the number of entities")?;
+        }
+        for (dimension, count) in counts.into_iter().enumerate() {
+            for _ in 0..count {
+                let tag = self.integer("the tag of an entity")?;
+                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                    self.double("the bounds of an entity")?;
+                }
+                let mut groups = Vec::new();
+                for _ in 0..self.size("the number of physical groups")? {
+                    // negative where the group holds the entity reversed
+                    groups.push(self.integer("a physical group")?.abs());
+                }
+                if dimension > 0 {
+                    for _ in 0..self.size("the number of bounding entities")? {
+                        self.integer("a bounding entity")?;
+                    }
+                }
+                self.entities.insert((dimension, tag), groups);
+            }
+        }
+        Ok(())
+    }
+
+    fn nodes_4(&mut self) -> Result<(), MeshError> {
+        let blocks = self.size("the number of node blocks")?;
+        let total = self.size("the number of nodes")?;
+        self.size("the smallest node tag")?;
+        self.size("the largest node tag")?;
+        let mut tags = Vec::new();
+        for _ in 0..blocks {
+            let dimension = self.integer("the dimension of an entity")?;
+            self.integer("the tag of an entity")?;
+            let parametric = self.integer("0 or 1 for parametric coordinates")?;
+            let count = self.size("the number of nodes in a block")?;
+            tags.clear();
+            for _ in 0..count {
+                tags.push((self.next_at(), self.size("a node tag")? as u64));
+            }
+            for &(tag_at, tag) in &tags {
+                let text = self.source.encoding == Encoding::Text;
+                let at = if text { self.next_at() } else { tag_at };
+                let x = self.point()?;
+                if parametric != 0 {
+                    for _ in 0..dimension {
+                        self.double("a parametric coordinate")?;
+                    }
+                }
+                self.raw.nodes.push(RawNode { tag, x, at });
+            }
+        }
+        self.check_total(self.raw.nodes.len(), total, "nodes")
+    }
+
+    fn elements_4(&mut self) -> Result<(), MeshError> {
+        let blocks = self.size("the number of element blocks")?;
+        let total = self.size("the number of elements")?;
+        self.size("the smallest element tag")?;
+        self.size("the largest element tag")?;
+        for _ in 0..blocks {
+            let dimension = self.integer("the dimension of an entity")?;
+            let entity = self.integer("the tag of an entity")?;
+            let kind_at = self.next_at();
+            let kind = self.integer("the type of the elements")?;
+            let count = self.size("the number of elements in a block")?;
+            let dimension = dimension.clamp(0, 3) as usize;
+            let groups = self
+                .entities
+                .get(&(dimension, entity))
+                .cloned()
+                .unwrap_or_default();
+            let group = self.group_list(dimension, groups);
+            for _ in 0..count {
+                let at = self.next_at();
+                let tag = self.size("an element tag")? as u64;
+                let shape = shape(kind).map_err(|e| self.element_error(kind_at, tag, kind, e))?;
+                let start = self.raw.element_nodes.len();
+                for _ in 0..shape.node_count() {
+                    let node = self.size("a node of an element")? as u64;
+                    self.raw.element_nodes.push(node);
+                }
+                self.raw.elements.push(RawElement {
+                    tag,
+                    shape,
+                    start,
+                    group,
+                    at,
+                });
+            }
+        }
+        self.check_total(self.raw.elements.len(), total, "elements")
+    }
+
+    /// The count of a section of version 2, which is text in both encodings.
+    fn count_2(&mut self, what: &str) -> Result<usize, MeshError> {
+        self.skip_space();
+        let at = self.at;
+        let line = self.line();
+        line.parse().map_err(|_| self.syntax_at(at, line, what))
+    }
+
+    fn nodes_2(&mut self) -> Result<(), MeshError> {
+        for _ in 0..self.count_2("the number of nodes")? {
+            let at = self.next_at();
+            let tag = self.integer("a node number")? as u64;
+            let x = self.point()?;
+            self.raw.nodes.push(RawNode { tag, x, at });
+        }
+        Ok(())
+    }
+
+    fn elements_2(&mut self) -> Result<(), MeshError> {
+        let total = self.count_2("the number of elements")?;
+        let text = self.source.encoding == Encoding::Text;
+        while self.raw.elements.len() < total {
+            // in binary one header serves several elements; in text each element is its own block
+            let mut at = self.next_at();
+            let mut tag = if text {
+                self.integer("an element number")?
+            } else {
+                0
+            };
+            let kind = self.integer("the type of an element")?;
+            let count = if text {
+                1
+            } else {
+                self.integer("the number of elements in a block")?
+            };
+            let tag_count = self.integer("the number of tags")?;
+            if count < 1 {
+                return Err(self.syntax_at(at, &format!("{count} elements"), "at least one"));
+            }
+            for _ in 0..count {
+                if !text {
+                    at = self.at;
+                    tag = self.integer("an element number")?;
+                }
+                let shape = shape(kind).map_err(|e| self.element_error(at, tag as u64, kind, e))?;
+                let mut physical = 0;
+                for i in 0..tag_count {
+                    let tag = self.integer("a tag of an element")?;
+                    if i == 0 {
+                        physical = tag.abs();
+                    }
+                }
+                let groups = if physical == 0 {
+                    Vec::new()
+                } else {
+                    vec![physical]
+                };
+                let group = self.group_list(shape.dimension(), groups);
+                let start = self.raw.element_nodes.len();
+                for _ in 0..shape.node_count() {
+                    let node = self.integer("a node of an element")? as u64;
+                    self.raw.element_nodes.push(node);
+                }
+                self.raw.elements.push(RawElement {
+                    tag: tag as u64,
+                    shape,
+                    start,
+                    group,
+                    at,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The number of a list of physical groups, whose names are looked up once.
+    fn group_list(&mut self, dimension: usize, groups: Vec<i64>) -> u32 {
+        if groups.is_empty() {
+            return 0;
+        }
+        let key = (dimension, groups);
+        if let Some(&number) = self.lists.get(&key) {
+            return number;
+        }
+        let name = |tag: &i64| match self.names.get(&(dimension, *tag)) {
+            Some(name) => name.clone(),
+            None => format!("physical_{tag}"),
+        };
+        let number = self.raw.groups.len() as u32;
+        self.raw.groups.push(key.1.iter().map(name).collect());
+        self.lists.insert(key, number);
+        number
+    }
+
+    /// Passes over a section, up to its end mark.
+    fn skip_section(&mut self, name: &str) -> Result<(), MeshError> {
+        let end = format!("$End{name}");
+        let rest = &self.source.bytes[self.at..];
+        match rest.windows(end.len()).position(|w| w == end.as_bytes()) {
+            Some(n) => {
+                self.at += n;
+                Ok(())
+            }
+            None => {
+                self.at = self.source.bytes.len();
+                Err(self.truncated(&end))
+            }
+        }
+    }
+
+    fn end_of_section(&mut self, name: &str) -> Result<(), MeshError> {
+        self.skip_space();
+        let at = self.at;
+        let wanted = format!("$End{name}");
+        if at == self.source.bytes.len() {
+            return Err(self.truncated(&wanted));
+        }
+        let line = self.line();
+        if line == wanted {
+            return Ok(());
+        }
+        Err(self.syntax_at(
+            at,
+            line,
+            &format!("{wanted} (the section holds more than it announces)"),
+        ))
+    }
+
+    fn check_total(&self, found: usize, announced: usize, what: &str) -> Result<(), MeshError> {
+        if found == announced {
+            return Ok(());
+        }
+        Err(self.syntax_at(
+            self.at,
+            &format!("{found} {what}"),
+            &format!("{announced}, as announced,"),
+        ))
+    }
+
+    fn point(&mut self) -> Result<[f64; 3], MeshError> {
+        let mut x = [0.0; 3];
+        for x in &mut x {
+            *x = self.double("a coordinate of a node")?;
+        }
+        Ok(x)
+    }
+
+    /// An `int` of the format.
+    fn integer(&mut self, wanted: &str) -> Result<i64, MeshError> {
+        if self.source.encoding == Encoding::Text {
+            return self.number(wanted);
+        }
+        let n = i32::from_ne_bytes(self.bytes(wanted)?);
+        Ok(i64::from(if self.swapped { n.swap_bytes() } else { n }))
+    }
+
+    /// A `size_t` of the format.
+    fn size(&mut self, wanted: &str) -> Result<usize, MeshError> {
+        if self.source.encoding == Encoding::Text {
+            return self.number(wanted);
+        }
+        if self.size_bytes == 4 {
+            let n = u32::from_ne_bytes(self.bytes(wanted)?);
+            return Ok(if self.swapped { n.swap_bytes() } else { n } as usize);
+        }
+        let n = u64::from_ne_bytes(self.bytes(wanted)?);
+        Ok(if self.swapped { n.swap_bytes() } else { n } as usize)
+    }
+
+    fn double(&mut self, wanted: &str) -> Result<f64, MeshError> {
+        if self.source.encoding == Encoding::Text {
+            return self.number(wanted);
+        }
+        let n = u64::from_ne_bytes(self.bytes(wanted)?);
+        Ok(f64::from_bits(if self.swapped {
+            n.swap_bytes()
+        } else {
+            n
+        }))
+    }
+
+    fn bytes<const N: usize>(&mut self, wanted: &str) -> Result<[u8; N], MeshError> {
+        match self.source.bytes[self.at..].first_chunk::<N>() {
+            Some(chunk) => {
+                self.at += N;
+                Ok(*chunk)
+            }
+            None => Err(self.truncated(wanted)),
+        }
+    }
+
+    /// The next word of a text file as a number.
+    fn number<T: std::str::FromStr>(&mut self, wanted: &str) -> Result<T, MeshError> {
+        let start = self.next_at();
+        let rest = &self.source.bytes[start..];
+        let length = rest
+            .iter()
+            .position(u8::is_ascii_whitespace)
+            .unwrap_or(rest.len());
+        if length == 0 {
+            self.at = start;
+            return Err(self.truncated(wanted));
+        }
+        let word = String::from_utf8_lossy(&rest[..length]);
+        match word.parse() {
+            Ok(value) => {
+                self.at = start + length;
+                Ok(value)
+            }
+            Err(_) => Err(self.syntax_at(start, &word, wanted)),
+        }
+    }
+
+    /// Where the next entry stands: in text after blanks and line ends.
+    fn next_at(&self) -> usize {
+        if self.source.encoding == Encoding::Binary {
+            return self.at;
+        }
+        let rest = &self.source.bytes[self.at..];
+        self.at
+            + rest
+                .iter()
+                .position(|b| !b.is_ascii_whitespace())
+                .unwrap_or(rest.len())
+    }
+
+    fn skip_space(&mut self) {
+        let rest = &self.source.bytes[self.at..];
+        self.at += rest
+            .iter()
+            .position(|b| !b.is_ascii_whitespace())
+            .unwrap_or(rest.len());
+    }
+
+    /// The rest of the line, trimmed; what is not UTF-8 reads as nothing.
+    fn line(&mut self) -> &'a str {
+        let rest = &self.source.bytes[self.at..];
+        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+        self.at += (length + 1).min(rest.len());
+        std::str::from_utf8(&rest[..length]).unwrap_or("").trim()
+    }
+
+    fn truncated(&self, wanted: &str) -> MeshError {
+        MeshError::Truncated {
+            path: self.source.path.clone(),
+            place: self.source.place(self.at),
+            section: self.section.clone(),
+            wanted: wanted.into(),
+        }
+    }
+
+    fn syntax_at(&self, at: usize, found: &str, wanted: &str) -> MeshError {
+        let found: String = found.chars().take(60).collect();
+        MeshError::Syntax {
+            path: self.source.path.clone(),
+            place: self.source.place(at),
+            found: if found.is_empty() {
+                "nothing legible".into()
+            } else {
+                format!("\"{found}\"")
+            },
+            wanted: wanted.into(),
+            remedy: REWRITE,
+        }
+    }
+
+    fn unsupported(&self, at: usize, what: &str, remedy: &'static str) -> MeshError {
+        MeshError::Unsupported {
+            path: self.source.path.clone(),
+            place: self.source.place(at),
+            what: what.into(),
+            remedy,
+        }
+    }
+
+    fn element_error(
+        &self,
+        at: usize,
+        element: u64,
+        kind: i64,
+        (name, remedy): (&'static str, &'static str),
+    ) -> MeshError {
+        MeshError::UnsupportedElement {
+            path: self.source.path.clone(),
+            place: self.source.place(at),
+            element,
+            kind,
+            name,
+            remedy,
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "gmsh_tests.rs"]
+mod tests;

@@ -1,1 +1,312 @@
-//! One entry for all mesh files.
+//! One entry for all mesh files, and what their readers share: from nodes and elements as a file holds them to a [`Mesh`].
+
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use super::error::axis_name;
+use super::{CellShape, Facet, Mesh, MeshError, Place, gmsh, vtk};
+use crate::tensor::Vector;
+
+/// How far out of its plane a node of a 2D mesh may lie, as a fraction of the mesh's extent.
+const OUT_OF_PLANE: f64 = 1e-12;
+
+/// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.vtk` or `.vtu`.
+///
+/// Cells are the elements of dimension `D`. Named groups of them become cell sets, groups of dimension `D − 1` facet sets,
+/// and groups of still lower dimension node sets. The cell set `all` is added unless the file has one of that name. Nodes
+/// that no cell uses, such as centres of circles, are dropped. Node order is kept otherwise.
+///
+/// # Errors
+/// See [`MeshError`]; each names the file, the place in it, the value and the remedy. The shapes of cells are not
+/// looked at here: see [`quality::check`](super::quality::check).
+pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>, MeshError> {
+    let bytes = load(path)?;
+    let (raw, source) = parse(path, &bytes)?;
+    raw.assemble(&source)
+}
+
+/// The largest dimension of any element in the file.
+///
+/// # Errors
+/// As [`read`].
+pub fn detect_dimension(path: &Path) -> Result<usize, MeshError> {
+    let bytes = load(path)?;
+    let (raw, source) = parse(path, &bytes)?;
+    raw.dimension(&source)
+}
+
+fn load(path: &Path) -> Result<Vec<u8>, MeshError> {
+    std::fs::read(path).map_err(|source| MeshError::Open {
+        path: path.into(),
+        source,
+    })
+}
+
+fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(RawMesh, Source<'a>), MeshError> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    match extension.to_ascii_lowercase().as_str() {
+        "msh" => gmsh::parse(path, bytes),
+        "vtk" => vtk::parse(path, bytes, vtk::Flavour::Legacy),
+        "vtu" => vtk::parse(path, bytes, vtk::Flavour::Xml),
+        _ => Err(MeshError::UnknownExtension { path: path.into() }),
+    }
+}
+
+/// The file behind a mesh, for messages.
+pub(super) struct Source<'a> {
+    pub path: PathBuf,
+    pub bytes: &'a [u8],
+    pub encoding: Encoding,
+}
+
+/// How positions in a file are told to its reader.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Encoding {
+    /// By lines.
+    Text,
+    /// By bytes.
+    Binary,
+    /// Not at all: the parser beneath does not know them.
+    Opaque,
+}
+
+impl Source<'_> {
+    /// The place of byte `at`.
+    pub fn place(&self, at: usize) -> Place {
+        match self.encoding {
+            Encoding::Text => {
+                let before = &self.bytes[..at.min(self.bytes.len())];
+                Place::Line(1 + before.iter().filter(|&&b| b == b'\n').count())
+            }
+            Encoding::Binary => Place::Byte(at),
+            Encoding::Opaque => Place::File,
+        }
+    }
+}
+
+/// A node as the file holds it.
+pub(super) struct RawNode {
+    pub tag: u64,
+    pub x: [f64; 3],
+    /// Byte where it stands.
+    pub at: usize,
+}
+
+/// An element as the file holds it.
+pub(super) struct RawElement {
+    pub tag: u64,
+    pub shape: CellShape,
+    /// Where its node tags start in [`RawMesh::element_nodes`].
+    pub start: usize,
+    /// Which of [`RawMesh::groups`] it is in.
+    pub group: u32,
+    /// Byte where it stands.
+    pub at: usize,
+}
+
+/// Nodes and elements as a file holds them, whatever its format.
+pub(super) struct RawMesh {
+    pub nodes: Vec<RawNode>,
+    pub elements: Vec<RawElement>,
+    pub element_nodes: Vec<u64>,
+    /// Lists of set names; the first one is empty.
+    pub groups: Vec<Vec<String>>,
+}
+
+impl Default for RawMesh {
+    fn default() -> Self {
+        Self {
+            nodes: Vec::new(),
+            elements: Vec::new(),
+            element_nodes: Vec::new(),
+            groups: vec![Vec::new()],
+        }
+    }
+}
+
+impl RawMesh {
+    fn dimension(&self, source: &Source) -> Result<usize, MeshError> {
+        let found = self.elements.iter().map(|e| e.shape.dimension()).max();
+        match found {
+            Some(found) if !self.nodes.is_empty() && found > 0 => Ok(found),
+            _ => Err(MeshError::Empty {
+                path: source.path.clone(),
+                nodes: self.nodes.len(),
+                elements: self.elements.len(),
+            }),
+        }
+    }
+
+    fn assemble<const D: usize>(&self, source: &Source) -> Result<Mesh<D>, MeshError> {
+        let path = || source.path.clone();
+        let found = self.dimension(source)?;
+        if found != D {
+            return Err(MeshError::WrongDimension {
+                path: path(),
+                wanted: D,
+                found,
+                remedy: if found < D {
+                    "mesh the volume too (in Gmsh: gmsh -3, and a physical group for it), or use the dimension found"
+                } else {
+                    "use the dimension found"
+                },
+            });
+        }
+        let numbers = self.number_nodes(source)?;
+        let mut mesh = Mesh::<D> {
+            nodes: self
+                .nodes
+                .iter()
+                .map(|n| Vector::from_fn(|k, _| n.x[k]))
+                .collect(),
+            ..Mesh::default()
+        };
+        // a 2.2 file repeats an element for each of its groups
+        let mut known: HashMap<[u32; 8], (u32, HashSet<u32>)> = HashMap::new();
+        let mut nodes: Vec<u32> = Vec::with_capacity(8);
+        for element in &self.elements {
+            nodes.clear();
+            let tags = &self.element_nodes[element.start..][..element.shape.node_count()];
+            for tag in tags {
+                let Some(&n) = numbers.get(tag) else {
+                    return Err(MeshError::MissingNode {
+                        path: path(),
+                        place: source.place(element.at),
+                        element: element.tag,
+                        node: *tag,
+                    });
+                };
+                nodes.push(n);
+            }
+            let names = &self.groups[element.group as usize];
+            let dimension = element.shape.dimension();
+            if dimension == D {
+                let mut key = [u32::MAX; 8];
+                key[..nodes.len()].copy_from_slice(&nodes);
+                key.sort_unstable();
+                let cell = match known.entry(key) {
+                    Entry::Vacant(slot) => {
+                        let cell = mesh.cell_count() as u32;
+                        slot.insert((cell, HashSet::from([element.group])));
+                        mesh.push_cell(element.shape, &nodes);
+                        cell
+                    }
+                    Entry::Occupied(mut slot) => {
+                        let (cell, groups) = slot.get_mut();
+                        if !groups.insert(element.group) {
+                            let first = self.cell_tag(D, *cell as usize);
+                            return Err(MeshError::DuplicateElement {
+                                path: path(),
+                                place: source.place(element.at),
+                                element: element.tag,
+                                first,
+                            });
+                        }
+                        *cell
+                    }
+                };
+                for name in names {
+                    mesh.cell_sets.entry(name.clone()).or_default().push(cell);
+                }
+            } else if dimension + 1 == D {
+                for name in names {
+                    let set = mesh.facet_sets.entry(name.clone()).or_default();
+                    set.push(nodes.clone());
+                }
+            } else {
+                for name in names {
+                    let set = mesh.node_sets.entry(name.clone()).or_default();
+                    set.extend_from_slice(&nodes);
+                }
+            }
+        }
+        self.check_plane(&mesh, source)?;
+        for set in mesh
+            .cell_sets
+            .values_mut()
+            .chain(mesh.node_sets.values_mut())
+        {
+            set.sort_unstable();
+            set.dedup();
+        }
+        for set in mesh.facet_sets.values_mut() {
+            let mut seen = HashSet::new();
+            set.retain(|facet| {
+                let mut key: Facet = facet.clone();
+                key.sort_unstable();
+                seen.insert(key)
+            });
+        }
+        let all = (0..mesh.cell_count() as u32).collect();
+        mesh.cell_sets.entry("all".into()).or_insert(all);
+        mesh.drop_unused_nodes();
+        Ok(mesh)
+    }
+
+    /// Number of each node tag; refuses a tag that comes twice and coordinates that are no numbers.
+    fn number_nodes(&self, source: &Source) -> Result<HashMap<u64, u32>, MeshError> {
+        let mut numbers = HashMap::with_capacity(self.nodes.len());
+        for (i, node) in self.nodes.iter().enumerate() {
+            if let Some(first) = numbers.insert(node.tag, i as u32) {
+                return Err(MeshError::DuplicateTag {
+                    path: source.path.clone(),
+                    place: source.place(node.at),
+                    node: node.tag,
+                    first: source.place(self.nodes[first as usize].at),
+                });
+            }
+            if let Some(k) = node.x.iter().position(|v| !v.is_finite()) {
+                return Err(MeshError::NonFinite {
+                    path: source.path.clone(),
+                    place: source.place(node.at),
+                    node: node.tag,
+                    axis: axis_name(k),
+                    value: node.x[k],
+                });
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// The tag of the first element that became cell number `cell`.
+    fn cell_tag(&self, dimension: usize, cell: usize) -> u64 {
+        let mut seen = HashSet::new();
+        self.elements
+            .iter()
+            .filter(|e| e.shape.dimension() == dimension)
+            .filter(|e| {
+                let mut tags = self.element_nodes[e.start..][..e.shape.node_count()].to_vec();
+                tags.sort_unstable();
+                seen.insert(tags)
+            })
+            .nth(cell)
+            .map_or(0, |e| e.tag)
+    }
+
+    /// Refuses nodes of cells with a coordinate beyond the mesh's dimension.
+    fn check_plane<const D: usize>(
+        &self,
+        mesh: &Mesh<D>,
+        source: &Source,
+    ) -> Result<(), MeshError> {
+        let (lo, hi) = mesh.bounds();
+        let tolerance = OUT_OF_PLANE * (hi - lo).amax();
+        for &n in &mesh.connectivity {
+            let node = &self.nodes[n as usize];
+            for k in D..3 {
+                if node.x[k].abs() > tolerance {
+                    return Err(MeshError::OutOfPlane {
+                        path: source.path.clone(),
+                        place: source.place(node.at),
+                        node: node.tag,
+                        axis: axis_name(k),
+                        value: node.x[k],
+                        dimension: D,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
