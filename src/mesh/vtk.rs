@@ -109,7 +109,7 @@ fn add_piece(
         .points
         .cast_into()
         .ok_or_else(|| Err("points that are no numbers".to_owned()))?;
-    if points.len() % 3 != 0 {
+    if !points.len().is_multiple_of(3) {
         return Err(Err(format!(
             "{} coordinates, not three per point",
             points.len()
