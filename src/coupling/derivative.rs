@@ -49,11 +49,9 @@ pub fn quadratic<const D: usize>(
                 a[(r, c)] = w[r] * value;
             }
         }
-        let svd = a.svd(true, true);
-        if svd.singular_values.min() < 1e-8 * svd.singular_values.max() {
+        let Some(inverse) = left_inverse(a, 1e-8) else {
             continue;
-        }
-        let inverse = svd.pseudo_inverse(0.0).ok()?;
+        };
         let mut result = DerivativeWeights {
             neighbours: Vec::new(),
             gradient: Vec::new(),
@@ -79,6 +77,21 @@ pub fn quadratic<const D: usize>(
         return Some(result);
     }
     None
+}
+
+/// `(AᵀA)⁻¹Aᵀ` by QR with column pivoting; `None` if the columns depend on each other to within `tolerance`.
+///
+/// A singular value decomposition would do as well, but nalgebra's loses half of the digits where singular values coincide, as they do on lattices.
+fn left_inverse(a: DMatrix<f64>, tolerance: f64) -> Option<DMatrix<f64>> {
+    let qr = a.col_piv_qr();
+    let r = qr.r();
+    let diagonal = r.diagonal().abs();
+    if diagonal.min() <= tolerance * diagonal.max() {
+        return None;
+    }
+    let mut inverse = r.solve_upper_triangular(&qr.q().transpose())?;
+    qr.p().inv_permute_rows(&mut inverse);
+    Some(inverse)
 }
 
 /// `x_b`, then `x_b x_d` (halved on the diagonal) for `b ≤ d`: the Taylor monomials.
@@ -120,11 +133,7 @@ pub fn fit<const D: usize>(
             a[(r, c + 1)] = weight * value;
         }
     }
-    let svd = a.svd(true, true);
-    if svd.singular_values.min() < 1e-7 * svd.singular_values.max() {
-        return None;
-    }
-    let inverse = svd.pseudo_inverse(0.0).ok()?;
+    let inverse = left_inverse(a, 1e-7)?;
     Some((0..data.len()).map(|r| inverse[(0, r)] * w[r]).collect())
 }
 

@@ -226,6 +226,8 @@ pub struct Model<const D: usize> {
     tensors: Vec<Tensor4<D>>,
     cell_material: Vec<u16>,
     body: Option<PdBody<D>>,
+    /// All quadrature points in and around elements whose stress is a partial stress.
+    surroundings: Option<Cloud<D>>,
     point_zone: Vec<Zone>,
     node_cells: (Vec<u32>, Vec<u32>),
     spacing: f64,
@@ -267,6 +269,7 @@ impl<const D: usize> Model<D> {
             tensors,
             cell_material,
             body: None,
+            surroundings: None,
             point_zone: Vec::new(),
             node_cells,
             spacing: 0.0,
@@ -402,6 +405,10 @@ impl<const D: usize> Model<D> {
         };
         let keep = cloud.prune(&families, reach);
         let families = families.restrict(&keep.renumbered, &keep.active);
+        let wide = self
+            .roles
+            .contains(&CellRole::StressElement)
+            .then(|| cloud.clone());
         cloud.retain(&keep.renumbered);
 
         let mut point_site = vec![NONE; cloud.position.len()];
@@ -417,24 +424,16 @@ impl<const D: usize> Model<D> {
         }
         progress.stage("seam", None);
         self.node_transfer = self.fit_nodes(node_site, coupling.interface(), &cloud)?;
-        let transfer = Transfer::from_rows((0..cloud.position.len()).map(|i| {
-            match &cloud.element[i] {
-                None => vec![(point_site[i], 1.0)],
-                Some((cell, shape)) => self
-                    .mesh
-                    .cell(*cell as usize)
-                    .iter()
-                    .zip(shape)
-                    .filter(|&(_, &s)| s != 0.0)
-                    .flat_map(|(&n, &s)| {
-                        self.node_transfer
-                            .row(n as usize)
-                            .map(move |(site, w)| (site, w * s))
-                            .collect::<Vec<_>>()
-                    })
-                    .collect(),
-            }
-        }));
+        let transfer = self.transfer_of(&cloud, |i| point_site[i]);
+        if let Some(wide) = wide {
+            let transfer = self.transfer_of(&wide, |i| point_site[keep.renumbered[i] as usize]);
+            self.surroundings = Some(Cloud {
+                position: wide.position,
+                volume: wide.volume,
+                horizon: wide.horizon,
+                transfer,
+            });
+        }
         progress.stage("bonds", None);
         let lattice = LatticeFactors::new(p, &cloud)?;
         let shells = |horizon: f64, xi: &Vector<D>| lattice.factor(horizon, xi);
@@ -465,6 +464,32 @@ impl<const D: usize> Model<D> {
             .map_err(|e| ModelError::family("the point", e))?;
         self.body = Some(body);
         Ok(())
+    }
+
+    /// Expresses the points of a cloud through sites; `site` names that of a point that is one.
+    fn transfer_of(&self, cloud: &PointCloud<D>, site: impl Fn(usize) -> u32) -> Transfer {
+        Transfer::from_rows(cloud.element.iter().enumerate().map(|(i, element)| {
+            match element {
+                None => vec![(site(i), 1.0)],
+                Some((cell, shape)) => self
+                    .mesh
+                    .cell(*cell as usize)
+                    .iter()
+                    .zip(shape)
+                    .filter(|&(_, &s)| s != 0.0)
+                    .flat_map(|(&n, &s)| {
+                        self.node_transfer
+                            .row(n as usize)
+                            .map(move |(site, w)| (site, w * s))
+                    })
+                    .collect(),
+            }
+        }))
+    }
+
+    /// All quadrature points in and around elements whose stress is a partial stress, if there are such elements.
+    pub fn surroundings(&self) -> Option<&Cloud<D>> {
+        self.surroundings.as_ref()
     }
 
     /// Expresses nodes at the seam, that are no sites, through the sites around them.

@@ -31,6 +31,7 @@ pub struct Volumes {
 /// Points before they are sites.
 ///
 /// Shapes: one entry per point in each vector.
+#[derive(Clone)]
 pub(super) struct PointCloud<const D: usize> {
     pub position: Vec<Vector<D>>,
     pub volume: Vec<f64>,
@@ -140,7 +141,7 @@ pub(super) fn place<const D: usize>(
         Vector::repeat(f64::INFINITY),
         Vector::repeat(f64::NEG_INFINITY),
     );
-    for c in (0..mesh.cell_count()).filter(|&c| roles[c] == CellRole::Points) {
+    for c in (0..mesh.cell_count()).filter(|&c| roles[c] != CellRole::Element) {
         for &n in mesh.cell(c) {
             low = low.inf(&mesh.nodes[n as usize]);
             high = high.sup(&mesh.nodes[n as usize]);
