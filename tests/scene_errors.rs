@@ -261,18 +261,25 @@ fn overrides() {
     .unwrap();
     assert_eq!(spec.peridynamics.unwrap().horizon.as_constant(), Some(0.4));
     assert_eq!(spec.title.as_deref(), Some("My plate"));
-    assert!(matches!(spec.coupling, CouplingSpec::Blending(b) if b.beta == BetaSpec::Smooth));
+    assert!(
+        matches!(spec.coupling.into_inner(), CouplingSpec::Blending(b) if b.beta == BetaSpec::Smooth)
+    );
     for choice in [
         "coupling=splice",
         "coupling.splice={}",
         "coupling = \"splice\"",
     ] {
         let spec = parse(RIGHT, &[choice]).unwrap();
-        assert!(matches!(spec.coupling, CouplingSpec::Splice(_)), "{choice}");
+        assert!(
+            matches!(spec.coupling.into_inner(), CouplingSpec::Splice(_)),
+            "{choice}"
+        );
     }
     // a second override sees the first
     let spec = parse(RIGHT, &["coupling=splice", "coupling.blending.beta=linear"]).unwrap();
-    assert!(matches!(spec.coupling, CouplingSpec::Blending(b) if b.beta == BetaSpec::Linear));
+    assert!(
+        matches!(spec.coupling.into_inner(), CouplingSpec::Blending(b) if b.beta == BetaSpec::Linear)
+    );
     let spec = parse(
         RIGHT,
         &[

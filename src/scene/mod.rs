@@ -7,20 +7,33 @@
 //! | `expression.rs`, `value.rs` | numbers, expressions, coordinates with their places |
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
+//! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `materials.rs`, `conditions.rs` | its parts |
 //! | `error.rs` | place, value and remedy |
 
+mod check;
 mod choice;
+mod conditions;
 mod error;
 mod expression;
+mod materials;
+mod meshing;
 mod parse;
+mod region;
 mod source;
 pub mod spec;
+mod validate;
 mod value;
+mod zones;
 
+pub use conditions::{Components, Condition, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
+pub use materials::{Law, Material, Method, Peridynamics, Points};
+pub use region::Region;
 pub use source::{Source, Span};
 pub use spec::SceneSpec;
+pub use validate::{AnyScene, Output, Scene, Solver};
 pub use value::{Coordinates, Count, Number, Text};
 
 /// The JSON Schema of scene files, for editors.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
+use toml::Spanned;
 
 use crate::scene::value::{Coordinates, Count, Number, Text};
 
@@ -32,7 +33,8 @@ pub struct LineMeshSpec {
     /// Right end.
     pub max: Coordinates,
     /// How the line is divided.
-    pub x: AxisSpec,
+    #[schemars(with = "AxisSpec")]
+    pub x: Spanned<AxisSpec>,
     /// Intervals left out, by name.
     #[serde(default)]
     pub cutouts: BTreeMap<Text, CutoutSpec>,
@@ -47,9 +49,11 @@ pub struct RectangleMeshSpec {
     /// Largest corner.
     pub max: Coordinates,
     /// How the x axis is divided.
-    pub x: AxisSpec,
+    #[schemars(with = "AxisSpec")]
+    pub x: Spanned<AxisSpec>,
     /// How the y axis is divided.
-    pub y: AxisSpec,
+    #[schemars(with = "AxisSpec")]
+    pub y: Spanned<AxisSpec>,
     /// Shape of the cells.
     #[serde(default)]
     pub cell: PlaneCellSpec,
@@ -67,11 +71,14 @@ pub struct BoxMeshSpec {
     /// Largest corner.
     pub max: Coordinates,
     /// How the x axis is divided.
-    pub x: AxisSpec,
+    #[schemars(with = "AxisSpec")]
+    pub x: Spanned<AxisSpec>,
     /// How the y axis is divided.
-    pub y: AxisSpec,
+    #[schemars(with = "AxisSpec")]
+    pub y: Spanned<AxisSpec>,
     /// How the z axis is divided.
-    pub z: AxisSpec,
+    #[schemars(with = "AxisSpec")]
+    pub z: Spanned<AxisSpec>,
     /// Shape of the cells.
     #[serde(default)]
     pub cell: SolidCellSpec,

@@ -28,6 +28,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
+use toml::Spanned;
 
 use super::value::Text;
 
@@ -43,7 +44,8 @@ pub struct SceneSpec {
     #[serde(default)]
     pub title: Option<String>,
     /// How the body stands for a three-dimensional solid; fixes the dimension.
-    pub kinematics: KinematicsSpec,
+    #[schemars(with = "KinematicsSpec")]
+    pub kinematics: Spanned<KinematicsSpec>,
     /// The mesh: generated, or read from a file.
     pub mesh: MeshSpec,
     /// The materials by name. At most one of several may be without `cells`: it fills what the others leave.
@@ -55,7 +57,8 @@ pub struct SceneSpec {
     #[serde(default)]
     pub zones: ZonesSpec,
     /// How the two models are joined; also as text where no option is set, `coupling = "splice"`.
-    pub coupling: CouplingSpec,
+    #[schemars(with = "CouplingSpec")]
+    pub coupling: Spanned<CouplingSpec>,
     /// Displacements, tractions and body forces by name.
     #[serde(default)]
     pub conditions: BTreeMap<Text, ConditionSpec>,

@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Deserialize;
+use toml::Spanned;
 
 use crate::scene::value::{Coordinates, Number, Text};
 
@@ -11,10 +12,12 @@ use crate::scene::value::{Coordinates, Number, Text};
 pub struct ZonesSpec {
     /// Peridynamics only. Cells whose centroid lies inside.
     #[serde(default)]
-    pub nonlocal: Option<ShapeSpec>,
+    #[schemars(with = "Option<ShapeSpec>")]
+    pub nonlocal: Option<Spanned<ShapeSpec>>,
     /// Both models at once (blending, partial stress). Cells whose centroid lies inside and that are not nonlocal.
     #[serde(default)]
-    pub transition: Option<TransitionSpec>,
+    #[schemars(with = "Option<TransitionSpec>")]
+    pub transition: Option<Spanned<TransitionSpec>>,
 }
 
 /// A region of space or a named set of cells.

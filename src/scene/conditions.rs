@@ -1,0 +1,346 @@
+//! Conditions of a validated scene.
+
+use std::collections::BTreeMap;
+
+use super::error::{SceneError, SceneErrorKind};
+use super::expression::Expression;
+use super::materials::no_further_axes;
+use super::region::{Region, region, unknown_set};
+use super::source::Span;
+use super::spec::{ConditionSpec, ShapeSpec};
+use super::value::Text;
+use crate::mesh::{Facet, Mesh};
+use crate::tensor::{Vector, padded};
+
+/// A vector field, component by component; components left out are free or zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Components<const D: usize>(pub [Option<Expression>; D]);
+
+impl PartialEq for Expression {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
+}
+
+impl<const D: usize> Components<D> {
+    /// The component along `axis` at `x`, if it is given.
+    pub fn at(&self, axis: usize, x: &Vector<D>) -> Option<f64> {
+        self.0[axis].as_ref().map(|e| e.eval(&padded(x)))
+    }
+
+    /// The vector at `x`, zero where nothing is given.
+    pub fn vector(&self, x: &Vector<D>) -> Vector<D> {
+        Vector::from_fn(|k, _| self.at(k, x).unwrap_or(0.0))
+    }
+}
+
+/// Where a displacement is prescribed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Support<const D: usize> {
+    /// On a named set of the mesh: its nodes, and the facets among them if it is a set of facets.
+    Set {
+        /// Its name.
+        name: String,
+        /// Its nodes.
+        nodes: Vec<u32>,
+        /// Its facets.
+        facets: Vec<Facet>,
+    },
+    /// At all sites inside a region.
+    Inside(Region<D>),
+}
+
+/// What is prescribed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Prescribed<const D: usize> {
+    /// Displacement.
+    Displacement(Support<D>),
+    /// Force per area on facets.
+    Traction(Vec<Facet>),
+    /// Force per volume inside a region.
+    BodyForce(Region<D>),
+}
+
+/// A condition of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Condition<const D: usize> {
+    /// Its name.
+    pub name: String,
+    /// What and where.
+    pub prescribed: Prescribed<D>,
+    /// How much.
+    pub components: Components<D>,
+}
+
+/// All conditions.
+pub(crate) fn conditions<const D: usize>(
+    spec: &BTreeMap<Text, ConditionSpec>,
+    mesh: &Mesh<D>,
+) -> Result<Vec<Condition<D>>, SceneError> {
+    let mut found = Vec::with_capacity(spec.len());
+    for (name, condition) in spec {
+        found.push(one(name, condition, mesh)?);
+    }
+    if !found
+        .iter()
+        .any(|c| matches!(c.prescribed, Prescribed::Displacement(_)))
+    {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            "no condition prescribes a displacement: nothing holds the body",
+        )
+        .label(0..0, "no [conditions.NAME.displacement] in this scene")
+        .help("add one, for example [conditions.base.displacement] with on = \"bottom\", y = 0"));
+    }
+    agree(spec, &found, mesh)?;
+    Ok(found)
+}
+
+fn one<const D: usize>(
+    name: &Text,
+    spec: &ConditionSpec,
+    mesh: &Mesh<D>,
+) -> Result<Condition<D>, SceneError> {
+    let (kind, given) = match spec {
+        ConditionSpec::Displacement(c) => ("displacement", [&c.x, &c.y, &c.z]),
+        ConditionSpec::Traction(c) => ("traction", [&c.x, &c.y, &c.z]),
+        ConditionSpec::BodyForce(c) => ("body-force", [&c.x, &c.y, &c.z]),
+    };
+    let place = format!("conditions.{name}.{kind}");
+    let components = components::<D>(&place, name, given)?;
+    let prescribed = match spec {
+        ConditionSpec::Displacement(c) => {
+            let support = match (&c.on, &c.inside) {
+                (Some(set), None) => {
+                    let at = format!("{place}.on");
+                    let known = mesh.set_names();
+                    let Some(nodes) = mesh.nodes_of_set(&set.value) else {
+                        return Err(unknown_set(&at, set, "set", &known, mesh));
+                    };
+                    not_empty(&at, set, nodes.len())?;
+                    Support::Set {
+                        name: set.value.clone(),
+                        nodes,
+                        facets: mesh.facet_sets.get(&set.value).cloned().unwrap_or_default(),
+                    }
+                }
+                (None, Some(shape)) => Support::Inside(inside(&place, name, shape, mesh)?),
+                (both, _) => {
+                    let (what, label) = match both {
+                        Some(_) => ("both `on` and `inside`", "two places"),
+                        None => ("neither `on` nor `inside`", "where?"),
+                    };
+                    return Err(SceneError::new(
+                        SceneErrorKind::Choice,
+                        format!("`{place}` has {what}"),
+                    )
+                    .label(name.span.clone(), label)
+                    .help("keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`"));
+                }
+            };
+            if let Support::Set { nodes, .. } = &support {
+                finite(
+                    &place,
+                    name,
+                    &components,
+                    nodes.iter().map(|&n| mesh.nodes[n as usize]),
+                )?;
+            }
+            Prescribed::Displacement(support)
+        }
+        ConditionSpec::Traction(c) => {
+            let Some(facets) = mesh.facet_sets.get(&c.on.value) else {
+                let known: Vec<&str> = mesh.facet_sets.keys().map(String::as_str).collect();
+                let wanted = ["set of end points", "set of edges", "set of faces"][D - 1];
+                return Err(unknown_set(
+                    &format!("{place}.on"),
+                    &c.on,
+                    wanted,
+                    &known,
+                    mesh,
+                ));
+            };
+            not_empty(&format!("{place}.on"), &c.on, facets.len())?;
+            let nodes = facets.iter().flatten().map(|&n| mesh.nodes[n as usize]);
+            finite(&place, name, &components, nodes)?;
+            Prescribed::Traction(facets.clone())
+        }
+        ConditionSpec::BodyForce(c) => {
+            let region = match &c.inside {
+                Some(shape) => inside(&place, name, shape, mesh)?,
+                None => Region::Shape {
+                    shape: crate::shape::Shape::Everywhere,
+                    margin: 0.0,
+                },
+            };
+            let within = (0..mesh.cell_count())
+                .map(|i| mesh.centroid(i))
+                .filter(|x| region.contains(x, 0.0));
+            finite(&place, name, &components, within)?;
+            Prescribed::BodyForce(region)
+        }
+    };
+    Ok(Condition {
+        name: name.value.clone(),
+        prescribed,
+        components,
+    })
+}
+
+fn components<const D: usize>(
+    place: &str,
+    name: &Text,
+    given: [&Option<Expression>; 3],
+) -> Result<Components<D>, SceneError> {
+    let axes = ["x", "y", "z"];
+    if let Some((k, e)) = (D..3).find_map(|k| given[k].as_ref().map(|e| (k, e))) {
+        return Err(SceneError::new(
+            SceneErrorKind::Dimension,
+            format!("`{place}.{}` in a scene of dimension {D}", axes[k]),
+        )
+        .label(e.span.clone(), "no such axis")
+        .help(format!("remove `{}`", axes[k])));
+    }
+    for (axis, expression) in axes.iter().zip(given) {
+        if let Some(e) = expression {
+            no_further_axes::<D>(&format!("{place}.{axis}"), e)?;
+        }
+    }
+    if given.iter().all(|e| e.is_none()) {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            format!("`{place}` prescribes no component"),
+        )
+        .label(name.span.clone(), "nothing prescribed")
+        .help(format!(
+            "add {}",
+            ["x = 0", "x = 0 or y = 0", "x = 0, y = 0 or z = 0"][D - 1]
+        )));
+    }
+    Ok(Components(std::array::from_fn(|k| given[k].clone())))
+}
+
+fn inside<const D: usize>(
+    place: &str,
+    name: &Text,
+    shape: &ShapeSpec,
+    mesh: &Mesh<D>,
+) -> Result<Region<D>, SceneError> {
+    if let ShapeSpec::Set(set) = shape {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`{place}.inside` is the set `{set}`"),
+        )
+        .label(set.span.clone(), "no shape")
+        .help("name a set by `on`, or give a shape such as `box`"));
+    }
+    let found = region(&format!("{place}.inside"), shape, mesh)?;
+    let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
+    let holds_something = mesh.nodes.iter().any(|x| found.contains(x, tolerance))
+        || (0..mesh.cell_count()).any(|c| found.contains(&mesh.centroid(c), tolerance));
+    if holds_something {
+        return Ok(found);
+    }
+    Err(SceneError::new(
+        SceneErrorKind::Empty,
+        format!("`{place}.inside` holds no part of the mesh"),
+    )
+    .label(name.span.clone(), "acts nowhere")
+    .help(extent(mesh)))
+}
+
+/// The extent of a mesh, as a remedy for what misses it.
+pub(crate) fn extent<const D: usize>(mesh: &Mesh<D>) -> String {
+    let (lo, hi) = mesh.bounds();
+    format!(
+        "the mesh reaches from {:?} to {:?}",
+        lo.as_slice(),
+        hi.as_slice()
+    )
+}
+
+fn not_empty(place: &str, set: &Text, count: usize) -> Result<(), SceneError> {
+    if count > 0 {
+        return Ok(());
+    }
+    Err(SceneError::new(
+        SceneErrorKind::Empty,
+        format!("`{place}`: the set `{set}` of the mesh is empty"),
+    )
+    .label(set.span.clone(), "empty")
+    .help("put facets or nodes into it, or name another set"))
+}
+
+fn finite<const D: usize>(
+    place: &str,
+    name: &Text,
+    components: &Components<D>,
+    positions: impl Iterator<Item = Vector<D>>,
+) -> Result<(), SceneError> {
+    for x in positions {
+        for k in 0..D {
+            let Some(value) = components.at(k, &x).filter(|v| !v.is_finite()) else {
+                continue;
+            };
+            let span = components.0[k]
+                .as_ref()
+                .map_or(name.span.clone(), |e| e.span.clone());
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!(
+                    "`{place}.{}` is {value} at {:?}",
+                    ["x", "y", "z"][k],
+                    x.as_slice()
+                ),
+            )
+            .label(span, "no finite number there")
+            .help("choose between branches with if(condition, a, b), or restrict the condition"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses two displacements of one node that differ.
+fn agree<const D: usize>(
+    spec: &BTreeMap<Text, ConditionSpec>,
+    conditions: &[Condition<D>],
+    mesh: &Mesh<D>,
+) -> Result<(), SceneError> {
+    let mut seen: BTreeMap<(u32, usize), (usize, f64)> = BTreeMap::new();
+    for (number, condition) in conditions.iter().enumerate() {
+        let Prescribed::Displacement(Support::Set { nodes, .. }) = &condition.prescribed else {
+            continue;
+        };
+        for &n in nodes {
+            let x = &mesh.nodes[n as usize];
+            for k in 0..D {
+                let Some(value) = condition.components.at(k, x) else {
+                    continue;
+                };
+                let Some((other, before)) = seen.insert((n, k), (number, value)) else {
+                    continue;
+                };
+                if (before - value).abs() <= 1e-9 * before.abs().max(value.abs()) {
+                    continue;
+                }
+                let span = |name: &str| -> Span {
+                    spec.get_key_value(name)
+                        .map_or(0..0, |(k, _)| k.span.clone())
+                };
+                let (first, second) = (&conditions[other].name, &condition.name);
+                return Err(SceneError::new(
+                    SceneErrorKind::Conflict,
+                    format!(
+                        "`{first}` and `{second}` prescribe the {} displacements {before} and {value} at {:?}",
+                        ["x", "y", "z"][k],
+                        x.as_slice()
+                    ),
+                )
+                .label(span(second), "one")
+                .label(span(first), "the other")
+                .help("let both agree where their sets meet, or leave the component out of one"));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,360 @@
+//! Materials and peridynamics of a validated scene.
+
+use std::collections::BTreeMap;
+
+use toml::Spanned;
+
+use super::check;
+use super::error::{SceneError, SceneErrorKind};
+use super::expression::Expression;
+use super::region::{cells_of_set, position};
+use super::spec::{
+    BetaSpec, CouplingSpec, FormSpec, InfluenceSpec, InterfaceSpec, MaterialSpec, MicromodulusSpec,
+    PeridynamicsSpec, PointsSpec, SurfacesSpec, WeightsSpec,
+};
+use super::value::{Number, Text};
+use crate::material::{Elastic, Kinematics};
+use crate::mesh::Mesh;
+use crate::peridynamics::{Influence, Micromodulus};
+use crate::tensor::{Tensor4, Vector};
+
+/// The law that bonds of a material follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// Bonds that act alone.
+    BondBased(Micromodulus),
+    /// Linear peridynamic solid.
+    Lps(Influence),
+    /// Elastic correspondence with its stabilising force, relative to an LPS.
+    Correspondence(Influence, f64),
+}
+
+/// A material of a scene: elastic constants in the scene's dimension, and the law of its bonds.
+#[derive(Clone, Debug)]
+pub struct Material<const D: usize> {
+    /// Its name.
+    pub name: String,
+    /// Law of bonds.
+    pub law: Law,
+    /// Lamé's parameters (λ_D, μ) of the scene's dimension [Pa].
+    pub lame: (f64, f64),
+    /// Density [kg/m³]; zero if not given.
+    pub density: f64,
+}
+
+impl<const D: usize> Material<D> {
+    /// The local stiffness [Pa].
+    pub fn stiffness(&self) -> Tensor4<D> {
+        Tensor4::isotropic(self.lame.0, self.lame.1)
+    }
+}
+
+/// Where the peridynamic points are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Points<const D: usize> {
+    /// At the centroids of cells.
+    Cells,
+    /// On a lattice of this spacing through this point.
+    Lattice {
+        /// Distance of neighbours.
+        spacing: f64,
+        /// Any point of the lattice.
+        origin: Vector<D>,
+    },
+}
+
+/// The peridynamic choices of a scene.
+#[derive(Clone, Debug)]
+pub struct Peridynamics<const D: usize> {
+    /// Horizon δ as a field.
+    pub horizon: Expression,
+    /// Where the points are.
+    pub points: Points<D>,
+    /// Bond weights.
+    pub weights: WeightsSpec,
+    /// Whether the mesh's boundary cuts bonds.
+    pub surfaces: SurfacesSpec,
+}
+
+impl<const D: usize> Peridynamics<D> {
+    /// The horizon at a position.
+    pub fn horizon_at(&self, x: &Vector<D>) -> f64 {
+        self.horizon.eval(&crate::tensor::padded(x))
+    }
+}
+
+/// How the two models are joined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Splice.
+    Splice,
+    /// Force-based blending.
+    Blending(BetaSpec),
+    /// Partial stress.
+    PartialStress(FormSpec, InterfaceSpec),
+    /// Finite elements alone.
+    Local,
+    /// Peridynamics alone.
+    Nonlocal,
+}
+
+impl Method {
+    pub(crate) fn of(spec: &Spanned<CouplingSpec>) -> Self {
+        match spec.get_ref() {
+            CouplingSpec::Splice(_) => Self::Splice,
+            CouplingSpec::Blending(b) => Self::Blending(b.beta),
+            CouplingSpec::PartialStress(p) => Self::PartialStress(p.form, p.interface),
+            CouplingSpec::Local(_) => Self::Local,
+            CouplingSpec::Nonlocal(_) => Self::Nonlocal,
+        }
+    }
+
+    /// The name, as a scene spells it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Splice => "splice",
+            Self::Blending(_) => "blending",
+            Self::PartialStress(..) => "partial-stress",
+            Self::Local => "local",
+            Self::Nonlocal => "nonlocal",
+        }
+    }
+
+    /// Whether the method needs a zone where both models overlap.
+    pub fn needs_transition(self) -> bool {
+        matches!(self, Self::Blending(_) | Self::PartialStress(..))
+    }
+}
+
+/// All materials, and the material of each cell.
+pub(crate) fn materials<const D: usize>(
+    spec: &BTreeMap<Text, MaterialSpec>,
+    influence: Influence,
+    kinematics: Kinematics,
+    mesh: &Mesh<D>,
+) -> Result<(Vec<Material<D>>, Vec<u16>), SceneError> {
+    let Some(first) = spec.keys().next() else {
+        return Err(SceneError::new(SceneErrorKind::Missing, "`materials` names no material")
+            .label(0..0, "not found in this scene")
+            .help("add one, for example [materials.steel.lps] with youngs-modulus and poisson-ratio"));
+    };
+    let mut found = Vec::with_capacity(spec.len());
+    let mut owner: Vec<Option<u16>> = vec![None; mesh.cell_count()];
+    let mut rest: Option<(&Text, u16)> = None;
+    for (number, (name, material)) in spec.iter().enumerate() {
+        let number = number as u16;
+        let (law, cells) = law_and_cells(name, material, influence)?;
+        let (lame, density) = constants::<D>(name, material, kinematics)?;
+        found.push(Material {
+            name: name.value.clone(),
+            law,
+            lame,
+            density,
+        });
+        match (cells, rest) {
+            (Some(set), _) => {
+                for c in cells_of_set(&format!("materials.{name}.cells"), set, mesh)? {
+                    if let Some(other) = owner[c as usize].replace(number) {
+                        let other = &found[other as usize].name;
+                        return Err(SceneError::new(
+                            SceneErrorKind::Conflict,
+                            format!("cell {c} belongs to the materials `{other}` and `{name}`"),
+                        )
+                        .label(set.span.clone(), "this set overlaps another")
+                        .help("make the sets of cells disjoint"));
+                    }
+                }
+            }
+            (None, Some((other, _))) => {
+                return Err(SceneError::new(
+                    SceneErrorKind::Conflict,
+                    format!("the materials `{other}` and `{name}` both lack `cells`"),
+                )
+                .label(name.span.clone(), "which cells?")
+                .label(other.span.clone(), "which cells?")
+                .help("give `cells = \"set\"` to all materials but one"));
+            }
+            (None, None) => rest = Some((name, number)),
+        }
+    }
+    let mut material = Vec::with_capacity(owner.len());
+    for (c, owner) in owner.into_iter().enumerate() {
+        match owner.or(rest.map(|(_, n)| n)) {
+            Some(number) => material.push(number),
+            None => {
+                let at = mesh.centroid(c);
+                return Err(SceneError::new(
+                    SceneErrorKind::Missing,
+                    format!("cell {c} at {:?} has no material", at.as_slice()),
+                )
+                .label(first.span.clone(), "leaves cells out")
+                .help("add a material without `cells`: it fills what the others leave"));
+            }
+        }
+    }
+    Ok((found, material))
+}
+
+fn law_and_cells<'a>(
+    name: &Text,
+    spec: &'a MaterialSpec,
+    influence: Influence,
+) -> Result<(Law, Option<&'a Text>), SceneError> {
+    Ok(match spec {
+        MaterialSpec::BondBased(m) => {
+            let micromodulus = match &m.micromodulus {
+                MicromodulusSpec::InverseDistance => Micromodulus::InverseDistance,
+                MicromodulusSpec::Constant => Micromodulus::Constant,
+                MicromodulusSpec::Uniform => Micromodulus::Uniform,
+                MicromodulusSpec::Triangular => Micromodulus::Triangular,
+                MicromodulusSpec::Influence(i) => {
+                    let place = format!("materials.{name}.bond-based.micromodulus.influence");
+                    Micromodulus::Influence(self::influence(&place, i)?)
+                }
+            };
+            (Law::BondBased(micromodulus), m.cells.as_ref())
+        }
+        MaterialSpec::Lps(m) => (Law::Lps(influence), m.cells.as_ref()),
+        MaterialSpec::Correspondence(m) => {
+            let place = format!("materials.{name}.correspondence.stabilisation");
+            let stabilisation = match &m.stabilisation {
+                Some(s) => check::not_negative(&place, s)?,
+                None => 1.0,
+            };
+            (
+                Law::Correspondence(influence, stabilisation),
+                m.cells.as_ref(),
+            )
+        }
+    })
+}
+
+fn constants<const D: usize>(
+    name: &Text,
+    spec: &MaterialSpec,
+    kinematics: Kinematics,
+) -> Result<((f64, f64), f64), SceneError> {
+    let (kind, modulus, ratio, density) = match spec {
+        MaterialSpec::BondBased(m) => ("bond-based", &m.youngs_modulus, None, &m.density),
+        MaterialSpec::Lps(m) => ("lps", &m.youngs_modulus, Some(&m.poisson_ratio), &m.density),
+        MaterialSpec::Correspondence(m) => (
+            "correspondence",
+            &m.youngs_modulus,
+            Some(&m.poisson_ratio),
+            &m.density,
+        ),
+    };
+    let place = |key: &str| format!("materials.{name}.{kind}.{key}");
+    let e = check::positive(&place("youngs-modulus"), modulus)?;
+    let density = match density {
+        Some(d) => check::not_negative(&place("density"), d)?,
+        None => 0.0,
+    };
+    let nu = match (ratio, kinematics) {
+        (Some(ratio), _) => check::within(
+            &place("poisson-ratio"),
+            ratio,
+            ratio.value > -1.0 && ratio.value < 0.5,
+            "must lie between -1 and 0.5",
+            "use 0.2 to 0.35 for most solids, 0.49 for rubber; 0.5 has no finite stiffness",
+        )?,
+        // bonds that act alone carry equal Lamé parameters, in one dimension C = 3 μ
+        (None, Kinematics::Bar) => return Ok(((e / 3.0, e / 3.0), density)),
+        (None, Kinematics::PlaneStress) => 1.0 / 3.0,
+        (None, Kinematics::PlaneStrain | Kinematics::Solid) => 0.25,
+    };
+    let failed = |error: crate::material::MaterialError| {
+        SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`materials.{name}`: {error}"),
+        )
+        .label(modulus.span.clone(), "of this material")
+    };
+    let elastic = Elastic::new(e, nu, density).map_err(failed)?;
+    Ok((elastic.lame::<D>(kinematics).map_err(failed)?, density))
+}
+
+/// The influence function typed at `place`.
+pub(crate) fn influence(place: &str, spec: &InfluenceSpec) -> Result<Influence, SceneError> {
+    let InfluenceSpec::Polynomial(p) = spec else {
+        return Ok(Influence::Gaussian);
+    };
+    let small = |v: usize| u32::try_from(v).unwrap_or(u32::MAX);
+    Influence::polynomial(small(p.degree.value), small(p.alpha.value)).map_err(|error| {
+        let degree_is_wrong = Influence::polynomial(small(p.degree.value), 0).is_err();
+        let span = if degree_is_wrong {
+            &p.degree.span
+        } else {
+            &p.alpha.span
+        };
+        SceneError::new(SceneErrorKind::WrongValue, format!("`{place}`: {error}"))
+            .label(span.clone(), "not offered")
+            .help("degree is 0, 1, 3, 5 or 7; alpha is 0 or 1")
+    })
+}
+
+/// The peridynamic choices; `dimensions of the body` come from the mesh.
+pub(crate) fn peridynamics<const D: usize>(
+    spec: &PeridynamicsSpec,
+    mesh: &Mesh<D>,
+) -> Result<Peridynamics<D>, SceneError> {
+    no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
+    if let Some(value) = spec.horizon.as_constant() {
+        let number = Number {
+            value,
+            span: spec.horizon.span.clone(),
+        };
+        check::positive("peridynamics.horizon", &number)?;
+    }
+    let points = match &spec.points {
+        PointsSpec::Cells => Points::Cells,
+        PointsSpec::Lattice(lattice) => {
+            let spacing = check::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
+            let (lo, hi) = mesh.bounds();
+            let count: f64 = (hi - lo).iter().map(|l| l / spacing).product();
+            if count > 1e9 {
+                return Err(SceneError::new(
+                    SceneErrorKind::WrongValue,
+                    format!(
+                        "`peridynamics.points.lattice.spacing` is {spacing}: {count:.1e} points would fill the mesh"
+                    ),
+                )
+                .label(lattice.spacing.span.clone(), "too fine")
+                .help("use a larger spacing"));
+            }
+            let origin = match &lattice.origin {
+                Some(o) => position("peridynamics.points.lattice.origin", o)?,
+                None => lo.add_scalar(0.5 * spacing),
+            };
+            Points::Lattice { spacing, origin }
+        }
+    };
+    Ok(Peridynamics {
+        horizon: spec.horizon.clone(),
+        points,
+        weights: spec.weights,
+        surfaces: spec.surfaces,
+    })
+}
+
+/// Refuses an expression in `y` or `z` where the scene has no such axis.
+pub(crate) fn no_further_axes<const D: usize>(
+    place: &str,
+    expression: &Expression,
+) -> Result<(), SceneError> {
+    match (D..3).find(|&k| expression.depends_on(k)) {
+        None => Ok(()),
+        Some(k) => Err(SceneError::new(
+            SceneErrorKind::Dimension,
+            format!(
+                "`{place}` uses {} in a scene of dimension {D}",
+                ["x", "y", "z"][k]
+            ),
+        )
+        .label(expression.span.clone(), "no such axis")
+        .help(format!(
+            "use {} only",
+            ["x", "x and y", "x, y and z"][D - 1]
+        ))),
+    }
+}

@@ -1,0 +1,228 @@
+//! The mesh of a scene: generated or read, and checked.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use toml::Spanned;
+
+use super::check;
+use super::error::{SceneError, SceneErrorKind};
+use super::region::{corners, position};
+use super::source::Span;
+use super::spec::{AxisSpec, CutoutSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
+use super::value::{Coordinates, Text};
+use crate::mesh::generate::{Axis, CutOut, Grid};
+use crate::mesh::{Mesh, MeshError, quality, read};
+
+/// The most cells that a generated mesh may have: beyond it a typing error is likelier than a wish.
+const MOST_CELLS: f64 = 1e8;
+
+/// The mesh of a scene whose file lies in `directory`.
+pub(crate) fn build<const D: usize>(
+    spec: &MeshSpec,
+    directory: &Path,
+    kinematics: &Span,
+) -> Result<Mesh<D>, SceneError> {
+    let dimension = |wanted: usize, name: &str, min: &Coordinates| {
+        if wanted == D {
+            return Ok(());
+        }
+        Err(SceneError::new(
+            SceneErrorKind::Dimension,
+            format!("`mesh.{name}` is of dimension {wanted}, the scene's kinematics are of dimension {D}"),
+        )
+        .label(kinematics.clone(), format!("dimension {D}"))
+        .label(min.span.clone(), format!("dimension {wanted}"))
+        .help(format!(
+            "use [mesh.{}], or another `kinematics`",
+            ["line", "rectangle", "box"][D - 1]
+        )))
+    };
+    let mesh = match spec {
+        MeshSpec::Line(m) => {
+            dimension(1, "line", &m.min)?;
+            generate("mesh.line", &m.min, &m.max, &[&m.x], &m.cutouts, Boxes)?
+        }
+        MeshSpec::Rectangle(m) => {
+            dimension(2, "rectangle", &m.min)?;
+            let cells = match m.cell {
+                PlaneCellSpec::Quad4 => Boxes,
+                PlaneCellSpec::Tri3 => Simplices,
+            };
+            generate(
+                "mesh.rectangle",
+                &m.min,
+                &m.max,
+                &[&m.x, &m.y],
+                &m.cutouts,
+                cells,
+            )?
+        }
+        MeshSpec::Box(m) => {
+            dimension(3, "box", &m.min)?;
+            let cells = match m.cell {
+                SolidCellSpec::Hex8 => Boxes,
+                SolidCellSpec::Tet4 => Simplices,
+            };
+            generate(
+                "mesh.box",
+                &m.min,
+                &m.max,
+                &[&m.x, &m.y, &m.z],
+                &m.cutouts,
+                cells,
+            )?
+        }
+        MeshSpec::File(file) => {
+            let path = directory.join(&file.path.value);
+            let failed = |error: MeshError| {
+                SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
+                    .label(file.path.span.clone(), "this mesh")
+                    .help("the path is relative to the scene file")
+            };
+            let mesh = read::read(&path).map_err(failed)?;
+            quality::check(&mesh).map_err(failed)?;
+            mesh
+        }
+    };
+    Ok(mesh)
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Cells {
+    Boxes,
+    Simplices,
+}
+use Cells::{Boxes, Simplices};
+
+fn generate<const D: usize>(
+    place: &str,
+    min: &Coordinates,
+    max: &Coordinates,
+    axes: &[&Spanned<AxisSpec>],
+    cutouts: &BTreeMap<Text, CutoutSpec>,
+    cells: Cells,
+) -> Result<Mesh<D>, SceneError> {
+    let (lo, hi) = corners::<D>(place, min, max)?;
+    let mut lines = Vec::with_capacity(D);
+    let mut total = 1.0;
+    for (k, spec) in axes.iter().enumerate().take(D) {
+        let name = ["x", "y", "z"][k];
+        let (line, count) = axis(&format!("{place}.{name}"), lo[k], hi[k], spec)?;
+        lines.push(line);
+        total *= count;
+        if total > MOST_CELLS {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("`{place}` would have more than {total:.1e} cells"),
+            )
+            .label(spec.span(), "too fine")
+            .help(format!(
+                "ask for fewer cells; the limit is {MOST_CELLS:.0e}"
+            )));
+        }
+    }
+    let Ok(lines) = <[Axis; D]>::try_from(lines) else {
+        return Err(SceneError::new(
+            SceneErrorKind::Dimension,
+            format!("`{place}` does not divide every axis"),
+        )
+        .help("give x, y and z as far as the dimension goes"));
+    };
+    let mut grid = Grid::new(lines);
+    if cells == Simplices {
+        grid.simplices();
+    }
+    for (name, cutout) in cutouts {
+        let at = format!("{place}.cutouts.{name}");
+        let (min, max) = corners::<D>(&at, &cutout.min, &cutout.max)?;
+        grid.cut_out(CutOut {
+            name: name.value.clone(),
+            min,
+            max,
+        });
+    }
+    grid.mesh().map_err(|error| {
+        let span = match &error {
+            MeshError::Axis { axis, .. } => ["x", "y", "z"]
+                .iter()
+                .position(|n| n.starts_with(*axis))
+                .and_then(|k| axes.get(k))
+                .map(|a| a.span()),
+            MeshError::CutOutOffGrid { name, .. } | MeshError::CutOutEmpty { name, .. } => cutouts
+                .get_key_value(name.as_str())
+                .map(|(key, _)| key.span.clone()),
+            _ => None,
+        };
+        SceneError::new(SceneErrorKind::Mesh, format!("`{place}`: {error}"))
+            .label(span.unwrap_or(min.span.clone()), "here")
+    })
+}
+
+/// The axis and about how many cells it has.
+fn axis(
+    place: &str,
+    min: f64,
+    max: f64,
+    spec: &Spanned<AxisSpec>,
+) -> Result<(Axis, f64), SceneError> {
+    let length = max - min;
+    match spec.get_ref() {
+        AxisSpec::Cells(count) if count.value == 0 => Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`{place}.cells` is 0"),
+        )
+        .label(count.span.clone(), "no cells")
+        .help("ask for at least 1 cell")),
+        AxisSpec::Cells(count) => Ok((
+            Axis::Uniform {
+                min,
+                max,
+                cells: count.value,
+            },
+            count.value as f64,
+        )),
+        AxisSpec::Spacing(spacing) => {
+            let h = check::positive(&format!("{place}.spacing"), spacing)?;
+            let count = (length / h).round().max(1.0);
+            // `as` saturates; the total is refused before anything is allocated
+            let cells = count as usize;
+            Ok((Axis::Uniform { min, max, cells }, count))
+        }
+        AxisSpec::Graded(g) => {
+            let fine = position::<2>(&format!("{place}.graded.fine"), &g.fine)?;
+            let spacing = check::positive(&format!("{place}.graded.spacing"), &g.spacing)?;
+            let ratio = match &g.growth {
+                Some(growth) => check::within(
+                    &format!("{place}.graded.growth"),
+                    growth,
+                    growth.value >= 1.0,
+                    "must be at least 1",
+                    "1.2 to 1.5 suits most meshes; 1 keeps all cells fine",
+                )?,
+                None => 1.3,
+            };
+            let largest = match &g.largest {
+                Some(largest) => check::positive(&format!("{place}.graded.largest"), largest)?,
+                None => length,
+            };
+            let outside = (length - (fine[1] - fine[0])).max(0.0);
+            let growing = if ratio > 1.0 {
+                2.0 * (outside / spacing).max(1.0).ln() / ratio.ln() + outside / largest
+            } else {
+                outside / spacing
+            };
+            Ok((
+                Axis::Graded {
+                    min,
+                    max,
+                    fine: [fine[0], fine[1]],
+                    spacing,
+                    ratio,
+                    largest,
+                },
+                (fine[1] - fine[0]).abs() / spacing + growing,
+            ))
+        }
+    }
+}

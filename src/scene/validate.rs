@@ -1,0 +1,516 @@
+//! From what was typed to a scene that can be run: every name resolved, every number checked.
+
+use std::path::{Path, PathBuf};
+
+use super::check;
+use super::conditions::{self, Condition, extent};
+use super::error::{SceneError, SceneErrorKind};
+use super::materials::{self, Material, Method, Peridynamics, Points};
+use super::meshing;
+use super::region::{self, Region};
+use super::source::{Source, Span};
+use super::spec::{InfluenceSpec, KinematicsSpec, MethodSpec, OrderingSpec, SceneSpec, ShapeSpec};
+use super::zones;
+use crate::coupling::Zone;
+use crate::fem::Locator;
+use crate::material::Kinematics;
+use crate::mesh::Mesh;
+use crate::peridynamics::Influence;
+use crate::shape::{Barrier, Shape};
+use crate::tensor::{Vector, padded};
+
+/// A validated scene of dimension `D`.
+#[derive(Clone, Debug)]
+pub struct Scene<const D: usize> {
+    /// What the scene says of itself; its name if it says nothing.
+    pub title: String,
+    /// How the body stands for a solid.
+    pub kinematics: Kinematics,
+    /// The mesh of the whole body.
+    pub mesh: Mesh<D>,
+    /// The model of each cell.
+    pub zones: Vec<Zone>,
+    /// The materials.
+    pub materials: Vec<Material<D>>,
+    /// The material of each cell.
+    pub cell_material: Vec<u16>,
+    /// The peridynamic choices; none if the scene is local throughout.
+    pub peridynamics: Option<Peridynamics<D>>,
+    /// How the models are joined.
+    pub method: Method,
+    /// Displacements, tractions, body forces.
+    pub conditions: Vec<Condition<D>>,
+    /// Empty regions: no point lies inside.
+    pub voids: Vec<Shape<D>>,
+    /// Voids and cracks that cut bonds.
+    pub barriers: Vec<Barrier<D>>,
+    /// The linear solver.
+    pub solver: Solver,
+    /// What is written.
+    pub output: Output<D>,
+}
+
+/// The linear solver of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    /// Which solver.
+    pub method: MethodSpec,
+    /// Elimination order of a direct one.
+    pub ordering: OrderingSpec,
+    /// Relative residual.
+    pub tolerance: f64,
+    /// Most iterations.
+    pub max_iterations: usize,
+}
+
+/// The outputs of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Output<const D: usize> {
+    /// Folder of all files.
+    pub directory: PathBuf,
+    /// Beginning of all file names.
+    pub name: String,
+    /// Whether a VTU is written.
+    pub vtu: bool,
+    /// Lines of samples: name and positions.
+    pub lines: Vec<(String, Vec<Vector<D>>)>,
+    /// Probes: name and position.
+    pub probes: Vec<(String, Vector<D>)>,
+}
+
+/// A validated scene of any dimension.
+#[derive(Clone, Debug)]
+pub enum AnyScene {
+    /// One dimension.
+    Bar(Box<Scene<1>>),
+    /// Two dimensions.
+    Plane(Box<Scene<2>>),
+    /// Three dimensions.
+    Solid(Box<Scene<3>>),
+}
+
+impl AnyScene {
+    /// Reads and validates a scene file with overrides `key=value`.
+    ///
+    /// # Errors
+    /// A [`SceneError`] with place, value and remedy.
+    pub fn load(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            SceneError::new(
+                SceneErrorKind::File,
+                format!("cannot read the scene {}: {error}", path.display()),
+            )
+            .help("check the path; `bondline new scene.toml` writes a template")
+        })?;
+        let mut source = Source::new(path.display().to_string(), text);
+        for text in overrides {
+            source.push_override(text)?;
+        }
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let name = path
+            .file_stem()
+            .map_or("scene".into(), |s| s.to_string_lossy().into_owned());
+        Self::from_source(&source, directory, &name)
+    }
+
+    /// Validates a scene whose relative paths start in `directory` and whose files are named `name` by default.
+    ///
+    /// # Errors
+    /// A [`SceneError`] with place, value and remedy.
+    pub fn from_source(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
+        let spec = SceneSpec::parse(source)?;
+        let found = match spec.kinematics.get_ref() {
+            KinematicsSpec::Bar => scene(&spec, Kinematics::Bar, directory, name).map(Self::bar),
+            KinematicsSpec::PlaneStress => {
+                scene(&spec, Kinematics::PlaneStress, directory, name).map(Self::plane)
+            }
+            KinematicsSpec::PlaneStrain => {
+                scene(&spec, Kinematics::PlaneStrain, directory, name).map(Self::plane)
+            }
+            KinematicsSpec::Solid => {
+                scene(&spec, Kinematics::Solid, directory, name).map(Self::solid)
+            }
+        };
+        found.map_err(|error| error.shown_in(source))
+    }
+
+    fn bar(scene: Scene<1>) -> Self {
+        Self::Bar(Box::new(scene))
+    }
+
+    fn plane(scene: Scene<2>) -> Self {
+        Self::Plane(Box::new(scene))
+    }
+
+    fn solid(scene: Scene<3>) -> Self {
+        Self::Solid(Box::new(scene))
+    }
+}
+
+fn scene<const D: usize>(
+    spec: &SceneSpec,
+    kinematics: Kinematics,
+    directory: &Path,
+    name: &str,
+) -> Result<Scene<D>, SceneError> {
+    let method = Method::of(&spec.coupling);
+    let solver = solver(spec)?;
+    let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
+    let peridynamics = match (&spec.peridynamics, method) {
+        (Some(p), _) => Some(materials::peridynamics(p, &mesh)?),
+        (None, Method::Local) => None,
+        (None, _) => {
+            return Err(SceneError::new(
+                SceneErrorKind::Missing,
+                format!("coupling `{}` needs [peridynamics]", method.name()),
+            )
+            .label(spec.coupling.span(), "has a peridynamic side")
+            .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
+        }
+    };
+    let influence = match spec
+        .peridynamics
+        .as_ref()
+        .and_then(|p| p.influence.as_ref())
+    {
+        Some(i) => materials::influence("peridynamics.influence", i)?,
+        None => default_influence()?,
+    };
+    let (found, cell_material) =
+        materials::materials(&spec.materials, influence, kinematics, &mesh)?;
+    let zones = zones::zones(spec, method, &mesh)?;
+    one_peridynamic_material(spec, &found, &cell_material, &zones)?;
+    if let Some(p) = &peridynamics {
+        horizon(spec, p, &mesh, &zones)?;
+    }
+    let (voids, barriers) = barriers(spec, &mesh, &zones)?;
+    let conditions = conditions::conditions(&spec.conditions, &mesh)?;
+    let output = output(spec, &mesh, name)?;
+    Ok(Scene {
+        title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
+        kinematics,
+        mesh,
+        zones,
+        materials: found,
+        cell_material,
+        peridynamics,
+        method,
+        conditions,
+        voids,
+        barriers,
+        solver,
+        output,
+    })
+}
+
+fn default_influence() -> Result<Influence, SceneError> {
+    materials::influence(
+        "peridynamics.influence",
+        &InfluenceSpec::Polynomial(super::spec::PolynomialSpec {
+            degree: super::Count {
+                value: 3,
+                span: 0..0,
+            },
+            alpha: super::Count::default(),
+        }),
+    )
+}
+
+fn solver(spec: &SceneSpec) -> Result<Solver, SceneError> {
+    let s = &spec.solver;
+    let tolerance = match &s.tolerance {
+        Some(t) => check::within(
+            "solver.tolerance",
+            t,
+            t.value > 0.0 && t.value < 1.0,
+            "must lie between 0 and 1",
+            "1e-10 suits most scenes",
+        )?,
+        None => 1e-10,
+    };
+    let max_iterations = match &s.max_iterations {
+        Some(n) if n.value == 0 => {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                "`solver.max-iterations` is 0",
+            )
+            .label(n.span.clone(), "no iteration")
+            .help("allow at least 1; 500 suits most scenes"));
+        }
+        Some(n) => n.value,
+        None => 500,
+    };
+    Ok(Solver {
+        method: s.method,
+        ordering: s.ordering,
+        tolerance,
+        max_iterations,
+    })
+}
+
+/// The core gives all points one law.
+fn one_peridynamic_material<const D: usize>(
+    spec: &SceneSpec,
+    found: &[Material<D>],
+    cell_material: &[u16],
+    zones: &[Zone],
+) -> Result<(), SceneError> {
+    let mut used = cell_material
+        .iter()
+        .zip(zones)
+        .filter(|(_, zone)| **zone != Zone::Local)
+        .map(|(m, _)| *m);
+    let Some(first) = used.next() else {
+        return Ok(());
+    };
+    let Some(other) = used.find(|m| *m != first) else {
+        return Ok(());
+    };
+    let (a, b) = (&found[first as usize].name, &found[other as usize].name);
+    let span = |name: &str| -> Span {
+        spec.materials
+            .get_key_value(name)
+            .map_or(0..0, |(k, _)| k.span.clone())
+    };
+    Err(SceneError::new(
+        SceneErrorKind::Later,
+        format!("the materials `{a}` and `{b}` both reach into the peridynamic zones"),
+    )
+    .label(span(a), "one")
+    .label(span(b), "another")
+    .help("keep the nonlocal and transition zones within one material; bonds between materials come later"))
+}
+
+fn horizon<const D: usize>(
+    spec: &SceneSpec,
+    p: &Peridynamics<D>,
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+) -> Result<(), SceneError> {
+    for c in (0..mesh.cell_count()).filter(|&c| zones[c] != Zone::Local) {
+        let x = mesh.centroid(c);
+        let delta = p.horizon_at(&x);
+        let spacing = match p.points {
+            Points::Lattice { spacing, .. } => spacing,
+            Points::Cells if zones[c] == Zone::Nonlocal => {
+                mesh.cell_volume(c).abs().powf(1.0 / D as f64)
+            }
+            Points::Cells => 0.0,
+        };
+        if delta.is_finite() && delta > 0.0 && delta >= spacing * (1.0 - 1e-9) {
+            continue;
+        }
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            if delta.is_finite() && delta > 0.0 {
+                format!(
+                    "`peridynamics.horizon` is {delta} at {:?}, below the spacing {spacing} of the points there",
+                    x.as_slice()
+                )
+            } else {
+                format!("`peridynamics.horizon` is {delta} at {:?}", x.as_slice())
+            },
+        )
+        .label(
+            spec.peridynamics.as_ref().map_or(0..0, |p| p.horizon.span.clone()),
+            "no point would have a neighbour",
+        )
+        .help("make it three to six times the spacing, or refine the points"));
+    }
+    Ok(())
+}
+
+type Obstacles<const D: usize> = (Vec<Shape<D>>, Vec<Barrier<D>>);
+
+fn barriers<const D: usize>(
+    spec: &SceneSpec,
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+) -> Result<Obstacles<D>, SceneError> {
+    let (mut voids, mut barriers) = (Vec::new(), Vec::new());
+    for (name, v) in &spec.voids {
+        let place = format!("voids.{name}.inside");
+        let shape = region::shape(&place, &v.inside, mesh, &name.span)?;
+        if !matches!(
+            shape,
+            Shape::Box { .. } | Shape::Ball { .. } | Shape::Polygon(_)
+        ) {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("`{place}` has no volume"),
+            )
+            .label(name.span.clone(), "nothing lies inside")
+            .help("use `box`, `ball` or, in 2D, `polygon`; a surface is a crack: [cracks.NAME]"));
+        }
+        let inside = |c: &usize| shape.signed_distance(&mesh.centroid(*c)) < 0.0;
+        if let Some(c) = (0..mesh.cell_count())
+            .filter(|&c| zones[c] != Zone::Nonlocal)
+            .find(inside)
+        {
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                format!(
+                    "`{place}` covers cell {c} at {:?}, which is not nonlocal",
+                    mesh.centroid(c).as_slice()
+                ),
+            )
+            .label(name.span.clone(), "finite elements cannot be emptied")
+            .help(
+                "enlarge [zones.nonlocal] around the void, or leave it out of the mesh (cutouts)",
+            ));
+        }
+        if v.cut_bonds {
+            barriers.push(Barrier::Void(shape.clone()));
+        }
+        voids.push(shape);
+    }
+    let locator = Locator::new(mesh, 0..mesh.cell_count());
+    for (name, c) in &spec.cracks {
+        let place = format!("cracks.{name}");
+        let shape = region::shape(&place, c, mesh, &name.span)?;
+        let thin = matches!(
+            (&shape, c, D),
+            (Shape::Segment { .. }, ShapeSpec::Point(_), 1)
+                | (Shape::Segment { .. }, ShapeSpec::Segment(_), 2)
+                | (Shape::Polyline(_), _, 2)
+                | (Shape::Polygon(_), _, 3)
+        );
+        if !thin {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("`{place}` is no surface in a scene of dimension {D}"),
+            )
+            .label(name.span.clone(), "cuts nothing")
+            .help([
+                "give a point: point = 0.5",
+                "give a segment = { from, to } or a polyline; what has an area is a void: [voids.NAME]",
+                "give a plane polygon = [[x, y, z], ...]; what has a volume is a void: [voids.NAME]",
+            ][D - 1]));
+        }
+        let samples = samples(&shape);
+        let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
+        let cells: Vec<(Vector<D>, usize)> = samples
+            .iter()
+            .filter_map(|x| locator.locate(mesh, x, tolerance).map(|l| (*x, l.cell)))
+            .collect();
+        if cells.is_empty() {
+            return Err(SceneError::new(
+                SceneErrorKind::Empty,
+                format!("`{place}` lies outside the mesh"),
+            )
+            .label(name.span.clone(), "cuts nothing")
+            .help(extent(mesh)));
+        }
+        if let Some((x, _)) = cells.iter().find(|(_, cell)| zones[*cell] == Zone::Local) {
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                format!("`{place}` passes through the local zone at {:?}", x.as_slice()),
+            )
+            .label(name.span.clone(), "finite elements cannot be cut")
+            .help("enlarge [zones.nonlocal], for example near = { segment = ..., within = 3 horizons }"));
+        }
+        barriers.push(Barrier::Crack(shape));
+    }
+    Ok((voids, barriers))
+}
+
+/// Points on a thin shape, dense enough to meet every zone it passes through.
+fn samples<const D: usize>(shape: &Shape<D>) -> Vec<Vector<D>> {
+    const PER_EDGE: usize = 64;
+    let edge = |a: &Vector<D>, b: &Vector<D>| -> Vec<Vector<D>> {
+        (0..=PER_EDGE)
+            .map(|i| a.lerp(b, i as f64 / PER_EDGE as f64))
+            .collect()
+    };
+    match shape {
+        Shape::Segment { a, b } => edge(a, b),
+        Shape::Polyline(points) => points.windows(2).flat_map(|w| edge(&w[0], &w[1])).collect(),
+        Shape::Polygon(points) => {
+            let centre = points.iter().sum::<Vector<D>>() / points.len().max(1) as f64;
+            let closed = points.iter().zip(points.iter().cycle().skip(1));
+            closed
+                .flat_map(|(a, b)| edge(a, b))
+                .flat_map(|x| [x, x.lerp(&centre, 0.5)])
+                .chain([centre])
+                .collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn output<const D: usize>(
+    spec: &SceneSpec,
+    mesh: &Mesh<D>,
+    name: &str,
+) -> Result<Output<D>, SceneError> {
+    let o = &spec.output;
+    let mut lines = Vec::with_capacity(o.lines.len());
+    for (key, line) in &o.lines {
+        let place = format!("output.lines.{key}");
+        let from = region::position::<D>(&format!("{place}.from"), &line.from)?;
+        let to = region::position::<D>(&format!("{place}.to"), &line.to)?;
+        let n = line.samples.value;
+        if !(2..=1_000_000).contains(&n) {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("`{place}.samples` is {n}"),
+            )
+            .label(line.samples.span.clone(), "2 to 1000000")
+            .help("a line needs at least its two ends"));
+        }
+        let positions = (0..n)
+            .map(|i| from.lerp(&to, i as f64 / (n - 1) as f64))
+            .collect();
+        lines.push((key.value.clone(), positions));
+    }
+    let locator = Locator::new(mesh, 0..mesh.cell_count());
+    let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
+    let mut probes = Vec::with_capacity(o.probes.len());
+    for (key, probe) in &o.probes {
+        let place = format!("output.probes.{key}.at");
+        let at = region::position::<D>(&place, &probe.at)?;
+        if locator.locate(mesh, &at, tolerance).is_none() {
+            return Err(SceneError::new(
+                SceneErrorKind::Empty,
+                format!("`{place}` = {:?} lies outside the mesh", at.as_slice()),
+            )
+            .label(probe.at.span.clone(), "outside")
+            .help(extent(mesh)));
+        }
+        probes.push((key.value.clone(), at));
+    }
+    Ok(Output {
+        directory: o
+            .directory
+            .as_ref()
+            .map_or("out".into(), |d| d.value.clone().into()),
+        name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
+        vtu: o.vtu.unwrap_or(true),
+        lines,
+        probes,
+    })
+}
+
+impl<const D: usize> Scene<D> {
+    /// Whether the horizon varies in space.
+    pub fn horizon_varies(&self) -> bool {
+        self.peridynamics
+            .as_ref()
+            .is_some_and(|p| p.horizon.as_constant().is_none())
+    }
+
+    /// The horizon at a position; zero without peridynamics.
+    pub fn horizon_at(&self, x: &Vector<D>) -> f64 {
+        self.peridynamics
+            .as_ref()
+            .map_or(0.0, |p| p.horizon.eval(&padded(x)))
+    }
+
+    /// A region that is the whole space.
+    pub fn everywhere() -> Region<D> {
+        Region::Shape {
+            shape: Shape::Everywhere,
+            margin: 0.0,
+        }
+    }
+}

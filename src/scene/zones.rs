@@ -1,0 +1,155 @@
+//! The model of each cell: local, transition or nonlocal.
+
+use rayon::prelude::*;
+
+use super::check;
+use super::conditions::extent;
+use super::error::{SceneError, SceneErrorKind};
+use super::materials::Method;
+use super::region::{self, Region};
+use super::source::Span;
+use super::spec::{SceneSpec, ShapeSpec, TransitionSpec};
+use crate::coupling::Zone;
+use crate::mesh::Mesh;
+
+/// The model of each cell.
+pub(crate) fn zones<const D: usize>(
+    spec: &SceneSpec,
+    method: Method,
+    mesh: &Mesh<D>,
+) -> Result<Vec<Zone>, SceneError> {
+    let count = mesh.cell_count();
+    match method {
+        Method::Local => return Ok(vec![Zone::Local; count]),
+        Method::Nonlocal => return Ok(vec![Zone::Nonlocal; count]),
+        _ => {}
+    }
+    let chosen = spec.coupling.span();
+    let Some(nonlocal) = &spec.zones.nonlocal else {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            format!("coupling `{}` needs a nonlocal zone", method.name()),
+        )
+        .label(chosen, "couples a local and a nonlocal zone")
+        .help(
+            "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }",
+        ));
+    };
+    let region = region::region("zones.nonlocal", nonlocal.get_ref(), mesh)?;
+    let inner = region.select(mesh);
+    let span = nonlocal.span();
+    if !inner.contains(&true) {
+        return Err(empty("zones.nonlocal", span, mesh));
+    }
+    let mut zones: Vec<Zone> = inner
+        .iter()
+        .map(|n| if *n { Zone::Nonlocal } else { Zone::Local })
+        .collect();
+    if let Some(transition) = &spec.zones.transition {
+        let span = transition.span();
+        let selected = transition_cells(transition.get_ref(), &region, &inner, mesh)?;
+        let both: Vec<usize> = (0..count).filter(|&c| selected[c] && inner[c]).collect();
+        let all = inner.iter().filter(|n| **n).count();
+        if !both.is_empty() && both.len() != all {
+            let at = mesh.centroid(both[0]);
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                format!(
+                    "`zones.transition` overlaps {} of the {all} cells of `zones.nonlocal`, the first at {:?}",
+                    both.len(),
+                    at.as_slice()
+                ),
+            )
+            .label(span, "overlaps in part")
+            .label(nonlocal.span(), "this zone")
+            .help("let it enclose the nonlocal zone, or keep the two apart; around = 0.1 does the former"));
+        }
+        let mut any = false;
+        for c in (0..count).filter(|&c| selected[c] && !inner[c]) {
+            zones[c] = Zone::Transition;
+            any = true;
+        }
+        if !any && method.needs_transition() {
+            return Err(empty("zones.transition", span, mesh));
+        }
+    } else if method.needs_transition() {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            format!("coupling `{}` needs a transition zone", method.name()),
+        )
+        .label(chosen, "works where both models overlap")
+        .help("add [zones.transition] with around = ..., at least one horizon"));
+    }
+    if !zones.contains(&Zone::Local) {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            "the nonlocal and transition zones hold every cell: nothing is local",
+        )
+        .label(nonlocal.span(), "reaches everywhere")
+        .help("make the zones smaller, or use coupling = \"nonlocal\""));
+    }
+    Ok(zones)
+}
+
+fn empty<const D: usize>(place: &str, span: Span, mesh: &Mesh<D>) -> SceneError {
+    SceneError::new(
+        SceneErrorKind::Empty,
+        format!("`{place}` is empty: no cell has its centroid inside"),
+    )
+    .label(span, "selects no cell")
+    .help(format!(
+        "move or enlarge it, or refine the mesh there; {}",
+        extent(mesh)
+    ))
+}
+
+fn transition_cells<const D: usize>(
+    spec: &TransitionSpec,
+    nonlocal: &Region<D>,
+    inner: &[bool],
+    mesh: &Mesh<D>,
+) -> Result<Vec<bool>, SceneError> {
+    let place = "zones.transition";
+    let shape = match spec.clone() {
+        TransitionSpec::Around(width) => {
+            let width = check::positive("zones.transition.around", &width)?;
+            return Ok(around(nonlocal, inner, mesh, width));
+        }
+        TransitionSpec::Box(s) => ShapeSpec::Box(s),
+        TransitionSpec::Ball(s) => ShapeSpec::Ball(s),
+        TransitionSpec::Near(s) => ShapeSpec::Near(s),
+        TransitionSpec::Set(s) => ShapeSpec::Set(s),
+        TransitionSpec::Any(s) => ShapeSpec::Any(s),
+        TransitionSpec::Without(s) => ShapeSpec::Without(s),
+    };
+    Ok(region::region(place, &shape, mesh)?.select(mesh))
+}
+
+/// The cells outside `inner` within `width` of it.
+fn around<const D: usize>(
+    nonlocal: &Region<D>,
+    inner: &[bool],
+    mesh: &Mesh<D>,
+    width: f64,
+) -> Vec<bool> {
+    let facets = match nonlocal.distance(&mesh.centroid(0)) {
+        Some(_) => Vec::new(),
+        // a set has no shape: measure from the facets of its boundary
+        None => mesh.boundary_facets((0..mesh.cell_count() as u32).filter(|&c| inner[c as usize])),
+    };
+    (0..mesh.cell_count())
+        .into_par_iter()
+        .map(|c| {
+            let x = mesh.centroid(c);
+            if inner[c] {
+                return false;
+            }
+            match nonlocal.distance(&x) {
+                Some(d) => d <= width,
+                None => facets
+                    .iter()
+                    .any(|f| mesh.distance_to_facet(&x, &f.nodes) <= width),
+            }
+        })
+        .collect()
+}
