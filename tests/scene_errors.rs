@@ -1,6 +1,7 @@
 //! Wrong scenes: each message names the place, the value and the remedy, and underlines the token at fault.
 
-use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source};
+use bondline::coupling::Zone;
+use bondline::scene::{AnyScene, SceneError, SceneErrorKind, SceneSpec, Source, Template};
 
 /// A scene with nothing wrong in it.
 const RIGHT: &str = r#"
@@ -43,6 +44,26 @@ fn parse(text: &str, overrides: &[&str]) -> Result<SceneSpec, SceneError> {
 fn error(from: &str, to: &str) -> SceneError {
     assert!(RIGHT.contains(from), "{from}");
     parse(&RIGHT.replacen(from, to, 1), &[]).expect_err("this scene is wrong")
+}
+
+fn build(text: &str, overrides: &[&str]) -> Result<AnyScene, SceneError> {
+    let mut source = Source::new("plate.toml", text);
+    for o in overrides {
+        source.push_override(o)?;
+    }
+    AnyScene::from_source(
+        &source,
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")),
+        "plate",
+    )
+}
+
+/// The error of the right scene with `from` replaced by `to`, which reads well and means something wrong.
+fn wrong(from: &str, to: &str) -> SceneError {
+    assert!(RIGHT.contains(from), "{from}");
+    let text = RIGHT.replacen(from, to, 1);
+    parse(&text, &[]).expect("this scene reads well");
+    build(&text, &[]).expect_err("this scene is wrong")
 }
 
 fn check(error: &SceneError, kind: SceneErrorKind, underlined: &str, message: &str, help: &str) {
@@ -289,7 +310,7 @@ fn overrides() {
     )
     .unwrap();
     assert!(matches!(
-        spec.zones.transition,
+        spec.zones.transition.map(|t| t.into_inner()),
         Some(bondline::scene::spec::TransitionSpec::Box(_))
     ));
 }
@@ -338,4 +359,502 @@ fn the_schema_knows_every_choice() {
     ] {
         assert!(schema.contains(word), "{word}");
     }
+}
+
+#[test]
+fn the_right_scene_is_validated() {
+    let AnyScene::Plane(scene) = build(RIGHT, &[]).unwrap() else {
+        panic!("a plane scene")
+    };
+    assert_eq!(scene.mesh.cell_count(), 200);
+    // columns of cells of width 0.1: centroids 0.65 … 1.35 are nonlocal, 0.35, 0.45, 0.55 and 1.45, 1.55, 1.65 transition
+    let count = |zone| scene.zones.iter().filter(|z| **z == zone).count();
+    assert_eq!(count(Zone::Nonlocal), 80);
+    assert_eq!(count(Zone::Transition), 60);
+    // plane stress with ν = 1/3: λ = μ = 3/8 E
+    assert!((scene.materials[0].lame.0 - 75.0).abs() < 1e-12);
+    assert!((scene.materials[0].lame.1 - 75.0).abs() < 1e-12);
+    // in one dimension C = λ + 2 μ = E
+    let AnyScene::Bar(bar) = build(Template::Bar.text(), &[]).unwrap() else {
+        panic!("a bar")
+    };
+    assert!((bar.materials[0].lame.0 + 2.0 * bar.materials[0].lame.1 - 200e9).abs() < 1.0);
+}
+
+#[test]
+fn templates_are_right_and_never_overwritten() {
+    build(Template::Plate.text(), &[]).unwrap();
+    build(Template::Bar.text(), &[]).unwrap();
+    parse(Template::File.text(), &[]).unwrap();
+    // the one that names a mesh says so where there is none
+    let e = build(Template::File.text(), &[]).unwrap_err();
+    check(
+        &e,
+        SceneErrorKind::Mesh,
+        "\"plate.msh\"",
+        "plate.msh",
+        "relative to the scene",
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    for template in Template::ALL {
+        template.write(&path).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), template.text());
+        let e = template.write(&path).unwrap_err();
+        assert!(e.to_string().contains("nothing is overwritten"), "{e}");
+        std::fs::remove_file(&path).unwrap();
+    }
+    let e = AnyScene::load(&path, &[]).unwrap_err();
+    assert_eq!(e.kind(), SceneErrorKind::File);
+    assert!(e.to_string().contains("bondline new"), "{e}");
+}
+
+#[test]
+fn wrong_numbers() {
+    let e = wrong("youngs-modulus = 200", "youngs-modulus = -200");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "-200",
+        "`materials.plate.bond-based.youngs-modulus` is -200",
+        "larger than 0",
+    );
+    let e = wrong(
+        "bond-based]\nyoungs-modulus = 200",
+        "lps]\nyoungs-modulus = 200\npoisson-ratio = 0.5",
+    );
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "0.5",
+        "poisson-ratio` is 0.5",
+        "0.49",
+    );
+    let e = wrong("\"3/10\"", "\"-3/10\"");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "\"-3/10\"",
+        "`peridynamics.horizon` is -0.3",
+        "larger than 0",
+    );
+    let e = wrong("spacing = 0.1", "spacing = 0");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "0",
+        "spacing` is 0",
+        "larger than 0",
+    );
+    let e = wrong("spacing = 0.1", "spacing = 1e-9");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "1e-9",
+        "points would fill the mesh",
+        "larger spacing",
+    );
+    let e = wrong(
+        "[zones.nonlocal]",
+        "[solver]\ntolerance = 2\n[zones.nonlocal]",
+    );
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "2",
+        "`solver.tolerance` is 2",
+        "1e-10",
+    );
+    let e = wrong(
+        "[zones.nonlocal]",
+        "[solver]\nmax-iterations = 0\n[zones.nonlocal]",
+    );
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "0",
+        "`solver.max-iterations` is 0",
+        "at least 1",
+    );
+}
+
+#[test]
+fn horizon_below_the_spacing() {
+    let e = wrong("\"3/10\"", "0.05");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "0.05",
+        "below the spacing 0.1",
+        "three to six times",
+    );
+    // only somewhere
+    let e = wrong("\"3/10\"", "\"if(y > 0.9, 0.01, 0.3)\"");
+    assert!(e.message().contains("0.95]"), "{e}");
+    let e = wrong("\"3/10\"", "\"0.3 + z\"");
+    check(
+        &e,
+        SceneErrorKind::Dimension,
+        "\"0.3 + z\"",
+        "uses z in a scene of dimension 2",
+        "x and y only",
+    );
+    let e = wrong("\"3/10\"", "\"0.3 / (x - x)\"");
+    assert!(e.message().contains("inf at"), "{e}");
+}
+
+#[test]
+fn influence_functions_that_do_not_exist() {
+    let e = wrong(
+        "[zones.nonlocal]",
+        "influence = { degree = 2 }\n[zones.nonlocal]",
+    );
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "2",
+        "degree n = 2",
+        "0, 1, 3, 5 or 7",
+    );
+    let e = wrong(
+        "[zones.nonlocal]",
+        "influence = { degree = 3, alpha = 2 }\n[zones.nonlocal]",
+    );
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "2",
+        "alpha = 2",
+        "alpha is 0 or 1",
+    );
+    let e = error(
+        "[zones.nonlocal]",
+        "influence = \"gausian\"\n[zones.nonlocal]",
+    );
+    check(
+        &e,
+        SceneErrorKind::UnknownKey,
+        "\"gausian\"",
+        "`gausian` is not known",
+        "did you mean `gaussian`?",
+    );
+}
+
+#[test]
+fn wrong_meshes() {
+    let e = wrong("max = [2, 1]", "max = [2, 0]");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "[2, 0]",
+        "from 0 to 0 along y",
+        "larger",
+    );
+    let e = wrong("max = [2, 1]", "max = [2, 1, 3]");
+    check(
+        &e,
+        SceneErrorKind::Dimension,
+        "[2, 1, 3]",
+        "has 3 coordinates in a scene of dimension 2",
+        "[0.1, 0.2]",
+    );
+    let e = wrong("cells = 20", "cells = 0");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "0",
+        "cells` is 0",
+        "at least 1",
+    );
+    let e = wrong("cells = 20", "cells = 1e12");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "{ cells = 1e12 }",
+        "more than",
+        "fewer cells",
+    );
+    let e = wrong("\"plane-stress\"", "\"solid\"");
+    check(
+        &e,
+        SceneErrorKind::Dimension,
+        "\"solid\"",
+        "`mesh.rectangle` is of dimension 2",
+        "[mesh.box]",
+    );
+    let e = wrong(
+        "y = { cells = 10 }",
+        "y = { cells = 10 }\ncutouts = { hole = { min = [0.33, 0.4], max = [0.5, 0.6] } }",
+    );
+    check(&e, SceneErrorKind::Mesh, "hole", "0.33", "");
+    let e = wrong(
+        "x = { cells = 20 }",
+        "x = { graded = { fine = [0.5, 3], spacing = 0.1 } }",
+    );
+    check(
+        &e,
+        SceneErrorKind::Mesh,
+        "{ graded = { fine = [0.5, 3], spacing = 0.1 } }",
+        "must lie within",
+        "",
+    );
+}
+
+#[test]
+fn wrong_zones() {
+    let e = wrong(
+        "min = [0.6, 0], max = [1.4, 1]",
+        "min = [5, 0], max = [6, 1]",
+    );
+    assert_eq!(e.kind(), SceneErrorKind::Empty);
+    assert!(
+        e.message().contains("`zones.nonlocal` is empty")
+            && e.remedy().unwrap().contains("[2.0, 1.0]"),
+        "{e}"
+    );
+    let e = wrong("around = 0.3", "around = 0.01");
+    assert!(e.message().contains("`zones.transition` is empty"), "{e}");
+    let e = wrong("around = 0.3", "box = { min = [1, 0], max = [1.8, 1] }");
+    assert_eq!(e.kind(), SceneErrorKind::Conflict);
+    assert!(e.message().contains("overlaps 40 of the 80 cells"), "{e}");
+    let e = wrong("[zones.transition]\naround = 0.3\n", "");
+    assert!(
+        e.message()
+            .contains("coupling `blending` needs a transition zone"),
+        "{e}"
+    );
+    let e = wrong("around = 0.3", "around = 3");
+    assert!(e.message().contains("nothing is local"), "{e}");
+    let e = wrong(
+        "box = { min = [0.6, 0], max = [1.4, 1] }",
+        "set = \"crack\"",
+    );
+    check(
+        &e,
+        SceneErrorKind::UnknownSet,
+        "\"crack\"",
+        "the mesh has no set `crack`",
+        "`all`",
+    );
+    let e = wrong(
+        "box = { min = [0.6, 0], max = [1.4, 1] }",
+        "near = { within = 0.1 }",
+    );
+    check(
+        &e,
+        SceneErrorKind::Choice,
+        "0.1",
+        "names no shape",
+        "`segment`",
+    );
+    // what has no seam needs no zone
+    build(RIGHT, &["coupling=local"]).unwrap();
+    build(RIGHT, &["coupling=nonlocal"]).unwrap();
+    let text = RIGHT.replace(
+        "[peridynamics]\nhorizon = \"3/10\"\npoints.lattice = { spacing = 0.1 }\n",
+        "",
+    );
+    build(&text, &["coupling=local"]).unwrap();
+    let e = build(&text, &["coupling=splice"]).unwrap_err();
+    check(
+        &e,
+        SceneErrorKind::Missing,
+        "\"splice\"",
+        "needs [peridynamics]",
+        "horizon",
+    );
+}
+
+#[test]
+fn wrong_conditions() {
+    let e = wrong("on = \"bottom\"", "on = \"botom\"");
+    check(
+        &e,
+        SceneErrorKind::UnknownSet,
+        "\"botom\"",
+        "`conditions.bottom.displacement.on`: the mesh has no set `botom`",
+        "did you mean `bottom`?",
+    );
+    let e = wrong("on = \"top\"", "on = \"all\"");
+    check(
+        &e,
+        SceneErrorKind::UnknownSet,
+        "\"all\"",
+        "is no set of edges",
+        "`left`",
+    );
+    let e = wrong("y = \"1 + x\"", "z = 1");
+    check(
+        &e,
+        SceneErrorKind::Dimension,
+        "1",
+        "`conditions.top.traction.z` in a scene of dimension 2",
+        "remove `z`",
+    );
+    let e = wrong("y = \"1 + x\"", "");
+    check(
+        &e,
+        SceneErrorKind::Missing,
+        "top",
+        "prescribes no component",
+        "x = 0 or y = 0",
+    );
+    let e = wrong("y = \"1 + x\"", "y = \"sqrt(x - 1)\"");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "\"sqrt(x - 1)\"",
+        "`conditions.top.traction.y` is NaN at [0.1, 1.0]",
+        "if(condition",
+    );
+    let e = wrong("on = \"bottom\"\n", "");
+    check(
+        &e,
+        SceneErrorKind::Choice,
+        "bottom",
+        "neither `on` nor `inside`",
+        "on = ",
+    );
+    let e = wrong(
+        "on = \"bottom\"",
+        "inside.box = { min = [5, 5], max = [6, 6] }",
+    );
+    check(
+        &e,
+        SceneErrorKind::Empty,
+        "bottom",
+        "holds no part of the mesh",
+        "[2.0, 1.0]",
+    );
+    let e = wrong(
+        "[conditions.bottom.displacement]\non = \"bottom\"",
+        "[conditions.bottom.body-force]",
+    );
+    assert_eq!(e.kind(), SceneErrorKind::Missing);
+    assert!(e.message().contains("nothing holds the body"), "{e}");
+    let e = wrong(
+        "[conditions.top.traction]",
+        "[conditions.left.displacement]\non = \"left\"\ny = \"1e-3 + y\"\n[conditions.top.traction]",
+    );
+    assert_eq!(e.kind(), SceneErrorKind::Conflict);
+    assert!(
+        e.message().contains(
+            "`bottom` and `left` prescribe the y displacements 0 and 0.001 at [0.0, 0.0]"
+        ),
+        "{e}"
+    );
+}
+
+#[test]
+fn wrong_voids_and_cracks() {
+    let with = |table: &str| build(&format!("{RIGHT}{table}"), &[]).unwrap_err();
+    let e = with("[cracks.notch]\nsegment = { from = [0, 0.5], to = [1, 0.5] }");
+    check(
+        &e,
+        SceneErrorKind::Conflict,
+        "notch",
+        "passes through the local zone",
+        "near",
+    );
+    let e = with("[cracks.notch]\nball = { center = [1, 0.5], radius = 0.1 }");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "notch",
+        "is no surface",
+        "[voids.NAME]",
+    );
+    let e = with("[cracks.notch]\nsegment = { from = [1, 0.5], to = [1, 0.5] }");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "[1, 0.5]",
+        "has no length",
+        "move one of its ends",
+    );
+    let e = with("[cracks.notch]\nsegment = { from = [7, 0.5], to = [8, 0.5] }");
+    check(
+        &e,
+        SceneErrorKind::Empty,
+        "notch",
+        "outside the mesh",
+        "[2.0, 1.0]",
+    );
+    let e = with("[voids.hole]\ninside.segment = { from = [0.8, 0.5], to = [1.2, 0.5] }");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "hole",
+        "has no volume",
+        "[cracks.NAME]",
+    );
+    let e = with("[voids.hole]\ninside.ball = { center = [0, 0.5], radius = 0.2 }");
+    check(
+        &e,
+        SceneErrorKind::Conflict,
+        "hole",
+        "which is not nonlocal",
+        "cutouts",
+    );
+    build(
+        &format!("{RIGHT}[voids.hole]\ninside.ball = {{ center = [1, 0.5], radius = 0.2 }}"),
+        &[],
+    )
+    .unwrap();
+}
+
+#[test]
+fn wrong_materials() {
+    let two = "[materials.rest.bond-based]\nyoungs-modulus = 1\n[peridynamics]";
+    let e = wrong("[peridynamics]", two);
+    assert_eq!(e.kind(), SceneErrorKind::Conflict);
+    assert!(
+        e.message().contains("`plate` and `rest` both lack `cells`"),
+        "{e}"
+    );
+    let e = wrong(
+        "youngs-modulus = 200",
+        "youngs-modulus = 200\ncells = \"plate\"",
+    );
+    check(
+        &e,
+        SceneErrorKind::UnknownSet,
+        "\"plate\"",
+        "no set `plate`",
+        "`all`",
+    );
+    let e = wrong(
+        "[materials.plate.bond-based]\nyoungs-modulus = 200",
+        "[materials]",
+    );
+    assert_eq!(e.kind(), SceneErrorKind::Missing);
+}
+
+#[test]
+fn wrong_outputs() {
+    let with = |table: &str| build(&format!("{RIGHT}{table}"), &[]).unwrap_err();
+    let e = with("[output.lines.mid]\nfrom = [0, 0]\nto = [1, 1]\nsamples = 1");
+    check(
+        &e,
+        SceneErrorKind::WrongValue,
+        "1",
+        "`output.lines.mid.samples` is 1",
+        "two ends",
+    );
+    let e = with("[output.probes.far]\nat = [9, 9]");
+    check(
+        &e,
+        SceneErrorKind::Empty,
+        "[9, 9]",
+        "lies outside the mesh",
+        "[2.0, 1.0]",
+    );
+    let e = with("[output.probes.far]\nat = 9");
+    check(
+        &e,
+        SceneErrorKind::Dimension,
+        "9",
+        "has 1 coordinate in",
+        "[0.1, 0.2]",
+    );
 }

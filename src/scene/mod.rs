@@ -9,6 +9,7 @@
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `materials.rs`, `conditions.rs` | its parts |
+//! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
 
 mod check;
@@ -22,6 +23,7 @@ mod parse;
 mod region;
 mod source;
 pub mod spec;
+mod template;
 mod validate;
 mod value;
 mod zones;
@@ -33,6 +35,7 @@ pub use materials::{Law, Material, Method, Peridynamics, Points};
 pub use region::Region;
 pub use source::{Source, Span};
 pub use spec::SceneSpec;
+pub use template::Template;
 pub use validate::{AnyScene, Output, Scene, Solver};
 pub use value::{Coordinates, Count, Number, Text};
 
