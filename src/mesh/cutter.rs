@@ -206,13 +206,20 @@ impl<const D: usize> SegmentCutter<D> {
         touches.extend([0.0, 1.0]);
         touches.sort_unstable_by(f64::total_cmp);
         touches.windows(2).any(|w| {
-            w[1] - w[0] > 4.0 * TOUCH
-                && self.height(&(a + (b - a) * (0.5 * (w[0] + w[1]))), length) > skin
+            let piece = (w[1] - w[0]) * length;
+            // at least one end of the piece lies on the boundary, hence the reach
+            piece > 4.0 * skin
+                && self.height(
+                    &(a + (b - a) * (0.5 * (w[0] + w[1]))),
+                    0.5 * piece + skin,
+                    skin,
+                ) > skin
         })
     }
 
     /// Distance of `x` from the boundary, positive outside the mesh; `reach` is an upper bound of its size.
-    fn height(&self, x: &Vector<D>, reach: f64) -> f64 {
+    /// A distance below `skin` is as good as none, and ends the search.
+    fn height(&self, x: &Vector<D>, reach: f64, skin: f64) -> f64 {
         let mut nearest = (f64::INFINITY, 0.0);
         self.visit(&x.add_scalar(-reach), &x.add_scalar(reach), |cell| {
             for facet in self.facets_in(cell) {
@@ -226,7 +233,11 @@ impl<const D: usize> SegmentCutter<D> {
                     nearest = (distance, distance.copysign((x - foot).dot(normal)));
                 }
             }
-            Visit::On
+            if nearest.0 <= skin {
+                Visit::Stop
+            } else {
+                Visit::On
+            }
         });
         nearest.1
     }

@@ -18,6 +18,7 @@ pub mod cutter;
 mod error;
 pub mod generate;
 pub mod gmsh;
+mod gmsh_kinds;
 pub mod quality;
 pub mod read;
 pub mod vtk;

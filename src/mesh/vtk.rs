@@ -63,7 +63,7 @@ pub(super) fn parse<'a>(
         wanted: wanted.into(),
         remedy: "it may be truncated: write it again, for instance with meshio",
     };
-    // the parser beneath panics on some files that end early
+    // the parser beneath unwraps in places; no file may end the run
     let parsed = catch_unwind(AssertUnwindSafe(|| match flavour {
         Flavour::Legacy => Vtk::parse_legacy_be(bytes),
         Flavour::Xml => Vtk::parse_xml(bytes),
