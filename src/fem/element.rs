@@ -344,6 +344,26 @@ mod tests {
                 row(&mesh, c, &tangent, a, &mut blocks);
                 assert_eq!(&blocks, expected);
             }
+            // a tensor without any symmetry tells its indices apart
+            let mut odd = Tensor4::<D>::zeros();
+            for i in 0..D {
+                for j in 0..D {
+                    odd.0[i][j] = Tensor::from_fn(|k, l| noise(9 * i + j, 7 * k + l));
+                }
+            }
+            let mut expected = [[Tensor::<D>::zeros(); 8]; 8];
+            for_each_point(&mesh, c, Rule::Stiffness, |p| {
+                for a in 0..p.nodes {
+                    for b in 0..p.nodes {
+                        expected[a][b] += odd.between(&p.gradient[a], &p.gradient[b]) * p.weight;
+                    }
+                }
+            });
+            for (row, expected) in stiffness(&mesh, c, &odd).iter().zip(&expected) {
+                for (block, expected) in row.iter().zip(expected) {
+                    assert!((block - expected).amax() < 1e-14);
+                }
+            }
             // as many zero modes as there are rigid ones, and no negative one
             let n = nodes * D;
             let k = nalgebra::DMatrix::from_fn(n, n, |p, q| rows[p / D][q / D][(p % D, q % D)]);

@@ -232,7 +232,7 @@ fn located<const D: usize>(
     })
 }
 
-/// Sets shape functions near 0 or 1 to exactly that and keeps their sum at one.
+/// Sets shape functions near 0 to exactly that; the largest makes up their sum to one, and is one if it is alone.
 fn snap(shape: &mut [f64; 8], nodes: usize) {
     let mut largest = 0;
     for a in 0..nodes {
@@ -242,11 +242,6 @@ fn snap(shape: &mut [f64; 8], nodes: usize) {
         if shape[a] > shape[largest] {
             largest = a;
         }
-    }
-    if (shape[largest] - 1.0).abs() < SNAP {
-        *shape = [0.0; 8];
-        shape[largest] = 1.0;
-        return;
     }
     let others: f64 = (0..nodes).filter(|&a| a != largest).map(|a| shape[a]).sum();
     shape[largest] = 1.0 - others;
@@ -353,6 +348,35 @@ mod tests {
                 .locate(&mesh, &x(0.5), 1e-9)
                 .is_none()
         );
+    }
+
+    #[test]
+    fn the_smallest_cell_wins_across_bins() {
+        // numbered from the right: within the tolerance of two cells, the right one has the smaller number
+        let mut mesh = unit_box::<1>(CellShape::Line2, 10, 0.0);
+        mesh.connectivity = (0..10).rev().flat_map(|n| [n, n + 1]).collect();
+        let locator = Locator::new(&mesh, 0..10);
+        for n in 0..9 {
+            let x = Vector::<1>::new((n as f64 + 0.95) / 10.0);
+            assert_eq!(locator.locate(&mesh, &x, 1e-9).unwrap().cell, 9 - n);
+            assert_eq!(locator.locate(&mesh, &x, 0.1).unwrap().cell, 8 - n);
+        }
+    }
+
+    #[test]
+    fn weights_near_zero_and_one_snap() {
+        let mesh = unit_box::<2>(CellShape::Quad4, 1, 0.0);
+        let locator = Locator::new(&mesh, 0..1);
+        let at = |x: f64, y: f64| {
+            locator
+                .locate(&mesh, &Vector::<2>::new(x, y), 1e-9)
+                .unwrap()
+                .shape
+        };
+        assert_eq!(at(1e-11, -1e-11)[..4], [1.0, 0.0, 0.0, 0.0]);
+        let edge = at(0.25, 1e-11);
+        assert_eq!((edge[2], edge[3], edge[0] + edge[1]), (0.0, 0.0, 1.0));
+        assert!(at(1e-8, 0.5)[1] > 0.0);
     }
 
     #[test]
