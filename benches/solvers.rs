@@ -1,138 +1,376 @@
-//! Times the solvers against each other, all within one run: `cargo bench --bench solvers -- [CASE …]`.
+//! Times the solvers against each other, all within one run, in seconds of CPU (the machine may be shared):
+//! `cargo bench --bench solvers -- [direct|faer|krylov …] [CASE …]`.
 
 use bondline::progress::Silent;
-use bondline::solve::FreeDofs;
 use bondline::solve::direct::{DirectParams, Factor};
-use bondline::solve::ordering::Ordering;
+use bondline::solve::krylov::{KrylovParams, conjugate_gradients, gmres};
+use bondline::solve::multigrid::{Multigrid, MultigridParams};
+use bondline::solve::ordering::{Ordering, SiteGraph};
 use bondline::solve::stencils::{Lattice, splice};
+use bondline::solve::{FreeDofs, FreeOperator};
 use bondline::system::{BlockCsr, Symmetry};
+use faer::Side;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::cholesky::{SymmetricOrdering, factorize_symbolic_cholesky};
+use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use std::time::Instant;
+
+/// A matrix with the sites that belong to it.
+struct Case {
+    lattice: Lattice,
+    matrix: BlockCsr,
+    symmetry: Symmetry,
+}
+
+impl Case {
+    fn symmetric(lattice: Lattice, matrix: BlockCsr) -> Case {
+        Case {
+            lattice,
+            matrix,
+            symmetry: Symmetry::Symmetric,
+        }
+    }
+
+    /// PD in the middle half along each axis, FE around it.
+    fn spliced(lattice: Lattice, m: usize) -> Case {
+        let inside = |x: [f64; 3]| {
+            (0..lattice.dimension).all(|k| {
+                let half = 0.5 * (lattice.counts[k] - 1) as f64;
+                (x[k] - half).abs() <= 0.5 * half
+            })
+        };
+        let x = lattice.positions();
+        let matrix = splice(&lattice.bonds(m), &lattice.elements(), |i| inside(x[i]));
+        Case {
+            lattice,
+            matrix,
+            symmetry: Symmetry::Unsymmetric,
+        }
+    }
+}
+
+type Make = fn() -> Case;
+
+const CASES: [(&str, Make); 9] = [
+    ("pd2d", || {
+        let l = Lattice::rectangle(240, 240);
+        Case::symmetric(l.clone(), l.bonds(6))
+    }),
+    ("pd2d-large", || {
+        let l = Lattice::rectangle(480, 480);
+        Case::symmetric(l.clone(), l.bonds(6))
+    }),
+    ("fe2d", || {
+        let l = Lattice::rectangle(400, 400);
+        Case::symmetric(l.clone(), l.elements())
+    }),
+    ("fe3d", || {
+        let l = Lattice::block(40, 40, 40);
+        Case::symmetric(l.clone(), l.elements())
+    }),
+    ("pd3d", || {
+        let l = Lattice::block(30, 30, 30);
+        Case::symmetric(l.clone(), l.bonds(3))
+    }),
+    ("splice2d-small", || {
+        Case::spliced(Lattice::rectangle(120, 120), 6)
+    }),
+    ("splice2d", || {
+        Case::spliced(Lattice::rectangle(240, 240), 6)
+    }),
+    ("splice3d-small", || {
+        Case::spliced(Lattice::block(18, 18, 18), 3)
+    }),
+    ("splice3d", || Case::spliced(Lattice::block(30, 30, 30), 3)),
+];
 
 fn main() {
     let wanted: Vec<String> = std::env::args()
         .skip(1)
         .filter(|a| !a.starts_with("--"))
         .collect();
-    let cases: [(&str, fn() -> (BlockCsr, Lattice)); 6] = [
-        ("pd2d", || {
-            let l = Lattice::rectangle(240, 240);
-            (l.bonds(6), l)
-        }),
-        ("pd2d-large", || {
-            let l = Lattice::rectangle(480, 480);
-            (l.bonds(6), l)
-        }),
-        ("fe3d", || {
-            let l = Lattice::block(40, 40, 40);
-            (l.elements(), l)
-        }),
-        ("pd3d", || {
-            let l = Lattice::block(30, 30, 30);
-            (l.bonds(3), l)
-        }),
-        ("fe2d", || {
-            let l = Lattice::rectangle(400, 400);
-            (l.elements(), l)
-        }),
-        ("splice2d", || {
-            let l = Lattice::rectangle(240, 240);
-            let (pd, fe) = (l.bonds(6), l.elements());
-            let x = l.positions();
-            let k = splice(&pd, &fe, |i| {
-                (x[i][0] - 120.0).abs() < 60.0 && (x[i][1] - 120.0).abs() < 60.0
-            });
-            (k, l)
-        }),
-    ];
-    for (name, make) in cases {
-        if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
+    let asked = |name: &str, kinds: &[&str]| {
+        let named: Vec<&String> = wanted
+            .iter()
+            .filter(|w| kinds.contains(&w.as_str()))
+            .collect();
+        named.is_empty() || named.iter().any(|w| *w == name)
+    };
+    let names = CASES.map(|(name, _)| name);
+    let solvers = ["direct", "orderings", "faer", "krylov"];
+    for (name, make) in CASES {
+        if !asked(name, &names) {
             continue;
         }
-        let (matrix, lattice) = make();
-        let positions = lattice.positions();
-        let d = lattice.dimension;
+        let case = make();
+        let d = case.lattice.dimension;
+        let positions = case.lattice.positions();
         // the two faces across the first axis are held
-        let prescribed: Vec<Option<f64>> = (0..matrix.dofs())
+        let prescribed: Vec<Option<f64>> = (0..case.matrix.dofs())
             .map(|k| {
                 let x = positions[k / d][0] as usize;
-                (x == 0 || x + 1 == lattice.counts[0]).then_some(0.0)
+                (x == 0 || x + 1 == case.lattice.counts[0]).then_some(0.0)
             })
             .collect();
         let free = FreeDofs::from_prescribed(&prescribed, d);
-        let load: Vec<f64> = prescribed
-            .iter()
-            .enumerate()
-            .map(|(k, p)| {
-                if p.is_none() {
+        println!(
+            "{name}: {} free dofs, {} non-zeros",
+            free.count(),
+            case.matrix.nonzeros()
+        );
+        let bench = Bench {
+            case: &case,
+            positions: &positions,
+            free: &free,
+        };
+        if asked("direct", &solvers) {
+            bench.direct(Ordering::CoordinateNestedDissection, Symmetry::Symmetric);
+            bench.direct(Ordering::CoordinateNestedDissection, Symmetry::Unsymmetric);
+        }
+        if asked("orderings", &solvers) {
+            bench.direct(Ordering::Metis, case.symmetry);
+            bench.direct(Ordering::Amd, case.symmetry);
+        }
+        if asked("krylov", &solvers) {
+            bench.krylov();
+        }
+        if asked("faer", &solvers) {
+            bench.faer();
+        }
+    }
+}
+
+struct Bench<'a> {
+    case: &'a Case,
+    positions: &'a [[f64; 3]],
+    free: &'a FreeDofs,
+}
+
+impl Bench<'_> {
+    fn load(&self) -> Vec<f64> {
+        let d = self.free.block();
+        (0..self.case.matrix.dofs())
+            .map(|k| {
+                if self.free.is_free(k / d, k % d) {
                     (k % 7) as f64 - 3.0
                 } else {
                     0.0
                 }
             })
-            .collect();
-        println!(
-            "{name}: {} free dofs, {} non-zeros",
-            free.count(),
-            matrix.nonzeros()
+            .collect()
+    }
+
+    fn residual(&self, x: &[f64]) -> f64 {
+        let (d, load, product) = (self.free.block(), self.load(), self.case.matrix.multiply(x));
+        let mut sums = (0.0, 0.0);
+        for k in (0..x.len()).filter(|&k| self.free.is_free(k / d, k % d)) {
+            sums.0 += (load[k] - product[k]).powi(2);
+            sums.1 += load[k].powi(2);
+        }
+        f64::sqrt(sums.0 / sums.1)
+    }
+
+    fn direct(&self, ordering: Ordering, symmetry: Symmetry) {
+        if self.case.symmetry == Symmetry::Unsymmetric && symmetry == Symmetry::Symmetric {
+            return;
+        }
+        let params = DirectParams {
+            ordering,
+            symmetry,
+            ..DirectParams::default()
+        };
+        let (wall, cpu) = (Instant::now(), cpu_seconds());
+        let made = Factor::new(
+            &self.case.matrix,
+            self.free,
+            self.positions,
+            &params,
+            &Silent,
         );
-        for ordering in [
-            Ordering::CoordinateNestedDissection,
-            Ordering::Metis,
-            Ordering::Amd,
-        ] {
-            for symmetry in [Symmetry::Symmetric, Symmetry::Unsymmetric] {
-                if name.starts_with("splice") && symmetry == Symmetry::Symmetric {
-                    continue;
-                }
-                if ordering != Ordering::CoordinateNestedDissection && name == "pd2d-large" {
-                    continue;
-                }
-                let params = DirectParams {
-                    ordering,
-                    symmetry,
-                    ..DirectParams::default()
-                };
-                let (factor, info) =
-                    Factor::new(&matrix, &free, &positions, &params, &Silent).expect("factor");
-                let start = Instant::now();
-                let x = factor.solve(&load);
-                let seconds = start.elapsed().as_secs_f64();
-                let r = matrix.multiply(&x);
-                let mut sums = (0.0, 0.0);
-                for k in 0..r.len() {
-                    if prescribed[k].is_none() {
-                        sums.0 += (load[k] - r[k]).powi(2);
-                        sums.1 += load[k].powi(2);
+        let (wall, cpu) = (wall.elapsed().as_secs_f64(), cpu_seconds() - cpu);
+        let (factor, info) = made.expect("the case is regular");
+        let start = cpu_seconds();
+        let x = factor.solve(&self.load());
+        let solve = cpu_seconds() - start;
+        println!(
+            "  own {symmetry:?} {ordering:?}: nnz {:.3e}, {:.3e} flops, {} fronts up to {}, ordering {:.2}, total {cpu:.2} \
+             cpu ({wall:.2} wall, {:.1} Gflop/cpu s), solve {solve:.2}, residual {:.0e}, predicted {:.2} GB, stored {:.2} GB, \
+             peak so far {:.2} GB",
+            info.cost.factor_nnz as f64,
+            info.cost.flops,
+            info.fronts,
+            info.largest_front,
+            info.ordering_seconds,
+            info.cost.flops / cpu * 1e-9,
+            self.residual(&x),
+            info.cost.bytes as f64 * 1e-9,
+            factor.bytes() as f64 * 1e-9,
+            peak(),
+        );
+    }
+
+    fn krylov(&self) {
+        let start = cpu_seconds();
+        let (multigrid, info) = Multigrid::new(
+            &self.case.matrix,
+            self.free,
+            self.positions,
+            &MultigridParams::default(),
+        )
+        .expect("hierarchy");
+        let setup = cpu_seconds() - start;
+        let operator = FreeOperator::new(&self.case.matrix, self.free);
+        let solver = match self.case.symmetry {
+            Symmetry::Symmetric => conjugate_gradients,
+            Symmetry::Unsymmetric => gmres,
+        };
+        let start = cpu_seconds();
+        let (x, done) = solver(
+            &operator,
+            &multigrid,
+            &self.load(),
+            &KrylovParams::default(),
+            &Silent,
+        )
+        .expect("converged");
+        println!(
+            "  krylov {:?}: levels {:?}, complexity {:.2}, set-up {setup:.2}, {} iterations {:.2} cpu, residual {:.0e}, peak so far {:.2} GB",
+            self.case.symmetry,
+            info.dofs,
+            info.operator_complexity,
+            done.iterations,
+            cpu_seconds() - start,
+            self.residual(&x),
+            peak(),
+        );
+    }
+
+    /// The free part of the matrix, columns compressed, in the order of elimination.
+    fn permuted(
+        &self,
+        ordering: Ordering,
+        keep: impl Fn(usize, usize) -> bool,
+    ) -> SparseColMat<u32, f64> {
+        let matrix = &self.case.matrix;
+        let graph = SiteGraph::new(matrix, self.free);
+        let order = ordering.order(&graph, self.positions).expect("order");
+        let d = matrix.block;
+        let mut number = vec![u32::MAX; matrix.dofs()];
+        let mut dofs = Vec::new();
+        for &v in &order {
+            let i = graph.sites[v as usize] as usize;
+            for a in self.free.of_site(i) {
+                number[i * d + a] = dofs.len() as u32;
+                dofs.push(i * d + a);
+            }
+        }
+        // rows of the matrix are columns of its transpose
+        let (mut offsets, mut rows, mut values) = (vec![0u32], Vec::new(), Vec::new());
+        for &dof in &dofs {
+            let (columns, blocks) = matrix.row(dof / d);
+            let mut row = Vec::new();
+            for (e, &c) in columns.iter().enumerate() {
+                for b in self.free.of_site(c as usize) {
+                    let to = number[c as usize * d + b];
+                    if keep(number[dof] as usize, to as usize) {
+                        row.push((to, blocks[e * d * d + dof % d * d + b]));
                     }
                 }
-                println!(
-                    "  {ordering:?} {symmetry:?}: nnz {:.3e} flops {:.3e} ({} fronts, largest {}) order {:.2}s factor {:.2}s ({:.1} Gflop/s) solve {:.2}s residual {:.1e} predicted {:.2} GB stored {:.2} GB peak rss {:.2} GB",
-                    info.cost.factor_nnz as f64,
-                    info.cost.flops,
-                    info.fronts,
-                    info.largest_front,
-                    info.ordering_seconds,
-                    info.factor_seconds,
-                    info.cost.flops / info.factor_seconds * 1e-9,
-                    seconds,
-                    f64::sqrt(sums.0 / sums.1),
-                    info.cost.bytes as f64 * 1e-9,
-                    factor.bytes() as f64 * 1e-9,
-                    peak(),
-                );
             }
+            row.sort_by_key(|r| r.0);
+            rows.extend(row.iter().map(|r| r.0));
+            values.extend(row.iter().map(|r| r.1));
+            offsets.push(rows.len() as u32);
+        }
+        let n = dofs.len();
+        SparseColMat::new(
+            SymbolicSparseColMat::new_checked(n, n, offsets, None, rows),
+            values,
+        )
+    }
+
+    /// faer's own sparse factorisations of the same matrix: Cholesky in the same order, LU with COLAMD.
+    fn faer(&self) {
+        if self.case.symmetry == Symmetry::Symmetric {
+            let upper = self.permuted(Ordering::CoordinateNestedDissection, |own, other| {
+                other <= own
+            });
+            let identity: Vec<u32> = (0..upper.ncols() as u32).collect();
+            let start = cpu_seconds();
+            let symbolic = factorize_symbolic_cholesky(
+                upper.symbolic(),
+                Side::Upper,
+                SymmetricOrdering::Custom(faer::perm::PermRef::new_checked(
+                    &identity,
+                    &identity,
+                    identity.len(),
+                )),
+                Default::default(),
+            )
+            .expect("symbolic");
+            let par = faer::get_global_parallelism();
+            let mut values = vec![0.0; symbolic.len_val()];
+            let mut memory = MemBuffer::new(
+                symbolic.factorize_numeric_llt_scratch::<f64>(par, Default::default()),
+            );
+            symbolic
+                .factorize_numeric_llt(
+                    &mut values,
+                    upper.as_ref(),
+                    Side::Upper,
+                    Default::default(),
+                    par,
+                    MemStack::new(&mut memory),
+                    Default::default(),
+                )
+                .expect("positive definite");
+            println!(
+                "  faer LLT, same order: stored {:.2} GB, {:.2} cpu, peak so far {:.2} GB",
+                8e-9 * values.len() as f64,
+                cpu_seconds() - start,
+                peak()
+            );
+        } else {
+            let all = self.permuted(Ordering::CoordinateNestedDissection, |_, _| true);
+            let start = cpu_seconds();
+            let symbolic = SymbolicLu::try_new(all.symbolic()).expect("symbolic");
+            let lu = Lu::try_new_with_symbolic(symbolic, all.as_ref()).expect("regular");
+            println!(
+                "  faer LU (COLAMD): {:.2} cpu, peak so far {:.2} GB",
+                cpu_seconds() - start,
+                peak()
+            );
+            drop(lu);
         }
     }
 }
 
+/// Seconds of CPU that this process has used on all threads.
+fn cpu_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields: Vec<&str> = text
+        .rsplit(") ")
+        .next()
+        .unwrap_or("")
+        .split_whitespace()
+        .collect();
+    let ticks = |k: usize| {
+        fields
+            .get(k)
+            .and_then(|f| f.parse::<f64>().ok())
+            .unwrap_or(0.0)
+    };
+    (ticks(11) + ticks(12)) / 100.0
+}
+
+/// Largest resident size so far, in gigabytes.
 fn peak() -> f64 {
-    std::fs::read_to_string("/proc/self/status")
-        .ok()
-        .and_then(|s| {
-            s.lines()
-                .find(|l| l.starts_with("VmHWM"))
-                .and_then(|l| l.split_whitespace().nth(1)?.parse::<f64>().ok())
-        })
+    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = text.lines().find(|l| l.starts_with("VmHWM")).unwrap_or("");
+    line.split_whitespace()
+        .nth(1)
+        .and_then(|kb| kb.parse::<f64>().ok())
         .unwrap_or(0.0)
         * 1e-6
 }

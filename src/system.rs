@@ -56,20 +56,43 @@ impl BlockCsr {
 
     /// `y = K x`, threaded over rows; the same bits for any number of threads.
     pub fn multiply_into(&self, x: &[f64], y: &mut [f64]) {
-        let d = self.block;
-        y.par_chunks_mut(d).enumerate().for_each(|(i, yi)| {
-            yi.fill(0.0);
-            let (columns, blocks) = self.row(i);
-            for (e, &c) in columns.iter().enumerate() {
-                let xj = &x[c as usize * d..][..d];
-                let k = &blocks[e * d * d..][..d * d];
-                for a in 0..d {
-                    for b in 0..d {
-                        yi[a] += k[a * d + b] * xj[b];
+        match self.block {
+            1 => self.multiply_blocks::<1>(x, y),
+            2 => self.multiply_blocks::<2>(x, y),
+            3 => self.multiply_blocks::<3>(x, y),
+            6 => self.multiply_blocks::<6>(x, y),
+            d => y.par_chunks_mut(d.max(1)).enumerate().for_each(|(i, yi)| {
+                yi.fill(0.0);
+                let (columns, blocks) = self.row(i);
+                for (&c, k) in columns.iter().zip(blocks.chunks_exact(d * d)) {
+                    let xj = &x[c as usize * d..][..d];
+                    for (y, row) in yi.iter_mut().zip(k.chunks_exact(d)) {
+                        *y += row.iter().zip(xj).map(|(k, x)| k * x).sum::<f64>();
                     }
                 }
-            }
-        });
+            }),
+        }
+    }
+
+    /// The product with blocks of a size known to the compiler, which unrolls them.
+    fn multiply_blocks<const D: usize>(&self, x: &[f64], y: &mut [f64]) {
+        // short rows (a 2D mesh has 9 blocks each) are dealt out in bundles
+        y.par_chunks_exact_mut(D)
+            .enumerate()
+            .with_min_len(128)
+            .for_each(|(i, yi)| {
+                let (columns, blocks) = self.row(i);
+                let mut sum = [0.0; D];
+                for (&c, k) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+                    let xj = &x[c as usize * D..][..D];
+                    for a in 0..D {
+                        for b in 0..D {
+                            sum[a] += k[a * D + b] * xj[b];
+                        }
+                    }
+                }
+                yi.copy_from_slice(&sum);
+            });
     }
 
     /// `K x`.

@@ -1,14 +1,22 @@
 //! Solvers of `K u = f`: elimination orders, a multifrontal direct solver, Krylov methods with multigrid, and the
 //! static problem that chooses among them.
 
+mod aggregate;
 pub mod direct;
 mod front;
+pub mod krylov;
 mod multifrontal;
+pub mod multigrid;
 pub mod ordering;
 mod singular;
+pub mod smoother;
 pub mod statics;
 pub mod stencils;
 pub mod symbolic;
+
+use crate::solve::krylov::LinearMap;
+use crate::system::BlockCsr;
+use rayon::prelude::*;
 
 /// Which dofs are unknown; the others are prescribed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +71,26 @@ impl FreeDofs {
         (0..self.block).filter(move |a| bits >> a & 1 == 1)
     }
 
+    /// Number of sites with at least one unknown dof.
+    pub fn sites_with_free_dofs(&self) -> usize {
+        self.bits.iter().filter(|&&b| b != 0).count()
+    }
+
+    /// Sets the entries of prescribed dofs to zero. Shape: `x` has one entry per dof.
+    pub fn clear_prescribed(&self, x: &mut [f64]) {
+        let full = ((1u16 << self.block) - 1) as u8;
+        x.par_chunks_mut(self.block)
+            .zip(&self.bits)
+            .for_each(|(x, &bits)| {
+                if bits != full {
+                    x.iter_mut()
+                        .enumerate()
+                        .filter(|(a, _)| bits >> a & 1 == 0)
+                        .for_each(|(_, x)| *x = 0.0);
+                }
+            });
+    }
+
     /// Dofs per site.
     pub fn block(&self) -> usize {
         self.block
@@ -71,5 +99,27 @@ impl FreeDofs {
     /// Number of sites.
     pub fn sites(&self) -> usize {
         self.bits.len()
+    }
+}
+
+/// `K` restricted to its free dofs, as a map: prescribed entries of the result are zero, and those of the argument
+/// must be.
+#[derive(Clone, Copy, Debug)]
+pub struct FreeOperator<'a> {
+    matrix: &'a BlockCsr,
+    free: &'a FreeDofs,
+}
+
+impl<'a> FreeOperator<'a> {
+    /// The free part of `matrix`.
+    pub fn new(matrix: &'a BlockCsr, free: &'a FreeDofs) -> Self {
+        FreeOperator { matrix, free }
+    }
+}
+
+impl LinearMap for FreeOperator<'_> {
+    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
+        self.matrix.multiply_into(x, y);
+        self.free.clear_prescribed(y);
     }
 }

@@ -1,10 +1,12 @@
 //! The static problem: `K u = f` on free dofs, `u` given on the others.
 
 use crate::progress::Progress;
-use crate::solve::FreeDofs;
 use crate::solve::direct::{DirectError, DirectInfo, DirectParams, Factor};
+use crate::solve::krylov::{KrylovError, KrylovParams, conjugate_gradients, gmres};
+use crate::solve::multigrid::{Multigrid, MultigridError, MultigridParams};
 use crate::solve::ordering::{Ordering, OrderingError};
 use crate::solve::singular::{self, FreeMotion};
+use crate::solve::{FreeDofs, FreeOperator};
 use crate::system::{BlockCsr, Symmetry};
 use std::time::Instant;
 
@@ -40,11 +42,13 @@ pub struct StaticProblem<'a> {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Direct.
+    /// By size and dimension: direct while it is the faster or the model is small.
     #[default]
     Auto,
     /// Cholesky or LU, by the symmetry of the system.
     Direct,
+    /// Conjugate gradients or GMRES, by the symmetry of the system, preconditioned by multigrid.
+    Krylov,
 }
 
 /// What a static solve may be asked for.
@@ -79,6 +83,10 @@ pub enum MethodUsed {
     Cholesky,
     /// Multifrontal LU.
     Lu,
+    /// Conjugate gradients with multigrid.
+    ConjugateGradients,
+    /// Restarted GMRES with multigrid.
+    Gmres,
     /// Nothing was free.
     None,
 }
@@ -177,6 +185,9 @@ pub enum StaticError {
     /// The elimination order could not be computed.
     #[error(transparent)]
     Ordering(#[from] OrderingError),
+    /// The multigrid hierarchy could not be built.
+    #[error(transparent)]
+    Multigrid(#[from] MultigridError),
 }
 
 fn first_places(sites: &[usize], positions: &[[f64; 3]]) -> String {
@@ -235,7 +246,22 @@ pub fn solve(
         if let Some(motion) = singular::unheld_bodies(matrix, &free, problem.positions) {
             return Err(singular_error(motion, problem.positions));
         }
-        direct(problem, &free, params, progress, &mut u, &mut info)?;
+        let iterate = match params.method {
+            Method::Auto => info.free_dofs > largest_direct(matrix.block),
+            Method::Direct => false,
+            Method::Krylov => true,
+        };
+        let start = u.clone();
+        let mut outcome = match iterate {
+            true => krylov(problem, &free, params, progress, &mut u, &mut info),
+            false => direct(problem, &free, params, progress, &mut u, &mut info),
+        };
+        if iterate && params.method == Method::Auto && outcome.is_err() {
+            u = start;
+            info.iterations = 0;
+            outcome = direct(problem, &free, params, progress, &mut u, &mut info);
+        }
+        outcome?;
     }
     let mut reactions = matrix.multiply(&u);
     for (k, r) in reactions.iter_mut().enumerate() {
@@ -332,6 +358,104 @@ fn residual(problem: &StaticProblem<'_>, u: &[f64]) -> (Vec<f64>, f64) {
     (r, norm)
 }
 
+/// Largest number of unknowns that `Auto` solves directly, by dimension.
+fn largest_direct(dimension: usize) -> usize {
+    match dimension {
+        1 => usize::MAX,
+        2 => 400_000,
+        _ => 30_000,
+    }
+}
+
+fn krylov(
+    problem: &StaticProblem<'_>,
+    free: &FreeDofs,
+    params: &StaticParams,
+    progress: &dyn Progress,
+    u: &mut Vec<f64>,
+    info: &mut StaticInfo,
+) -> Result<(), StaticError> {
+    let start = Instant::now();
+    progress.stage("multigrid set-up", None);
+    let (multigrid, _) = Multigrid::new(
+        problem.stiffness,
+        free,
+        problem.positions,
+        &MultigridParams::default(),
+    )?;
+    info.factor_seconds = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    progress.stage("iteration", None);
+    let operator = FreeOperator::new(problem.stiffness, free);
+    let (mut r, scale) = residual(problem, u);
+    let mut norm = scale;
+    info.method = MethodUsed::ConjugateGradients;
+    if problem.symmetry == Symmetry::Unsymmetric {
+        info.method = MethodUsed::Gmres;
+    }
+    // the recurrence of conjugate gradients drifts from the true residual; starting over from it mends that
+    while norm > params.tolerance * scale && info.iterations < params.max_iterations {
+        let limits = KrylovParams {
+            tolerance: 0.9 * params.tolerance * scale / norm,
+            max_iterations: params.max_iterations - info.iterations,
+            ..KrylovParams::default()
+        };
+        let result = match info.method {
+            MethodUsed::Gmres => gmres(&operator, &multigrid, &r, &limits, progress),
+            _ => conjugate_gradients(&operator, &multigrid, &r, &limits, progress),
+        };
+        match result {
+            Ok((step, done)) => {
+                info.iterations += done.iterations;
+                u.iter_mut().zip(&step).for_each(|(u, s)| *u += s);
+            }
+            Err(KrylovError::Indefinite { iteration }) => {
+                info.iterations += iteration;
+                info.method = MethodUsed::Gmres;
+                continue;
+            }
+            Err(KrylovError::NotConverged {
+                residual,
+                iterations,
+            }) => {
+                return Err(StaticError::NotConverged {
+                    residual: residual * norm / scale,
+                    tolerance: params.tolerance,
+                    iterations: info.iterations + iterations,
+                });
+            }
+        }
+        let before = norm;
+        (r, norm) = residual(problem, u);
+        if norm.is_nan() || norm > 0.5 * before {
+            break;
+        }
+    }
+    info.relative_residual = if scale > 0.0 { norm / scale } else { 0.0 };
+    info.solve_seconds = start.elapsed().as_secs_f64();
+    accept(problem, params, u, &r, info)
+}
+
+/// Refuses a solution whose residual is above the tolerance and above round-off.
+fn accept(
+    problem: &StaticProblem<'_>,
+    params: &StaticParams,
+    u: &[f64],
+    r: &[f64],
+    info: &StaticInfo,
+) -> Result<(), StaticError> {
+    let enough =
+        info.relative_residual <= params.tolerance || backward_error(problem, u, r) <= BACKWARD;
+    if enough {
+        return Ok(());
+    }
+    Err(StaticError::NotConverged {
+        residual: info.relative_residual,
+        tolerance: params.tolerance,
+        iterations: info.iterations,
+    })
+}
+
 fn direct(
     problem: &StaticProblem<'_>,
     free: &FreeDofs,
@@ -371,15 +495,7 @@ fn direct(
     }
     info.relative_residual = if scale > 0.0 { norm / scale } else { 0.0 };
     info.solve_seconds = start.elapsed().as_secs_f64();
-    let backward = backward_error(problem, u, &r);
-    if info.relative_residual > params.tolerance && backward > BACKWARD {
-        return Err(StaticError::NotConverged {
-            residual: info.relative_residual,
-            tolerance: params.tolerance,
-            iterations: info.iterations,
-        });
-    }
-    Ok(())
+    accept(problem, params, u, &r, info)
 }
 
 /// `‖r‖ / (‖K‖ ‖u‖ + ‖f‖)` in the largest-entry norm.

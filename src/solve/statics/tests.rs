@@ -164,6 +164,54 @@ fn direct_agrees_with_dense_lu_for_every_ordering() {
 }
 
 #[test]
+fn krylov_agrees_with_direct() {
+    let (plane, solid) = (Lattice::rectangle(70, 60), Lattice::block(16, 14, 12));
+    let x = plane.positions();
+    let y = solid.positions();
+    use Symmetry::{Symmetric, Unsymmetric};
+    let cases = [
+        (&plane, plane.bonds(3), Symmetric),
+        (&plane, plane.elements(), Symmetric),
+        (
+            &plane,
+            splice(&plane.bonds(3), &plane.elements(), |i| {
+                (x[i][0] - 35.0).abs() < 12.0
+            }),
+            Unsymmetric,
+        ),
+        (&solid, solid.bonds(2), Symmetric),
+        (
+            &solid,
+            splice(&solid.bonds(2), &solid.elements(), |i| {
+                (y[i][0] - 8.0).abs() < 4.0
+            }),
+            Unsymmetric,
+        ),
+    ];
+    for (lattice, matrix, symmetry) in cases {
+        let case = Case::new(lattice, matrix, symmetry).held();
+        let direct = case
+            .solve(&StaticParams {
+                method: Method::Direct,
+                ..StaticParams::default()
+            })
+            .expect("direct");
+        let params = StaticParams {
+            method: Method::Krylov,
+            tolerance: 1e-12,
+            ..StaticParams::default()
+        };
+        let krylov = case.solve(&params).expect("krylov");
+        let error = distance(&krylov.displacement, &direct.displacement);
+        println!("{symmetry:?} {error:e} {:?}", krylov.info);
+        assert!(error < 1e-8, "{error:e}");
+        assert!(krylov.info.relative_residual <= 1e-12);
+        // multigrid keeps the count of iterations low whatever the size
+        assert!(krylov.info.iterations <= 40, "{:?}", krylov.info);
+    }
+}
+
+#[test]
 fn reactions_balance_the_load() {
     // symmetric models conserve momentum, so that the reactions and the load add up to nothing
     for (name, case) in cases()
@@ -210,20 +258,25 @@ fn results_have_the_same_bits_on_any_number_of_threads() {
         (spliced, Symmetry::Unsymmetric),
     ] {
         let case = Case::new(&lattice, matrix, symmetry).held();
-        let run = |threads: usize| {
+        let run = |threads: usize, method: Method| {
             let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
                 .build()
                 .expect("pool");
             pool.install(|| {
-                case.solve(&StaticParams::default())
-                    .expect("solved")
-                    .displacement
+                case.solve(&StaticParams {
+                    method,
+                    ..StaticParams::default()
+                })
+                .expect("solved")
+                .displacement
             })
         };
-        let one = run(1);
-        assert_eq!(one, run(2));
-        assert_eq!(one, run(5));
+        for method in [Method::Direct, Method::Krylov] {
+            let one = run(1, method);
+            assert_eq!(one, run(2, method));
+            assert_eq!(one, run(5, method));
+        }
     }
 }
 

@@ -1,0 +1,323 @@
+//! Preconditioned conjugate gradients and restarted GMRES.
+//!
+//! All reductions run over fixed chunks, so that results have the same bits on any number of threads.
+
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// A linear map `y = A x` on vectors of one length.
+pub trait LinearMap: Sync {
+    /// Overwrites `y` by `A x`.
+    fn apply_into(&self, x: &[f64], y: &mut [f64]);
+}
+
+/// The map that changes nothing: no preconditioner.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Identity;
+
+impl LinearMap for Identity {
+    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(x);
+    }
+}
+
+/// When an iteration stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KrylovParams {
+    /// Relative residual `‖b − A x‖₂ / ‖b‖₂` to be reached.
+    pub tolerance: f64,
+    /// Limit of iterations.
+    pub max_iterations: usize,
+    /// Iterations of GMRES between restarts; each keeps one vector.
+    pub restart: usize,
+}
+
+impl Default for KrylovParams {
+    fn default() -> Self {
+        // 60 vectors are less than the matrix of a 2D horizon of three spacings; multigrid takes 10 to 30 iterations
+        KrylovParams {
+            tolerance: 1e-10,
+            max_iterations: 1000,
+            restart: 60,
+        }
+    }
+}
+
+/// What an iteration did.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct KrylovInfo {
+    /// Applications of the preconditioned operator.
+    pub iterations: usize,
+    /// Relative residual by the recurrence.
+    pub relative_residual: f64,
+}
+
+/// Why an iteration stopped short.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum KrylovError {
+    /// A direction with `p·A p ≤ 0`, or a preconditioner with `r·M r ≤ 0`.
+    #[error(
+        "conjugate gradients met a direction of no or negative energy at iteration {iteration}; the matrix is not \
+         symmetric positive definite, use GMRES or the direct method"
+    )]
+    Indefinite {
+        /// Iteration at which it was met.
+        iteration: usize,
+    },
+    /// The tolerance was not reached.
+    #[error(
+        "the relative residual is {residual:.1e} after {iterations} iterations; use the direct method"
+    )]
+    NotConverged {
+        /// Relative residual reached.
+        residual: f64,
+        /// Iterations done.
+        iterations: usize,
+    },
+}
+
+/// Entries per chunk of a reduction.
+const CHUNK: usize = 8192;
+
+/// `a·b`, summed by fixed chunks.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let partial: Vec<f64> = a
+        .par_chunks(CHUNK)
+        .zip(b.par_chunks(CHUNK))
+        .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum())
+        .collect();
+    partial.iter().sum()
+}
+
+/// `‖a‖₂`.
+pub(crate) fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// `y ← y + s x`.
+pub(crate) fn add_scaled(s: f64, x: &[f64], y: &mut [f64]) {
+    y.par_chunks_mut(CHUNK)
+        .zip(x.par_chunks(CHUNK))
+        .for_each(|(y, x)| y.iter_mut().zip(x).for_each(|(y, x)| *y += s * x));
+}
+
+/// Solves `A x = b` for a symmetric positive definite `A`, from `x = 0`.
+///
+/// `preconditioner` must be symmetric positive definite too.
+///
+/// # Errors
+/// [`KrylovError::Indefinite`] if `A` or the preconditioner is found not to be positive definite,
+/// [`KrylovError::NotConverged`] with the residual reached.
+pub fn conjugate_gradients(
+    operator: &dyn LinearMap,
+    preconditioner: &dyn LinearMap,
+    rhs: &[f64],
+    params: &KrylovParams,
+    progress: &dyn Progress,
+) -> Result<(Vec<f64>, KrylovInfo), KrylovError> {
+    let n = rhs.len();
+    let mut x = vec![0.0; n];
+    let scale = norm(rhs);
+    if scale == 0.0 {
+        return Ok((
+            x,
+            KrylovInfo {
+                iterations: 0,
+                relative_residual: 0.0,
+            },
+        ));
+    }
+    let mut r = rhs.to_vec();
+    let (mut z, mut q) = (vec![0.0; n], vec![0.0; n]);
+    preconditioner.apply_into(&r, &mut z);
+    let mut p = z.clone();
+    let mut rz = dot(&r, &z);
+    let mut residual = 1.0;
+    for iteration in 1..=params.max_iterations {
+        operator.apply_into(&p, &mut q);
+        let energy = dot(&p, &q);
+        if !(energy > 0.0 && rz > 0.0) {
+            return Err(KrylovError::Indefinite { iteration });
+        }
+        let step = rz / energy;
+        add_scaled(step, &p, &mut x);
+        add_scaled(-step, &q, &mut r);
+        residual = norm(&r) / scale;
+        progress.advance(1);
+        if residual <= params.tolerance {
+            return Ok((
+                x,
+                KrylovInfo {
+                    iterations: iteration,
+                    relative_residual: residual,
+                },
+            ));
+        }
+        preconditioner.apply_into(&r, &mut z);
+        let next = dot(&r, &z);
+        let ratio = next / rz;
+        rz = next;
+        p.par_chunks_mut(CHUNK)
+            .zip(z.par_chunks(CHUNK))
+            .for_each(|(p, z)| p.iter_mut().zip(z).for_each(|(p, z)| *p = z + ratio * *p));
+    }
+    Err(KrylovError::NotConverged {
+        residual,
+        iterations: params.max_iterations,
+    })
+}
+
+/// Solves `A x = b` by GMRES with the preconditioner on the right, restarted, from `x = 0`.
+///
+/// The residual of the recurrence is the residual of the system itself (right preconditioning). Any fixed linear
+/// preconditioner will do.
+///
+/// # Errors
+/// [`KrylovError::NotConverged`] with the residual reached.
+pub fn gmres(
+    operator: &dyn LinearMap,
+    preconditioner: &dyn LinearMap,
+    rhs: &[f64],
+    params: &KrylovParams,
+    progress: &dyn Progress,
+) -> Result<(Vec<f64>, KrylovInfo), KrylovError> {
+    let n = rhs.len();
+    let mut x = vec![0.0; n];
+    let scale = norm(rhs);
+    if scale == 0.0 {
+        return Ok((
+            x,
+            KrylovInfo {
+                iterations: 0,
+                relative_residual: 0.0,
+            },
+        ));
+    }
+    let mut r = rhs.to_vec();
+    let mut z = vec![0.0; n];
+    let mut iterations = 0;
+    let mut residual = 1.0;
+    while iterations < params.max_iterations {
+        let beta = norm(&r);
+        let mut basis = vec![r.iter().map(|v| v / beta).collect::<Vec<f64>>()];
+        let mut least = LeastSquares::new(beta);
+        while least.columns() < params.restart.max(1) && iterations < params.max_iterations {
+            let k = least.columns();
+            preconditioner.apply_into(&basis[k], &mut z);
+            let mut w = vec![0.0; n];
+            operator.apply_into(&z, &mut w);
+            let before = norm(&w);
+            let mut column = vec![0.0; k + 2];
+            // twice is enough (Giraud et al. 2005), and once is not for nearly dependent vectors
+            for _ in 0..2 {
+                for (h, v) in column.iter_mut().zip(&basis) {
+                    let c = dot(v, &w);
+                    *h += c;
+                    add_scaled(-c, v, &mut w);
+                }
+            }
+            let size = norm(&w);
+            column[k + 1] = size;
+            residual = least.push(column) / scale;
+            iterations += 1;
+            progress.advance(1);
+            // a vanishing new direction means that the solution lies in the space already spanned
+            if residual <= params.tolerance || size <= 1e-14 * before {
+                break;
+            }
+            w.par_chunks_mut(CHUNK)
+                .for_each(|w| w.iter_mut().for_each(|w| *w /= size));
+            basis.push(w);
+        }
+        let mut combination = vec![0.0; n];
+        for (c, v) in least.solve().iter().zip(&basis) {
+            add_scaled(*c, v, &mut combination);
+        }
+        preconditioner.apply_into(&combination, &mut z);
+        add_scaled(1.0, &z, &mut x);
+        operator.apply_into(&x, &mut z);
+        r.iter_mut()
+            .zip(rhs)
+            .zip(&z)
+            .for_each(|((r, b), z)| *r = b - z);
+        let true_residual = norm(&r) / scale;
+        if true_residual <= params.tolerance {
+            return Ok((
+                x,
+                KrylovInfo {
+                    iterations,
+                    relative_residual: true_residual,
+                },
+            ));
+        }
+        // no progress within a whole cycle: round-off or stagnation, and another cycle would repeat it
+        let stagnant = true_residual > 0.999 * beta / scale;
+        residual = true_residual;
+        if stagnant || !true_residual.is_finite() {
+            break;
+        }
+    }
+    Err(KrylovError::NotConverged {
+        residual,
+        iterations,
+    })
+}
+
+/// The Hessenberg least-squares problem of GMRES, updated by Givens rotations.
+struct LeastSquares {
+    triangle: Vec<Vec<f64>>,
+    rotations: Vec<(f64, f64)>,
+    rhs: Vec<f64>,
+}
+
+impl LeastSquares {
+    fn new(beta: f64) -> LeastSquares {
+        LeastSquares {
+            triangle: Vec::new(),
+            rotations: Vec::new(),
+            rhs: vec![beta],
+        }
+    }
+
+    fn columns(&self) -> usize {
+        self.triangle.len()
+    }
+
+    /// Adds a column of the Hessenberg matrix; returns the norm of the residual.
+    fn push(&mut self, mut column: Vec<f64>) -> f64 {
+        let k = self.triangle.len();
+        for (i, &(c, s)) in self.rotations.iter().enumerate() {
+            let (a, b) = (column[i], column[i + 1]);
+            column[i] = c * a + s * b;
+            column[i + 1] = c * b - s * a;
+        }
+        let length = column[k].hypot(column[k + 1]);
+        let (c, s) = if length > 0.0 {
+            (column[k] / length, column[k + 1] / length)
+        } else {
+            (1.0, 0.0)
+        };
+        column[k] = length;
+        column.truncate(k + 1);
+        self.triangle.push(column);
+        self.rotations.push((c, s));
+        let last = self.rhs[k];
+        self.rhs[k] = c * last;
+        self.rhs.push(-s * last);
+        self.rhs[k + 1].abs()
+    }
+
+    /// The coefficients of the basis vectors.
+    fn solve(&self) -> Vec<f64> {
+        let n = self.triangle.len();
+        let mut y = self.rhs[..n].to_vec();
+        for k in (0..n).rev() {
+            let pivot = self.triangle[k][k];
+            y[k] = if pivot == 0.0 { 0.0 } else { y[k] / pivot };
+            for i in 0..k {
+                y[i] -= self.triangle[k][i] * y[k];
+            }
+        }
+        y
+    }
+}

@@ -1,0 +1,201 @@
+//! Smoothed-aggregation algebraic multigrid on block rows, with rigid-body modes (Vaněk, Mandel & Brezina 1996).
+//!
+//! Every non-zero block is a strong connection, so that a wide PD stencil is aggregated over its whole row. The
+//! prolongation is smoothed by `ω = 4/(3 λ_max)`, the restriction is its transpose (also for unsymmetric operators),
+//! the smoother is a Chebyshev polynomial of block-Jacobi, the coarsest level is factorised.
+
+use crate::progress::Silent;
+use crate::solve::aggregate::{
+    Aggregates, Prolongation, coarse_matrix, rigid_near_null_space, smoothed,
+};
+use crate::solve::direct::{DirectError, DirectParams, Factor};
+use crate::solve::krylov::{LinearMap, add_scaled};
+use crate::solve::smoother::{BlockJacobi, Chebyshev, Residual};
+use crate::solve::{FreeDofs, FreeOperator};
+use crate::system::{BlockCsr, Symmetry};
+
+/// How a hierarchy is built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MultigridParams {
+    /// A level with at most this many dofs is factorised.
+    pub coarsest: usize,
+    /// Limit of levels.
+    pub max_levels: usize,
+    /// Degree of the Chebyshev smoother.
+    pub degree: usize,
+    /// The smoother damps eigenvalues of `D⁻¹K` from `λ_max / smoothed_range` to `λ_max`.
+    pub smoothed_range: f64,
+}
+
+impl Default for MultigridParams {
+    fn default() -> Self {
+        MultigridParams {
+            coarsest: 3000,
+            max_levels: 20,
+            degree: 2,
+            smoothed_range: 10.0,
+        }
+    }
+}
+
+/// What a hierarchy looks like.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct MultigridInfo {
+    /// Dofs of each level, the finest first.
+    pub dofs: Vec<usize>,
+    /// Scalars in the matrices of all levels over those of the finest.
+    pub operator_complexity: f64,
+}
+
+/// Why a hierarchy could not be built.
+#[derive(Debug, thiserror::Error)]
+pub enum MultigridError {
+    /// The diagonal block of a site cannot be inverted.
+    #[error(
+        "the diagonal block of site {site} is singular; support the site or use the direct method"
+    )]
+    SingularBlock {
+        /// The site, on the finest level.
+        site: usize,
+    },
+    /// The coarsest level could not be factorised.
+    #[error("the coarsest level could not be factorised: {0}; use the direct method")]
+    Coarsest(#[from] DirectError),
+}
+
+/// A hierarchy of matrices, applied as one V-cycle from a zero guess.
+#[derive(Debug)]
+pub struct Multigrid<'a> {
+    finest: &'a BlockCsr,
+    free: &'a FreeDofs,
+    levels: Vec<Level>,
+    coarsest: Factor,
+}
+
+/// One level above the coarsest.
+#[derive(Debug)]
+struct Level {
+    /// The matrix of the level; `None` on the finest, which is borrowed.
+    matrix: Option<BlockCsr>,
+    smoother: Chebyshev,
+    prolongation: Prolongation,
+}
+
+impl<'a> Multigrid<'a> {
+    /// Builds the hierarchy of the free part of `matrix`.
+    ///
+    /// Shapes: `positions` has one entry per site. `matrix.block` is the dimension, so that there are 1, 3 or 6
+    /// rigid-body modes.
+    ///
+    /// # Errors
+    /// [`MultigridError`] if a diagonal block or the coarsest matrix is singular.
+    pub fn new(
+        matrix: &'a BlockCsr,
+        free: &'a FreeDofs,
+        positions: &[[f64; 3]],
+        params: &MultigridParams,
+    ) -> Result<(Multigrid<'a>, MultigridInfo), MultigridError> {
+        let mut info = MultigridInfo {
+            dofs: vec![free.count()],
+            operator_complexity: 1.0,
+        };
+        let mut near_null = rigid_near_null_space(positions, free);
+        let mut places = positions.to_vec();
+        let mut levels: Vec<Level> = Vec::new();
+        let mut current: Option<BlockCsr> = None;
+        let mut all = None;
+        loop {
+            let a = current.as_ref().unwrap_or(matrix);
+            let mask = all.as_ref().unwrap_or(free);
+            if mask.count() <= params.coarsest || levels.len() + 1 >= params.max_levels {
+                break;
+            }
+            let aggregates = Aggregates::new(a, mask);
+            if 10 * aggregates.count >= 9 * mask.sites_with_free_dofs() {
+                // nothing left to gather: bodies too small to coarsen
+                break;
+            }
+            let jacobi =
+                BlockJacobi::new(a, mask).map_err(|site| MultigridError::SingularBlock { site })?;
+            let largest = jacobi.largest_eigenvalue(&FreeOperator::new(a, mask));
+            let (tentative, coarse_null) = aggregates.tentative(mask, &near_null);
+            let prolongation = smoothed(
+                a,
+                mask,
+                &jacobi,
+                4.0 / (3.0 * largest),
+                &aggregates,
+                &tentative,
+                coarse_null.modes,
+            );
+            let coarse = coarse_matrix(a, mask, &prolongation);
+            places = aggregates.centres(&places);
+            near_null = coarse_null;
+            info.dofs.push(coarse.dofs());
+            info.operator_complexity += coarse.nonzeros() as f64 / matrix.nonzeros() as f64;
+            all = Some(FreeDofs::all(coarse.rows(), coarse.block));
+            let smoother = Chebyshev::new(jacobi, largest, params.smoothed_range, params.degree);
+            levels.push(Level {
+                matrix: current.take(),
+                smoother,
+                prolongation,
+            });
+            current = Some(coarse);
+        }
+        let coarsest = Factor::new(
+            current.as_ref().unwrap_or(matrix),
+            all.as_ref().unwrap_or(free),
+            &places,
+            &DirectParams {
+                symmetry: Symmetry::Unsymmetric,
+                smallest_pivot: 0.0,
+                ..DirectParams::default()
+            },
+            &Silent,
+        )?
+        .0;
+        Ok((
+            Multigrid {
+                finest: matrix,
+                free,
+                levels,
+                coarsest,
+            },
+            info,
+        ))
+    }
+
+    /// One V-cycle for `A x = b` on `level`, from `x = 0`.
+    fn cycle(&self, level: usize, b: &[f64]) -> Vec<f64> {
+        let Some(here) = self.levels.get(level) else {
+            return self.coarsest.solve(b);
+        };
+        let everything;
+        let operator = match &here.matrix {
+            Some(matrix) => {
+                everything = FreeDofs::all(matrix.rows(), matrix.block);
+                FreeOperator::new(matrix, &everything)
+            }
+            None => FreeOperator::new(self.finest, self.free),
+        };
+        let mut x = vec![0.0; b.len()];
+        let mut r = b.to_vec();
+        here.smoother
+            .smooth(&operator, &mut x, &mut r, Residual::Update);
+        let coarse = self.cycle(level + 1, &here.prolongation.restrict(&r));
+        let step = here.prolongation.prolong(&coarse);
+        let mut product = vec![0.0; b.len()];
+        operator.apply_into(&step, &mut product);
+        add_scaled(1.0, &step, &mut x);
+        add_scaled(-1.0, &product, &mut r);
+        here.smoother
+            .smooth(&operator, &mut x, &mut r, Residual::Forget);
+        x
+    }
+}
+
+impl LinearMap for Multigrid<'_> {
+    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(&self.cycle(0, x));
+    }
+}
