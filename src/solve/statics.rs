@@ -372,7 +372,7 @@ fn krylov(
     free: &FreeDofs,
     params: &StaticParams,
     progress: &dyn Progress,
-    u: &mut Vec<f64>,
+    u: &mut [f64],
     info: &mut StaticInfo,
 ) -> Result<(), StaticError> {
     let start = Instant::now();
