@@ -7,7 +7,7 @@
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `model.rs`, `points.rs` | shared: sites, PD points, families, what completes them | |
-//! | `row.rs`, `derivative.rs`, `edge.rs` | shared: places through sites, least squares, distances | |
+//! | `row.rs`, `derivative.rs`, `edge.rs`, `sample.rs` | shared: places through sites, least squares, distances, displacements anywhere | |
 //!
 //! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
 //! every affine field, whatever its neighbours' rows are, makes the patch test pass; so all that a seam must provide is (a) complete families and complete patches of
@@ -21,6 +21,7 @@ pub mod model;
 pub mod partial_stress;
 pub mod points;
 pub mod row;
+pub mod sample;
 pub mod single;
 pub mod splice;
 
@@ -28,6 +29,7 @@ pub use blending::{Blending, BlendingFunction};
 pub use derivative::FitDegree;
 pub use model::{Model, ModelError, Peridynamics, PointSource, Problem, Site, SiteKind};
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
+pub use sample::Sampler;
 pub use single::{Local, Nonlocal};
 pub use splice::Splice;
 

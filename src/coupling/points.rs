@@ -1,6 +1,6 @@
 //! Peridynamic points: those of the peridynamic region, and those that continue its lattice or cells into the finite elements to complete families.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -10,7 +10,7 @@ use crate::{
         model::{Peridynamics, PointSource, Surfaces},
     },
     fem::{self, Locator},
-    mesh::Mesh,
+    mesh::{Mesh, boundary::BoundaryFacet, cutter::SegmentCutter},
     peridynamics::{
         BondWeights, Families, Family, LatticeFamily, TIE_TOLERANCE, collapsed_tensor,
         isotropic_shell_factors,
@@ -433,32 +433,74 @@ pub(super) fn cut<const D: usize>(
     position: &[Vector<D>],
     families: &mut Families,
 ) {
-    let barriers = Barriers::new(p.barriers.to_vec());
-    let surfaces = p.surfaces == Surfaces::Cut;
-    if barriers.is_empty() && !surfaces {
+    let barriers = Barriers::new(p.barriers.clone());
+    let surface = (p.surfaces == Surfaces::Cut).then(|| mesh.outer_facets());
+    if barriers.is_empty() && surface.is_none() {
         return;
     }
     let reach = position.iter().map(|x| (p.horizon)(x)).fold(0.0, f64::max);
+    // a bond crosses a facet only if both of its ends are within a horizon of it
+    let bins = surface
+        .as_ref()
+        .map(|facets| NearBins::new(mesh, facets, reach));
+    let cutter = surface.map(|facets| SegmentCutter::new(mesh, &facets));
     let near: Vec<bool> = position
         .par_iter()
-        .map(|x| surfaces || barriers.near(x, reach))
+        .map(|x| barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x)))
         .collect();
-    let all = surfaces.then(|| Locator::new(mesh, 0..mesh.cell_count()));
     families.retain(|i, j| {
-        if !(near[i] && near[j as usize]) {
+        let j = j as usize;
+        if !(near[i] && near[j]) {
             return true;
         }
-        let (a, b) = (&position[i], &position[j as usize]);
-        if barriers.cuts(a, b) {
-            return false;
-        }
-        // a bond that leaves the mesh does so, on its way through a hole, at its middle or near it
-        all.as_ref().is_none_or(|all| {
-            [0.25, 0.5, 0.75]
-                .iter()
-                .all(|t| all.locate(mesh, &(a * (1.0 - t) + b * *t), 1e-6).is_some())
-        })
+        let (a, b) = (&position[i], &position[j]);
+        !barriers.cuts(a, b) && !cutter.as_ref().is_some_and(|c| c.cuts(a, b))
     });
+}
+
+/// Bins of the size of a horizon in or beside which facets lie.
+struct NearBins<const D: usize> {
+    size: f64,
+    bins: HashSet<[i64; D]>,
+}
+
+impl<const D: usize> NearBins<D> {
+    fn new(mesh: &Mesh<D>, facets: &[BoundaryFacet], size: f64) -> Self {
+        let mut bins = HashSet::new();
+        for facet in facets {
+            let (mut low, mut high): (Vector<D>, Vector<D>) = (
+                Vector::repeat(f64::INFINITY),
+                Vector::repeat(f64::NEG_INFINITY),
+            );
+            for &n in &facet.nodes {
+                low = low.inf(&mesh.nodes[n as usize]);
+                high = high.sup(&mesh.nodes[n as usize]);
+            }
+            let margin = Vector::repeat(size * (1.0 + 1e-6));
+            let (from, to) = (
+                Self::bin(&(low - margin), size),
+                Self::bin(&(high + margin), size),
+            );
+            let counts: [usize; D] = std::array::from_fn(|i| (to[i] - from[i] + 1) as usize);
+            for index in 0..counts.iter().product::<usize>() {
+                let mut rest = index;
+                bins.insert(std::array::from_fn(|i| {
+                    let k = rest % counts[i];
+                    rest /= counts[i];
+                    from[i] + k as i64
+                }));
+            }
+        }
+        Self { size, bins }
+    }
+
+    fn bin(x: &Vector<D>, size: f64) -> [i64; D] {
+        std::array::from_fn(|i| (x[i] / size).floor() as i64)
+    }
+
+    fn contains(&self, x: &Vector<D>) -> bool {
+        self.bins.contains(&Self::bin(x, self.size))
+    }
 }
 
 /// Bond factors of a lattice, shell by shell, for every horizon in use.

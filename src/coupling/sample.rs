@@ -1,0 +1,82 @@
+//! The displacement anywhere in a coupled model: from finite elements, or from the peridynamic points around.
+
+use std::collections::HashMap;
+
+use crate::{
+    coupling::{FitDegree, Model, SiteKind, derivative},
+    fem::Locator,
+    tensor::Vector,
+};
+
+/// Finds displacements at any position of the body.
+pub struct Sampler<'a, const D: usize> {
+    model: &'a Model<D>,
+    elements: Locator<D>,
+    bins: HashMap<[i64; D], Vec<u32>>,
+}
+
+impl<'a, const D: usize> Sampler<'a, D> {
+    /// Sorts the cells and points of a model.
+    pub fn new(model: &'a Model<D>) -> Self {
+        let elements = Locator::new(
+            &model.mesh,
+            (0..model.mesh.cell_count()).filter(|&c| model.is_element(c)),
+        );
+        let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
+        for (s, site) in model.sites.iter().enumerate() {
+            if matches!(site.kind, SiteKind::Point(_)) {
+                bins.entry(bin(&site.position, model.spacing())).or_default().push(s as u32);
+            }
+        }
+        Self { model, elements, bins }
+    }
+
+    /// The displacement at `x` \[m\]: a site's own where one lies there, else by shape functions, else by an affine fit to the points within 1.6 spacings.
+    /// `None` outside of the body.
+    pub fn displacement(&self, x: &Vector<D>, u: &[f64]) -> Option<Vector<D>> {
+        let of_site = |s: u32| Vector::<D>::from_fn(|a, _| u[s as usize * D + a]);
+        let h = self.model.spacing();
+        let near = if h > 0.0 { self.points_near(x, 1.6 * h) } else { Vec::new() };
+        let position = |s: u32| self.model.sites[s as usize].position;
+        if let Some(&s) = near.iter().find(|&&s| (position(s) - x).norm() <= 1e-9 * h) {
+            return Some(of_site(s));
+        }
+        if let Some(located) = self.elements.locate(&self.model.mesh, x, 1e-9) {
+            let nodes = self.model.mesh.cell(located.cell);
+            return Some(
+                nodes
+                    .iter()
+                    .zip(&located.shape)
+                    .map(|(&n, &w)| self.model.node_transfer.displacement::<D>(n as usize, u) * w)
+                    .sum(),
+            );
+        }
+        let data: Vec<Vector<D>> = near.iter().map(|&s| position(s)).collect();
+        let weights = derivative::fit(x, &data, FitDegree::Affine)?;
+        Some(near.iter().zip(weights).map(|(&s, w)| of_site(s) * w).sum())
+    }
+
+    fn points_near(&self, x: &Vector<D>, radius: f64) -> Vec<u32> {
+        let h = self.model.spacing();
+        let centre = bin(x, h);
+        let mut found = Vec::new();
+        for index in 0..5usize.pow(D as u32) {
+            let mut rest = index;
+            let key = std::array::from_fn(|i| {
+                let k = rest % 5;
+                rest /= 5;
+                centre[i] + k as i64 - 2
+            });
+            for &s in self.bins.get(&key).into_iter().flatten() {
+                if (self.model.sites[s as usize].position - x).norm() <= radius {
+                    found.push(s);
+                }
+            }
+        }
+        found
+    }
+}
+
+fn bin<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {
+    std::array::from_fn(|i| (x[i] / size).floor() as i64)
+}
