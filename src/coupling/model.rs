@@ -397,7 +397,7 @@ impl<const D: usize> Model<D> {
             .iter()
             .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
         let mut families = Families::search(&cloud.position, &cloud.horizon, TIE_TOLERANCE)?;
-        self.cut_bonds(&cloud.position, &mut families);
+        points::cut(p, &self.mesh, &cloud.position, &mut families);
         // which points need a family of their own, and which only complete those of others
         let reach = match coupling.reach(p.law.as_ref()) {
             Reach::Own if constant => Reach::Own,
