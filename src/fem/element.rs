@@ -353,9 +353,9 @@ mod tests {
             }
             let mut expected = [[Tensor::<D>::zeros(); 8]; 8];
             for_each_point(&mesh, c, Rule::Stiffness, |p| {
-                for a in 0..p.nodes {
-                    for b in 0..p.nodes {
-                        expected[a][b] += odd.between(&p.gradient[a], &p.gradient[b]) * p.weight;
+                for (row, ga) in expected.iter_mut().zip(&p.gradient) {
+                    for (block, gb) in row.iter_mut().zip(&p.gradient) {
+                        *block += odd.between(ga, gb) * p.weight;
                     }
                 }
             });
