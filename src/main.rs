@@ -1,1 +1,161 @@
-fn main() {}
+//! The command line: arguments to a scene, its run, a report and an exit code.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use bondline::observe::progress::TerminalProgress;
+use bondline::scene::{self, AnyScene, Template};
+use clap::{Parser, Subcommand, ValueEnum};
+
+const EXAMPLES: &str = "Examples:
+  bondline new plate.toml                     write a commented scene to start from
+  bondline check plate.toml                   say what is wrong with it, and how large it is
+  bondline run plate.toml                     solve it and write out/plate.vtu for ParaView
+  bondline run plate.toml --set coupling=splice --set peridynamics.horizon=0.04
+  bondline run plate.toml --json              the summary as JSON on standard output
+  bondline schema > bondline.schema.json      completion and checks in an editor";
+
+/// Couples classical finite elements to meshfree peridynamics.
+#[derive(Parser)]
+#[command(version, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Solve a scene and write its results.
+    #[command(
+        after_help = "Any key of the scene can be set: --set mesh.rectangle.x.cells=240, --set coupling=local, \
+                            --set 'conditions.top.displacement.y=\"1e-3*x\"'. A choice that differs replaces the whole table."
+    )]
+    Run {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Print the summary as JSON.
+        #[arg(long)]
+        json: bool,
+        /// Folder for all files, instead of the scene's.
+        #[arg(long, value_name = "DIR")]
+        output: Option<PathBuf>,
+        /// Number of threads; all cores if left out.
+        #[arg(long, value_name = "N")]
+        threads: Option<usize>,
+    },
+    /// Validate a scene and predict its size, without solving it.
+    Check {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Print the prediction as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write a commented scene to start from; never overwrites.
+    New {
+        /// The file to write.
+        #[arg(default_value = "scene.toml")]
+        path: PathBuf,
+        /// Which one.
+        #[arg(long, value_enum, default_value = "plate")]
+        template: TemplateName,
+    },
+    /// Print the JSON Schema of scenes, for editors.
+    Schema,
+}
+
+#[derive(clap::Args)]
+struct SceneArguments {
+    /// The scene, a TOML file.
+    scene: PathBuf,
+    /// Set a key of the scene; the value is TOML, or else text.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum TemplateName {
+    /// A coupled bar in one dimension.
+    Bar,
+    /// A plate with a slit, on a generated mesh.
+    Plate,
+    /// A plate on a mesh from a file.
+    File,
+}
+
+fn main() -> ExitCode {
+    match execute(Arguments::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(report) => {
+            eprintln!("{report:?}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn execute(command: Command) -> miette::Result<()> {
+    match command {
+        Command::Run {
+            scene,
+            json,
+            output,
+            threads,
+        } => {
+            if let Some(n) = threads {
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(n)
+                    .build_global()
+                    .map_err(|e| miette::miette!("cannot start {n} threads: {e}"))?;
+            }
+            let mut scene = load(&scene)?;
+            if let Some(directory) = output {
+                scene.set_output_directory(directory);
+            }
+            let summary = scene
+                .run(&TerminalProgress::on_stderr())
+                .map_err(|e| miette::miette!("{e}"))?;
+            if json {
+                println!("{}", summary.json().map_err(|e| miette::miette!("{e}"))?);
+            } else {
+                println!("{summary}");
+            }
+        }
+        Command::Check { scene, json } => {
+            let scene = load(&scene)?;
+            let sizes = scene
+                .sizes(&TerminalProgress::on_stderr())
+                .map_err(|e| miette::miette!("{e}"))?;
+            if json {
+                let text = serde_json::to_string_pretty(&sizes);
+                println!("{}", text.map_err(|e| miette::miette!("{e}"))?);
+            } else {
+                println!(
+                    "the scene is right: {} cells, {} sites ({} points), {} bonds, {} unknowns before conditions",
+                    sizes.cells, sizes.sites, sizes.points, sizes.bonds, sizes.dofs
+                );
+            }
+        }
+        Command::New { path, template } => {
+            let template = match template {
+                TemplateName::Bar => Template::Bar,
+                TemplateName::Plate => Template::Plate,
+                TemplateName::File => Template::File,
+            };
+            template.write(&path).map_err(|e| e.report())?;
+            println!(
+                "wrote {}; solve it with: bondline run {}",
+                path.display(),
+                path.display()
+            );
+        }
+        Command::Schema => {
+            let text = serde_json::to_string_pretty(&scene::schema());
+            println!("{}", text.map_err(|e| miette::miette!("{e}"))?);
+        }
+    }
+    Ok(())
+}
+
+fn load(arguments: &SceneArguments) -> miette::Result<AnyScene> {
+    AnyScene::load(&arguments.scene, &arguments.overrides).map_err(|e| e.report())
+}

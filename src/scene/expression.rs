@@ -48,13 +48,16 @@ pub struct ExpressionError {
 enum Term {
     Constant(f64),
     Variable(usize),
-    Unary(fn(f64) -> f64, Box<Term>),
-    Binary(fn(f64, f64) -> f64, Box<Term>, Box<Term>),
+    Unary(Unary, Box<Term>),
+    Binary(Binary, Box<Term>, Box<Term>),
     If(Box<[Term; 3]>),
 }
 
+type Unary = fn(f64) -> f64;
+type Binary = fn(f64, f64) -> f64;
+
 /// The functions of one argument, by name.
-const UNARY: &[(&str, fn(f64) -> f64)] = &[
+const UNARY: &[(&str, Unary)] = &[
     ("abs", f64::abs),
     ("acos", f64::acos),
     ("asin", f64::asin),
@@ -76,7 +79,7 @@ const UNARY: &[(&str, fn(f64) -> f64)] = &[
 ];
 
 /// The functions of two arguments, by name.
-const BINARY: &[(&str, fn(f64, f64) -> f64)] = &[
+const BINARY: &[(&str, Binary)] = &[
     ("atan2", f64::atan2),
     ("hypot", f64::hypot),
     ("max", f64::max),
@@ -210,7 +213,7 @@ impl Parser<'_> {
 
     fn comparison(&mut self) -> Result<Term, ExpressionError> {
         let left = self.sum()?;
-        let f: fn(f64, f64) -> f64 = match self.take(&["<=", ">=", "<", ">"]) {
+        let f: Binary = match self.take(&["<=", ">=", "<", ">"]) {
             None => return Ok(left),
             Some("<=") => |a, b| f64::from(u8::from(a <= b)),
             Some(">=") => |a, b| f64::from(u8::from(a >= b)),
@@ -223,7 +226,7 @@ impl Parser<'_> {
     fn sum(&mut self) -> Result<Term, ExpressionError> {
         let mut left = self.product()?;
         while let Some(sign) = self.take(&["+", "-"]) {
-            let f: fn(f64, f64) -> f64 = if sign == "+" {
+            let f: Binary = if sign == "+" {
                 |a, b| a + b
             } else {
                 |a, b| a - b
@@ -236,7 +239,7 @@ impl Parser<'_> {
     fn product(&mut self) -> Result<Term, ExpressionError> {
         let mut left = self.signed()?;
         while let Some(sign) = self.take(&["*", "/"]) {
-            let f: fn(f64, f64) -> f64 = if sign == "*" {
+            let f: Binary = if sign == "*" {
                 |a, b| a * b
             } else {
                 |a, b| a / b
@@ -376,7 +379,7 @@ impl Parser<'_> {
     }
 }
 
-fn binary(f: fn(f64, f64) -> f64, a: Term, b: Term) -> Term {
+fn binary(f: Binary, a: Term, b: Term) -> Term {
     Term::Binary(f, Box::new(a), Box::new(b))
 }
 

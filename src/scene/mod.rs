@@ -9,6 +9,7 @@
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `materials.rs`, `conditions.rs` | its parts |
+//! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
 
@@ -21,11 +22,13 @@ mod materials;
 mod meshing;
 mod parse;
 mod region;
+mod run;
 mod source;
 pub mod spec;
 mod template;
 mod validate;
 mod value;
+mod write;
 mod zones;
 
 pub use conditions::{Components, Condition, Prescribed, Support};
@@ -33,6 +36,7 @@ pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use materials::{Law, Material, Method, Peridynamics, Points};
 pub use region::Region;
+pub use run::{RunError, Solved, sizes, solve_with};
 pub use source::{Source, Span};
 pub use spec::SceneSpec;
 pub use template::Template;

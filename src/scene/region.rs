@@ -258,7 +258,7 @@ pub(crate) fn shape<const D: usize>(
     span: &Span,
 ) -> Result<Shape<D>, SceneError> {
     match region(place, spec, mesh)? {
-        Region::Shape { shape, margin } if margin == 0.0 => Ok(shape),
+        Region::Shape { shape, margin: 0.0 } => Ok(shape),
         _ => Err(SceneError::new(
             SceneErrorKind::Conflict,
             format!("`{place}` must be one plain shape"),

@@ -8,15 +8,19 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::{self, Material, Method, Peridynamics, Points};
 use super::meshing;
 use super::region::{self, Region};
+use super::run::{self, RunError};
 use super::source::{Source, Span};
-use super::spec::{InfluenceSpec, KinematicsSpec, MethodSpec, OrderingSpec, SceneSpec, ShapeSpec};
+use super::spec::{InfluenceSpec, KinematicsSpec, SceneSpec, ShapeSpec};
 use super::zones;
 use crate::coupling::Zone;
 use crate::fem::Locator;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
+use crate::observe::summary::{RunSummary, Sizes};
 use crate::peridynamics::Influence;
+use crate::progress::Progress;
 use crate::shape::{Barrier, Shape};
+use crate::solve::ordering::Ordering;
 use crate::tensor::{Vector, padded};
 
 /// A validated scene of dimension `D`.
@@ -54,9 +58,9 @@ pub struct Scene<const D: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
     /// Which solver.
-    pub method: MethodSpec,
+    pub method: crate::solve::statics::Method,
     /// Elimination order of a direct one.
-    pub ordering: OrderingSpec,
+    pub ordering: Ordering,
     /// Relative residual.
     pub tolerance: f64,
     /// Most iterations.
@@ -132,6 +136,39 @@ impl AnyScene {
             }
         };
         found.map_err(|error| error.shown_in(source))
+    }
+
+    /// Writes all files into another folder than the scene's.
+    pub fn set_output_directory(&mut self, directory: PathBuf) {
+        match self {
+            Self::Bar(s) => s.output.directory = directory,
+            Self::Plane(s) => s.output.directory = directory,
+            Self::Solid(s) => s.output.directory = directory,
+        }
+    }
+
+    /// Solves the scene and writes its outputs.
+    ///
+    /// # Errors
+    /// [`RunError`], each with place and remedy.
+    pub fn run(self, progress: &dyn Progress) -> Result<RunSummary, RunError> {
+        match self {
+            Self::Bar(s) => run::run(*s, progress),
+            Self::Plane(s) => run::run(*s, progress),
+            Self::Solid(s) => run::run(*s, progress),
+        }
+    }
+
+    /// How large the model is, without solving it.
+    ///
+    /// # Errors
+    /// [`RunError::Model`] if the model cannot be built.
+    pub fn sizes(self, progress: &dyn Progress) -> Result<Sizes, RunError> {
+        match self {
+            Self::Bar(s) => run::sizes(*s, progress),
+            Self::Plane(s) => run::sizes(*s, progress),
+            Self::Solid(s) => run::sizes(*s, progress),
+        }
     }
 
     fn bar(scene: Scene<1>) -> Self {

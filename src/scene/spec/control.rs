@@ -6,6 +6,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::scene::value::{Coordinates, Count, Number, Text};
+use crate::solve::ordering::Ordering;
+use crate::solve::statics::Method;
 
 /// The linear solver.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
@@ -13,7 +15,7 @@ use crate::scene::value::{Coordinates, Count, Number, Text};
 pub struct SolverSpec {
     /// Which solver.
     #[serde(default)]
-    pub method: MethodSpec,
+    pub method: Method,
     /// Relative residual at which the iteration stops; 1e-10 if left out.
     #[serde(default)]
     pub tolerance: Option<Number>,
@@ -22,35 +24,7 @@ pub struct SolverSpec {
     pub max_iterations: Option<Count>,
     /// Elimination order of the direct solver.
     #[serde(default)]
-    pub ordering: OrderingSpec,
-}
-
-/// Which solver.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum MethodSpec {
-    /// By size and symmetry.
-    #[default]
-    Auto,
-    /// Sparse factorisation.
-    Direct,
-    /// Krylov iteration (conjugate gradients if symmetric, GMRES if not) with algebraic multigrid.
-    Krylov,
-}
-
-/// Elimination order of the direct solver.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum OrderingSpec {
-    /// The best known for the size.
-    #[default]
-    Auto,
-    /// Nested dissection by coordinates.
-    Coordinates,
-    /// Nested dissection by METIS' method on the graph.
-    Metis,
-    /// Approximate minimum degree.
-    Amd,
+    pub ordering: Ordering,
 }
 
 /// What is written, and where.

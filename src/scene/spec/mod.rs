@@ -9,7 +9,7 @@ mod mesh;
 mod region;
 
 pub use condition::{BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VoidSpec};
-pub use control::{LineSpec, MethodSpec, OrderingSpec, OutputSpec, ProbeSpec, SolverSpec};
+pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec};
 pub use material::{
     BetaSpec, BlendingSpec, BondBasedSpec, CorrespondenceSpec, CouplingSpec, FormSpec,
     InfluenceSpec, InterfaceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec, NoOptionsSpec,

@@ -1,0 +1,297 @@
+//! Results of a run as files: one VTU with cells and points together, and CSV along lines and at probes.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::run::Solved;
+use super::validate::Output;
+use crate::coupling::{SiteKind, Zone};
+use crate::fem::{self, Locator};
+use crate::mesh::{CellShape, Mesh};
+use crate::observe::ObserveError;
+use crate::observe::csv::CsvTable;
+use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
+use crate::tensor::{Tensor, Vector, padded, strain};
+
+/// Writes what the scene asks for; returns the files.
+pub(crate) fn write<const D: usize>(
+    output: &Output<D>,
+    solved: &Solved<'_, D>,
+) -> Result<Vec<PathBuf>, ObserveError> {
+    let mut files = Vec::new();
+    let sampler = Sampler::new(solved);
+    if output.vtu {
+        let path = output.directory.join(format!("{}.vtu", output.name));
+        write_vtu(&path, &snapshot(solved, &sampler), Compression::Zlib)?;
+        files.push(path);
+    }
+    for (name, positions) in &output.lines {
+        let path = output.directory.join(format!("{}_{name}.csv", output.name));
+        table(&path, positions, &sampler)?;
+        files.push(path);
+    }
+    if !output.probes.is_empty() {
+        let path = output.directory.join(format!("{}_probes.csv", output.name));
+        let positions: Vec<Vector<D>> = output.probes.iter().map(|(_, x)| *x).collect();
+        table(&path, &positions, &sampler)?;
+        files.push(path);
+    }
+    Ok(files)
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+fn table<const D: usize>(
+    path: &std::path::Path,
+    positions: &[Vector<D>],
+    sampler: &Sampler<'_, D>,
+) -> Result<(), ObserveError> {
+    let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
+    header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
+    for i in 0..D {
+        header.extend((i..D).map(|j| format!("e{}{}", AXES[i], AXES[j])));
+    }
+    header.push("model".to_owned());
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let mut table = CsvTable::create(path, &header)?;
+    let samples: Vec<Sample<D>> = positions.par_iter().map(|x| sampler.at(x)).collect();
+    for (x, sample) in positions.iter().zip(samples) {
+        let e = strain(&sample.gradient);
+        let mut row: Vec<f64> = x
+            .iter()
+            .chain(sample.displacement.iter())
+            .copied()
+            .collect();
+        for i in 0..D {
+            row.extend((i..D).map(|j| e[(i, j)]));
+        }
+        row.push(f64::from(label(sample.zone)));
+        table.row(&row)?;
+    }
+    Ok(())
+}
+
+/// 0 local, 1 transition, 2 nonlocal.
+fn label(zone: Zone) -> u8 {
+    match zone {
+        Zone::Local => 0,
+        Zone::Transition => 1,
+        Zone::Nonlocal => 2,
+    }
+}
+
+struct Sample<const D: usize> {
+    displacement: Vector<D>,
+    gradient: Tensor<D>,
+    zone: Zone,
+}
+
+/// The solution between its sites.
+struct Sampler<'a, const D: usize> {
+    solved: &'a Solved<'a, D>,
+    elements: Locator<D>,
+    tolerance: f64,
+    points: Vec<usize>,
+}
+
+impl<'a, const D: usize> Sampler<'a, D> {
+    fn new(solved: &'a Solved<'a, D>) -> Self {
+        let model = solved.model;
+        let (lo, hi) = model.mesh.bounds();
+        Self {
+            solved,
+            elements: Locator::new(
+                &model.mesh,
+                (0..model.mesh.cell_count()).filter(|&c| model.is_element(c)),
+            ),
+            tolerance: 1e-9 * (hi - lo).norm(),
+            points: (0..model.sites.len())
+                .filter(|&s| matches!(model.sites[s].kind, SiteKind::Point(_)))
+                .collect(),
+        }
+    }
+
+    fn node(&self, n: usize) -> Vector<D> {
+        self.solved
+            .model
+            .node_transfer
+            .displacement(n, self.solved.displacement)
+    }
+
+    fn site(&self, site: usize) -> Vector<D> {
+        Vector::from_column_slice(&self.solved.displacement[site * D..][..D])
+    }
+
+    /// In an element its own interpolation; among points the affine field of the nearest point's family.
+    fn at(&self, x: &Vector<D>) -> Sample<D> {
+        let model = self.solved.model;
+        let mesh: &Mesh<D> = &model.mesh;
+        if let Some(found) = self.elements.locate(mesh, x, self.tolerance) {
+            let displacement = mesh
+                .cell(found.cell)
+                .iter()
+                .zip(found.shape)
+                .map(|(&n, shape)| self.node(n as usize) * shape)
+                .sum();
+            return Sample {
+                displacement,
+                gradient: self.element_gradient(found.cell),
+                zone: model.zones[found.cell],
+            };
+        }
+        let distance = |site: usize| (model.sites[site].position - x).norm_squared();
+        let nearest = self
+            .points
+            .iter()
+            .copied()
+            .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        match nearest {
+            Some(site) => {
+                let gradient = self.point_gradient(site);
+                Sample {
+                    displacement: self.site(site) + gradient * (x - model.sites[site].position),
+                    gradient,
+                    zone: self.solved.zone_of_site[site],
+                }
+            }
+            None => Sample {
+                displacement: Vector::zeros(),
+                gradient: Tensor::zeros(),
+                zone: Zone::Local,
+            },
+        }
+    }
+
+    fn element_gradient(&self, c: usize) -> Tensor<D> {
+        fem::displacement_gradient_at_centre(&self.solved.model.mesh, c, |n| self.node(n))
+    }
+
+    /// Least-squares gradient over the nearest bonds of a point, weighted by 1/|ξ|²: sharper than over the whole family.
+    fn point_gradient(&self, site: usize) -> Tensor<D> {
+        let Some((body, p)) = self.solved.model.point_of(site) else {
+            return Tensor::zeros();
+        };
+        let here = self.site(site);
+        let bonds: Vec<(Vector<D>, usize)> = body
+            .families
+            .of(p)
+            .iter()
+            .map(|&j| (body.bond(p, j as usize), j as usize))
+            .collect();
+        let nearest = bonds
+            .iter()
+            .map(|(xi, _)| xi.norm())
+            .fold(f64::INFINITY, f64::min);
+        // the full family where the nearest shells do not span the space
+        for reach in [1.5 * nearest, f64::INFINITY] {
+            let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
+            for (xi, j) in bonds.iter().filter(|(xi, _)| xi.norm() <= reach) {
+                let w = 1.0 / xi.norm_squared();
+                let eta: Vector<D> = body
+                    .cloud
+                    .transfer
+                    .displacement::<D>(*j, self.solved.displacement)
+                    - here;
+                shape += xi * xi.transpose() * w;
+                moment += eta * xi.transpose() * w;
+            }
+            if let Ok(inverse) = crate::peridynamics::invert_shape_tensor(&shape, bonds.len()) {
+                return moment * inverse;
+            }
+        }
+        Tensor::zeros()
+    }
+}
+
+fn snapshot<const D: usize>(solved: &Solved<'_, D>, sampler: &Sampler<'_, D>) -> Snapshot {
+    let model = solved.model;
+    let mesh = &model.mesh;
+    let sites = model.sites.len();
+    // nodes that elements use, then points
+    let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
+    let mut snapshot = Snapshot::default();
+    let mut site_of_point: Vec<Option<usize>> = Vec::new();
+    let mut displacement: Vec<Vector<D>> = Vec::new();
+    let mut zones = Vec::new();
+    let (mut strains, mut stresses) = (Vec::new(), Vec::new());
+    let mut site_of_node = vec![None; mesh.nodes.len()];
+    for (site, s) in model.sites.iter().enumerate() {
+        if let SiteKind::Node(n) = s.kind {
+            site_of_node[n as usize] = Some(site);
+        }
+    }
+    for c in (0..mesh.cell_count()).filter(|&c| model.is_element(c)) {
+        let mut nodes = [0u32; 8];
+        for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
+            let entry = &mut point_of_node[n as usize];
+            if *entry == u32::MAX {
+                *entry = snapshot.points.len() as u32;
+                snapshot.points.push(padded(&mesh.nodes[n as usize]));
+                displacement.push(sampler.node(n as usize));
+                site_of_point.push(site_of_node[n as usize]);
+            }
+            *slot = *entry;
+        }
+        snapshot.push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
+        zones.push(label(model.zones[c]));
+        let gradient = sampler.element_gradient(c);
+        strains.push(strain(&gradient));
+        stresses.push(
+            solved
+                .operator
+                .cell_stress(c, solved.displacement)
+                .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
+        );
+    }
+    let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = sampler
+        .points
+        .par_iter()
+        .map(|&site| {
+            let stress = model.point_of(site).map_or(Tensor::zeros(), |(body, p)| {
+                body.partial_stress(p, solved.displacement)
+            });
+            (site, strain(&sampler.point_gradient(site)), stress)
+        })
+        .collect();
+    for (site, e, stress) in on_points {
+        let number = snapshot.points.len() as u32;
+        snapshot.points.push(padded(&model.sites[site].position));
+        snapshot.push_cell(CellShape::Vertex, &[number]);
+        displacement.push(sampler.site(site));
+        site_of_point.push(Some(site));
+        zones.push(label(solved.zone_of_site[site]));
+        strains.push(e);
+        stresses.push(stress);
+    }
+    debug_assert!(sites >= sampler.points.len());
+    let of_site = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        site_of_point.iter().map(|s| s.map_or(0.0, f)).collect()
+    };
+    let horizon = |site: usize| {
+        model
+            .peridynamics
+            .as_ref()
+            .map_or(0.0, |p| (p.horizon)(&model.sites[site].position))
+    };
+    let residual: Vec<Vector<D>> = site_of_point
+        .iter()
+        .map(|s| {
+            s.map_or(Vector::zeros(), |s| {
+                Vector::from_column_slice(&solved.residual[s * D..][..D])
+            })
+        })
+        .collect();
+    snapshot.point_fields = vec![
+        Field::vector("displacement", &displacement),
+        Field::scalar("beta", of_site(&|s| solved.operator.beta(s))),
+        Field::scalar("horizon", of_site(&horizon)),
+        Field::vector("residual", &residual),
+    ];
+    snapshot.cell_fields = vec![
+        Field::labels("model", zones),
+        Field::tensor("strain", &strains),
+        Field::tensor("stress", &stresses),
+    ];
+    snapshot
+}
