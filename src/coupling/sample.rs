@@ -25,10 +25,16 @@ impl<'a, const D: usize> Sampler<'a, D> {
         let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
         for (s, site) in model.sites.iter().enumerate() {
             if matches!(site.kind, SiteKind::Point(_)) {
-                bins.entry(bin(&site.position, model.spacing())).or_default().push(s as u32);
+                bins.entry(bin(&site.position, model.spacing()))
+                    .or_default()
+                    .push(s as u32);
             }
         }
-        Self { model, elements, bins }
+        Self {
+            model,
+            elements,
+            bins,
+        }
     }
 
     /// The displacement at `x` \[m\]: a site's own where one lies there, else by shape functions, else by an affine fit to the points within 1.6 spacings.
@@ -36,7 +42,11 @@ impl<'a, const D: usize> Sampler<'a, D> {
     pub fn displacement(&self, x: &Vector<D>, u: &[f64]) -> Option<Vector<D>> {
         let of_site = |s: u32| Vector::<D>::from_fn(|a, _| u[s as usize * D + a]);
         let h = self.model.spacing();
-        let near = if h > 0.0 { self.points_near(x, 1.6 * h) } else { Vec::new() };
+        let near = if h > 0.0 {
+            self.points_near(x, 1.6 * h)
+        } else {
+            Vec::new()
+        };
         let position = |s: u32| self.model.sites[s as usize].position;
         if let Some(&s) = near.iter().find(|&&s| (position(s) - x).norm() <= 1e-9 * h) {
             return Some(of_site(s));

@@ -49,8 +49,8 @@ fn table<const D: usize>(
 ) -> Result<(), ObserveError> {
     let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
     header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
-    for i in 0..D {
-        header.extend((i..D).map(|j| format!("e{}{}", AXES[i], AXES[j])));
+    for (i, first) in AXES[..D].iter().enumerate() {
+        header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
     }
     header.push("model".to_owned());
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
@@ -207,7 +207,6 @@ impl<'a, const D: usize> Sampler<'a, D> {
 fn snapshot<const D: usize>(solved: &Solved<'_, D>, sampler: &Sampler<'_, D>) -> Snapshot {
     let model = solved.model;
     let mesh = &model.mesh;
-    let sites = model.sites.len();
     // nodes that elements use, then points
     let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
     let mut snapshot = Snapshot::default();
@@ -264,7 +263,6 @@ fn snapshot<const D: usize>(solved: &Solved<'_, D>, sampler: &Sampler<'_, D>) ->
         strains.push(e);
         stresses.push(stress);
     }
-    debug_assert!(sites >= sampler.points.len());
     let of_site = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
         site_of_point.iter().map(|s| s.map_or(0.0, f)).collect()
     };
