@@ -1,6 +1,7 @@
 //! Conditions of a validated scene.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
@@ -50,15 +51,58 @@ pub enum Support<const D: usize> {
     Inside(Region<D>),
 }
 
+/// A displacement given by a function: another solution, say. A program sets it; a scene file has expressions.
+#[derive(Clone)]
+pub struct Field<const D: usize>(FieldFunction<D>);
+
+type FieldFunction<const D: usize> = Arc<dyn Fn(&Vector<D>) -> Option<Vector<D>> + Send + Sync>;
+
+impl<const D: usize> Field<D> {
+    /// Prescribes `function(x)` at every site where it has a value.
+    pub fn new(function: impl Fn(&Vector<D>) -> Option<Vector<D>> + Send + Sync + 'static) -> Self {
+        Self(Arc::new(function))
+    }
+
+    /// The displacement at `x`, if it is prescribed there.
+    pub fn at(&self, x: &Vector<D>) -> Option<Vector<D>> {
+        (self.0)(x)
+    }
+}
+
+impl<const D: usize> std::fmt::Debug for Field<D> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Field")
+    }
+}
+
+impl<const D: usize> PartialEq for Field<D> {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
 /// What is prescribed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Prescribed<const D: usize> {
     /// Displacement.
     Displacement(Support<D>),
+    /// Displacement as a function of position; the components of the condition are not used.
+    Field(Field<D>),
     /// Force per area on facets.
     Traction(Vec<Facet>),
     /// Force per volume inside a region.
     BodyForce(Region<D>),
+}
+
+impl<const D: usize> Condition<D> {
+    /// A displacement given by a function.
+    pub fn field(name: &str, field: Field<D>) -> Self {
+        Self {
+            name: name.to_owned(),
+            prescribed: Prescribed::Field(field),
+            components: Components(std::array::from_fn(|_| None)),
+        }
+    }
 }
 
 /// A condition of a scene.

@@ -31,7 +31,7 @@ mod value;
 mod write;
 mod zones;
 
-pub use conditions::{Components, Condition, Prescribed, Support};
+pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use materials::{Law, Material, Method, Peridynamics, Points};

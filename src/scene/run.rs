@@ -188,7 +188,7 @@ pub fn solve_with<const D: usize>(
             .conditions
             .iter()
             .zip(&reactions)
-            .filter(|(c, _)| matches!(c.prescribed, Prescribed::Displacement(_)))
+            .filter(|(c, _)| matches!(c.prescribed, Prescribed::Displacement(_) | Prescribed::Field(_)))
             .map(|(c, r)| Reaction {
                 condition: c.name.clone(),
                 force: r.iter().copied().collect(),
@@ -428,8 +428,18 @@ fn supports<const D: usize>(
     let (lo, hi) = model.mesh.bounds();
     let tolerance = 1e-9 * (hi - lo).norm();
     for (number, condition) in conditions.iter().enumerate() {
-        let Prescribed::Displacement(support) = &condition.prescribed else {
-            continue;
+        let support = match &condition.prescribed {
+            Prescribed::Displacement(support) => support,
+            Prescribed::Field(field) => {
+                for (site, s) in model.sites.iter().enumerate() {
+                    for (k, value) in field.at(&s.position).iter().flatten().enumerate() {
+                        prescribed[site * D + k] = Some(*value);
+                        holder[site * D + k] = Some(number);
+                    }
+                }
+                continue;
+            }
+            Prescribed::Traction(_) | Prescribed::BodyForce(_) => continue,
         };
         let sites: Vec<usize> = match support {
             Support::Set { nodes, facets, .. } => {
@@ -477,7 +487,7 @@ fn loads<const D: usize>(
         let mut own: Vec<(usize, Vector<D>)> = Vec::new();
         let field = |x: &Vector<D>| condition.components.vector(x);
         match &condition.prescribed {
-            Prescribed::Displacement(_) => continue,
+            Prescribed::Displacement(_) | Prescribed::Field(_) => continue,
             Prescribed::Traction(facets) => {
                 traction(model, facets, &condition.components, &site_of, &mut own);
             }
