@@ -42,6 +42,7 @@ pub use spec::SceneSpec;
 pub use template::Template;
 pub use validate::{AnyScene, Output, Scene, Solver};
 pub use value::{Coordinates, Count, Number, Text};
+pub use write::write;
 
 /// The JSON Schema of scene files, for editors.
 pub fn schema() -> schemars::Schema {

@@ -188,7 +188,12 @@ pub fn solve_with<const D: usize>(
             .conditions
             .iter()
             .zip(&reactions)
-            .filter(|(c, _)| matches!(c.prescribed, Prescribed::Displacement(_) | Prescribed::Field(_)))
+            .filter(|(c, _)| {
+                matches!(
+                    c.prescribed,
+                    Prescribed::Displacement(_) | Prescribed::Field(_)
+                )
+            })
             .map(|(c, r)| Reaction {
                 condition: c.name.clone(),
                 force: r.iter().copied().collect(),

@@ -15,7 +15,7 @@ use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
 use crate::tensor::{Tensor, Vector, padded, strain};
 
 /// Writes what the scene asks for; returns the files.
-pub(crate) fn write<const D: usize>(
+pub fn write<const D: usize>(
     output: &Output<D>,
     solved: &Solved<'_, D>,
 ) -> Result<Vec<PathBuf>, ObserveError> {
