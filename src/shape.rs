@@ -52,7 +52,7 @@ pub enum Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
-    /// Whether `x` lies in the shape or within `tolerance` [length] of it.
+    /// Whether `x` lies in the shape or within `tolerance` \[length\] of it.
     ///
     /// On the boundary of what [`Shape::Without`] removes, a point is still contained.
     pub fn contains(&self, x: &Vector<D>, tolerance: f64) -> bool {

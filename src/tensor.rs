@@ -18,7 +18,7 @@ impl<const D: usize> Tensor4<D> {
         Self([[Tensor::zeros(); D]; D])
     }
 
-    /// `C_ijkl = λ δ_ij δ_kl + μ (δ_ik δ_jl + δ_il δ_jk)`; `lambda`, `mu` are the Lamé parameters [Pa].
+    /// `C_ijkl = λ δ_ij δ_kl + μ (δ_ik δ_jl + δ_il δ_jk)`; `lambda`, `mu` are the Lamé parameters \[Pa\].
     pub fn isotropic(lambda: f64, mu: f64) -> Self {
         let mut c = Self::zeros();
         for i in 0..D {

@@ -110,7 +110,7 @@ fn check_cell<const D: usize>(mesh: &Mesh<D>, c: usize) -> Result<(), FemError> 
 
 /// The stiffness of a body: one block row per node of the mesh, `K u = f_external`.
 ///
-/// `tangent` gives each cell's stiffness tensor [Pa], or `None` for a cell that is no part of the body. Rows of nodes
+/// `tangent` gives each cell's stiffness tensor \[Pa\], or `None` for a cell that is no part of the body. Rows of nodes
 /// without cells are empty. Rows are built in parallel, each in the order of its cells: the same bits for any
 /// number of threads.
 ///
@@ -199,9 +199,9 @@ pub fn assemble<'a, const D: usize>(
     })
 }
 
-/// The internal force `f_a = −Σ ∫ σ(G) ∂N_a/∂x dV` [N] of every node, without a matrix and for any law.
+/// The internal force `f_a = −Σ ∫ σ(G) ∂N_a/∂x dV` \[N\] of every node, without a matrix and for any law.
 ///
-/// Shapes: `displacement` has one entry per node [m]; `law` gives each cell's law, or `None` for a cell that is no part
+/// Shapes: `displacement` has one entry per node \[m\]; `law` gives each cell's law, or `None` for a cell that is no part
 /// of the body. Precondition: the mesh has passed [`check`].
 pub fn internal_force<'a, const D: usize>(
     mesh: &Mesh<D>,
@@ -237,7 +237,7 @@ pub fn nodal_volumes<const D: usize>(
     volumes
 }
 
-/// Lumped mass of every node, `M_a = Σ ρ ∫ N_a dV` [kg]; `density` gives each cell's ρ [kg/m^D].
+/// Lumped mass of every node, `M_a = Σ ρ ∫ N_a dV` \[kg\]; `density` gives each cell's ρ [kg/m^D].
 pub fn lumped_mass<const D: usize>(mesh: &Mesh<D>, density: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut mass = vec![0.0; mesh.nodes.len()];
     for c in 0..mesh.cell_count() {
@@ -464,7 +464,7 @@ mod tests {
         }
     }
 
-    /// Relative L2 error of a cantilever under a tip load, against the elasticity solution of Timoshenko and Goodier.
+    /// Relative L2 error of a cantilever under a tip load, against the elasticity solution of Timoshenko and Goodier \[TimoshenkoGoodier1970\].
     fn cantilever(shape: CellShape, n: usize) -> f64 {
         let (length, height, e, nu, p) = (2.0, 1.0, 3.0, 0.3, 1e-3);
         let inertia = height * height * height / 12.0;

@@ -10,7 +10,7 @@ use crate::tensor::{Tensor, Tensor4, Vector, inverse, padded};
 /// Shapes: `shape` and `gradient` have room for eight nodes; entries from `nodes` on are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadraturePoint<const D: usize> {
-    /// Position [m].
+    /// Position \[m\].
     pub position: Vector<D>,
     /// `|det J| w` [m^D].
     pub weight: f64,
@@ -213,7 +213,7 @@ pub fn cell_volume<const D: usize>(mesh: &Mesh<D>, c: usize) -> f64 {
 
 /// The displacement gradient `G_ij = Σ_a u_a,i ∂N_a/∂x_j` at a point of a cell.
 ///
-/// Shapes: `displacement` gives the displacement [m] of a local node, below `point.nodes`.
+/// Shapes: `displacement` gives the displacement \[m\] of a local node, below `point.nodes`.
 pub fn displacement_gradient<const D: usize>(
     point: &QuadraturePoint<D>,
     mut displacement: impl FnMut(usize) -> Vector<D>,
@@ -227,7 +227,7 @@ pub fn displacement_gradient<const D: usize>(
 
 /// The displacement gradient at the centre of cell `c`, where low-order cells are most accurate; for output.
 ///
-/// Shapes: `displacement` gives the displacement [m] of a node of the mesh. Strain is [`crate::tensor::strain`] of
+/// Shapes: `displacement` gives the displacement \[m\] of a node of the mesh. Strain is [`crate::tensor::strain`] of
 /// it, stress that of the law.
 pub fn displacement_gradient_at_centre<const D: usize>(
     mesh: &Mesh<D>,
@@ -295,7 +295,7 @@ mod tests {
 
     #[test]
     fn unit_cube_line_and_triangle_have_their_published_stiffness() {
-        // Liu and Tovar, "An efficient 3D topology optimization code written in Matlab", 2014: first two entries
+        // [LiuTovar2014]: first two entries
         let nu = 0.3;
         let mesh = unit_box::<3>(CellShape::Hex8, 1, 0.0);
         let rows = stiffness(&mesh, 0, &tangent::<3>(1.0, nu));

@@ -24,7 +24,7 @@ const TRIANGLE: [(f64, f64); 2] = [
 /// Shapes: `shape` has one entry per node of the facet (up to four).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FacetPoint<const D: usize> {
-    /// Position [m].
+    /// Position \[m\].
     pub position: Vector<D>,
     /// Weight [m^(D−1)]; 1 for the single point of a facet in 1D.
     pub weight: f64,
@@ -121,7 +121,7 @@ pub fn facet_area<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> f64 {
 
 /// Consistent nodal forces `f_a = ∫ N_a t dA` of a traction on a facet: one (node, force) per node of the facet.
 ///
-/// `traction` is t(x) [N/m²] (force per length and unit thickness in 2D, force in 1D). Forces [N].
+/// `traction` is t(x) [N/m²] (force per length and unit thickness in 2D, force in 1D). Forces \[N\].
 pub fn traction_vector<const D: usize>(
     mesh: &Mesh<D>,
     facet: &[u32],
@@ -139,7 +139,7 @@ pub fn traction_vector<const D: usize>(
 
 /// Consistent nodal forces `f_a = ∫ N_a b dV` of a body force in cell `c`: one (node, force) per node of the cell.
 ///
-/// `body_force` is b(x) [N/m^D]; exact where b is affine and the cell too. Forces [N].
+/// `body_force` is b(x) [N/m^D]; exact where b is affine and the cell too. Forces \[N\].
 pub fn body_force_vector<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,

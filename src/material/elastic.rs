@@ -12,7 +12,7 @@ pub struct Elastic {
 }
 
 impl Elastic {
-    /// A solid of Young's modulus E [Pa], Poisson's ratio ν and density ρ [kg/m³].
+    /// A solid of Young's modulus E \[Pa\], Poisson's ratio ν and density ρ [kg/m³].
     ///
     /// # Errors
     /// `MaterialError::{YoungsModulus, PoissonRatio, Density}` unless E > 0, -1 < ν < 0.5, ρ ≥ 0, all finite.
@@ -41,7 +41,7 @@ impl Elastic {
         })
     }
 
-    /// Young's modulus E [Pa].
+    /// Young's modulus E \[Pa\].
     pub fn youngs_modulus(&self) -> f64 {
         self.youngs_modulus
     }
@@ -56,17 +56,17 @@ impl Elastic {
         self.density
     }
 
-    /// Shear modulus `μ = E / (2 (1 + ν))` [Pa].
+    /// Shear modulus `μ = E / (2 (1 + ν))` \[Pa\].
     pub fn shear_modulus(&self) -> f64 {
         self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
     }
 
-    /// Bulk modulus `K = E / (3 (1 − 2ν))` [Pa] of the three-dimensional solid.
+    /// Bulk modulus `K = E / (3 (1 − 2ν))` \[Pa\] of the three-dimensional solid.
     pub fn bulk_modulus(&self) -> f64 {
         self.youngs_modulus / (3.0 * (1.0 - 2.0 * self.poisson_ratio))
     }
 
-    /// The Lamé parameters (λ_D, μ) [Pa] of `D` dimensions: `C_ijkl = λ_D δ_ij δ_kl + μ (δ_ik δ_jl + δ_il δ_jk)`.
+    /// The Lamé parameters (λ_D, μ) \[Pa\] of `D` dimensions: `C_ijkl = λ_D δ_ij δ_kl + μ (δ_ik δ_jl + δ_il δ_jk)`.
     ///
     /// | kinematics | λ_D |
     /// |---|---|
@@ -98,7 +98,7 @@ impl Elastic {
         Ok((lambda, mu))
     }
 
-    /// The stiffness tensor [Pa] of `D` dimensions.
+    /// The stiffness tensor \[Pa\] of `D` dimensions.
     ///
     /// # Errors
     /// `MaterialError::Kinematics` if the kinematics belong to another dimension than `D`.

@@ -14,7 +14,7 @@ pub struct Lattice<const D: usize> {
 }
 
 impl<const D: usize> Lattice<D> {
-    /// The law `σ = C : G` of the tensor C [Pa] with density [kg/m³].
+    /// The law `σ = C : G` of the tensor C \[Pa\] with density [kg/m³].
     ///
     /// # Errors
     /// `MaterialError::NotFinite` for a component that is not a number, `MaterialError::Asymmetric` unless

@@ -5,8 +5,8 @@
 //! | `elastic.rs` | isotropic linear elasticity of a bar, in plane stress, plane strain and of a solid |
 //! | `lattice.rs` | a law given by its tensor, such as the fourth moments of a peridynamic lattice |
 //!
-//! A law takes the gradient `G_ij = ∂u_i/∂x_j` [1] and gives the energy density `W(G)` [Pa], the stress
-//! `σ = ∂W/∂G` [Pa] and the tangent `C = ∂σ/∂G` [Pa]. A new law is one file, one line in the list below and one line
+//! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] and gives the energy density `W(G)` \[Pa\], the stress
+//! `σ = ∂W/∂G` \[Pa\] and the tangent `C = ∂σ/∂G` \[Pa\]. A new law is one file, one line in the list below and one line
 //! in the table of the conformance tests, which check for every law that these three belong together, that nothing
 //! is stressed at rest, and that a (linearised) rotation stresses nothing.
 
@@ -61,7 +61,7 @@ pub enum MaterialError {
         "Young's modulus is {value}, but must be positive and finite; give it in the scene's unit of stress, such as 72e9 for 72 GPa"
     )]
     YoungsModulus {
-        /// What was given [Pa].
+        /// What was given \[Pa\].
         value: f64,
     },
     /// Poisson's ratio is outside of (-1, 0.5).
@@ -111,7 +111,7 @@ pub enum MaterialError {
         k: usize,
         /// Fourth index.
         l: usize,
-        /// The component [Pa].
+        /// The component \[Pa\].
         value: f64,
     },
     /// A tensor given for a law lacks a symmetry without which there is no energy or no objectivity.
@@ -128,15 +128,15 @@ pub enum MaterialError {
 
 /// A local law: stress and energy of a displacement gradient, here and now.
 pub trait LocalLaw<const D: usize>: Send + Sync {
-    /// `C_ijkl = ∂σ_ij/∂G_kl` [Pa], at rest.
+    /// `C_ijkl = ∂σ_ij/∂G_kl` \[Pa\], at rest.
     fn tangent(&self) -> &Tensor4<D>;
 
-    /// The stress `σ(G)` [Pa]; `gradient` is `G_ij = ∂u_i/∂x_j`.
+    /// The stress `σ(G)` \[Pa\]; `gradient` is `G_ij = ∂u_i/∂x_j`.
     fn stress(&self, gradient: &Tensor<D>) -> Tensor<D> {
         self.tangent().contract(gradient)
     }
 
-    /// The energy density `W(G)` [Pa], zero at rest.
+    /// The energy density `W(G)` \[Pa\], zero at rest.
     fn energy(&self, gradient: &Tensor<D>) -> f64 {
         0.5 * self.stress(gradient).dot(gradient)
     }

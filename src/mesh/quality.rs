@@ -15,9 +15,9 @@ const COINCIDENT: f64 = 1e-12;
 /// What [`check`] measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// Shortest edge of all cells [length].
+    /// Shortest edge of all cells \[length\].
     pub shortest_edge: f64,
-    /// Longest edge of all cells [length].
+    /// Longest edge of all cells \[length\].
     pub longest_edge: f64,
     /// Smallest scaled Jacobian at any corner: 1 for a square corner, 0 for a flat one.
     pub smallest_scaled_jacobian: f64,

@@ -10,8 +10,8 @@ use crate::{
 
 /// Linear elastic correspondence material, stabilised against zero-energy modes.
 ///
-/// Source: [SAND2015-7998] section 7.2 (after Silling et al. 2007): `F̄ = Ḡ K⁻¹`, `T⟨ξ⟩ = ω σ(F̄) K⁻¹ ξ`. The stabilising term
-/// `q ω (η − F̄ ξ)` (Silling 2017) vanishes for affine fields and leaves the partial stress as it is; without it an alternating displacement costs no energy.
+/// Source: [SAND2015-7998] section 7.2 (after \[Silling2007\]): `F̄ = Ḡ K⁻¹`, `T⟨ξ⟩ = ω σ(F̄) K⁻¹ ξ`. The stabilising term
+/// `q ω (η − F̄ ξ)` \[Silling2017\] vanishes for affine fields and leaves the partial stress as it is; without it an alternating displacement costs no energy.
 #[derive(Clone, Debug)]
 pub struct Correspondence<const D: usize> {
     /// The influence function ω.

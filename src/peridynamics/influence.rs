@@ -137,7 +137,7 @@ impl Influence {
     ///
     /// A bond that touches the horizon counts as inside whatever rounding made of its length, so `r/δ` is
     /// cut at 1 rather than tested against it; who is in the family is decided by the family.
-    /// Units: r, δ [m] → ω [m^(−α)].
+    /// Units: r, δ \[m\] → ω [m^(−α)].
     pub fn value(self, r: f64, delta: f64) -> f64 {
         let s = (r / delta).min(1.0);
         match self {
@@ -151,7 +151,7 @@ impl Influence {
 
     /// `∫_0^δ ω(r) r^p dr`, in closed form, for `p ≥ 1`.
     ///
-    /// Units: δ [m] → [m^(p + 1 − α)].
+    /// Units: δ \[m\] → [m^(p + 1 − α)].
     pub fn radial_moment(self, p: u32, delta: f64) -> f64 {
         match self {
             Self::Polynomial { degree, alpha } => {
@@ -165,7 +165,7 @@ impl Influence {
     /// Weighted volume of a full, continuous family, `m = ∫ ω(|ξ|) |ξ|² dV`.
     ///
     /// Source: [SAND2015-7998] eq. (5.12) in 1D, (5.18) in 3D; the same integral in 2D.
-    /// Units: δ [m] → m [m^(D + 2 − α)].
+    /// Units: δ \[m\] → m [m^(D + 2 − α)].
     pub fn weighted_volume<const D: usize>(self, delta: f64) -> f64 {
         sphere_measure::<D>() * self.radial_moment(D as u32 + 1, delta)
     }
@@ -174,19 +174,19 @@ impl Influence {
 /// The shape of a micromodulus λ(|ξ|) of the linearised bond-based material, up to its constant `c`:
 /// force density `∫ λ(|ξ|) ξ ⊗ ξ (u(x + ξ) − u(x)) dV`.
 ///
-/// Source: [SAND2015-7998] eq. (3.1). [Bobaru2009] writes `λ = c(|ξ|)/|ξ|³` (section 2.1); its names stand in
+/// Source: [SAND2015-7998] eq. (3.1). \[Bobaru2009\] writes `λ = c(|ξ|)/|ξ|³` (section 2.1); its names stand in
 /// the variants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Micromodulus {
     /// `λ = c`, the same for every bond.
     Uniform,
-    /// `λ = c / |ξ|²`: in 1D the force is `c η`, a constant spring stiffness `C` per bond ([Bobaru2009] eq. (22), whose
+    /// `λ = c / |ξ|²`: in 1D the force is `c η`, a constant spring stiffness `C` per bond (\[Bobaru2009\] eq. (22), whose
     /// `c(|ξ|)` of eq. (19) it calls "inverted triangular"). Equal to [`Micromodulus::Influence`] with n = 0, α = 0.
     Constant,
     /// `λ = c / |ξ|³`: the slit plate of [SAND2015-7998] section 3.4; the prototype microelastic brittle law, "constant"
-    /// in [Bobaru2009], since the force is `c` times the bond's stretch.
+    /// in \[Bobaru2009\], since the force is `c` times the bond's stretch.
     InverseDistance,
-    /// `λ = c (1 − |ξ|/δ) / |ξ|³`: "triangular" in [Bobaru2009] eq. (16).
+    /// `λ = c (1 − |ξ|/δ) / |ξ|³`: "triangular" in \[Bobaru2009\] eq. (16).
     Triangular,
     /// `λ = c ω(|ξ|) / |ξ|²`. Source: [SAND2015-7998] eq. (5.13a).
     Influence(Influence),
@@ -225,7 +225,7 @@ impl Micromodulus {
     /// stress (ν = 1/3) and `6E/5` in plane strain and 3D (ν = 1/4).
     ///
     /// Source: [SAND2015-7998] eq. (3.6), (3.7) with `Λ = C_1111`.
-    /// Units: δ [m], c1111 [Pa] → c such that `λ = c · shape` is in [Pa/m^(D+4)].
+    /// Units: δ \[m\], c1111 \[Pa\] → c such that `λ = c · shape` is in [Pa/m^(D+4)].
     pub fn constant<const D: usize>(self, delta: f64, c1111: f64) -> f64 {
         let d = D as f64;
         let angular = sphere_measure::<D>() * 3.0 / (d * (d + 2.0));

@@ -312,7 +312,7 @@ pub fn fourth_moments<const D: usize>(bonds: &[(Vector<D>, f64)], g: &[f64]) -> 
 
 /// Weighted volume `m = Σ ω |ξ|² V` over the bonds `(ξ, V)` of one family.
 ///
-/// Source: [SAND2015-7998] eq. (5.18), as a sum. Units: ξ [m], V [m^D] → [m^(D+2)] times those of ω.
+/// Source: [SAND2015-7998] eq. (5.18), as a sum. Units: ξ \[m\], V [m^D] → [m^(D+2)] times those of ω.
 pub fn weighted_volume<const D: usize>(bonds: &[(Vector<D>, f64)], omega: &[f64]) -> f64 {
     bonds
         .iter()

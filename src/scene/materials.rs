@@ -36,14 +36,14 @@ pub struct Material<const D: usize> {
     pub name: String,
     /// Law of bonds.
     pub law: Law,
-    /// Lamé's parameters (λ_D, μ) of the scene's dimension [Pa].
+    /// Lamé's parameters (λ_D, μ) of the scene's dimension \[Pa\].
     pub lame: (f64, f64),
     /// Density [kg/m³]; zero if not given.
     pub density: f64,
 }
 
 impl<const D: usize> Material<D> {
-    /// The local stiffness [Pa].
+    /// The local stiffness \[Pa\].
     pub fn stiffness(&self) -> Tensor4<D> {
         Tensor4::isotropic(self.lame.0, self.lame.1)
     }

@@ -208,7 +208,7 @@ pub fn gmres(
             operator.apply_into(&z, &mut w);
             let before = norm(&w);
             let mut column = vec![0.0; k + 2];
-            // twice is enough (Giraud et al. 2005), and once is not for nearly dependent vectors
+            // twice is enough [Giraud2005], and once is not for nearly dependent vectors
             for _ in 0..2 {
                 for (h, v) in column.iter_mut().zip(&basis) {
                     let c = dot(v, &w);

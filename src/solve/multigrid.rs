@@ -1,4 +1,4 @@
-//! Smoothed-aggregation algebraic multigrid on block rows, with rigid-body modes (Vaněk, Mandel & Brezina 1996).
+//! Smoothed-aggregation algebraic multigrid on block rows, with rigid-body modes \[Vanek1996\].
 //!
 //! Every non-zero block is a strong connection, so that a wide PD stencil is aggregated over its whole row. The
 //! prolongation is smoothed by `ω = 4/(3 λ_max)`, the restriction is its transpose (also for unsymmetric operators),

@@ -31,7 +31,7 @@ pub enum Ordering {
     /// Recursive bisection of the sites by coordinates, each cut widened to a vertex separator.
     #[default]
     CoordinateNestedDissection,
-    /// Multilevel nested dissection of the graph (Karypis & Kumar 1998), blind to coordinates.
+    /// Multilevel nested dissection of the graph \[KarypisKumar1998\], blind to coordinates.
     Metis,
     /// Approximate minimum degree: the cheapest to compute, the worst fill in 3D.
     Amd,

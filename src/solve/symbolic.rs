@@ -171,7 +171,7 @@ impl Symbolic {
         }
     }
 
-    /// Visits the child with the largest excess of peak over result first: the smallest stack (Liu 1986).
+    /// Visits the child with the largest excess of peak over result first: the smallest stack \[Liu1986\].
     fn sort_children(&mut self) {
         // children come before parents, so that their own lists are final when they are met here
         let mut peaks = vec![0u64; self.nodes.len()];
@@ -260,7 +260,7 @@ fn invert(order: &[u32]) -> Vec<u32> {
     number
 }
 
-/// The elimination tree and the length of each column of the factor, diagonal included (Liu 1990), by walking the
+/// The elimination tree and the length of each column of the factor, diagonal included \[Liu1990\], by walking the
 /// row subtrees: time of the order of the factor's entries in sites.
 fn elimination_tree(graph: &SiteGraph, order: &[u32], number: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let n = order.len();

@@ -1,0 +1,114 @@
+//! The pages under `docs/` and the sources say the same: keys of the literature resolve, links lead somewhere, scenes in the pages are valid.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// All files below `folder` whose names end in one of `endings`.
+fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut stack = vec![folder.to_path_buf()];
+    while let Some(folder) = stack.pop() {
+        let Ok(entries) = fs::read_dir(&folder) else {
+            continue;
+        };
+        for path in entries.map(|e| e.unwrap().path()) {
+            if path.is_dir() {
+                stack.push(path);
+            } else if endings
+                .iter()
+                .any(|e| path.to_string_lossy().ends_with(&format!(".{e}")))
+            {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn pages() -> Vec<PathBuf> {
+    let mut pages = files(&root().join("docs"), &["md"]);
+    pages.extend(["README.md", "CHANGELOG.md"].map(|p| root().join(p)));
+    pages
+}
+
+/// Keys such as `[SAND2015-7998]`: letters, four digits, and perhaps a hyphen with a number; also with escaped brackets.
+fn keys(text: &str) -> BTreeSet<String> {
+    let text = text.replace("\\[", "[").replace("\\]", "]");
+    text.split('[')
+        .skip(1)
+        .filter_map(|rest| rest.split_once(']').map(|(inner, _)| inner))
+        .filter(|inner| {
+            let letters = inner.chars().take_while(char::is_ascii_alphabetic).count();
+            let rest = &inner[letters..];
+            let (year, number) = rest.split_once('-').unwrap_or((rest, "0"));
+            letters > 1
+                && inner.starts_with(|c: char| c.is_ascii_uppercase())
+                && year.len() == 4
+                && [year, number]
+                    .iter()
+                    .all(|n| n.chars().all(|c| c.is_ascii_digit()))
+        })
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn every_key_of_the_literature_resolves() {
+    let references = fs::read_to_string(root().join("docs/references.md")).unwrap();
+    let known: BTreeSet<&str> = references
+        .lines()
+        .filter_map(|l| l.strip_prefix('[')?.split_once("]: ").map(|(key, _)| key))
+        .collect();
+    let mut sources = pages();
+    for folder in ["src", "tests", "examples", "benches"] {
+        sources.extend(files(&root().join(folder), &["rs", "toml"]));
+    }
+    let mut used = BTreeSet::new();
+    for path in sources {
+        for key in keys(&fs::read_to_string(&path).unwrap()) {
+            assert!(
+                known.contains(key.as_str()),
+                "[{key}] in {} is not in docs/references.md",
+                path.display()
+            );
+            used.insert(key);
+        }
+    }
+    // the search finds what is known to be there
+    assert!(
+        used.contains("SAND2015-7998") && used.contains("Bobaru2009"),
+        "{used:?}"
+    );
+}
+
+/// Targets of `[text](target)`.
+fn links(text: &str) -> Vec<&str> {
+    text.split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split_once(')').map(|(target, _)| target))
+        .collect()
+}
+
+#[test]
+fn links_between_pages_lead_somewhere() {
+    let mut count = 0;
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for link in links(&text) {
+            let target = link.split('#').next().unwrap_or_default();
+            if target.is_empty() || target.contains("://") {
+                continue;
+            }
+            let path = page.parent().unwrap().join(target);
+            assert!(path.exists(), "{link} in {} leads nowhere", page.display());
+            count += 1;
+        }
+    }
+    assert!(count > 10, "only {count} links found");
+}
