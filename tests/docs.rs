@@ -1,5 +1,7 @@
 //! The pages under `docs/` and the sources say the same: keys of the literature resolve, links lead somewhere, scenes in the pages are valid.
 
+use bondline::AnyScene;
+use bondline::scene::{SceneSpec, Source};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,7 +35,7 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
 
 fn pages() -> Vec<PathBuf> {
     let mut pages = files(&root().join("docs"), &["md"]);
-    pages.extend(["README.md", "CHANGELOG.md"].map(|p| root().join(p)));
+    pages.extend(["README.md", "CHANGELOG.md", "CONTRIBUTING.md"].map(|p| root().join(p)));
     pages
 }
 
@@ -87,10 +89,11 @@ fn every_key_of_the_literature_resolves() {
     );
 }
 
-/// Targets of `[text](target)`.
+/// Targets of `[text](target)` outside of fenced blocks.
 fn links(text: &str) -> Vec<&str> {
-    text.split("](")
-        .skip(1)
+    text.split("\n```")
+        .step_by(2)
+        .flat_map(|prose| prose.split("](").skip(1))
         .filter_map(|rest| rest.split_once(')').map(|(target, _)| target))
         .collect()
 }
@@ -111,4 +114,77 @@ fn links_between_pages_lead_somewhere() {
         }
     }
     assert!(count > 10, "only {count} links found");
+}
+
+/// Fenced blocks of TOML.
+fn toml_blocks(page: &str) -> Vec<&str> {
+    page.split("\n```toml\n")
+        .skip(1)
+        .filter_map(|rest| rest.split_once("\n```").map(|(block, _)| block))
+        .collect()
+}
+
+#[test]
+fn scenes_in_the_reference_are_read() {
+    let page = fs::read_to_string(root().join("docs/scene.md")).unwrap();
+    let blocks = toml_blocks(&page);
+    assert!(blocks.len() > 8, "{}", blocks.len());
+    let whole: toml::Table = blocks[0].parse().unwrap();
+    for block in blocks {
+        // a part of a scene takes the place of that part of the whole one
+        let mut scene = whole.clone();
+        scene.extend(block.parse::<toml::Table>().unwrap());
+        let source = Source::new("docs/scene.md", toml::to_string(&scene).unwrap());
+        if let Err(error) = SceneSpec::parse(&source) {
+            panic!("{error}\nin\n{block}");
+        }
+    }
+    let source = Source::new("docs/scene.md", toml::to_string(&whole).unwrap());
+    AnyScene::from_source(&source, &root(), "scene").unwrap();
+}
+
+/// Names of all keys and all words that a schema allows.
+fn words(schema: &serde_json::Value, found: &mut BTreeSet<String>) {
+    match schema {
+        serde_json::Value::Object(map) => {
+            for (key, value) in map {
+                match (key.as_str(), value) {
+                    ("properties", serde_json::Value::Object(properties)) => {
+                        found.extend(properties.keys().cloned());
+                    }
+                    ("const", serde_json::Value::String(word)) => {
+                        found.insert(word.clone());
+                    }
+                    ("enum", serde_json::Value::Array(listed)) => {
+                        found.extend(listed.iter().filter_map(|w| w.as_str().map(str::to_owned)));
+                    }
+                    _ => {}
+                }
+                words(value, found);
+            }
+        }
+        serde_json::Value::Array(list) => list.iter().for_each(|value| words(value, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn the_reference_names_every_key_of_the_schema() {
+    let page = fs::read_to_string(root().join("docs/scene.md")).unwrap();
+    let mut known = BTreeSet::new();
+    words(
+        &serde_json::to_value(bondline::scene::schema()).unwrap(),
+        &mut known,
+    );
+    assert!(
+        known.contains("kinematics") && known.contains("plane-stress"),
+        "{known:?}"
+    );
+    let missing: Vec<&String> = known
+        .iter()
+        .filter(|word| {
+            !page.contains(&format!("`{word}`")) && !page.contains(&format!("`\"{word}\"`"))
+        })
+        .collect();
+    assert!(missing.is_empty(), "not in docs/scene.md: {missing:?}");
 }

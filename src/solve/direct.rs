@@ -1,4 +1,4 @@
-//! Multifrontal Cholesky and LU on the tree of supernodes (Duff & Reid 1983), with faer's dense kernels.
+//! Multifrontal Cholesky and LU on the tree of supernodes \[DuffReid1983\], with faer's dense kernels.
 //!
 //! One code serves both: symbolic work on sites, fronts assembled straight from the block matrix, children's
 //! contribution blocks added in a fixed order. LU keeps the pattern of `K + Kᵀ` and exchanges rows only within the
