@@ -134,6 +134,21 @@ impl<const D: usize> Row<D> {
         }
     }
 
+    /// The row times each of `u` (`D` numbers per site), which empties it: for rows that are needed once, without a matrix.
+    pub fn take_products<const N: usize>(&mut self, u: [&[f64]; N]) -> [Vector<D>; N] {
+        let mut sums = [Vector::zeros(); N];
+        for (&column, block) in self.columns.iter().zip(&self.blocks) {
+            let start = column as usize * D;
+            for (sum, u) in sums.iter_mut().zip(u) {
+                *sum += block * Vector::<D>::from_column_slice(&u[start..start + D]);
+            }
+            self.slot[column as usize] = EMPTY;
+        }
+        self.columns.clear();
+        self.blocks.clear();
+        sums
+    }
+
     /// Empties the row into sorted columns and row-major blocks.
     fn drain_into(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f64>) {
         let mut order: Vec<u32> = (0..self.columns.len() as u32).collect();

@@ -1,2 +1,3 @@
 //! verify
 pub mod patch;
+pub mod variable_horizon;
