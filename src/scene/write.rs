@@ -15,6 +15,9 @@ use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
 use crate::tensor::{Tensor, Vector, padded, strain};
 
 /// Writes what the scene asks for; returns the files.
+///
+/// # Errors
+/// [`ObserveError`] if a file cannot be written.
 pub fn write<const D: usize>(
     output: &Output<D>,
     solved: &Solved<'_, D>,
