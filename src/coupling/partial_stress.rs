@@ -1,5 +1,7 @@
 //! Partial stress: transition regions whose stress is the peridynamic partial stress, meshfree or in finite elements.
 
+use rayon::prelude::*;
+
 use crate::{
     coupling::{
         CellRole, Coupling, FitDegree, Interface, Model, ModelError, Operator, Reach, Zone,
@@ -7,7 +9,9 @@ use crate::{
     },
     fem::{self, QuadraturePoint},
     mesh::Mesh,
-    peridynamics::{BondLaw, Ends, Factors, Families, Influence, PdBody, TIE_TOLERANCE},
+    peridynamics::{
+        BondLaw, Cloud, Ends, Factors, Families, Influence, PdBody, TIE_TOLERANCE, fitted,
+    },
     tensor::{Tensor, Vector},
 };
 
@@ -191,17 +195,7 @@ impl<'a, const D: usize> Elements<'a, D> {
                 cloud.transfer.push(&weights);
             }
         }
-        let gauss = &cloud.position[points..];
-        let rows = Families::search_from(
-            gauss,
-            &vec![None; gauss.len()],
-            &cloud.horizon[points..],
-            &around.position,
-            TIE_TOLERANCE,
-        )?;
-        let centres: Vec<u32> = (points as u32..cloud.position.len() as u32).collect();
-        let mut families = rows.spread(&centres, cloud.position.len());
-        model.cut_bonds(&cloud.position, &mut families);
+        let families = Self::families(model, &mut cloud, points, peridynamics.law.as_ref())?;
         let body = PdBody::new(
             cloud,
             families,
@@ -212,7 +206,58 @@ impl<'a, const D: usize> Elements<'a, D> {
         .map_err(ModelError::gauss_point)?;
         Ok(Self { model, body, first })
     }
+
+    /// Families of the Gauss points, which follow the first `points` of the cloud.
+    ///
+    /// At a free surface or edge a family lacks bonds, and what is left may be too few for the moment conditions of the law; such a family is given a wider
+    /// horizon, step by step, until it can carry them.
+    fn families(
+        model: &Model<D>,
+        cloud: &mut Cloud<D>,
+        points: usize,
+        law: &dyn BondLaw<D>,
+    ) -> Result<Families, ModelError> {
+        let centres: Vec<u32> = (points as u32..cloud.position.len() as u32).collect();
+        let mut candidates: Vec<usize> = (points..cloud.position.len()).collect();
+        let mut widened = 1.0;
+        loop {
+            let rows = Families::search_from(
+                &cloud.position[points..],
+                &vec![None; centres.len()],
+                &cloud.horizon[points..],
+                &cloud.position[..points],
+                TIE_TOLERANCE,
+            )?;
+            let mut families = rows.spread(&centres, cloud.position.len());
+            model.cut_bonds(&cloud.position, &mut families);
+            candidates = candidates
+                .into_par_iter()
+                .filter(|&i| {
+                    let bonds: Vec<(Vector<D>, f64)> = families
+                        .of(i)
+                        .iter()
+                        .map(|&j| {
+                            let j = j as usize;
+                            (cloud.position[j] - cloud.position[i], cloud.volume[j])
+                        })
+                        .collect();
+                    fitted(law, &bonds, cloud.horizon[i]).is_err()
+                })
+                .collect();
+            if candidates.is_empty() || widened > WIDEST {
+                return Ok(families);
+            }
+            widened *= WIDENING;
+            for &i in &candidates {
+                cloud.horizon[i] *= WIDENING;
+            }
+        }
+    }
 }
+
+/// Steps in which the horizon of a Gauss point with too few bonds grows, and where it stops: an edge of a body needs 1.25² at m = 2 in 3D.
+const WIDENING: f64 = 1.25;
+const WIDEST: f64 = 2.0;
 
 impl<const D: usize> Operator<D> for Elements<'_, D> {
     fn add_row(&self, site: usize, row: &mut Row<D>) {

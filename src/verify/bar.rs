@@ -9,10 +9,11 @@
 use std::{fmt, path::Path};
 
 use crate::{
-    coupling::Zone,
+    coupling::{SiteKind, Zone},
     observe::{
         ObserveError,
         figure::{LinePlot, Series, Stroke},
+        map::FieldMap,
         report::{Columns, Row, Table},
         summary::RunSummary,
     },
@@ -114,6 +115,8 @@ pub struct Bar {
     pub summary: RunSummary,
     /// Planes across it, by position.
     pub planes: Vec<Plane>,
+    /// The layer in the middle of a bar in three dimensions: displacement along x of its cells and points \[m\]; empty in 1D.
+    pub slice: FieldMap,
     /// Largest force along x with which an end is held, relative to `E A u′`; `None` if no end is held.
     pub pull: Option<f64>,
 }
@@ -197,8 +200,10 @@ fn solve_dimension<const D: usize>(
     });
     let half = STRETCH * high[0].abs().max(low[0].abs());
     let mut planes = Vec::new();
+    let mut slice = FieldMap::default();
     let summary = solve_with(scene, progress, |output, solved| {
         planes = planes_of(solved, half);
+        slice = slice_of(solved);
         match write {
             Write::Nothing => Ok(Vec::new()),
             Write::Outputs => crate::scene::write(output, solved),
@@ -212,6 +217,7 @@ fn solve_dimension<const D: usize>(
     Ok(Bar {
         summary,
         planes,
+        slice,
         pull,
     })
 }
@@ -241,6 +247,45 @@ fn planes_of<const D: usize>(solved: &Solved<'_, D>, scale: f64) -> Vec<Plane> {
         });
     }
     planes
+}
+
+/// The cells and points whose middle lies next to the plane z = 0, in millimetres, with `u_x` in micrometres.
+fn slice_of<const D: usize>(solved: &Solved<'_, D>) -> FieldMap {
+    let mut map = FieldMap::default();
+    if D != 3 {
+        return map;
+    }
+    let model = solved.model;
+    let flat = |x: &crate::tensor::Vector<D>| [1e3 * x[0], 1e3 * x[1]];
+    let side = 1e3 * model.spacing();
+    let near = |x: &crate::tensor::Vector<D>| 1e3 * x[2].abs() < 0.49 * side;
+    for c in (0..model.mesh.cell_count()).filter(|&c| model.is_element(c)) {
+        let centre = model.mesh.centroid(c);
+        if !near(&centre) {
+            continue;
+        }
+        let nodes = model.mesh.cell(c);
+        let sum: f64 = nodes
+            .iter()
+            .map(|&n| {
+                model
+                    .node_transfer
+                    .displacement::<D>(n as usize, solved.displacement)[0]
+            })
+            .sum();
+        let low = nodes
+            .iter()
+            .filter(|&&n| model.mesh.nodes[n as usize][2] < centre[2]);
+        let corners = low.map(|&n| flat(&model.mesh.nodes[n as usize])).collect();
+        map.cells.push((corners, 1e6 * sum / nodes.len() as f64));
+    }
+    for (s, site) in model.sites.iter().enumerate() {
+        if matches!(site.kind, SiteKind::Point(_)) && near(&site.position) {
+            let u = 1e6 * solved.displacement[s * D];
+            map.points.push((flat(&site.position), side, u));
+        }
+    }
+    map
 }
 
 /// Names of the models in tables.
@@ -364,7 +409,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     vec![line, free, enclosed]
 }
 
-/// Draws `bar_line.svg` (figure 7.8a) and `bar_deviation.svg`.
+/// Draws `bar_line.svg` and `bar_slice.svg` (figure 7.8) and `bar_deviation.svg`.
 ///
 /// # Errors
 /// [`FigureError`] if a bar cannot be solved or a file not written.
@@ -394,6 +439,14 @@ pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<(), FigureError
         ..LinePlot::default()
     }
     .write(&folder.join("bar_line.svg"))?;
+    let seams = [-14.0, -10.0, 10.0, 14.0].map(|x| vec![[x, -6.5], [x, 6.5]]);
+    FieldMap {
+        title: "Bar with free sides: layer z = 0".into(),
+        label: "displacement along x [µm]".into(),
+        lines: seams.to_vec(),
+        ..bar.slice.clone()
+    }
+    .write(&folder.join("bar_slice.svg"))?;
     let deviation = |name: &str, bar: &Bar| {
         let points = bar
             .planes
