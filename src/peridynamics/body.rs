@@ -331,10 +331,7 @@ fn along<const D: usize>(modulus: &Tensor4<D>, x: &Vector<D>, s: f64) -> [Tensor
 }
 
 /// The factors of one irregular family: not negative where the moments allow it, else of any sign.
-///
-/// # Errors
-/// [`PdError::Fit`] if the bonds are too few for the law's moment conditions.
-pub fn fitted<const D: usize>(
+fn fitted<const D: usize>(
     law: &dyn BondLaw<D>,
     bonds: &[(Vector<D>, f64)],
     horizon: f64,

@@ -23,7 +23,7 @@ pub mod shape_tensor;
 pub mod shells;
 pub mod weights;
 
-pub use body::{BondWeights, Cloud, Ends, Factors, PdBody, fitted};
+pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
