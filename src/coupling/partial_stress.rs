@@ -171,11 +171,11 @@ impl<'a, const D: usize> Elements<'a, D> {
         let points = cloud.position.len();
         let mut first = vec![u32::MAX; mesh.cell_count()];
         let mut quadrature: Vec<QuadraturePoint<D>> = Vec::new();
-        for c in 0..mesh.cell_count() {
+        for (c, start) in first.iter_mut().enumerate() {
             if model.roles[c] != CellRole::StressElement {
                 continue;
             }
-            first[c] = cloud.position.len() as u32;
+            *start = cloud.position.len() as u32;
             fem::quadrature(mesh, c, &mut quadrature);
             for g in &quadrature {
                 let weights: Vec<(u32, f64)> = mesh
