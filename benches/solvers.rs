@@ -2,10 +2,11 @@
 //! `cargo bench --bench solvers -- [direct|faer|krylov …] [CASE …]`.
 
 use bondline::progress::Silent;
-use bondline::solve::direct::{DirectParams, Factor};
+use bondline::solve::direct::{Analysis, DirectParams, Factor};
 use bondline::solve::krylov::{KrylovParams, conjugate_gradients, gmres};
 use bondline::solve::multigrid::{Multigrid, MultigridParams};
 use bondline::solve::ordering::{Ordering, SiteGraph};
+use bondline::solve::statics::{Method, StaticParams, StaticProblem, solve};
 use bondline::solve::stencils::{Lattice, splice};
 use bondline::solve::{FreeDofs, FreeOperator};
 use bondline::system::{BlockCsr, Symmetry};
@@ -90,6 +91,9 @@ fn main() {
         .skip(1)
         .filter(|a| !a.starts_with("--"))
         .collect();
+    if wanted.iter().any(|w| w == "crossover") {
+        return crossover();
+    }
     let asked = |name: &str, kinds: &[&str]| {
         let named: Vec<&String> = wanted
             .iter()
@@ -126,7 +130,9 @@ fn main() {
         };
         if asked("direct", &solvers) {
             bench.direct(Ordering::CoordinateNestedDissection, Symmetry::Symmetric);
-            bench.direct(Ordering::CoordinateNestedDissection, Symmetry::Unsymmetric);
+            if name != "pd2d-large" {
+                bench.direct(Ordering::CoordinateNestedDissection, Symmetry::Unsymmetric);
+            }
         }
         if asked("orderings", &solvers) {
             bench.direct(Ordering::Metis, case.symmetry);
@@ -137,6 +143,64 @@ fn main() {
         }
         if asked("faer", &solvers) {
             bench.faer();
+        }
+    }
+}
+
+/// Direct against Krylov over a range of sizes: where `Method::Auto` should change over.
+fn crossover() {
+    let flat = [40, 60, 80, 120, 160].map(|n| Lattice::rectangle(n, n));
+    let solid = [8, 10, 12, 16, 20].map(|n| Lattice::block(n, n, n));
+    for lattice in flat.into_iter().chain(solid) {
+        let m = if lattice.dimension == 2 { 4 } else { 3 };
+        let models = [
+            (
+                "elements",
+                Case::symmetric(lattice.clone(), lattice.elements()),
+            ),
+            ("bonds", Case::symmetric(lattice.clone(), lattice.bonds(m))),
+            ("splice", Case::spliced(lattice.clone(), m)),
+        ];
+        for (name, case) in models {
+            let positions = lattice.positions();
+            let d = lattice.dimension;
+            let prescribed: Vec<Option<f64>> = (0..case.matrix.dofs())
+                .map(|k| (positions[k / d][0] == 0.0).then_some(0.0))
+                .collect();
+            let free = FreeDofs::from_prescribed(&prescribed, d);
+            let bench = Bench {
+                case: &case,
+                positions: &positions,
+                free: &free,
+            };
+            let load = bench.load();
+            let seconds = [Method::Direct, Method::Krylov].map(|method| {
+                let problem = StaticProblem {
+                    stiffness: &case.matrix,
+                    symmetry: case.symmetry,
+                    positions: &positions,
+                    load: &load,
+                    prescribed: &prescribed,
+                };
+                let params = StaticParams {
+                    method,
+                    ..StaticParams::default()
+                };
+                let (start, mut runs) = (cpu_seconds(), 0);
+                // the clock ticks every 10 ms
+                while cpu_seconds() - start < 0.5 {
+                    solve(&problem, &params, &Silent).expect("solved");
+                    runs += 1;
+                }
+                (cpu_seconds() - start) / runs as f64
+            });
+            println!(
+                "{d}D {name}: {} dofs, direct {:.3}, krylov {:.3} cpu, direct / krylov {:.2}",
+                free.count(),
+                seconds[0],
+                seconds[1],
+                seconds[0] / seconds[1]
+            );
         }
     }
 }
@@ -176,18 +240,13 @@ impl Bench<'_> {
             return;
         }
         let params = DirectParams {
-            ordering,
             symmetry,
             ..DirectParams::default()
         };
         let (wall, cpu) = (Instant::now(), cpu_seconds());
-        let made = Factor::new(
-            &self.case.matrix,
-            self.free,
-            self.positions,
-            &params,
-            &Silent,
-        );
+        let analysis =
+            Analysis::new(&self.case.matrix, self.free, self.positions, ordering).expect("ordered");
+        let made = Factor::new(&self.case.matrix, self.free, analysis, &params, &Silent);
         let (wall, cpu) = (wall.elapsed().as_secs_f64(), cpu_seconds() - cpu);
         let (factor, info) = made.expect("the case is regular");
         let start = cpu_seconds();

@@ -18,8 +18,6 @@ use std::time::Instant;
 /// What a factorisation may be asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectParams {
-    /// Elimination order.
-    pub ordering: Ordering,
     /// Cholesky for `Symmetric`, LU for `Unsymmetric`.
     pub symmetry: Symmetry,
     /// A pivot smaller than this fraction of its original diagonal entry is an error.
@@ -27,14 +25,16 @@ pub struct DirectParams {
     /// Free bodies leave pivots of 1e-17 to 1e-14 of the diagonal; the smallest pivot of a supported model is about
     /// the inverse of its condition number, 1e-7 for a plate of 480 × 480 sites.
     pub smallest_pivot: f64,
+    /// Refuses a factorisation that is predicted to need more bytes.
+    pub memory_limit: Option<u64>,
 }
 
 impl Default for DirectParams {
     fn default() -> Self {
         DirectParams {
-            ordering: Ordering::default(),
             symmetry: Symmetry::Unsymmetric,
             smallest_pivot: 1e-12,
+            memory_limit: None,
         }
     }
 }
@@ -59,9 +59,17 @@ pub struct DirectInfo {
 /// Why a factorisation failed.
 #[derive(Debug, thiserror::Error)]
 pub enum DirectError {
-    /// The elimination order could not be computed.
-    #[error(transparent)]
-    Ordering(#[from] OrderingError),
+    /// The factors would not fit.
+    #[error(
+        "the factors need {:.1} GB, {:.1} GB are allowed; use the krylov method, or coarsen the model",
+        *bytes as f64 * 1e-9, *limit as f64 * 1e-9
+    )]
+    TooLarge {
+        /// Predicted peak bytes.
+        bytes: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
     /// Cholesky met a pivot that is not positive: the matrix is not positive definite.
     #[error(
         "site {site} has a pivot that is not positive; the matrix is not positive definite, factorise it by LU"
@@ -92,49 +100,94 @@ pub struct Factor {
     dofs: Vec<usize>,
 }
 
-/// Predicts the factorisation of `matrix` from its pattern alone.
-///
-/// Zero blocks count as absent. Shapes: `positions` has one entry per site.
-///
-/// # Errors
-/// [`OrderingError`] if an ordering crate refuses the graph.
-pub fn factor_cost(
-    matrix: &BlockCsr,
-    free: &FreeDofs,
-    positions: &[[f64; 3]],
+/// The elimination order and symbolic factorisation of a pattern: what a factorisation costs is known from here on.
+#[derive(Clone, Debug)]
+pub struct Analysis {
     ordering: Ordering,
-    symmetry: Symmetry,
-) -> Result<FactorCost, OrderingError> {
-    let graph = SiteGraph::new(matrix, free);
-    let order = ordering.order(&graph, positions)?;
-    Ok(Symbolic::new(&graph, &order).cost(symmetry))
+    graph: SiteGraph,
+    symbolic: Symbolic,
+    seconds: f64,
 }
 
-impl Factor {
-    /// Factorises `matrix` restricted to its free dofs.
+impl Analysis {
+    /// Orders and analyses the free part of `matrix`. Zero blocks count as absent.
     ///
-    /// Cholesky reads the upper triangle in the order of elimination, that is one of each pair of mirrored blocks.
-    /// Shapes: `positions` has one entry per site. Deterministic for any number of threads.
+    /// Shapes: `positions` has one entry per site.
     ///
     /// # Errors
-    /// [`DirectError::NotPositive`] from Cholesky, [`DirectError::Singular`] for a pivot below
-    /// `params.smallest_pivot`, and what the ordering returns.
+    /// [`OrderingError`] if an ordering crate refuses the graph.
     pub fn new(
         matrix: &BlockCsr,
         free: &FreeDofs,
         positions: &[[f64; 3]],
+        ordering: Ordering,
+    ) -> Result<Analysis, OrderingError> {
+        let start = Instant::now();
+        let mut analysis = Analysis::of_graph(SiteGraph::new(matrix, free), positions, ordering)?;
+        analysis.seconds = start.elapsed().as_secs_f64();
+        Ok(analysis)
+    }
+
+    /// Orders and analyses a graph; with [`SiteGraph::from_pattern`] this predicts the cost of a matrix that is not
+    /// assembled yet.
+    ///
+    /// Shapes: `positions` has one entry per site.
+    ///
+    /// # Errors
+    /// [`OrderingError`] if an ordering crate refuses the graph.
+    pub fn of_graph(
+        graph: SiteGraph,
+        positions: &[[f64; 3]],
+        ordering: Ordering,
+    ) -> Result<Analysis, OrderingError> {
+        let start = Instant::now();
+        let order = ordering.order(&graph, positions)?;
+        let symbolic = Symbolic::new(&graph, &order);
+        Ok(Analysis {
+            ordering,
+            graph,
+            symbolic,
+            seconds: start.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// The cost of a Cholesky (`Symmetric`) or an LU factorisation.
+    pub fn cost(&self, symmetry: Symmetry) -> FactorCost {
+        self.symbolic.cost(symmetry)
+    }
+}
+
+impl Factor {
+    /// Factorises `matrix` restricted to its free dofs, on the tree of `analysis` (of the same matrix or of one with
+    /// the same pattern).
+    ///
+    /// Cholesky reads the upper triangle in the order of elimination, that is one of each pair of mirrored blocks.
+    /// The result has the same bits on any number of threads.
+    ///
+    /// # Errors
+    /// [`DirectError::TooLarge`] before any work, [`DirectError::NotPositive`] from Cholesky, and
+    /// [`DirectError::Singular`] for a pivot below `params.smallest_pivot`.
+    pub fn new(
+        matrix: &BlockCsr,
+        free: &FreeDofs,
+        analysis: Analysis,
         params: &DirectParams,
         progress: &dyn Progress,
     ) -> Result<(Factor, DirectInfo), DirectError> {
         let start = Instant::now();
-        progress.stage("ordering", None);
-        let graph = SiteGraph::new(matrix, free);
-        let order = params.ordering.order(&graph, positions)?;
-        let symbolic = Symbolic::new(&graph, &order);
-        let ordering_seconds = start.elapsed().as_secs_f64();
-
-        let start = Instant::now();
+        let Analysis {
+            ordering,
+            graph,
+            symbolic,
+            seconds,
+        } = analysis;
         let cost = symbolic.cost(params.symmetry);
+        if let Some(limit) = params.memory_limit.filter(|&limit| cost.bytes > limit) {
+            return Err(DirectError::TooLarge {
+                bytes: cost.bytes,
+                limit,
+            });
+        }
         progress.stage("factorisation", Some(symbolic.nodes.len() as u64));
         let nodes = Assembly::new(matrix, free, &graph, &symbolic, params, progress).run()?;
         let mut dofs = Vec::with_capacity(symbolic.dofs());
@@ -143,7 +196,7 @@ impl Factor {
             dofs.extend(free.of_site(i).map(|a| i * matrix.block + a));
         }
         let info = DirectInfo {
-            ordering: params.ordering,
+            ordering,
             cost,
             fronts: nodes.len(),
             largest_front: symbolic
@@ -152,7 +205,7 @@ impl Factor {
                 .map(|n| n.pivot_dofs + n.row_dofs)
                 .max()
                 .unwrap_or(0),
-            ordering_seconds,
+            ordering_seconds: seconds,
             factor_seconds: start.elapsed().as_secs_f64(),
         };
         Ok((
@@ -281,4 +334,56 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + tail
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::solve::stencils::{Lattice, splice};
+
+    #[test]
+    fn the_prediction_from_a_pattern_is_what_is_stored() {
+        let lattice = Lattice::rectangle(50, 40);
+        let x = lattice.positions();
+        let spliced = splice(&lattice.bonds(3), &lattice.elements(), |i| x[i][0] > 20.0);
+        for (matrix, symmetry) in [
+            (lattice.bonds(3), Symmetry::Symmetric),
+            (spliced, Symmetry::Unsymmetric),
+        ] {
+            let mut prescribed = vec![None; matrix.dofs()];
+            (0..lattice.len())
+                .filter(|&i| x[i][0] == 0.0)
+                .for_each(|i| prescribed[2 * i] = Some(0.0));
+            prescribed[1] = Some(0.0);
+            let free = FreeDofs::from_prescribed(&prescribed, 2);
+            let graph = SiteGraph::from_pattern(&matrix.row_offsets, &matrix.columns, &free);
+            let ordering = Ordering::CoordinateNestedDissection;
+            let cost = Analysis::of_graph(graph, &x, ordering)
+                .expect("ordered")
+                .cost(symmetry);
+            let analysis = Analysis::new(&matrix, &free, &x, ordering).expect("ordered");
+            let params = DirectParams {
+                symmetry,
+                ..DirectParams::default()
+            };
+            let (factor, info) =
+                Factor::new(&matrix, &free, analysis, &params, &Silent).expect("regular");
+            assert_eq!(cost, info.cost);
+            let stored: usize = factor
+                .nodes
+                .iter()
+                .map(|n| 8 * (n.panel.len() + n.upper.len()))
+                .sum();
+            // the peak holds contribution blocks beside the factors
+            assert!(cost.bytes as usize >= stored && (cost.bytes as usize) < 2 * stored);
+            let limited = DirectParams {
+                memory_limit: Some(cost.bytes - 1),
+                ..params
+            };
+            let analysis = Analysis::new(&matrix, &free, &x, ordering).expect("ordered");
+            let refused = Factor::new(&matrix, &free, analysis, &limited, &Silent);
+            assert!(matches!(refused, Err(DirectError::TooLarge { .. })));
+        }
+    }
 }

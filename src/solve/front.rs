@@ -239,3 +239,116 @@ pub(crate) fn lu(
             );
         });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    /// A full front of pseudo-random entries in ±0.5 and a constant on the diagonal.
+    fn front(n: usize, diagonal: f64, symmetric: bool) -> DMatrix<f64> {
+        let mut state = 12345u64;
+        let mut a = DMatrix::from_fn(n, n, |_, _| {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / (1u64 << 31) as f64 - 0.5
+        });
+        if symmetric {
+            a.fill_lower_triangle_with_upper_triangle();
+        }
+        for k in 0..n {
+            a[(k, k)] += diagonal;
+        }
+        a
+    }
+
+    fn parts(a: &DMatrix<f64>, p: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let n = a.nrows();
+        let copy = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+            columns
+                .flat_map(|j| rows.clone().map(move |i| a[(i, j)]))
+                .collect::<Vec<f64>>()
+        };
+        (copy(0..n, 0..p), copy(0..p, p..n), copy(p..n, p..n))
+    }
+
+    #[test]
+    fn cholesky_gives_the_factor_and_the_schur_complement() {
+        for (p, r) in [(5, 0), (7, 4), (300, 130), (520, 270)] {
+            let a = front(p + r, (p + r) as f64, true);
+            let (mut panel, _, mut schur) = parts(&a, p);
+            cholesky(&mut panel, &mut schur, p, r).expect("positive definite");
+            let l = DMatrix::from_fn(
+                p + r,
+                p,
+                |i, j| if i >= j { panel[j * (p + r) + i] } else { 0.0 },
+            );
+            let product = &l * l.transpose();
+            for j in 0..p + r {
+                for i in j..p + r {
+                    let rest = if j >= p {
+                        schur[(j - p) * r + i - p]
+                    } else {
+                        0.0
+                    };
+                    assert!(
+                        (product[(i, j)] + rest - a[(i, j)]).abs() < 1e-9,
+                        "({i}, {j}) of {p} + {r}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lu_exchanges_rows_of_the_pivot_block() {
+        // without a heavy diagonal only row exchanges keep the factors small
+        for (p, r) in [(5, 0), (7, 4), (300, 130), (520, 270)] {
+            let a = front(p + r, 0.0, false);
+            let (mut panel, mut upper, mut schur) = parts(&a, p);
+            let mut permutation = vec![0; p];
+            lu(&mut panel, &mut upper, &mut schur, &mut permutation, p, r);
+            let l = DMatrix::from_fn(p + r, p, |i, j| match i.cmp(&j) {
+                std::cmp::Ordering::Less => 0.0,
+                std::cmp::Ordering::Equal => 1.0,
+                std::cmp::Ordering::Greater => panel[j * (p + r) + i],
+            });
+            let u = DMatrix::from_fn(p, p + r, |i, j| {
+                if j >= p {
+                    upper[(j - p) * p + i]
+                } else if i <= j {
+                    panel[j * (p + r) + i]
+                } else {
+                    0.0
+                }
+            });
+            assert!(
+                l.rows(0, p).amax() <= 1.0,
+                "partial pivoting bounds L11 by one"
+            );
+            let product = &l * &u;
+            let scale = u.amax().max(1.0) * l.amax();
+            for j in 0..p + r {
+                for i in 0..p + r {
+                    let from = if i < p { permutation[i] as usize } else { i };
+                    let rest = if i >= p && j >= p {
+                        schur[(j - p) * r + i - p]
+                    } else {
+                        0.0
+                    };
+                    let error = (product[(i, j)] + rest - a[(from, j)]).abs();
+                    assert!(error < 1e-9 * scale, "({i}, {j}) of {p} + {r}: {error:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_negative_pivot_is_refused_with_its_index() {
+        let mut a = front(400, 400.0, true);
+        a[(290, 290)] = -1e4;
+        let (mut panel, _, mut schur) = parts(&a, 400);
+        assert_eq!(cholesky(&mut panel, &mut schur, 400, 0), Err(BadPivot(290)));
+    }
+}

@@ -321,3 +321,119 @@ impl LeastSquares {
         y
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use nalgebra::{DMatrix, DVector};
+
+    struct Dense(DMatrix<f64>);
+
+    impl LinearMap for Dense {
+        fn apply_into(&self, x: &[f64], y: &mut [f64]) {
+            y.copy_from_slice((&self.0 * DVector::from_column_slice(x)).as_slice());
+        }
+    }
+
+    /// An advection-diffusion matrix: symmetric positive definite for `wind = 0`.
+    fn transport(n: usize, wind: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(n, n, |i, j| match j as isize - i as isize {
+            0 => 2.1,
+            1 => -1.0 + wind,
+            -1 => -1.0 - wind,
+            _ => 0.0,
+        })
+    }
+
+    fn rhs(n: usize) -> Vec<f64> {
+        (0..n).map(|k| ((k * 5) % 7) as f64 - 2.5).collect()
+    }
+
+    fn error(a: &DMatrix<f64>, x: &[f64], b: &[f64]) -> f64 {
+        let exact = a
+            .clone()
+            .lu()
+            .solve(&DVector::from_column_slice(b))
+            .expect("regular");
+        (DVector::from_column_slice(x) - &exact).norm() / exact.norm()
+    }
+
+    #[test]
+    fn both_methods_agree_with_dense_lu() {
+        let (n, params) = (
+            60,
+            KrylovParams {
+                tolerance: 1e-12,
+                ..KrylovParams::default()
+            },
+        );
+        let b = rhs(n);
+        let a = transport(n, 0.0);
+        let (x, info) = conjugate_gradients(&Dense(a.clone()), &Identity, &b, &params, &Silent)
+            .expect("solved");
+        assert!(error(&a, &x, &b) < 1e-10 && info.iterations <= n);
+        for wind in [0.0, 0.4, 0.9] {
+            let a = transport(n, wind);
+            let (x, info) =
+                gmres(&Dense(a.clone()), &Identity, &b, &params, &Silent).expect("solved");
+            assert!(
+                error(&a, &x, &b) < 1e-10 && info.iterations <= n,
+                "wind {wind}: {info:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn restarts_and_preconditioning_on_the_right_leave_the_true_residual() {
+        let (n, a) = (80, transport(80, 0.3));
+        let b = rhs(n);
+        let params = KrylovParams {
+            tolerance: 1e-11,
+            max_iterations: 2000,
+            restart: 7,
+        };
+        // a poor but regular preconditioner with uneven scales
+        let uneven = Dense(DMatrix::from_diagonal(&DVector::from_fn(n, |k, _| {
+            1.0 + (k % 3) as f64
+        })));
+        let (x, info) = gmres(&Dense(a.clone()), &uneven, &b, &params, &Silent).expect("solved");
+        let residual =
+            (DVector::from_column_slice(&b) - &a * DVector::from_column_slice(&x)).norm();
+        assert!(
+            (residual / norm(&b) - info.relative_residual).abs() < 1e-15 && info.iterations > 7
+        );
+        assert!(error(&a, &x, &b) < 1e-9);
+    }
+
+    #[test]
+    fn trouble_is_reported() {
+        let n = 20;
+        let mut a = transport(n, 0.0);
+        a[(3, 3)] = -4.0;
+        let b = rhs(n);
+        let params = KrylovParams::default();
+        let wrong = conjugate_gradients(&Dense(a), &Identity, &b, &params, &Silent);
+        assert!(
+            matches!(wrong, Err(KrylovError::Indefinite { .. })),
+            "{wrong:?}"
+        );
+        let few = KrylovParams {
+            max_iterations: 3,
+            ..params
+        };
+        let short = gmres(&Dense(transport(n, 0.5)), &Identity, &b, &few, &Silent);
+        assert!(
+            matches!(short, Err(KrylovError::NotConverged { iterations: 3, .. })),
+            "{short:?}"
+        );
+        // a singular matrix with a load outside its range
+        let mut singular = transport(n, 0.0);
+        singular.row_mut(4).fill(0.0);
+        let never = gmres(&Dense(singular), &Identity, &b, &params, &Silent);
+        assert!(
+            matches!(never, Err(KrylovError::NotConverged { .. })),
+            "{never:?}"
+        );
+    }
+}

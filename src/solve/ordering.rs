@@ -80,7 +80,29 @@ impl SiteGraph {
     ///
     /// Blocks that are exactly zero (bonds that were cut) join nothing.
     pub fn new(matrix: &BlockCsr, free: &FreeDofs) -> SiteGraph {
-        let n_sites = matrix.rows();
+        let size = matrix.block * matrix.block;
+        SiteGraph::joined(&matrix.row_offsets, &matrix.columns, free, |e| {
+            matrix.values[e * size..(e + 1) * size]
+                .iter()
+                .any(|&k| k != 0.0)
+        })
+    }
+
+    /// The graph of a pattern without values, to predict the cost of a matrix before it is assembled.
+    ///
+    /// Shapes: `row_offsets` and `columns` as in [`BlockCsr`], columns ascending within a row.
+    pub fn from_pattern(row_offsets: &[usize], columns: &[u32], free: &FreeDofs) -> SiteGraph {
+        SiteGraph::joined(row_offsets, columns, free, |_| true)
+    }
+
+    /// `joins` says whether an entry of the pattern connects its sites.
+    fn joined(
+        row_offsets: &[usize],
+        columns: &[u32],
+        free: &FreeDofs,
+        joins: impl Fn(usize) -> bool + Sync,
+    ) -> SiteGraph {
+        let n_sites = free.sites();
         let sites: Vec<u32> = (0..n_sites as u32)
             .filter(|&i| free.count_of_site(i as usize) > 0)
             .collect();
@@ -91,17 +113,11 @@ impl SiteGraph {
         let rows: Vec<Vec<u32>> = sites
             .par_iter()
             .map(|&i| {
-                let (columns, blocks) = matrix.row(i as usize);
-                let size = matrix.block * matrix.block;
-                columns
-                    .iter()
-                    .enumerate()
-                    .filter(|&(e, &c)| {
-                        c != i
-                            && vertex[c as usize] != u32::MAX
-                            && blocks[e * size..(e + 1) * size].iter().any(|&k| k != 0.0)
+                (row_offsets[i as usize]..row_offsets[i as usize + 1])
+                    .filter(|&e| {
+                        columns[e] != i && vertex[columns[e] as usize] != u32::MAX && joins(e)
                     })
-                    .map(|(_, &c)| vertex[c as usize])
+                    .map(|e| vertex[columns[e] as usize])
                     .collect()
             })
             .collect();
@@ -187,9 +203,7 @@ impl Ordering {
     }
 }
 
-/// Sites below which a part is not cut any further.
-///
-/// Seconds of ordering + factorisation with leaves of 8, 32 and 128 sites: see `docs/solvers.md`.
+/// Sites below which a part is not cut any further; small parts become one front in any case.
 const LEAF: usize = 32;
 
 /// Parts below this many sites are cut on one thread.
@@ -410,4 +424,94 @@ fn minimum_degree(graph: &SiteGraph) -> Result<Vec<u32>, OrderingError> {
     )
     .map_err(|e| failed(e.to_string()))?;
     Ok(forward.into_iter().map(|v| v as u32).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::stencils::{Lattice, splice};
+
+    fn graph_of(lattice: &Lattice, matrix: &BlockCsr) -> SiteGraph {
+        SiteGraph::new(matrix, &FreeDofs::all(lattice.len(), lattice.dimension))
+    }
+
+    #[test]
+    fn every_ordering_is_a_permutation() {
+        let lattice = Lattice::rectangle(23, 17);
+        let graph = graph_of(&lattice, &lattice.bonds(2));
+        for ordering in [
+            Ordering::CoordinateNestedDissection,
+            Ordering::Metis,
+            Ordering::Amd,
+        ] {
+            let mut order = ordering
+                .order(&graph, &lattice.positions())
+                .expect("ordered");
+            order.sort_unstable();
+            assert!(
+                order.into_iter().eq(0..lattice.len() as u32),
+                "{ordering:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_last_sites_separate_the_others() {
+        // 40 × 20 sites with bonds of two spacings: the first cut is a strip of 2 × 20 sites across the long axis
+        let lattice = Lattice::rectangle(40, 20);
+        let graph = graph_of(&lattice, &lattice.bonds(2));
+        let order = Ordering::CoordinateNestedDissection
+            .order(&graph, &lattice.positions())
+            .expect("ordered");
+        let separator = &order[order.len() - 40..];
+        let x: Vec<usize> = separator.iter().map(|&v| v as usize % 40).collect();
+        let (low, high) = (x.iter().min().copied(), x.iter().max().copied());
+        assert!(
+            matches!((low, high), (Some(a), Some(b)) if b == a + 1 && (17..22).contains(&a)),
+            "{low:?} {high:?}"
+        );
+        for v in (0..graph.len()).filter(|v| v % 40 < x[0].min(x[1])) {
+            assert!(
+                graph
+                    .neighbours_of(v)
+                    .iter()
+                    .all(|&w| (w as usize) % 40 <= high.unwrap_or(0))
+            );
+        }
+    }
+
+    #[test]
+    fn coincident_sites_do_not_stop_the_bisection() {
+        let lattice = Lattice::rectangle(30, 30);
+        let graph = graph_of(&lattice, &lattice.elements());
+        let order = Ordering::CoordinateNestedDissection
+            .order(&graph, &[[1.0; 3]; 900])
+            .expect("ordered");
+        assert_eq!(order.len(), 900);
+    }
+
+    #[test]
+    fn the_graph_is_symmetric_and_leaves_out_what_is_prescribed() {
+        let lattice = Lattice::rectangle(12, 9);
+        let matrix = splice(&lattice.bonds(3), &lattice.elements(), |i| i % 12 > 5);
+        let mut prescribed = vec![None; matrix.dofs()];
+        prescribed[2 * 40] = Some(0.0);
+        prescribed[2 * 41] = Some(0.0);
+        prescribed[2 * 41 + 1] = Some(0.0);
+        let graph = SiteGraph::new(&matrix, &FreeDofs::from_prescribed(&prescribed, 2));
+        assert_eq!(graph.len(), lattice.len() - 1);
+        assert_eq!(graph.weights[40], 1);
+        assert!(!graph.sites.contains(&41));
+        let joined = |i: u32, j: u32| matrix.row(i as usize).0.binary_search(&j).is_ok();
+        for v in 0..graph.len() {
+            let i = graph.sites[v];
+            let expected: Vec<u32> = (0..graph.len() as u32)
+                .filter(|&w| {
+                    let j = graph.sites[w as usize];
+                    i != j && (joined(i, j) || joined(j, i))
+                })
+                .collect();
+            assert_eq!(graph.neighbours_of(v), expected);
+        }
+    }
 }

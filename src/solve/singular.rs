@@ -5,9 +5,9 @@
 
 use crate::progress::Silent;
 use crate::solve::FreeDofs;
-use crate::solve::direct::{DirectParams, Factor};
+use crate::solve::direct::{Analysis, DirectParams, Factor};
 use crate::solve::ordering::Ordering;
-use crate::system::{BlockCsr, Symmetry};
+use crate::system::BlockCsr;
 use nalgebra::{DMatrix, DVector};
 
 /// Sites that can move without resistance.
@@ -312,12 +312,12 @@ fn null_vector(
             *k += shift[i * d + a];
         }
     }
+    let analysis = Analysis::new(&shifted, free, positions, ordering).ok()?;
     let params = DirectParams {
-        ordering,
-        symmetry: Symmetry::Unsymmetric,
         smallest_pivot: 0.0,
+        ..DirectParams::default()
     };
-    let (factor, _) = Factor::new(&shifted, free, positions, &params, &Silent).ok()?;
+    let (factor, _) = Factor::new(&shifted, free, analysis, &params, &Silent).ok()?;
     // any start with a part of every site will do; this one is fixed
     let mut v: Vec<f64> = (0..matrix.dofs())
         .map(|k| 1.0 + ((k * 7919) % 1013) as f64 / 1013.0)

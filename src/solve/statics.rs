@@ -1,7 +1,7 @@
 //! The static problem: `K u = f` on free dofs, `u` given on the others.
 
 use crate::progress::Progress;
-use crate::solve::direct::{DirectError, DirectInfo, DirectParams, Factor};
+use crate::solve::direct::{Analysis, DirectError, DirectInfo, DirectParams, Factor};
 use crate::solve::krylov::{KrylovError, KrylovParams, conjugate_gradients, gmres};
 use crate::solve::multigrid::{Multigrid, MultigridError, MultigridParams};
 use crate::solve::ordering::{Ordering, OrderingError};
@@ -62,6 +62,8 @@ pub struct StaticParams {
     pub tolerance: f64,
     /// Limit of iterations.
     pub max_iterations: usize,
+    /// Largest number of bytes that a factorisation may be predicted to need; `None` for no limit.
+    pub memory_limit: Option<u64>,
 }
 
 impl Default for StaticParams {
@@ -71,6 +73,7 @@ impl Default for StaticParams {
             ordering: Ordering::default(),
             tolerance: 1e-10,
             max_iterations: 1000,
+            memory_limit: None,
         }
     }
 }
@@ -185,6 +188,9 @@ pub enum StaticError {
     /// The elimination order could not be computed.
     #[error(transparent)]
     Ordering(#[from] OrderingError),
+    /// The factors would not fit into the memory allowed.
+    #[error(transparent)]
+    TooLarge(DirectError),
     /// The multigrid hierarchy could not be built.
     #[error(transparent)]
     Multigrid(#[from] MultigridError),
@@ -246,22 +252,7 @@ pub fn solve(
         if let Some(motion) = singular::unheld_bodies(matrix, &free, problem.positions) {
             return Err(singular_error(motion, problem.positions));
         }
-        let iterate = match params.method {
-            Method::Auto => info.free_dofs > largest_direct(matrix.block),
-            Method::Direct => false,
-            Method::Krylov => true,
-        };
-        let start = u.clone();
-        let mut outcome = match iterate {
-            true => krylov(problem, &free, params, progress, &mut u, &mut info),
-            false => direct(problem, &free, params, progress, &mut u, &mut info),
-        };
-        if iterate && params.method == Method::Auto && outcome.is_err() {
-            u = start;
-            info.iterations = 0;
-            outcome = direct(problem, &free, params, progress, &mut u, &mut info);
-        }
-        outcome?;
+        solve_free(problem, &free, params, progress, &mut u, &mut info)?;
     }
     let mut reactions = matrix.multiply(&u);
     for (k, r) in reactions.iter_mut().enumerate() {
@@ -358,13 +349,55 @@ fn residual(problem: &StaticProblem<'_>, u: &[f64]) -> (Vec<f64>, f64) {
     (r, norm)
 }
 
-/// Largest number of unknowns that `Auto` solves directly, by dimension.
-fn largest_direct(dimension: usize) -> usize {
-    match dimension {
-        1 => usize::MAX,
-        2 => 400_000,
-        _ => 30_000,
+/// `Auto` factorises while that takes at most this many operations per stored scalar of `K`.
+///
+/// On the cases of `benches/solvers.rs` an iterative solve takes 0.8e-7 to 2.5e-7 s of CPU per stored scalar and a
+/// factorisation 3e-11 s per operation, which balances at 3e3 to 8e3; a little more is allowed, because a direct
+/// solution is exact to round-off. `cargo bench --bench solvers -- crossover` prints both times over a range of sizes:
+/// the choice changes over at about 30 000 dofs for 2D bonds and splices, 6000 for 3D bonds, 25 000 for 3D
+/// elements, and beyond 300 000 for 2D elements.
+const DIRECT_OPERATIONS: f64 = 1e4;
+
+/// Beyond this many stored scalars `Auto` iterates without asking what a factorisation would cost: a bandwidth of
+/// peridynamic bonds never factorises faster there, and finding that out takes seconds.
+const ANALYSED: usize = 40_000_000;
+
+/// Chooses, and falls back where the choice was `Auto`'s and failed.
+fn solve_free(
+    problem: &StaticProblem<'_>,
+    free: &FreeDofs,
+    params: &StaticParams,
+    progress: &dyn Progress,
+    u: &mut [f64],
+    info: &mut StaticInfo,
+) -> Result<(), StaticError> {
+    let analyse = || {
+        progress.stage("ordering", None);
+        Analysis::new(problem.stiffness, free, problem.positions, params.ordering)
+    };
+    match params.method {
+        Method::Krylov => return krylov(problem, free, params, progress, u, info),
+        Method::Direct => {}
+        Method::Auto if problem.stiffness.nonzeros() <= ANALYSED => {
+            let analysis = analyse()?;
+            let cost = analysis.cost(problem.symmetry);
+            let fits = params.memory_limit.is_none_or(|limit| cost.bytes <= limit);
+            if fits && cost.flops <= DIRECT_OPERATIONS * problem.stiffness.nonzeros() as f64 {
+                return direct(problem, free, analysis, params, progress, u, info);
+            }
+            // not kept: its memory is better spent on the hierarchy
+        }
+        Method::Auto => {}
     }
+    if params.method == Method::Auto {
+        let (start, before) = (u.to_vec(), *info);
+        if krylov(problem, free, params, progress, u, info).is_ok() {
+            return Ok(());
+        }
+        u.copy_from_slice(&start);
+        *info = before;
+    }
+    direct(problem, free, analyse()?, params, progress, u, info)
 }
 
 fn krylov(
@@ -459,12 +492,13 @@ fn accept(
 fn direct(
     problem: &StaticProblem<'_>,
     free: &FreeDofs,
+    analysis: Analysis,
     params: &StaticParams,
     progress: &dyn Progress,
     u: &mut [f64],
     info: &mut StaticInfo,
 ) -> Result<(), StaticError> {
-    let (factor, symmetry, done) = factorise(problem, free, params, progress)?;
+    let (factor, symmetry, done) = factorise(problem, free, analysis, params, progress)?;
     info.method = match symmetry {
         Symmetry::Symmetric => MethodUsed::Cholesky,
         Symmetry::Unsymmetric => MethodUsed::Lu,
@@ -523,31 +557,27 @@ fn backward_error(problem: &StaticProblem<'_>, u: &[f64], r: &[f64]) -> f64 {
 fn factorise(
     problem: &StaticProblem<'_>,
     free: &FreeDofs,
+    analysis: Analysis,
     params: &StaticParams,
     progress: &dyn Progress,
 ) -> Result<(Factor, Symmetry, DirectInfo), StaticError> {
-    let attempt = |symmetry| {
+    let attempt = |analysis, symmetry| {
         let params = DirectParams {
-            ordering: params.ordering,
             symmetry,
+            memory_limit: params.memory_limit,
             ..DirectParams::default()
         };
-        Factor::new(
-            problem.stiffness,
-            free,
-            problem.positions,
-            &params,
-            progress,
-        )
-        .map(|(factor, info)| (factor, symmetry, info))
+        Factor::new(problem.stiffness, free, analysis, &params, progress)
+            .map(|(factor, info)| (factor, symmetry, info))
     };
-    let mut result = attempt(problem.symmetry);
+    let mut result = attempt(analysis, problem.symmetry);
     if let Err(DirectError::NotPositive { .. }) = result {
-        result = attempt(Symmetry::Unsymmetric);
+        let analysis = Analysis::new(problem.stiffness, free, problem.positions, params.ordering)?;
+        result = attempt(analysis, Symmetry::Unsymmetric);
     }
     match result {
         Ok(done) => Ok(done),
-        Err(DirectError::Ordering(error)) => Err(error.into()),
+        Err(error @ DirectError::TooLarge { .. }) => Err(StaticError::TooLarge(error)),
         Err(DirectError::NotPositive { site } | DirectError::Singular { site, .. }) => {
             let motion = singular::mechanism(
                 problem.stiffness,

@@ -362,3 +362,104 @@ fn merge(columns: &mut [Vec<u32>], parent: &mut [u32], heights: Vec<usize>) {
         children[s] = kept;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::FreeDofs;
+    use crate::solve::ordering::Ordering;
+    use crate::solve::stencils::Lattice;
+
+    /// Marks the entries of the factor by elimination on a dense pattern, vertex by vertex.
+    fn dense_fill(graph: &SiteGraph, symbolic: &Symbolic) -> Vec<Vec<bool>> {
+        let n = graph.len();
+        let mut filled = vec![vec![false; n]; n];
+        for v in 0..n {
+            for &w in graph.neighbours_of(v) {
+                filled[symbolic.number[v] as usize][symbolic.number[w as usize] as usize] = true;
+            }
+        }
+        for k in 0..n {
+            let below: Vec<usize> = (k + 1..n).filter(|&i| filled[i][k]).collect();
+            for &i in &below {
+                for &j in &below {
+                    filled[i][j] = true;
+                }
+            }
+        }
+        filled
+    }
+
+    #[test]
+    fn supernodes_hold_all_fill_and_few_zeros() {
+        for (lattice, matrix) in [
+            (
+                Lattice::rectangle(16, 13),
+                Lattice::rectangle(16, 13).elements(),
+            ),
+            (
+                Lattice::rectangle(16, 13),
+                Lattice::rectangle(16, 13).bonds(2),
+            ),
+            (Lattice::block(6, 5, 5), Lattice::block(6, 5, 5).elements()),
+        ] {
+            let graph = SiteGraph::new(&matrix, &FreeDofs::all(lattice.len(), lattice.dimension));
+            for ordering in [
+                Ordering::CoordinateNestedDissection,
+                Ordering::Metis,
+                Ordering::Amd,
+            ] {
+                let order = ordering
+                    .order(&graph, &lattice.positions())
+                    .expect("ordered");
+                let symbolic = Symbolic::new(&graph, &order);
+                let filled = dense_fill(&graph, &symbolic);
+                let mut stored = 0;
+                for (s, node) in symbolic.nodes.iter().enumerate() {
+                    for j in node.first..node.last {
+                        for i in j + 1..graph.len() as u32 {
+                            let held = i < node.last || node.rows.binary_search(&i).is_ok();
+                            stored += usize::from(held);
+                            assert!(
+                                held || !filled[i as usize][j as usize],
+                                "{ordering:?}: ({i}, {j}) is lost"
+                            );
+                        }
+                    }
+                    // the rows of a child belong to the front of its parent
+                    if let Some(parent) = symbolic.parent(s) {
+                        let parent = &symbolic.nodes[parent];
+                        let inside = |i: &u32| {
+                            (parent.first..parent.last).contains(i) || parent.rows.contains(i)
+                        };
+                        assert!(node.rows.iter().all(inside));
+                    } else {
+                        assert!(node.rows.is_empty());
+                    }
+                }
+                let needed = (0..graph.len())
+                    .map(|j| (j + 1..graph.len()).filter(|&i| filled[i][j]).count())
+                    .sum();
+                assert!(
+                    stored >= needed && stored < 2 * needed,
+                    "{ordering:?}: {stored} for {needed}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn costs_of_a_dense_matrix_are_the_textbook_ones() {
+        // every site of a 3 × 3 lattice sees every other within four spacings: one front of 18 dofs
+        let lattice = Lattice::rectangle(3, 3);
+        let graph = SiteGraph::new(&lattice.bonds(4), &FreeDofs::all(9, 2));
+        let symbolic = Symbolic::new(&graph, &(0..9).collect::<Vec<u32>>());
+        assert_eq!(symbolic.nodes.len(), 1);
+        let llt = symbolic.cost(Symmetry::Symmetric);
+        assert_eq!(llt.factor_nnz, 18 * 19 / 2);
+        assert!((llt.flops - 18f64.powi(3) / 3.0).abs() < 1e-9);
+        let lu = symbolic.cost(Symmetry::Unsymmetric);
+        assert_eq!((lu.factor_nnz, lu.bytes), (18 * 18, 8 * 18 * 18));
+        assert!((lu.flops - 2.0 * 18f64.powi(3) / 3.0).abs() < 1e-9);
+    }
+}

@@ -477,3 +477,31 @@ fn wrong_shapes_and_numbers_are_refused() {
         "{message}"
     );
 }
+
+#[test]
+fn auto_factorises_narrow_stencils_and_iterates_on_wide_ones_in_three_dimensions() {
+    let plane = Lattice::rectangle(60, 60);
+    let case = Case::new(&plane, plane.elements(), Symmetry::Symmetric).held();
+    let info = case.solve(&StaticParams::default()).expect("solved").info;
+    assert_eq!(info.method, MethodUsed::Cholesky);
+    let solid = Lattice::block(17, 17, 17);
+    let case = Case::new(&solid, solid.bonds(3), Symmetry::Symmetric).held();
+    let info = case.solve(&StaticParams::default()).expect("solved").info;
+    assert_eq!(info.method, MethodUsed::ConjugateGradients);
+    assert!(info.relative_residual <= 1e-10);
+    // too little memory for the factors leaves the iteration, and an error where that was ruled out
+    let small = StaticParams {
+        memory_limit: Some(1000),
+        ..StaticParams::default()
+    };
+    let case = Case::new(&plane, plane.elements(), Symmetry::Symmetric).held();
+    assert_eq!(
+        case.solve(&small).expect("solved").info.method,
+        MethodUsed::ConjugateGradients
+    );
+    let direct = StaticParams {
+        method: Method::Direct,
+        ..small
+    };
+    assert!(matches!(case.solve(&direct), Err(StaticError::TooLarge(_))));
+}
