@@ -328,6 +328,7 @@ fn params(solver: &Solver) -> StaticParams {
         ordering: solver.ordering,
         tolerance: solver.tolerance,
         max_iterations: solver.max_iterations,
+        ..StaticParams::default()
     }
 }
 
