@@ -156,6 +156,7 @@
 //!
 //! Keys in brackets, such as [SAND2015-7998], are resolved in `docs/references.md`.
 
+pub mod assembly;
 pub mod coupling;
 pub mod fem;
 pub mod material;

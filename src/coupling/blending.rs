@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use crate::{
+    assembly::Row,
     coupling::{
         CellRole, Coupling, Model, ModelError, Operator, Zone,
         derivative::{self, DerivativeWeights},
         edge::Edge,
-        row::Row,
     },
     mesh::Mesh,
     peridynamics::PdBody,

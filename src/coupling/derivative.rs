@@ -148,3 +148,100 @@ pub enum FitDegree {
     /// Reproduces quadratic fields, as in the report.
     Quadratic,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a lattice of spacing 0.5 around the origin, moved by up to `jitter` spacings.
+    fn around<const D: usize>(reach: i32, jitter: f64) -> Vec<Vector<D>> {
+        let side = 2 * reach + 1;
+        let mut state = 7u64;
+        (0..side.pow(D as u32))
+            .map(|index| {
+                let mut rest = index;
+                Vector::from_fn(|_, _| {
+                    let k = rest % side - reach;
+                    rest /= side;
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    let noise = (state >> 33) as f64 / f64::from(1u32 << 30) - 1.0;
+                    0.5 * (f64::from(k) + jitter * noise)
+                })
+            })
+            .collect()
+    }
+
+    /// A quadratic with gradient `g` and Hessian `h` at the origin.
+    fn quadratic_field<const D: usize>(x: &Vector<D>) -> (f64, Vector<D>, Tensor<D>) {
+        let g = Vector::<D>::from_fn(|a, _| 1.5 - a as f64);
+        let h = Tensor::<D>::from_fn(|a, b| 0.3 + (a + b) as f64 + if a == b { 2.0 } else { 0.0 });
+        (0.7 + g.dot(x) + 0.5 * x.dot(&(h * x)), g, h)
+    }
+
+    fn derivatives_are_exact_for_quadratics<const D: usize>() {
+        for jitter in [0.0, 0.15] {
+            let points = around::<D>(2, jitter);
+            let centre = points
+                .iter()
+                .position(|x| x.norm() < 0.2)
+                .expect("the centre");
+            let bonds: Vec<(u32, Vector<D>)> = (0..points.len())
+                .filter(|&i| i != centre)
+                .map(|i| (i as u32, points[i] - points[centre]))
+                .collect();
+            let weights = quadratic(0.5, &bonds).expect("enough neighbours");
+            let (here, ..) = quadratic_field(&points[centre]);
+            let (mut g, mut h) = (Vector::<D>::zeros(), Tensor::<D>::zeros());
+            for (n, &j) in weights.neighbours.iter().enumerate() {
+                let difference = quadratic_field(&points[j as usize]).0 - here;
+                g += weights.gradient[n] * difference;
+                h += weights.hessian[n] * difference;
+            }
+            let (_, g0, h0) = quadratic_field(&points[centre]);
+            assert!((g - (g0 + h0 * points[centre])).amax() < 1e-11);
+            assert!((h - h0).amax() < 1e-11);
+        }
+    }
+
+    #[test]
+    fn derivatives_of_quadratics_in_every_dimension() {
+        derivatives_are_exact_for_quadratics::<1>();
+        derivatives_are_exact_for_quadratics::<2>();
+        derivatives_are_exact_for_quadratics::<3>();
+    }
+
+    #[test]
+    fn on_a_lattice_the_nearest_ring_is_enough() {
+        let bonds: Vec<(u32, Vector<3>)> = (0..)
+            .zip(around::<3>(3, 0.0))
+            .filter(|(_, x)| x.norm() > 0.1)
+            .collect();
+        assert_eq!(
+            quadratic(0.5, &bonds).expect("a lattice").neighbours.len(),
+            26
+        );
+    }
+
+    #[test]
+    fn fits_reproduce_their_degree_and_refuse_too_little() {
+        let x = Vector::<2>::new(0.11, -0.07);
+        let data = around::<2>(1, 0.2);
+        let value = |weights: &[f64], f: &dyn Fn(&Vector<2>) -> f64| -> f64 {
+            data.iter().zip(weights).map(|(p, w)| w * f(p)).sum()
+        };
+        let affine = |p: &Vector<2>| 2.0 - p[0] + 3.0 * p[1];
+        let square = |p: &Vector<2>| quadratic_field(p).0;
+        let weights = fit(&x, &data, FitDegree::Quadratic).expect("nine points");
+        assert!((value(&weights, &square) - square(&x)).abs() < 1e-12);
+        let weights = fit(&x, &data, FitDegree::Affine).expect("nine points");
+        assert!((value(&weights, &affine) - affine(&x)).abs() < 1e-13);
+        assert!((value(&weights, &square) - square(&x)).abs() > 1e-3);
+        let line: Vec<Vector<2>> = (0..9)
+            .map(|k| Vector::<2>::new(f64::from(k), 0.0))
+            .collect();
+        assert!(fit(&x, &line, FitDegree::Affine).is_none());
+        assert!(fit(&x, &data[..5], FitDegree::Quadratic).is_none());
+    }
+}

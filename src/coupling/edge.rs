@@ -17,14 +17,7 @@ impl<'a, const D: usize> Edge<'a, D> {
             .into_iter()
             .map(|facet| {
                 let nodes = facet.first.nodes;
-                let (mut low, mut high): (Vector<D>, Vector<D>) = (
-                    Vector::repeat(f64::INFINITY),
-                    Vector::repeat(f64::NEG_INFINITY),
-                );
-                for &n in &nodes {
-                    low = low.inf(&mesh.nodes[n as usize]);
-                    high = high.sup(&mesh.nodes[n as usize]);
-                }
+                let (low, high) = mesh.bounds_of(&nodes);
                 (low, high, nodes)
             })
             .collect();

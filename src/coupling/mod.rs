@@ -6,8 +6,11 @@
 //! | `splice.rs` | each site takes the equation of its own model | [SAND2015-7998] eq. (2.30) |
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
-//! | `model.rs`, `points.rs` | shared: sites, PD points, families, what completes them | |
-//! | `row.rs`, `derivative.rs`, `edge.rs`, `sample.rs` | shared: places through sites, least squares, distances, displacements anywhere | |
+//! | `problem.rs` | what a coupled problem consists of | |
+//! | `model.rs` | shared: sites, families, what completes them | |
+//! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
+//! | `derivative.rs`, `edge.rs`, `sample.rs` | shared: least squares, distances, displacements anywhere | |
+//! | `crate::assembly` | rows, and places expressed through sites | |
 //!
 //! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
 //! every affine field, whatever its neighbours' rows are, makes the patch test pass; so all that a seam must provide is (a) complete families and complete patches of
@@ -15,25 +18,28 @@
 //! A method is one file with a [`Coupling`], one line here and its entry in the scene.
 
 pub mod blending;
+mod bonds;
 pub mod derivative;
 pub mod edge;
 pub mod model;
 pub mod partial_stress;
+mod place;
 pub mod points;
-pub mod row;
+pub mod problem;
 pub mod sample;
 pub mod single;
 pub mod splice;
 
 pub use blending::{Blending, BlendingFunction};
 pub use derivative::FitDegree;
-pub use model::{Model, ModelError, Peridynamics, PointSource, Problem, Site, SiteKind};
+pub use model::{Model, Site, SiteKind};
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
+pub use problem::{ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
 pub use sample::Sampler;
 pub use single::{Local, Nonlocal};
 pub use splice::Splice;
 
-use crate::{coupling::row::Row, mesh::Mesh, peridynamics::BondLaw, system::Symmetry};
+use crate::{assembly::Row, mesh::Mesh, peridynamics::BondLaw, system::Symmetry};
 
 /// The model that a scene asks for in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]

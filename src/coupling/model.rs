@@ -1,91 +1,22 @@
 //! What all couplings share: sites, peridynamic points, their families, and the places at the seam that follow sites.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
-use thiserror::Error;
 
 use crate::{
+    assembly::{self, Row, Transfer},
     coupling::{
-        CellRole, Coupling, FitDegree, Interface, Reach, Zone, derivative,
-        points::{self, LatticeFactors, PointCloud},
-        row::{self, Row, Transfer},
+        CellRole, Coupling, FitDegree, Interface, ModelError, Peridynamics, Problem, Reach, Zone,
+        bonds::{self, LatticeFactors},
+        derivative, place,
+        points::{PointCloud, Volumes},
     },
     fem,
     mesh::{CellShape, Mesh},
-    peridynamics::{
-        BondLaw, BondWeights, Cloud, Ends, Factors, Families, PdBody, PointError, TIE_TOLERANCE,
-    },
+    peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody, TIE_TOLERANCE},
     progress::Progress,
-    shape::Barrier,
-    system::{BlockCsr, Symmetry},
+    system::BlockCsr,
     tensor::{Tensor, Tensor4, Vector},
 };
-
-/// A scalar field of position.
-pub type ScalarField<const D: usize> = Arc<dyn Fn(&Vector<D>) -> f64 + Send + Sync>;
-
-/// Where peridynamic points come from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PointSource<const D: usize> {
-    /// One point per cell, at its centroid, with its volume.
-    Cells,
-    /// The points of a lattice that lie in the zone; the volume of each is what its cell of the lattice shares with the body.
-    Lattice {
-        /// Distance h of neighbouring points \[m\].
-        spacing: f64,
-        /// Any point of the lattice.
-        origin: Vector<D>,
-    },
-}
-
-/// The peridynamic part of a problem.
-pub struct Peridynamics<const D: usize> {
-    /// The law.
-    pub law: Box<dyn BondLaw<D>>,
-    /// Horizon δ as a field \[m\].
-    pub horizon: ScalarField<D>,
-    /// Where the points come from.
-    pub points: PointSource<D>,
-    /// How bonds are weighted.
-    pub weights: BondWeights,
-    /// Voids and cracks that cut bonds.
-    pub barriers: Vec<Barrier<D>>,
-    /// Shapes whose interior holds no points although the mesh may cover it.
-    pub voids: Vec<crate::shape::Shape<D>>,
-    /// Whether bonds that leave the mesh are cut (holes of a mesh that no barrier describes).
-    pub surfaces: Surfaces,
-}
-
-/// What becomes of bonds that cross the boundary of the mesh.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Surfaces {
-    /// They are cut.
-    Cut,
-    /// They are kept.
-    Uncut,
-}
-
-/// Everything that makes a coupled model, before it is assembled.
-pub struct Problem<const D: usize> {
-    /// The mesh of the whole part.
-    pub mesh: Mesh<D>,
-    /// The zone of each cell.
-    pub zones: Vec<Zone>,
-    /// Local elastic tensors \[Pa\], one per material.
-    pub tensors: Vec<Tensor4<D>>,
-    /// The material of each cell, an index into `tensors`.
-    pub cell_material: Vec<u16>,
-    /// The material that peridynamic points have, an index into `tensors`.
-    pub peridynamic_material: u16,
-    /// The peridynamic part; none in a purely local problem.
-    pub peridynamics: Option<Peridynamics<D>>,
-    /// The method.
-    pub coupling: Box<dyn Coupling<D>>,
-}
 
 /// What keeps degrees of freedom at a site.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,106 +36,6 @@ pub struct Site<const D: usize> {
     pub kind: SiteKind,
     /// Volume that the site stands for \[m^D\]: the point's, or the integral of the node's shape function.
     pub volume: f64,
-}
-
-/// Why a model cannot be built.
-#[derive(Debug, Error)]
-pub enum ModelError {
-    /// A zone has no cell.
-    #[error(
-        "the {zone} zone is empty: no cell of the mesh has its centroid in it; enlarge the zone, refine the mesh there, or choose coupling.local"
-    )]
-    EmptyZone {
-        /// Which zone.
-        zone: &'static str,
-    },
-    /// A zone holds no peridynamic point.
-    #[error(
-        "the nonlocal zone holds no peridynamic point: its smallest extent is below the spacing {spacing}; enlarge the zone or refine the lattice"
-    )]
-    NoPoints {
-        /// Spacing of the lattice \[m\].
-        spacing: f64,
-    },
-    /// The horizon is too small or not a number.
-    #[error("the horizon is {horizon} at ({}): it must be finite and at least the spacing of the points, {spacing}, or no point has a neighbour", join(.position))]
-    Horizon {
-        /// Where.
-        position: Vec<f64>,
-        /// Its value \[m\].
-        horizon: f64,
-        /// Spacing of the points \[m\].
-        spacing: f64,
-    },
-    /// A family cannot carry the law.
-    #[error("{what} at ({}) has a family of {bonds} bonds that cannot carry the material: {source}", join(.position))]
-    Family {
-        /// Point or Gauss point.
-        what: &'static str,
-        /// Where.
-        position: Vec<f64>,
-        /// Number of intact bonds.
-        bonds: usize,
-        /// Why.
-        #[source]
-        source: crate::peridynamics::PdError,
-    },
-    /// A node at the seam cannot be fitted.
-    #[error("node {node} at ({}) lies at the seam, but the {found} sites around it do not determine an affine fit: make the peridynamic zone at least three points thick there", join(.position))]
-    Fit {
-        /// Number of the node.
-        node: u32,
-        /// Where.
-        position: Vec<f64>,
-        /// Number of sites found.
-        found: usize,
-    },
-    /// Derivatives cannot be taken at a point of the blending region.
-    #[error("the point at ({}) lies where the models are blended, but its {bonds} bonds do not determine a quadratic field: widen the horizon or the body there", join(.position))]
-    Derivative {
-        /// Where.
-        position: Vec<f64>,
-        /// Number of intact bonds.
-        bonds: usize,
-    },
-    /// The points do not make families.
-    #[error(transparent)]
-    Families(#[from] crate::peridynamics::FamilyError),
-    /// Weights of the lattice's shells cannot be made isotropic.
-    #[error(transparent)]
-    Shells(#[from] crate::peridynamics::ShellError),
-    /// A combination that is not offered.
-    #[error("{what} is not offered: {remedy}")]
-    Unsupported {
-        /// What was asked for.
-        what: &'static str,
-        /// What to do instead.
-        remedy: &'static str,
-    },
-}
-
-fn join(position: &[f64]) -> String {
-    position
-        .iter()
-        .map(|x| format!("{x}"))
-        .collect::<Vec<_>>()
-        .join(", ")
-}
-
-impl ModelError {
-    fn family<const D: usize>(what: &'static str, e: PointError<D>) -> Self {
-        Self::Family {
-            what,
-            position: e.position.iter().copied().collect(),
-            bonds: e.bonds,
-            source: e.source,
-        }
-    }
-
-    /// The error of a family of a Gauss point.
-    pub fn gauss_point<const D: usize>(e: PointError<D>) -> Self {
-        Self::family("the Gauss point", e)
-    }
 }
 
 const NONE: u32 = u32::MAX;
@@ -231,7 +62,7 @@ pub struct Model<const D: usize> {
     point_zone: Vec<Zone>,
     node_cells: (Vec<u32>, Vec<u32>),
     spacing: f64,
-    volumes: points::Volumes,
+    volumes: Volumes,
 }
 
 impl<const D: usize> Model<D> {
@@ -273,7 +104,7 @@ impl<const D: usize> Model<D> {
             point_zone: Vec::new(),
             node_cells,
             spacing: 0.0,
-            volumes: points::Volumes::default(),
+            volumes: Volumes::default(),
         };
         let has_points = model.roles.contains(&CellRole::Points);
         if has_points && model.peridynamics.is_none() {
@@ -284,7 +115,7 @@ impl<const D: usize> Model<D> {
         }
         progress.stage("sites", None);
         let cloud = match &model.peridynamics {
-            Some(p) if has_points => Some(points::place(
+            Some(p) if has_points => Some(place::place(
                 &model.mesh,
                 &model.zones,
                 &model.roles,
@@ -397,7 +228,7 @@ impl<const D: usize> Model<D> {
             .iter()
             .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
         let mut families = Families::search(&cloud.position, &cloud.horizon, TIE_TOLERANCE)?;
-        points::cut(p, &self.mesh, &cloud.position, &mut families);
+        bonds::cut(p, &self.mesh, &cloud.position, &mut families);
         // which points need a family of their own, and which only complete those of others
         let reach = match coupling.reach(p.law.as_ref()) {
             Reach::Own if constant => Reach::Own,
@@ -576,7 +407,7 @@ impl<const D: usize> Model<D> {
     /// Removes the bonds that voids, cracks or the boundary of the mesh cut.
     pub fn cut_bonds(&self, position: &[Vector<D>], families: &mut Families) {
         let Some(p) = &self.peridynamics else { return };
-        points::cut(p, &self.mesh, position, families);
+        bonds::cut(p, &self.mesh, position, families);
     }
 
     /// The peridynamic body, if there is one.
@@ -608,7 +439,7 @@ impl<const D: usize> Model<D> {
     }
 
     /// Volumes of the peridynamic zone and of the points in it.
-    pub fn volumes(&self) -> points::Volumes {
+    pub fn volumes(&self) -> Volumes {
         self.volumes
     }
 
@@ -659,17 +490,12 @@ impl<const D: usize> Model<D> {
     /// Assembles the stiffness.
     pub fn assemble(&self, operator: &dyn super::Operator<D>, progress: &dyn Progress) -> BlockCsr {
         progress.stage("assembly", Some(self.sites.len() as u64));
-        let matrix = row::assemble(
+        let matrix = assembly::assemble(
             self.sites.len(),
             |by| progress.advance(by),
             |site, row| operator.add_row(site, row),
         );
         progress.finish();
         matrix
-    }
-
-    /// The symmetry of the coupled stiffness.
-    pub fn symmetry(coupling: &dyn Coupling<D>) -> Symmetry {
-        coupling.symmetry()
     }
 }

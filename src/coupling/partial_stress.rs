@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use crate::{
+    assembly::Row,
     coupling::{
         CellRole, Coupling, FitDegree, Interface, Model, ModelError, Operator, Reach, Zone,
-        row::Row,
     },
     fem::{self, QuadraturePoint},
     mesh::Mesh,

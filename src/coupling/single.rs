@@ -1,7 +1,8 @@
 //! One model everywhere: pure finite elements and pure peridynamics, as couplings that have nothing to couple.
 
 use crate::{
-    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, row::Row},
+    assembly::Row,
+    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone},
     mesh::Mesh,
     system::Symmetry,
 };

@@ -165,6 +165,17 @@ impl<const D: usize> Mesh<D> {
         (lo, hi)
     }
 
+    /// Smallest and largest coordinates of some nodes.
+    pub fn bounds_of(&self, nodes: &[u32]) -> (Vector<D>, Vector<D>) {
+        let mut lo: Vector<D> = Vector::repeat(f64::INFINITY);
+        let mut hi: Vector<D> = Vector::repeat(f64::NEG_INFINITY);
+        for &n in nodes {
+            lo = lo.inf(&self.nodes[n as usize]);
+            hi = hi.sup(&self.nodes[n as usize]);
+        }
+        (lo, hi)
+    }
+
     /// For each node, the cells that it belongs to: offsets and cell numbers.
     pub fn node_cells(&self) -> (Vec<u32>, Vec<u32>) {
         let mut offsets = vec![0u32; self.nodes.len() + 1];

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use crate::{
-    coupling::row::{Row, Transfer},
+    assembly::{Row, Transfer},
     peridynamics::{
         BondLaw, Bound, Families, Family, PdError, PointError, Reversed, StatePart,
         collapsed_tensor, weights,

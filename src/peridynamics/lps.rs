@@ -83,7 +83,7 @@ impl<const D: usize> BondLaw<D> for LinearPeridynamicSolid<D> {
             shape += xi * xi.transpose() * (omega[k] * family.volumes[k]);
         }
         let m = shape.trace();
-        if !(m > 0.0) {
+        if m.is_nan() || m <= 0.0 {
             return Err(PdError::EmptyFamily);
         }
         let d = D as f64;

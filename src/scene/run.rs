@@ -8,7 +8,7 @@ use super::conditions::{Components, Condition, Prescribed, Support};
 use super::materials::{Law, Method, Points};
 use super::spec::{BetaSpec, FormSpec, InterfaceSpec, SurfacesSpec, WeightsSpec};
 use super::validate::{Output, Scene, Solver};
-use crate::coupling::model::Surfaces;
+use crate::coupling::Surfaces;
 use crate::coupling::{
     self, Blending, BlendingFunction, Coupling, FitDegree, Local, Model, ModelError, Nonlocal,
     Operator, PartialStressElements, PartialStressMeshfree, PointSource, Problem, SiteKind, Splice,

@@ -142,7 +142,7 @@ pub fn trial<const D: usize>(name: &str, ratio: usize, law: &str, jitter: f64) {
             weights: BondWeights::Isotropic,
             barriers: vec![],
             voids: vec![],
-            surfaces: model::Surfaces::Uncut,
+            surfaces: Surfaces::Uncut,
         }),
         coupling,
     };

@@ -214,3 +214,50 @@ pub fn assemble<const D: usize>(
     }
     matrix
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_the_sum_of_its_weights() {
+        let transfer = Transfer::from_rows([
+            vec![(3, 0.25), (1, 0.5), (3, 0.25), (0, 0.0)],
+            vec![],
+            vec![(2, 1.0)],
+        ]);
+        assert_eq!(transfer.len(), 3);
+        assert_eq!(transfer.row(0).collect::<Vec<_>>(), [(1, 0.5), (3, 0.5)]);
+        assert_eq!(transfer.row(1).count(), 0);
+        let u = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+        assert_eq!(
+            transfer.displacement::<2>(0, &u),
+            Vector::<2>::new(5.0, 6.0)
+        );
+        assert_eq!(
+            transfer.displacement::<2>(2, &u),
+            Vector::<2>::new(5.0, 6.0)
+        );
+    }
+
+    #[test]
+    fn rows_are_sorted_summed_and_reused() {
+        let transfer = Transfer::from_rows([vec![(5, 0.5), (1, 0.5)]]);
+        let matrix = assemble::<2>(
+            600,
+            |_| {},
+            |site, row| {
+                row.add(&transfer, 0, &(Tensor::identity() * site as f64));
+                row.add_site(site as u32, &Tensor::new(1.0, 2.0, 3.0, 4.0));
+                row.add_site(site as u32, &Tensor::new(1.0, 2.0, 3.0, 4.0));
+            },
+        );
+        assert_eq!(matrix.rows(), 600);
+        let (columns, blocks) = matrix.row(7);
+        assert_eq!(columns, [1, 5, 7]);
+        assert_eq!(blocks[..4], [3.5, 0.0, 0.0, 3.5]);
+        assert_eq!(blocks[8..], [2.0, 4.0, 6.0, 8.0]);
+        assert_eq!(matrix.row(1).0, [1, 5]);
+        assert_eq!(matrix.row(1).1[..4], [2.5, 4.0, 6.0, 8.5]);
+    }
+}

@@ -1,0 +1,188 @@
+//! Bonds that voids, cracks and holes cut, and the weights of those of a lattice.
+
+use std::collections::{HashMap, HashSet};
+
+use rayon::prelude::*;
+
+use crate::{
+    coupling::{ModelError, Peridynamics, Surfaces, points::PointCloud},
+    mesh::{Mesh, boundary::BoundaryFacet, cutter::SegmentCutter},
+    peridynamics::{
+        BondWeights, Families, Family, LatticeFamily, TIE_TOLERANCE, collapsed_tensor,
+        isotropic_shell_factors,
+    },
+    shape::Barriers,
+    tensor::{Tensor4, Vector},
+};
+
+/// Removes the bonds that barriers or the boundary of the mesh cut.
+pub(super) fn cut<const D: usize>(
+    p: &Peridynamics<D>,
+    mesh: &Mesh<D>,
+    position: &[Vector<D>],
+    families: &mut Families,
+) {
+    let barriers = Barriers::new(p.barriers.clone());
+    let surface = (p.surfaces == Surfaces::Cut).then(|| mesh.outer_facets());
+    if barriers.is_empty() && surface.is_none() {
+        return;
+    }
+    let reach = position.iter().map(|x| (p.horizon)(x)).fold(0.0, f64::max);
+    // a bond crosses a facet only if both of its ends are within a horizon of it
+    let bins = surface
+        .as_ref()
+        .map(|facets| NearBins::new(mesh, facets, reach));
+    let cutter = surface.map(|facets| SegmentCutter::new(mesh, &facets));
+    let near: Vec<bool> = position
+        .par_iter()
+        .map(|x| barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x)))
+        .collect();
+    families.retain(|i, j| {
+        let j = j as usize;
+        if !(near[i] && near[j]) {
+            return true;
+        }
+        let (a, b) = (&position[i], &position[j]);
+        !barriers.cuts(a, b) && !cutter.as_ref().is_some_and(|c| c.cuts(a, b))
+    });
+}
+
+/// Bins of the size of a horizon in or beside which facets lie.
+struct NearBins<const D: usize> {
+    size: f64,
+    bins: HashSet<[i64; D]>,
+}
+
+impl<const D: usize> NearBins<D> {
+    fn new(mesh: &Mesh<D>, facets: &[BoundaryFacet], size: f64) -> Self {
+        let mut bins = HashSet::new();
+        for facet in facets {
+            let (low, high) = mesh.bounds_of(&facet.nodes);
+            let margin = Vector::repeat(size * (1.0 + 1e-6));
+            let (from, to) = (
+                Self::bin(&(low - margin), size),
+                Self::bin(&(high + margin), size),
+            );
+            let counts: [usize; D] = std::array::from_fn(|i| (to[i] - from[i] + 1) as usize);
+            for index in 0..counts.iter().product::<usize>() {
+                let mut rest = index;
+                bins.insert(std::array::from_fn(|i| {
+                    let k = rest % counts[i];
+                    rest /= counts[i];
+                    from[i] + k as i64
+                }));
+            }
+        }
+        Self { size, bins }
+    }
+
+    fn bin(x: &Vector<D>, size: f64) -> [i64; D] {
+        std::array::from_fn(|i| (x[i] / size).floor() as i64)
+    }
+
+    fn contains(&self, x: &Vector<D>) -> bool {
+        self.bins.contains(&Self::bin(x, self.size))
+    }
+}
+
+/// Bond factors of a lattice, shell by shell, for every horizon in use.
+pub(super) struct LatticeFactors {
+    tables: HashMap<u64, HashMap<u64, f64>>,
+    spacing: f64,
+    is_lattice: bool,
+}
+
+impl LatticeFactors {
+    /// Factors for the horizons of a cloud; without effect unless the points are a lattice's and the weights isotropic.
+    pub fn new<const D: usize>(
+        p: &Peridynamics<D>,
+        cloud: &PointCloud<D>,
+    ) -> Result<Self, ModelError> {
+        let mut factors = Self {
+            tables: HashMap::new(),
+            spacing: cloud.spacing,
+            is_lattice: cloud.is_lattice,
+        };
+        if !cloud.is_lattice || p.weights != BondWeights::Isotropic {
+            return Ok(factors);
+        }
+        for &horizon in &cloud.horizon {
+            if factors.tables.contains_key(&horizon.to_bits()) {
+                continue;
+            }
+            let mut table = HashMap::new();
+            if let Some(target) = p.law.shell_target() {
+                let lattice = LatticeFamily::<D>::new(horizon / cloud.spacing, TIE_TOLERANCE)?;
+                let base: Vec<f64> = lattice
+                    .shells
+                    .iter()
+                    .map(|s| p.law.kernel(s.length(cloud.spacing), horizon))
+                    .collect();
+                let weights = isotropic_shell_factors(&lattice, cloud.spacing, &base, target)?;
+                table = lattice
+                    .shells
+                    .iter()
+                    .map(|s| s.squared)
+                    .zip(weights)
+                    .collect();
+            }
+            factors.tables.insert(horizon.to_bits(), table);
+        }
+        Ok(factors)
+    }
+
+    /// Whether the points are a lattice's.
+    pub fn is_lattice(&self) -> bool {
+        self.is_lattice
+    }
+
+    /// The factor of a bond.
+    pub fn factor<const D: usize>(&self, horizon: f64, xi: &Vector<D>) -> f64 {
+        let squared = (xi.norm_squared() / (self.spacing * self.spacing)).round() as u64;
+        self.tables
+            .get(&horizon.to_bits())
+            .and_then(|table| table.get(&squared))
+            .copied()
+            .unwrap_or(1.0)
+    }
+
+    /// The elastic tensor of the plain full lattice; none without a lattice.
+    pub fn tensor<const D: usize>(
+        &self,
+        p: &Peridynamics<D>,
+        horizon: f64,
+    ) -> Result<Option<Tensor4<D>>, ModelError> {
+        if !self.is_lattice {
+            return Ok(None);
+        }
+        let lattice = LatticeFamily::<D>::new(horizon / self.spacing, TIE_TOLERANCE)?;
+        let bonds: Vec<Vector<D>> = lattice
+            .shells
+            .iter()
+            .flat_map(|s| {
+                s.offsets
+                    .iter()
+                    .map(|k| Vector::from_fn(|i, _| f64::from(k[i]) * self.spacing))
+            })
+            .collect();
+        let volumes = vec![self.spacing.powi(D as i32); bonds.len()];
+        let ones = vec![1.0; bonds.len()];
+        let family = Family {
+            bonds: &bonds,
+            volumes: &volumes,
+            factors: &ones,
+            horizon,
+        };
+        let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);
+        let state = p
+            .law
+            .coefficients(&family, &mut pair, &mut omega)
+            .map_err(|source| ModelError::Family {
+                what: "the full lattice",
+                position: vec![],
+                bonds: bonds.len(),
+                source,
+            })?;
+        Ok(Some(collapsed_tensor(&family, &pair, state.as_ref())))
+    }
+}

@@ -1,0 +1,283 @@
+//! Where peridynamic points lie: in the cells that hold them and, as far as families reach, in the finite elements around.
+
+use rayon::prelude::*;
+
+use crate::{
+    coupling::{CellRole, ModelError, Peridynamics, PointSource, Reach, Zone, points::PointCloud},
+    fem::{self, Locator},
+    mesh::Mesh,
+    tensor::Vector,
+};
+
+/// Places points in the cells that hold them and, as far as families reach, in the finite elements around.
+pub(super) fn place<const D: usize>(
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+    roles: &[CellRole],
+    p: &Peridynamics<D>,
+    reach: Reach,
+) -> Result<PointCloud<D>, ModelError> {
+    let volumes: Vec<f64> = (0..mesh.cell_count())
+        .into_par_iter()
+        .filter(|&c| roles[c] == CellRole::Points)
+        .map(|c| fem::cell_volume(mesh, c))
+        .collect();
+    let largest = (0..mesh.cell_count())
+        .map(|c| (p.horizon)(&mesh.centroid(c)))
+        .fold(0.0, f64::max);
+    let nodes: Vec<u32> = (0..mesh.cell_count())
+        .filter(|&c| roles[c] != CellRole::Element)
+        .flat_map(|c| mesh.cell(c).iter().copied())
+        .collect();
+    let (low, high) = mesh.bounds_of(&nodes);
+    let levels = if reach == Reach::Own { 1.0 } else { 2.0 };
+    let margin = Vector::repeat(levels * largest * (1.0 + 1e-6));
+    let placement = Placement {
+        mesh,
+        zones,
+        roles,
+        p,
+        low: low - margin,
+        high: high + margin,
+        region: volumes.iter().sum(),
+    };
+    match p.points {
+        PointSource::Cells => Ok(placement.at_cells()),
+        PointSource::Lattice { spacing, origin } if spacing.is_finite() && spacing > 0.0 => {
+            placement.on_lattice(spacing, origin)
+        }
+        PointSource::Lattice { spacing, .. } => Err(ModelError::NoPoints { spacing }),
+    }
+}
+
+/// What placing points needs to know.
+struct Placement<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    zones: &'a [Zone],
+    roles: &'a [CellRole],
+    p: &'a Peridynamics<D>,
+    /// Corners of the box that holds all points.
+    low: Vector<D>,
+    high: Vector<D>,
+    /// Volume of the cells that hold points.
+    region: f64,
+}
+
+/// Lattice points per block of work.
+const BLOCK: usize = 1024;
+
+impl<const D: usize> Placement<'_, D> {
+    fn horizon(&self, x: &Vector<D>) -> f64 {
+        (self.p.horizon)(x)
+    }
+
+    fn in_void(&self, x: &Vector<D>) -> bool {
+        let inside = |d: f64| d < -1e-9 * self.horizon(x);
+        self.p.voids.iter().any(|v| inside(v.signed_distance(x)))
+    }
+
+    fn at_cells(&self) -> PointCloud<D> {
+        let (mesh, zones, roles) = (self.mesh, self.zones, self.roles);
+        let mut cloud = PointCloud::empty(0.0, self.region);
+        for c in 0..mesh.cell_count() {
+            let x = mesh.centroid(c);
+            if (0..D).any(|i| x[i] < self.low[i] || x[i] > self.high[i]) || self.in_void(&x) {
+                continue;
+            }
+            let element = (roles[c] != CellRole::Points).then(|| {
+                let n = mesh.cell(c).len();
+                (c as u32, vec![1.0 / n as f64; n])
+            });
+            let volume = fem::cell_volume(mesh, c);
+            if element.is_none() {
+                cloud.volumes.points += volume;
+                cloud.spacing += volume;
+            }
+            cloud.push(x, volume, self.horizon(&x), zones[c], element);
+        }
+        let sites = cloud.element.iter().filter(|e| e.is_none()).count().max(1);
+        cloud.spacing = (cloud.spacing / sites as f64).powf(1.0 / D as f64);
+        if let Some(first) = cloud.position.first().copied() {
+            let h = cloud.spacing;
+            cloud.is_lattice = cloud.position.iter().zip(&cloud.volume).all(|(x, v)| {
+                let k = (x - first) / h;
+                k.iter().all(|k| (k - k.round()).abs() < 1e-6)
+                    && (v / h.powi(D as i32) - 1.0).abs() < 1e-6
+            });
+        }
+        cloud
+    }
+
+    fn on_lattice(&self, h: f64, origin: Vector<D>) -> Result<PointCloud<D>, ModelError> {
+        let (mesh, zones, roles) = (self.mesh, self.zones, self.roles);
+        let cells = |keep: &dyn Fn(usize) -> bool| {
+            Locator::new(mesh, (0..mesh.cell_count()).filter(|&c| keep(c)))
+        };
+        let elements = cells(&|c| roles[c] != CellRole::Points);
+        // at a face that zones share, the zone that comes first here has the point
+        let by_zone = [Zone::Nonlocal, Zone::Transition, Zone::Local].map(|zone| {
+            (
+                zone,
+                cells(&|c| roles[c] == CellRole::Points && zones[c] == zone),
+            )
+        });
+        let tolerance = 1e-9;
+        let in_region = |x: &Vector<D>| {
+            by_zone
+                .iter()
+                .find(|(_, l)| l.locate(mesh, x, tolerance).is_some())
+                .map(|(z, _)| *z)
+        };
+
+        let first: Vector<D> = ((self.low - origin) / h).map(f64::floor);
+        let last: Vector<D> = ((self.high - origin) / h).map(f64::ceil);
+        let points: f64 = (last - first).iter().map(|n| n + 1.0).product();
+        if points > f64::from(u32::MAX) {
+            return Err(ModelError::TooManyPoints { spacing: h, points });
+        }
+        let counts: [usize; D] = std::array::from_fn(|i| (last[i] - first[i]) as usize + 1);
+        let total: usize = counts.iter().product();
+        let position = |index: usize| {
+            let mut rest = index;
+            let mut k = first;
+            for i in (0..D).rev() {
+                k[i] += (rest % counts[i]) as f64;
+                rest /= counts[i];
+            }
+            origin + k * h
+        };
+        // lattice cells that an edge of the region passes: their volume is sampled
+        let mut edge = vec![false; total];
+        let region_cells =
+            (0..mesh.cell_count() as u32).filter(|&c| roles[c as usize] == CellRole::Points);
+        for facet in mesh.boundary_facets(region_cells) {
+            let (lo, hi) = mesh.bounds_of(&facet.nodes);
+            mark_box(&mut edge, &counts, &first, &origin, h, &lo, &hi);
+        }
+        let samples = if D == 3 { 4 } else { 8 };
+        let whole = h.powi(D as i32);
+        type Found<const D: usize> = (Vector<D>, f64, f64, Zone, Option<(u32, Vec<f64>)>);
+        let found: Vec<Vec<Found<D>>> = (0..total.div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|block| {
+                let mut list = Vec::new();
+                for index in block * BLOCK..((block + 1) * BLOCK).min(total) {
+                    let x = position(index);
+                    if self.in_void(&x) {
+                        continue;
+                    }
+                    let located = elements.locate(mesh, &x, tolerance);
+                    let zone = match &located {
+                        Some(l) => Some(zones[l.cell]),
+                        None => in_region(&x),
+                    };
+                    let Some(zone) = zone else { continue };
+                    let (mut volume, mut share) =
+                        (whole, if located.is_none() { whole } else { 0.0 });
+                    if edge[index] {
+                        let (mut body, mut here) = (0, 0);
+                        let count = samples_of::<D>(samples, |offset| {
+                            let s = x + offset * h;
+                            if self.in_void(&s) {
+                                return;
+                            }
+                            let inside = in_region(&s).is_some();
+                            here += usize::from(inside);
+                            body += usize::from(
+                                inside || elements.locate(mesh, &s, tolerance).is_some(),
+                            );
+                        });
+                        volume = whole * body as f64 / count as f64;
+                        share = whole * here as f64 / count as f64;
+                    }
+                    if volume > 0.0 {
+                        let element = located.map(|l| (l.cell as u32, l.shape[..l.nodes].to_vec()));
+                        list.push((x, volume, share, zone, element));
+                    }
+                }
+                list
+            })
+            .collect();
+        let mut cloud = PointCloud::empty(h, self.region);
+        cloud.is_lattice = true;
+        let points: f64 = found.iter().flatten().map(|f| f.2).sum();
+        // what sampling misses on curved edges is spread over the points whose cells the body's surface cuts
+        let cut: f64 = found
+            .iter()
+            .flatten()
+            .filter(|f| f.1 < whole)
+            .map(|f| f.2)
+            .sum();
+        let scale = if cut > 0.0 {
+            1.0 + (self.region - points) / cut
+        } else {
+            1.0
+        };
+        let scale = if (0.5..2.0).contains(&scale) && (scale - 1.0).abs() > 1e-12 {
+            scale
+        } else {
+            1.0
+        };
+        for (x, volume, share, zone, element) in found.into_iter().flatten() {
+            let factor = if volume < whole { scale } else { 1.0 };
+            cloud.volumes.points += share * factor;
+            cloud.push(x, volume * factor, self.horizon(&x), zone, element);
+        }
+        Ok(cloud)
+    }
+}
+
+fn mark_box<const D: usize>(
+    edge: &mut [bool],
+    counts: &[usize; D],
+    first: &Vector<D>,
+    origin: &Vector<D>,
+    h: f64,
+    lo: &Vector<D>,
+    hi: &Vector<D>,
+) {
+    let half = 0.5 * (1.0 - 1e-9);
+    let mut from = [0usize; D];
+    let mut to = [0usize; D];
+    for i in 0..D {
+        let a = ((lo[i] - origin[i]) / h - half - first[i]).ceil().max(0.0);
+        let b = ((hi[i] - origin[i]) / h + half - first[i])
+            .floor()
+            .min(counts[i] as f64 - 1.0);
+        if a > b {
+            return;
+        }
+        (from[i], to[i]) = (a as usize, b as usize);
+    }
+    let mut k = from;
+    loop {
+        let index = (0..D).fold(0, |index, i| index * counts[i] + k[i]);
+        edge[index] = true;
+        let mut axis = D;
+        loop {
+            if axis == 0 {
+                return;
+            }
+            axis -= 1;
+            if k[axis] < to[axis] {
+                k[axis] += 1;
+                break;
+            }
+            k[axis] = from[axis];
+        }
+    }
+}
+
+/// Visits `n^D` equal parts of the unit cell around the origin by their centres; returns their number.
+fn samples_of<const D: usize>(n: usize, mut visit: impl FnMut(Vector<D>)) -> usize {
+    let count = n.pow(D as u32);
+    for index in 0..count {
+        let mut rest = index;
+        visit(Vector::from_fn(|_, _| {
+            let k = rest % n;
+            rest /= n;
+            (k as f64 + 0.5) / n as f64 - 0.5
+        }));
+    }
+    count
+}
