@@ -248,8 +248,8 @@ mod tests {
             |_| {},
             |site, row| {
                 row.add(&transfer, 0, &(Tensor::identity() * site as f64));
-                row.add_site(site as u32, &Tensor::new(1.0, 2.0, 3.0, 4.0));
-                row.add_site(site as u32, &Tensor::new(1.0, 2.0, 3.0, 4.0));
+                row.add_site(site as u32, &Tensor::<2>::new(1.0, 2.0, 3.0, 4.0));
+                row.add_site(site as u32, &Tensor::<2>::new(1.0, 2.0, 3.0, 4.0));
             },
         );
         assert_eq!(matrix.rows(), 600);
