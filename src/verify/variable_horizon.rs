@@ -8,9 +8,10 @@ use std::{path::Path, sync::Arc};
 use rayon::prelude::*;
 
 use crate::{
+    assembly::Row as MatrixRow,
     coupling::{
         Coupling, Model, ModelError, Nonlocal, PartialStressMeshfree, Peridynamics, PointSource,
-        Problem, Zone, model::Surfaces, row::Row as MatrixRow,
+        Problem, Surfaces, Zone,
     },
     material::{Elastic, Kinematics, MaterialError},
     mesh::{
