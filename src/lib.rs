@@ -71,6 +71,7 @@
 //! | [`fem`] | cells, quadrature, the element kernel, loads |
 //! | [`peridynamics`] | families, influence functions, bond weights, laws, the PD body |
 //! | [`coupling`] | sites, what completes families and elements at the seam, one file per method |
+//! | [`assembly`] | sparse rows: places through sites, and the accumulator of one stiffness row |
 //! | [`system`] | the seam to solvers: a block-sparse stiffness and its symmetry |
 //! | [`solve`] | orderings, multifrontal factorisation, Krylov methods with multigrid, the static problem |
 //! | [`progress`] | what a long computation tells |
@@ -95,7 +96,7 @@
 //! A [`Problem`] says what the model is, a [`Model`] lays out its sites and bonds, an [`Operator`] gives the rows of the stiffness, a [`StaticProblem`] is solved.
 //!
 //! ```
-//! use bondline::coupling::{PointSource, model::Surfaces};
+//! use bondline::coupling::{PointSource, Surfaces};
 //! use bondline::mesh::{CellShape, Mesh};
 //! use bondline::peridynamics::{BondBased, BondWeights};
 //! use bondline::solve::statics::{StaticParams, solve};
