@@ -67,12 +67,17 @@ impl<const D: usize> Coupling<D> for Blending {
             .collect();
         // the collar: local cells within a horizon of the region where β > 0
         let edge = Edge::of(mesh, |c| zones[c] != Zone::Local);
+        // a point on the edge has the constant β, so its bonds of exactly one horizon have weight as well; other functions vanish there
+        let reach = match self.function {
+            BlendingFunction::Constant => largest_horizon * (1.0 + 1e-6),
+            _ => largest_horizon * (1.0 - 1e-9),
+        };
         for c in 0..mesh.cell_count() {
             if zones[c] == Zone::Local {
                 let near = mesh
                     .cell(c)
                     .iter()
-                    .any(|&n| edge.within(&mesh.nodes[n as usize], largest_horizon * (1.0 - 1e-9)));
+                    .any(|&n| edge.within(&mesh.nodes[n as usize], reach));
                 if near {
                     roles[c] = CellRole::Points;
                 }

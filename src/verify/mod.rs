@@ -1,7 +1,30 @@
-//! verify
+//! Suites that measure what the code claims: exact fields, error norms, and tables of figures with their limits.
+//!
+//! | suite | what it measures |
+//! |---|---|
+//! | `patch` | affine fields through the seam: residual, solution, out-of-balance force |
+//! | `balance` | the out-of-balance force of a seam against its leading term |
+//! | `weights` | the elastic tensor of a lattice with isotropic weights |
+//! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
+//! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
+//!
+//! A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
+
+pub mod balance;
 pub mod bar;
+pub mod enclosed;
+pub mod fields;
 pub mod patch;
+pub mod tangents;
 pub mod variable_horizon;
+pub mod weights;
+
+pub use balance::balance;
+pub use patch::patch;
+pub use tangents::tangents;
+pub use weights::weights;
+
+use crate::{observe::report::Table, progress::Progress};
 
 /// How much of a suite is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,4 +33,62 @@ pub enum Effort {
     Quick,
     /// Everything.
     Full,
+}
+
+/// A named set of measurements.
+#[derive(Clone, Copy, Debug)]
+pub struct Suite {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it measures, in one line.
+    pub about: &'static str,
+    /// Runs it.
+    pub run: fn(Effort, &dyn Progress) -> Vec<Table>,
+}
+
+/// Every suite, in the order in which `verify` runs them.
+pub const SUITES: &[Suite] = &[
+    Suite {
+        name: "patch",
+        about: "affine fields through the seam of every method, law, dimension and kind of mesh",
+        run: patch,
+    },
+    Suite {
+        name: "balance",
+        about: "out-of-balance force of a seam against its leading term, spurious force of a single site",
+        run: balance,
+    },
+    Suite {
+        name: "weights",
+        about: "elastic tensor of lattices with isotropic and with plain weights",
+        run: weights,
+    },
+    Suite {
+        name: "tangents",
+        about: "stiffness against finite differences of energies, symmetry, momentum, threads",
+        run: tangents,
+    },
+    Suite {
+        name: "variable-horizon",
+        about: "the bar of variable horizon, SAND2015-7998 section 7.2: accelerations under linear and quadratic fields",
+        run: variable_horizon::run,
+    },
+];
+
+/// The suite of that name.
+pub fn suite(name: &str) -> Option<&'static Suite> {
+    SUITES.iter().find(|s| s.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn suites_are_found_by_their_names() {
+        for s in SUITES {
+            assert_eq!(suite(s.name).map(|f| f.about), Some(s.about));
+        }
+        assert!(suite("ghost").is_none());
+    }
 }

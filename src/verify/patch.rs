@@ -1,287 +1,324 @@
-//! Patch test.
-use crate::{
-    coupling::*,
-    mesh::{CellShape, Mesh},
-    peridynamics::*,
-    progress::Silent,
-    tensor::*,
-};
-use std::sync::Arc;
+//! The patch test: affine fields through the seam of every method, law, dimension and kind of mesh.
 
-fn block<const D: usize>(n: usize, h: f64) -> Mesh<D> {
-    let mut mesh = Mesh::default();
-    let m = n + 1;
-    for i in 0..m.pow(D as u32) {
-        let mut r = i;
-        mesh.nodes.push(Vector::from_fn(|_, _| {
-            let k = r % m;
-            r /= m;
-            k as f64 * h
-        }));
-    }
-    for i in 0..n.pow(D as u32) {
-        let mut r = i;
-        let mut base = 0;
-        let mut stride = [0usize; 3];
-        let mut s = 1;
-        for a in 0..D {
-            base += (r % n) * s;
-            r /= n;
-            stride[a] = s;
-            s *= m;
-        }
-        let b = base as u32;
-        let (x, y, z) = (stride[0] as u32, stride[1] as u32, stride[2] as u32);
-        match D {
-            1 => mesh.push_cell(CellShape::Line2, &[b, b + x]),
-            2 => mesh.push_cell(CellShape::Quad4, &[b, b + x, b + x + y, b + y]),
-            _ => mesh.push_cell(
-                CellShape::Hex8,
-                &[
-                    b,
-                    b + x,
-                    b + x + y,
-                    b + y,
-                    b + z,
-                    b + x + z,
-                    b + x + y + z,
-                    b + y + z,
-                ],
-            ),
-        }
-    }
-    mesh
+pub mod influence;
+
+use rayon::prelude::*;
+
+use crate::{
+    observe::report::{Columns, Row, Table},
+    progress::{Progress, Silent},
+    solve::{
+        FreeDofs,
+        direct::{DirectParams, Factor},
+    },
+    tensor::{Tensor, Vector, padded},
+    verify::{
+        Effort,
+        enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNGS_MODULUS},
+        fields::{Field, affine_modes, monomials, worst},
+    },
+};
+
+/// Largest affine residual per volume, relative to `E |G|/h`, with elements aligned to the lattice.
+pub const ALIGNED_LIMIT: f64 = 1e-11;
+
+/// The same with jittered or simplicial elements.
+pub const IRREGULAR_LIMIT: f64 = 1e-9;
+
+/// Largest error of a solved affine field, relative to the largest displacement.
+pub const SOLUTION_LIMIT: f64 = 1e-9;
+
+/// Largest affine internal force per volume of the sites that are not on the outer boundary, relative to `E |G|/h`, over all gradients and rotations.
+///
+/// [SAND2015-7998] section 2.3 calls such a force a ghost force.
+pub fn affine_residual<const D: usize>(enclosed: &Enclosed<D>) -> f64 {
+    affine_modes::<D>()
+        .iter()
+        .map(|mode| {
+            let force = enclosed.stiffness.multiply(&mode.at(enclosed.positions()));
+            largest_density(enclosed, &force, |_, _| 0.0) * SPACING / YOUNGS_MODULUS
+        })
+        .fold(0.0, worst)
 }
 
-pub fn trial<const D: usize>(name: &str, ratio: usize, law: &str, jitter: f64) {
-    let m = if D == 3 { 2.0 } else { 3.0 };
-    let cell = ratio as f64;
-    let (pd, ts, fe) = match (D, ratio) {
-        (3, 1) => (2.0, 2.0, 4.0),
-        (3, _) => (3.0, 3.0, 6.0),
-        _ => (6.0, 6.0, 12.0),
+/// Largest difference of the internal force per volume from `C ∇∇u` under quadratic fields, relative to `E` (fields of unit second derivative), over the
+/// sites that are not on the outer boundary.
+pub fn quadratic_residual<const D: usize>(enclosed: &Enclosed<D>) -> f64 {
+    monomials::<D>(2)
+        .iter()
+        .map(|field| {
+            let force = enclosed.stiffness.multiply(&field.at(enclosed.positions()));
+            largest_density(enclosed, &force, |site, i| {
+                -body_force(enclosed, field, &enclosed.model.sites[site].position, i)
+            }) / YOUNGS_MODULUS
+        })
+        .fold(0.0, worst)
+}
+
+/// `C_ijkl ∂_j ∂_l u_k`.
+fn body_force<const D: usize>(
+    enclosed: &Enclosed<D>,
+    field: &Field<D>,
+    x: &Vector<D>,
+    i: usize,
+) -> f64 {
+    let Field::Monomial { component, .. } = field else {
+        return 0.0;
     };
-    let half = pd + ts + fe;
-    let n = (2.0 * half / cell).round() as usize;
-    let mut mesh = block::<D>(n, cell);
-    for x in &mut mesh.nodes {
-        for a in 0..D {
-            x[a] -= half;
+    let second = field.second_derivatives(x);
+    let mut sum = 0.0;
+    for j in 0..D {
+        for l in 0..D {
+            sum += enclosed.tensor.get(i, j, *component, l) * second[(j, l)];
         }
     }
-    let zones: Vec<Zone> = (0..mesh.cell_count())
-        .map(|c| {
-            let r = mesh.centroid(c).amax();
-            if r < pd {
-                Zone::Nonlocal
-            } else if r < pd + ts {
-                Zone::Transition
-            } else {
-                Zone::Local
+    sum
+}
+
+fn largest_density<const D: usize>(
+    enclosed: &Enclosed<D>,
+    force: &[f64],
+    wanted: impl Fn(usize, usize) -> f64,
+) -> f64 {
+    let mut largest = 0.0;
+    for (s, site) in enclosed.model.sites.iter().enumerate() {
+        if !enclosed.is_outer(s) {
+            for i in 0..D {
+                largest = worst(
+                    largest,
+                    (force[s * D + i] / site.volume - wanted(s, i)).abs(),
+                );
             }
+        }
+    }
+    largest
+}
+
+/// Largest error of the solution at any site, relative to the largest displacement, over all gradients and rotations; displacement is given on the outer boundary
+/// and nowhere else.
+///
+/// # Errors
+/// The solver's message if the system is singular.
+pub fn solution_error<const D: usize>(enclosed: &Enclosed<D>) -> Result<f64, String> {
+    let k = &enclosed.stiffness;
+    let sites = &enclosed.model.sites;
+    let held: Vec<Option<f64>> = (0..sites.len() * D)
+        .map(|dof| enclosed.is_outer(dof / D).then_some(0.0))
+        .collect();
+    let free = FreeDofs::from_prescribed(&held, D);
+    let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
+    // one factorisation serves all modes
+    let (factor, _) = Factor::new(k, &free, &positions, &DirectParams::default(), &Silent)
+        .map_err(|e| e.to_string())?;
+    let mut error = 0.0;
+    for mode in affine_modes::<D>() {
+        let exact = mode.at(enclosed.positions());
+        let mut u: Vec<f64> = held
+            .iter()
+            .zip(&exact)
+            .map(|(held, &exact)| if held.is_some() { exact } else { 0.0 })
+            .collect();
+        // the second step refines the first
+        for _ in 0..2 {
+            let mut residual = k.multiply(&u);
+            for (r, held) in residual.iter_mut().zip(&held) {
+                *r = if held.is_some() { 0.0 } else { -*r };
+            }
+            for (u, step) in u.iter_mut().zip(factor.solve(&residual)) {
+                *u += step;
+            }
+        }
+        let size = exact.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        for (u, exact) in u.iter().zip(&exact) {
+            error = worst(error, (u - exact).abs() / size);
+        }
+    }
+    Ok(error)
+}
+
+/// Sum of each block column of the stiffness, `Σ_i K_ij`: the force that the whole model exerts on itself when site `j` moves by 1.
+///
+/// It vanishes where a model conserves momentum, so it marks the seams; with the rows of the outer boundary included, nothing else.
+pub fn column_sums<const D: usize>(enclosed: &Enclosed<D>) -> Vec<Tensor<D>> {
+    let k = &enclosed.stiffness;
+    let mut sums = vec![Tensor::zeros(); k.rows()];
+    for i in 0..k.rows() {
+        let (columns, blocks) = k.row(i);
+        for (e, &c) in columns.iter().enumerate() {
+            let block = &blocks[e * D * D..(e + 1) * D * D];
+            sums[c as usize] += Tensor::from_fn(|a, b| block[a * D + b]);
+        }
+    }
+    sums
+}
+
+/// Largest component of any column sum: the spurious force per unit displacement of a single site \[N/m per m^(3 − D)\].
+pub fn spurious_force<const D: usize>(enclosed: &Enclosed<D>) -> f64 {
+    column_sums(enclosed)
+        .iter()
+        .map(|c| c.amax())
+        .fold(0.0, worst)
+}
+
+/// Sum of all internal forces along x that the half `x > 0` of the seam adds under `u = x^degree e_x`, by column sums.
+pub fn out_of_balance<const D: usize>(enclosed: &Enclosed<D>, degree: u32) -> f64 {
+    let mut powers = [0; D];
+    powers[0] = degree;
+    let field = Field::<D>::Monomial {
+        component: 0,
+        powers,
+    };
+    // internal force is −K u
+    -column_sums(enclosed)
+        .iter()
+        .zip(enclosed.positions())
+        .filter(|(_, x)| x[0] > 0.0)
+        .map(|(c, x)| (c * field.value(x))[0])
+        .sum::<f64>()
+}
+
+/// [`out_of_balance`] relative to the force that holds the field at the face `x = L` of the block.
+pub fn relative_out_of_balance<const D: usize>(enclosed: &Enclosed<D>, degree: u32) -> f64 {
+    let l = enclosed.half;
+    let stress = enclosed.tensor.get(0, 0, 0, 0) * f64::from(degree) * l.powi(degree as i32 - 1);
+    out_of_balance(enclosed, degree) / (stress * (2.0 * l).powi(D as i32 - 1))
+}
+
+/// The zones of a case: as narrow as the method's reach allows, so that the suite stays fast.
+pub fn widths<const D: usize>(method: Method, cells: Cells) -> Widths {
+    let (nonlocal, transition, local) = match (D, cells, method) {
+        (1 | 2, ..) => (6, 6, 12),
+        (_, Cells::Coarse, _) => (3, 3, 6),
+        // the collar of a blending region takes whole cells, here up to two horizons
+        (_, Cells::Jittered | Cells::Simplices, Method::Blending(_)) => (2, 2, 8),
+        _ => (2, 2, 4),
+    };
+    // a splice has no use for a transition zone
+    let transition = if method == Method::Splice {
+        0
+    } else {
+        transition
+    };
+    Widths {
+        nonlocal,
+        transition,
+        local,
+    }
+}
+
+/// All cases of a dimension.
+pub fn cases<const D: usize>(effort: Effort) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for law in Law::ALL {
+        for method in Method::ALL {
+            for kind in Cells::ALL {
+                let wanted = match (effort, D) {
+                    _ if D == 1 && kind == Cells::Simplices => false,
+                    (Effort::Full, _) | (Effort::Quick, 1) => true,
+                    (Effort::Quick, 2) => {
+                        !matches!(kind, Cells::Jittered)
+                            && method != Method::ALL[2]
+                            && method != Method::ALL[5]
+                    }
+                    (Effort::Quick, _) => {
+                        kind == Cells::Coarse
+                            && method != Method::ALL[1]
+                            && method != Method::ALL[2]
+                            && method != Method::ALL[5]
+                    }
+                };
+                if wanted {
+                    cases.push(Case {
+                        method,
+                        law,
+                        cells: kind,
+                        widths: widths::<D>(method, kind),
+                        ratio: if D == 3 { 2 } else { 3 },
+                    });
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// The rows of one case.
+fn rows<const D: usize>(case: &Case) -> Vec<Row> {
+    let name = format!(
+        "{}, {}, {}",
+        case.method.name(),
+        case.law.name(),
+        case.cells.name()
+    );
+    let limit = if case.cells.is_aligned() {
+        ALIGNED_LIMIT
+    } else {
+        IRREGULAR_LIMIT
+    };
+    let enclosed = match Enclosed::<D>::new(case) {
+        Ok(enclosed) => enclosed,
+        Err(e) => {
+            return ["residual", "solution error"]
+                .map(|q| Row::at_most(&name, q, f64::NAN, limit).because(e.to_string()))
+                .to_vec();
+        }
+    };
+    let error = match solution_error(&enclosed) {
+        Ok(error) => Row::at_most(&name, "solution error", error, SOLUTION_LIMIT),
+        Err(why) => Row::at_most(&name, "solution error", f64::NAN, SOLUTION_LIMIT).because(why),
+    };
+    vec![
+        Row::at_most(&name, "residual", affine_residual(&enclosed), limit),
+        error,
+        Row::info(&name, "quadratic", quadratic_residual(&enclosed)),
+        Row::info(&name, "cubic force", relative_out_of_balance(&enclosed, 3)),
+        Row::info(
+            &name,
+            "quartic force",
+            relative_out_of_balance(&enclosed, 4),
+        ),
+        Row::info(&name, "sites", enclosed.model.sites.len() as f64),
+    ]
+}
+
+/// One table for a dimension.
+pub fn table<const D: usize>(effort: Effort, progress: &dyn Progress) -> Table {
+    let cases = cases::<D>(effort);
+    let stage = format!("patch test, {D}D");
+    progress.stage(&stage, Some(cases.len() as u64));
+    let rows: Vec<Vec<Row>> = cases
+        .par_iter()
+        .map(|case| {
+            let mut rows = rows::<D>(case);
+            for row in &mut rows {
+                row.case = format!("{D}D {}", row.case);
+            }
+            progress.advance(1);
+            rows
         })
         .collect();
-    let mut seed = 1u64;
-    for x in &mut mesh.nodes {
-        if x.amax() < half - 0.5 {
-            for a in 0..D {
-                seed = seed
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
-                x[a] += jitter * cell * ((seed >> 33) as f64 / 2f64.powi(31) * 2.0 - 1.0) * 0.5;
-            }
-        }
-    }
-    let e = 1.0;
-    let (lam, mu) = match D {
-        1 => (1.0 / 3.0, 1.0 / 3.0),
-        2 => (0.375, 0.375),
-        _ => (0.4, 0.4),
-    };
-    let (lam, mu) = if law == "lps" {
-        (0.5 * lam, mu)
-    } else {
-        (lam, mu)
-    };
-    let inf = Influence::polynomial(1, 1).unwrap();
-    let law: Box<dyn BondLaw<D>> = match law {
-        "bond" => Box::new(BondBased::<D>::new(Micromodulus::InverseDistance, mu)),
-        "lps" => Box::new(LinearPeridynamicSolid::<D>::new(inf, lam, mu)),
-        _ => Box::new(Correspondence::<D>::new(inf, lam, mu, 1.0)),
-    };
-    let coupling: Box<dyn Coupling<D>> = match name {
-        "splice" => Box::new(Splice),
-        "blend-constant" => Box::new(Blending {
-            function: BlendingFunction::Constant,
-        }),
-        "blend-smooth" => Box::new(Blending {
-            function: BlendingFunction::Smooth,
-        }),
-        "ps-meshfree" => Box::new(PartialStressMeshfree { influence: inf }),
-        "ps-elements" => Box::new(PartialStressElements {
-            fit: FitDegree::Quadratic,
-        }),
-        "local" => Box::new(Local),
-        _ => Box::new(Nonlocal),
-    };
-    let tensor = Tensor4::isotropic(lam, mu);
-    let cells = mesh.cell_count();
-    let problem = Problem {
-        mesh,
-        zones,
-        tensors: vec![tensor],
-        cell_material: vec![0; cells],
-        peridynamic_material: 0,
-        peridynamics: Some(Peridynamics {
-            law,
-            horizon: Arc::new(move |_| m),
-            points: PointSource::Lattice {
-                spacing: 1.0,
-                origin: Vector::zeros(),
-            },
-            weights: BondWeights::Isotropic,
-            barriers: vec![],
-            voids: vec![],
-            surfaces: Surfaces::Uncut,
-        }),
-        coupling,
-    };
-    let (model, coupling) = match Model::new(problem, &Silent) {
-        Ok(m) => m,
-        Err(e) => {
-            println!("{D}D {name} x{ratio}: ERROR {e}");
-            return;
-        }
-    };
-    let operator = match coupling.operator(&model) {
-        Ok(m) => m,
-        Err(e) => {
-            println!("{D}D {name} x{ratio}: ERROR {e}");
-            return;
-        }
-    };
-    let k = model.assemble(operator.as_ref(), &Silent);
-    let inner: Vec<usize> = (0..model.sites.len())
-        .filter(|&s| model.sites[s].position.amax() < half - 1e-9)
-        .collect();
-    let mut worst: f64 = 0.0;
-    let mut at = 0;
-    for a in 0..D {
-        for b in 0..D {
-            let u: Vec<f64> = model
-                .sites
-                .iter()
-                .flat_map(|s| (0..D).map(move |c| if c == a { s.position[b] } else { 0.0 }))
-                .collect();
-            let r = k.multiply(&u);
-            for &s in &inner {
-                for c in 0..D {
-                    let v = r[s * D + c].abs() / model.sites[s].volume / e;
-                    if !(v <= worst) {
-                        worst = v;
-                        at = s;
-                    }
-                }
-            }
-        }
-    }
-    let mut err: f64 = f64::NAN;
-    let nf = inner.len() * D;
-    if nf < 1500 && std::env::var("SOLVE").is_ok() {
-        let mut index = vec![usize::MAX; model.sites.len()];
-        for (q, &s) in inner.iter().enumerate() {
-            index[s] = q;
-        }
-        let mut mat = nalgebra::DMatrix::<f64>::zeros(nf, nf);
-        let u: Vec<f64> = model
-            .sites
-            .iter()
-            .flat_map(|s| (0..D).map(move |c| s.position[(c + 1) % D] + 0.3 * s.position[c]))
-            .collect();
-        let mut rhs = nalgebra::DVector::<f64>::zeros(nf);
-        for (q, &s) in inner.iter().enumerate() {
-            let (cols, bl) = k.row(s);
-            for (x, &c) in cols.iter().enumerate() {
-                for i in 0..D {
-                    for j in 0..D {
-                        let v = bl[x * D * D + i * D + j];
-                        if index[c as usize] != usize::MAX {
-                            mat[(q * D + i, index[c as usize] * D + j)] += v;
-                        } else {
-                            rhs[q * D + i] -= v * u[c as usize * D + j];
-                        }
-                    }
-                }
-            }
-        }
-        if let Some(x) = mat.clone().lu().solve(&rhs) {
-            let umax = u.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-            err = inner
-                .iter()
-                .enumerate()
-                .flat_map(|(q, &s)| (0..D).map(move |c| (q * D + c, s * D + c)))
-                .map(|(q, s)| (x[q] - u[s]).abs())
-                .fold(0.0, f64::max)
-                / umax;
-        }
-        if nf < 2000 {
-            let sv = mat.complex_eigenvalues();
-            let lo = sv.iter().map(|z| z.re).fold(f64::INFINITY, f64::min);
-            let im = sv.iter().map(|z| z.im.abs()).fold(0.0, f64::max);
-            let hi = sv.iter().map(|z| z.re).fold(0.0, f64::max);
-            print!("[eig re {lo:.2e}..{hi:.2e} im {im:.1e}] ");
-        }
-    }
-    let vol = model.volumes();
-    println!(
-        "{D}D {name:15} x{ratio} jit {jitter} {:28} sites {} bonds {} nnz {} patch {worst:.2e} at {:?} err {err:.2e} asym {:.1e} vol {:.2e}",
-        model.peridynamics.as_ref().unwrap().law.name(),
-        model.sites.len(),
-        model.body().map_or(0, |b| b.bond_count()),
-        k.nonzeros(),
-        model.sites[at].position.as_slice(),
-        k.asymmetry(),
-        vol.points / vol.region - 1.0
+    let mut table = Table::new(
+        format!(
+            "Patch test in {D}D. residual: largest affine internal force per volume over E|G|/h; solution error: displacement given on the outer \
+             boundary only, over the largest displacement; quadratic: force per volume less C:grad grad u, over E; cubic, quartic force: out-of-balance \
+             force of half the seam over the force on a face"
+        ),
+        Columns::ByQuantity,
     );
+    rows.into_iter().flatten().for_each(|row| table.push(row));
+    table
 }
 
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn go() {
-        for ratio in [1, 3] {
-            for jitter in [0.0, 0.2] {
-                for law in ["bond", "lps", "corr"] {
-                    for name in [
-                        "local",
-                        "nonlocal",
-                        "splice",
-                        "blend-constant",
-                        "blend-smooth",
-                        "ps-meshfree",
-                        "ps-elements",
-                    ] {
-                        super::trial::<1>(name, ratio, law, jitter);
-                        super::trial::<2>(name, ratio, law, jitter);
-                    }
-                }
-            }
-        }
+/// The suite `patch`.
+pub fn patch(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let mut tables = vec![
+        table::<1>(effort, progress),
+        table::<2>(effort, progress),
+        table::<3>(effort, progress),
+    ];
+    if effort == Effort::Full {
+        tables.push(influence::table(progress));
     }
-    #[test]
-    fn go3() {
-        for ratio in [1, 3] {
-            for law in ["bond", "lps", "corr"] {
-                for name in [
-                    "local",
-                    "splice",
-                    "blend-constant",
-                    "ps-meshfree",
-                    "ps-elements",
-                ] {
-                    super::trial::<3>(name, ratio, law, 0.0);
-                }
-            }
-        }
-    }
+    progress.finish();
+    tables
 }

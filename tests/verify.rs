@@ -1,0 +1,56 @@
+//! The other suites of `bondline verify`, in part.
+
+use bondline::{
+    observe::report::{Table, Verdict},
+    progress::Silent,
+    verify::{Effort, balance, tangents, weights},
+};
+
+fn assert_no_short(tables: &[Table]) {
+    let short: Vec<_> = tables
+        .iter()
+        .flat_map(|t| &t.rows)
+        .filter(|r| r.verdict == Verdict::Short)
+        .collect();
+    assert!(short.is_empty(), "{short:#?}");
+}
+
+fn count(tables: &[Table], quantity: &str, verdict: Verdict) -> usize {
+    tables
+        .iter()
+        .flat_map(|t| &t.rows)
+        .filter(|r| r.quantity.contains(quantity) && r.verdict == verdict && r.limit.is_some())
+        .count()
+}
+
+#[test]
+fn out_of_balance_forces_follow_their_leading_term() {
+    let tables = balance::balance(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    // two laws; a splice, three functions over two widths
+    assert_eq!(count(&tables, "cubic", Verdict::Pass), 2 * 7);
+    assert_eq!(count(&tables, "quartic", Verdict::Pass), 2 * 7);
+    assert_eq!(count(&tables, "splice over", Verdict::Pass), 2);
+}
+
+#[test]
+fn isotropic_weights_give_the_typed_tensor() {
+    let tables = weights::weights(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    assert!(count(&tables, "isotropic", Verdict::Pass) > 60);
+    // and plain ones do not
+    let plain = tables
+        .iter()
+        .flat_map(|t| &t.rows)
+        .filter(|r| r.quantity == "plain" && r.value > 1e-3)
+        .count();
+    assert!(plain > 60, "{plain}");
+}
+
+#[test]
+fn tangents_are_derivatives_of_energies() {
+    let tables = tangents::tangents(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    assert_eq!(count(&tables, "difference", Verdict::Pass), 3 * 3 * 2);
+    assert!(count(&tables, "threads", Verdict::Pass) >= 6);
+}
