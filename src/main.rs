@@ -4,7 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use bondline::observe::progress::TerminalProgress;
+use bondline::observe::report;
 use bondline::scene::{self, AnyScene, Template};
+use bondline::verify::{self, Effort};
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Parser, Subcommand, ValueEnum};
 
 const EXAMPLES: &str = "Examples:
@@ -62,6 +65,18 @@ enum Command {
     },
     /// Print the JSON Schema of scenes, for editors.
     Schema,
+    /// Measure what the code claims, as tables with limits; the exit status is 1 if any row is short.
+    Verify {
+        /// One suite; all of them if left out.
+        #[arg(value_parser = suites())]
+        name: Option<String>,
+        /// Print one JSON array of all rows.
+        #[arg(long)]
+        json: bool,
+        /// Only a part, in seconds.
+        #[arg(long)]
+        quick: bool,
+    },
 }
 
 #[derive(clap::Args)]
@@ -85,7 +100,7 @@ enum TemplateName {
 
 fn main() -> ExitCode {
     match execute(Arguments::parse().command) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(report) => {
             eprintln!("{report:?}");
             ExitCode::FAILURE
@@ -93,7 +108,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn execute(command: Command) -> miette::Result<()> {
+fn execute(command: Command) -> miette::Result<ExitCode> {
     match command {
         Command::Run {
             scene,
@@ -152,8 +167,32 @@ fn execute(command: Command) -> miette::Result<()> {
             let text = serde_json::to_string_pretty(&scene::schema());
             println!("{}", text.map_err(|e| miette::miette!("{e}"))?);
         }
+        Command::Verify { name, json, quick } => {
+            let effort = if quick { Effort::Quick } else { Effort::Full };
+            let progress = TerminalProgress::on_stderr();
+            let tables: Vec<report::Table> = verify::SUITES
+                .iter()
+                .filter(|s| name.as_ref().is_none_or(|name| name == s.name))
+                .flat_map(|s| (s.run)(effort, &progress))
+                .collect();
+            let format = if json {
+                report::Format::Json
+            } else {
+                report::Format::Text
+            };
+            print!("{}", report::render(&tables, format));
+            return Ok(ExitCode::from(report::exit_code(&tables)));
+        }
     }
-    Ok(())
+    Ok(ExitCode::SUCCESS)
+}
+
+fn suites() -> PossibleValuesParser {
+    PossibleValuesParser::new(
+        verify::SUITES
+            .iter()
+            .map(|s| PossibleValue::new(s.name).help(s.about)),
+    )
 }
 
 fn load(arguments: &SceneArguments) -> miette::Result<AnyScene> {

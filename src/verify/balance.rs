@@ -260,7 +260,7 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
                 &mut table,
                 &format!("1D {name}, m = {ratio}"),
                 &cases,
-                limit,
+                Some(SPURIOUS_RATIO),
             );
         }
     }

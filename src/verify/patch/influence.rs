@@ -113,9 +113,44 @@ pub fn table(progress: &dyn Progress) -> Table {
         })
         .collect();
     let mut table = Table::new(
-        "Influence functions in a bar (m = 3, matching): eigenvalues of the stiffness per volume times h^2/E, error of the solved affine field",
+        "Influence functions (m = 3, matching): eigenvalues of a bar's stiffness per volume times h^2/E, error of the solved affine field",
         Columns::ByQuantity,
     );
     rows.into_iter().flatten().for_each(|row| table.push(row));
+    meshfree(progress)
+        .into_iter()
+        .for_each(|row| table.push(row));
     table
+}
+
+/// Meshfree partial stress in 2D, where the solution loses digits: which ω of the divergence loses how many.
+fn meshfree(progress: &dyn Progress) -> Vec<Row> {
+    let cases: Vec<(String, Law, Influence)> = influences()
+        .flat_map(|(name, divergence)| {
+            [Law::ALL[0], Law::ALL[1]].map(|law| (name.clone(), law, divergence))
+        })
+        .collect();
+    progress.stage("influence functions, 2D", Some(cases.len() as u64));
+    cases
+        .into_par_iter()
+        .map(|(name, law, divergence)| {
+            let method = Method::Meshfree(divergence);
+            let case = Case {
+                method,
+                law,
+                cells: Cells::Matching,
+                widths: widths::<2>(method, Cells::Matching),
+                ratio: 3,
+            };
+            let name = format!("2D {}, {}, divergence {name}", method.name(), law.name());
+            progress.advance(1);
+            let solved = Enclosed::<2>::new(&case)
+                .map_err(|e| e.to_string())
+                .and_then(|block| solution_error(&block));
+            match solved {
+                Ok(error) => Row::info(name, "solution error", error),
+                Err(why) => Row::refused(name, "solution error", why),
+            }
+        })
+        .collect()
 }
