@@ -1,12 +1,12 @@
 //! The patch-test and ghost-force suite, in part; `bondline verify patch` runs all of it.
 
 use bondline::{
-    coupling::BlendingFunction,
     observe::report::{Table, Verdict, exit_code},
+    peridynamics::Micromodulus,
     progress::Silent,
     verify::{
         Effort,
-        enclosed::{Case, Cells, Enclosed, INFLUENCE, Law, Method, Widths},
+        enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
         patch,
     },
 };
@@ -51,15 +51,15 @@ fn affine_fields_are_exact_through_every_seam() {
 
 #[test]
 fn a_seam_that_lacks_bonds_is_found() {
-    // too thin a local zone: families of the collar reach beyond the block
+    // too thin a local zone: bonds of the last points reach beyond the block
     let case = Case {
-        method: Method::Blending(BlendingFunction::Constant),
-        law: Law::StateBased(INFLUENCE),
+        method: Method::Splice,
+        law: Law::BondBased(Micromodulus::InverseDistance),
         cells: Cells::Matching,
         widths: Widths {
             nonlocal: 6,
-            transition: 6,
-            local: 5,
+            transition: 0,
+            local: 1,
         },
         ratio: 3,
     };
