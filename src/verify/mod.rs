@@ -6,6 +6,7 @@
 //! | `balance` | the out-of-balance force of a seam against its leading term |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
+//! | `bar` | the coupled bar of [SAND2015-7998] section 7.3 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
 //!
 //! A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
@@ -67,6 +68,11 @@ pub const SUITES: &[Suite] = &[
         name: "tangents",
         about: "stiffness against finite differences of energies, symmetry, momentum, threads",
         run: tangents,
+    },
+    Suite {
+        name: "bar",
+        about: "the coupled bar of SAND2015-7998 section 7.3: deviation from the straight line",
+        run: bar::run,
     },
     Suite {
         name: "variable-horizon",

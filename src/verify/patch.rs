@@ -9,7 +9,8 @@ use crate::{
     progress::{Progress, Silent},
     solve::{
         FreeDofs,
-        direct::{DirectParams, Factor},
+        direct::{Analysis, DirectParams, Factor},
+        ordering::Ordering,
     },
     tensor::{Tensor, Vector, padded},
     verify::{
@@ -108,8 +109,12 @@ pub fn solution_error<const D: usize>(enclosed: &Enclosed<D>) -> Result<f64, Str
     let free = FreeDofs::from_prescribed(&held, D);
     let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
     // one factorisation serves all modes
-    let (factor, _) = Factor::new(k, &free, &positions, &DirectParams::default(), &Silent)
-        .map_err(|e| e.to_string())?;
+    let params = DirectParams::default();
+    let (factor, _) = Analysis::new(k, &free, &positions, Ordering::default())
+        .map_err(|e| e.to_string())
+        .and_then(|analysis| {
+            Factor::new(k, &free, analysis, &params, &Silent).map_err(|e| e.to_string())
+        })?;
     let mut error = 0.0;
     for mode in affine_modes::<D>() {
         let exact = mode.at(enclosed.positions());

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::{
-    coupling::row::{self, Transfer},
+    assembly::{self, Transfer},
     observe::report::{Columns, Row, Table},
     peridynamics::{Cloud, Ends, Factors, Families, PdBody, TIE_TOLERANCE},
     progress::Progress,
@@ -186,7 +186,7 @@ impl<const D: usize> RandomCloud<D> {
 
 /// The stiffness of a body alone.
 pub fn stiffness<const D: usize>(body: &PdBody<D>) -> BlockCsr {
-    row::assemble(
+    assembly::assemble(
         body.cloud.position.len(),
         |_| {},
         |site, row| body.add_force_row(site, |_| 1.0, row),
