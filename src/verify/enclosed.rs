@@ -6,7 +6,7 @@ use crate::{
     coupling::{
         Blending, BlendingFunction, Coupling, FitDegree, Local, Model, ModelError,
         PartialStressElements, PartialStressMeshfree, Peridynamics, PointSource, Problem, Splice,
-        Zone, model::Surfaces,
+        Surfaces, Zone,
     },
     mesh::{
         Mesh, MeshError,
