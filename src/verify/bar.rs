@@ -451,6 +451,7 @@ pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<(), FigureError
         title: "Bar with free sides: layer z = 0".into(),
         label: "displacement along x [µm]".into(),
         lines: seams.to_vec(),
+        range: Some((-1e3 * half, 1e3 * half)),
         ..bar.slice.clone()
     }
     .write(&folder.join("bar_slice.svg"))?;
