@@ -26,8 +26,8 @@ pub struct FreeMotion {
 /// ones, its rotation barely held, has 1e-10.
 const HELD: f64 = 1e-13;
 
-/// A force this far below the stiffness times the motion is zero (round-off is 1e-16 to 1e-14, assembled weights may
-/// add 1e-12).
+/// A force this far below the stiffness times the motion is zero: far above the round-off of assembly, far below a
+/// spring that anybody would call a support.
 const NO_FORCE: f64 = 1e-10;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -264,28 +264,36 @@ fn meets_no_force(
     force <= NO_FORCE * stiffness * size
 }
 
-/// The sites that move in the null vector of a matrix that met a tiny pivot, by inverse iteration with a shifted
-/// matrix. `site` is where the pivot was met, the answer of last resort.
+/// The sites that move in the null vector of a matrix, by inverse iteration with a shifted matrix; nothing if the
+/// matrix has none.
 pub(crate) fn mechanism(
     matrix: &BlockCsr,
     free: &FreeDofs,
     positions: &[[f64; 3]],
     ordering: Ordering,
-    site: usize,
-) -> FreeMotion {
-    let moving = null_vector(matrix, free, positions, ordering).map(|v| {
-        let d = matrix.block;
-        let size: Vec<f64> = v
-            .chunks(d)
-            .map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt())
-            .collect();
-        let largest = size.iter().fold(0.0, |a: f64, &b| a.max(b));
-        (0..size.len())
-            .filter(|&i| size[i] > 1e-3 * largest)
-            .collect()
-    });
+) -> Option<FreeMotion> {
+    let v = null_vector(matrix, free, positions, ordering)?;
+    let d = matrix.block;
+    let size: Vec<f64> = v
+        .chunks(d)
+        .map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt())
+        .collect();
+    let largest = size.iter().fold(0.0, |a: f64, &b| a.max(b));
+    let all: Vec<usize> = (0..size.len()).collect();
+    let motion = |i: usize| std::array::from_fn(|a| if a < d { v[i * d + a] } else { 0.0 });
+    meets_no_force(matrix, free, &all, motion).then(|| {
+        moving(
+            (0..size.len())
+                .filter(|&i| size[i] > 1e-3 * largest)
+                .collect(),
+        )
+    })
+}
+
+/// The report of a mechanism that moves `sites`.
+pub(crate) fn moving(sites: Vec<usize>) -> FreeMotion {
     FreeMotion {
-        sites: moving.filter(|s: &Vec<usize>| !s.is_empty()).unwrap_or_else(|| vec![site]),
+        sites,
         modes: vec!["a mechanism: a motion that is not rigid and meets no force".to_owned()],
         remedy: "hold these sites, or give the joint a stiffness (a hinge between two sites, a family with too few \
                  bonds?)"
