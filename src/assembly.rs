@@ -169,55 +169,211 @@ impl<const D: usize> Row<D> {
     }
 }
 
+/// Rows of one task.
+const CHUNK: usize = 256;
+
+/// Tasks that run before their rows are moved into the matrix: what is held twice is one wave, not the whole matrix.
+const WAVE: usize = 16;
+
 /// Assembles a block matrix row by row, in parallel; the same bits for any number of threads.
 pub fn assemble<const D: usize>(
     sites: usize,
     advance: impl Fn(u64) + Sync,
     add_row: impl Fn(usize, &mut Row<D>) + Sync,
 ) -> BlockCsr {
-    const CHUNK: usize = 256;
-    let chunks: Vec<(Vec<usize>, Vec<u32>, Vec<f64>)> = (0..sites.div_ceil(CHUNK))
+    let mut matrix = BlockCsr {
+        block: D,
+        row_offsets: Vec::with_capacity(sites + 1),
+        columns: Vec::new(),
+        values: Vec::new(),
+    };
+    matrix.row_offsets.push(0);
+    let chunks = sites.div_ceil(CHUNK);
+    for wave in (0..chunks).step_by(WAVE) {
+        let parts: Vec<(Vec<usize>, Vec<u32>, Vec<f64>)> = (wave..(wave + WAVE).min(chunks))
+            .into_par_iter()
+            .map_init(
+                || Row::<D>::new(sites),
+                |row, chunk| {
+                    let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(sites);
+                    let (mut ends, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+                    let count = range.len() as u64;
+                    for site in range {
+                        add_row(site, row);
+                        row.drain_into(&mut columns, &mut values);
+                        ends.push(columns.len());
+                    }
+                    advance(count);
+                    (ends, columns, values)
+                },
+            )
+            .collect();
+        for (ends, columns, values) in parts {
+            let before = matrix.columns.len();
+            matrix.row_offsets.extend(ends.iter().map(|e| before + e));
+            matrix.columns.extend(columns);
+            matrix.values.extend(values);
+        }
+    }
+    matrix.columns.shrink_to_fit();
+    matrix.values.shrink_to_fit();
+    matrix
+}
+
+/// What remains of a block matrix whose values were dropped row by row.
+#[derive(Clone, Debug, Default)]
+pub struct Pattern {
+    /// Blocks that [`assemble`] would store, zero blocks included.
+    pub stored: usize,
+    /// An estimate of `‖K − Kᵀ‖_F / ‖K‖_F`, from `xᵀ K y − yᵀ K x` with random `x` and `y`.
+    pub asymmetry: f64,
+    /// Start of each block row among the blocks that are not zero.
+    pub row_offsets: Vec<usize>,
+    /// Column of each block that is not zero, ascending within a row.
+    pub columns: Vec<u32>,
+}
+
+/// Sums over the values of rows that are dropped.
+#[derive(Clone, Copy, Debug, Default)]
+struct Dropped {
+    stored: usize,
+    skew: f64,
+    squares: f64,
+}
+
+/// A number in [−1, 1) that depends on its arguments only.
+fn noise(site: u32, component: usize, which: u64) -> f64 {
+    let mut z = (u64::from(site) << 4 | (component as u64) << 1 | which)
+        .wrapping_add(1)
+        .wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+impl<const D: usize> Row<D> {
+    /// Empties the row of `site` into the columns of its non-zero blocks.
+    fn drain_pattern(&mut self, site: u32, columns: &mut Vec<u32>, sums: &mut Dropped) {
+        let start = columns.len();
+        for (&other, block) in self.columns.iter().zip(&self.blocks) {
+            self.slot[other as usize] = EMPTY;
+            sums.stored += 1;
+            if block.iter().all(|&k| k == 0.0) {
+                continue;
+            }
+            columns.push(other);
+            for a in 0..D {
+                for b in 0..D {
+                    let k = block[(a, b)];
+                    sums.skew += k
+                        * (noise(site, a, 0) * noise(other, b, 1)
+                            - noise(site, a, 1) * noise(other, b, 0));
+                    sums.squares += k * k;
+                }
+            }
+        }
+        columns[start..].sort_unstable();
+        self.columns.clear();
+        self.blocks.clear();
+    }
+}
+
+/// The pattern of the matrix that [`assemble`] would make; each row is computed and dropped.
+pub fn pattern<const D: usize>(
+    sites: usize,
+    advance: impl Fn(u64) + Sync,
+    add_row: impl Fn(usize, &mut Row<D>) + Sync,
+) -> Pattern {
+    let parts: Vec<(Vec<usize>, Vec<u32>, Dropped)> = (0..sites.div_ceil(CHUNK))
         .into_par_iter()
         .map_init(
             || Row::<D>::new(sites),
             |row, chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(sites);
-                let (mut lengths, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+                let (mut ends, mut columns) = (Vec::new(), Vec::new());
+                let mut sums = Dropped::default();
                 let count = range.len() as u64;
                 for site in range {
-                    let before = columns.len();
                     add_row(site, row);
-                    row.drain_into(&mut columns, &mut values);
-                    lengths.push(columns.len() - before);
+                    row.drain_pattern(site as u32, &mut columns, &mut sums);
+                    ends.push(columns.len());
                 }
                 advance(count);
-                (lengths, columns, values)
+                (ends, columns, sums)
             },
         )
         .collect();
-    let entries = chunks.iter().map(|c| c.1.len()).sum();
-    let mut matrix = BlockCsr {
-        block: D,
-        row_offsets: Vec::with_capacity(sites + 1),
-        columns: Vec::with_capacity(entries),
-        values: Vec::with_capacity(entries * D * D),
+    let mut pattern = Pattern {
+        row_offsets: vec![0],
+        ..Pattern::default()
     };
-    matrix.row_offsets.push(0);
-    let mut total = 0;
-    for (lengths, columns, values) in chunks {
-        for length in lengths {
-            total += length;
-            matrix.row_offsets.push(total);
-        }
-        matrix.columns.extend(columns);
-        matrix.values.extend(values);
+    let mut sums = Dropped::default();
+    for (ends, columns, part) in parts {
+        let before = pattern.columns.len();
+        pattern.row_offsets.extend(ends.iter().map(|e| before + e));
+        pattern.columns.extend(columns);
+        sums.stored += part.stored;
+        sums.skew += part.skew;
+        sums.squares += part.squares;
     }
-    matrix
+    pattern.stored = sums.stored;
+    // x and y have variance 1/3 per entry: E (xᵀ (K − Kᵀ) y)² = ‖K − Kᵀ‖² / 9
+    if sums.squares > 0.0 {
+        pattern.asymmetry = 3.0 * sums.skew.abs() / sums.squares.sqrt();
+    }
+    pattern
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A ring of sites, each joined to the next ones; `skew` times an antisymmetric part.
+    fn ring(sites: usize, skew: f64) -> impl Fn(usize, &mut Row<2>) + Sync {
+        move |site, row| {
+            let k = Tensor::<2>::new(2.0, 1.0, 1.0, 3.0);
+            for (step, sign) in [(1, 1.0), (sites - 1, -1.0)] {
+                row.add_site(((site + step) % sites) as u32, &(k * (skew * sign - 1.0)));
+            }
+            row.add_site(((site + 5) % sites) as u32, &Tensor::zeros());
+            row.add_site(site as u32, &(k * 2.0));
+        }
+    }
+
+    #[test]
+    fn the_pattern_is_that_of_the_matrix() {
+        for skew in [0.0, 1e-3] {
+            let sites = 10_000;
+            let matrix = assemble(sites, |_| (), ring(sites, skew));
+            let found = pattern(sites, |_| (), ring(sites, skew));
+            assert_eq!(matrix.rows(), sites);
+            assert_eq!(found.row_offsets.len(), sites + 1);
+            assert_eq!(found.stored * 4, matrix.nonzeros());
+            for i in [0, 255, 256, 4095, 4096, 9999] {
+                let mut wanted = vec![
+                    ((i + sites - 1) % sites) as u32,
+                    i as u32,
+                    ((i + 1) % sites) as u32,
+                ];
+                wanted.sort_unstable();
+                let row = found.row_offsets[i]..found.row_offsets[i + 1];
+                assert_eq!(found.columns[row], wanted);
+                assert_eq!(matrix.row(i).0.len(), 4);
+                assert!(matrix.row(i).0.is_sorted());
+            }
+            let exact = matrix.asymmetry();
+            if skew == 0.0 {
+                assert!(
+                    exact == 0.0 && found.asymmetry < 1e-13,
+                    "{}",
+                    found.asymmetry
+                );
+            } else {
+                let ratio = found.asymmetry / exact;
+                assert!((0.01..10.0).contains(&ratio), "{ratio}");
+            }
+        }
+    }
 
     #[test]
     fn a_place_is_the_sum_of_its_weights() {

@@ -1,5 +1,7 @@
 //! The command line: arguments to a scene, its run, a report and an exit code.
 
+use std::fmt::Display;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -46,7 +48,7 @@ enum Command {
         #[arg(long, value_name = "N")]
         threads: Option<usize>,
     },
-    /// Validate a scene and predict its size, without solving it.
+    /// Validate a scene and predict its size, memory and time, without solving it.
     Check {
         #[command(flatten)]
         scene: SceneArguments,
@@ -130,24 +132,21 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                 .run(&TerminalProgress::on_stderr())
                 .map_err(|e| miette::miette!("{e}"))?;
             if json {
-                println!("{}", summary.json().map_err(|e| miette::miette!("{e}"))?);
+                print(summary.json().map_err(|e| miette::miette!("{e}"))?)?;
             } else {
-                println!("{summary}");
+                print(summary)?;
             }
         }
         Command::Check { scene, json } => {
             let scene = load(&scene)?;
-            let sizes = scene
-                .sizes(&TerminalProgress::on_stderr())
+            let prediction = scene
+                .predict(&TerminalProgress::on_stderr())
                 .map_err(|e| miette::miette!("{e}"))?;
             if json {
-                let text = serde_json::to_string_pretty(&sizes);
-                println!("{}", text.map_err(|e| miette::miette!("{e}"))?);
+                let text = serde_json::to_string_pretty(&prediction);
+                print(text.map_err(|e| miette::miette!("{e}"))?)?;
             } else {
-                println!(
-                    "the scene is right: {} cells, {} sites ({} points), {} bonds, {} unknowns before conditions",
-                    sizes.cells, sizes.sites, sizes.points, sizes.bonds, sizes.dofs
-                );
+                print(prediction)?;
             }
         }
         Command::New { path, template } => {
@@ -157,15 +156,15 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                 TemplateName::File => Template::File,
             };
             template.write(&path).map_err(|e| e.report())?;
-            println!(
+            print(format_args!(
                 "wrote {}; solve it with: bondline run {}",
                 path.display(),
                 path.display()
-            );
+            ))?;
         }
         Command::Schema => {
             let text = serde_json::to_string_pretty(&scene::schema());
-            println!("{}", text.map_err(|e| miette::miette!("{e}"))?);
+            print(text.map_err(|e| miette::miette!("{e}"))?)?;
         }
         Command::Verify { name, json, quick } => {
             let effort = if quick { Effort::Quick } else { Effort::Full };
@@ -180,7 +179,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             } else {
                 report::Format::Text
             };
-            print!("{}", report::render(&tables, format));
+            print(report::render(&tables, format).trim_end())?;
             return Ok(ExitCode::from(report::exit_code(&tables)));
         }
     }
@@ -193,6 +192,18 @@ fn suites() -> PossibleValuesParser {
             .iter()
             .map(|s| PossibleValue::new(s.name).help(s.about)),
     )
+}
+
+/// Writes a line to standard output, which may be a full disk or a reader that has left.
+fn print(text: impl Display) -> miette::Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{text}")
+        .and_then(|()| out.flush())
+        .map_err(|e| {
+            miette::miette!(
+                "cannot write to standard output: {e}; free the disk, or send it elsewhere"
+            )
+        })
 }
 
 fn load(arguments: &SceneArguments) -> miette::Result<AnyScene> {

@@ -57,16 +57,25 @@ fn a_coupled_bar_stretches_as_a_bar() {
 fn a_body_force_hangs_on_its_support() {
     // b per length on a bar of length 1: the support takes -b, the free end moves by b / (2 E)
     let weight = "conditions.right.body-force={x=1e6}";
-    // finite elements are exact at nodes; a seam between cells and points interpolates u linearly over one cell, which
-    // errs by h² u''/8 in two rows: measured 5.8e-4 (splice), 8.3e-4 (blending), 0.7e-4 (partial stress) at h = 1/200
-    for (method, limit) in [
-        ("local", 1e-9),
-        ("splice", 7e-4),
-        ("blending", 1e-3),
-        ("partial-stress", 1e-4),
+    // points on the nodes of the mesh: the seam interpolates nothing and quadratic fields pass it to round-off; points at
+    // centroids: u is interpolated linearly over one cell, which errs by h² u''/8 in two rows, measured 5.8e-4
+    // (splice), 8.3e-4 (blending), 0.7e-4 (partial stress) at h = 1/200
+    for (method, points, limit) in [
+        ("local", "points.lattice.spacing=\"1/200\"", 1e-11),
+        ("splice", "points.lattice.spacing=\"1/200\"", 1e-11),
+        ("blending", "points.lattice.spacing=\"1/200\"", 1e-11),
+        ("partial-stress", "points.lattice.spacing=\"1/200\"", 1e-11),
+        ("splice", "points=\"cells\"", 7e-4),
+        ("blending", "points=\"cells\"", 1e-3),
+        ("partial-stress", "points=\"cells\"", 1e-4),
     ] {
-        let set = format!("coupling={method}");
-        let (summary, rows) = run(Template::Bar, &[weight, &set], "scene_axis.csv");
+        let set = [
+            weight.to_owned(),
+            format!("coupling={method}"),
+            format!("peridynamics.{points}"),
+        ];
+        let set: Vec<&str> = set.iter().map(String::as_str).collect();
+        let (summary, rows) = run(Template::Bar, &set, "scene_axis.csv");
         let reaction = summary.reactions[0].force[0];
         assert!(
             (reaction / -1e6 - 1.0).abs() < limit,
@@ -105,8 +114,12 @@ fn a_plate_hangs_together_by_every_method() {
         );
         lips.push(rows[0][3]);
     }
+    // the couplings agree with each other; peridynamics throughout, its horizon a tenth of the plate, is softer along the
+    // free edges of the plate, and the lip opens less: measured 6.4 %
     for lip in &lips {
-        // one spacing more of the plate lies between the held layers of points than between held nodes
-        assert!((lip / lips[0] - 1.0).abs() < 0.05, "{lips:?}");
+        assert!((lip / lips[1] - 1.0).abs() < 0.08, "{lips:?}");
+    }
+    for lip in &lips[1..] {
+        assert!((lip / lips[1] - 1.0).abs() < 3e-3, "{lips:?}");
     }
 }

@@ -35,7 +35,7 @@ pub use derivative::FitDegree;
 pub use model::{Model, Site, SiteKind};
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
 pub use problem::{ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
-pub use sample::Sampler;
+pub use sample::{Carrier, Sampler};
 pub use single::{Local, Nonlocal};
 pub use splice::Splice;
 

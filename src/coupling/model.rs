@@ -498,4 +498,20 @@ impl<const D: usize> Model<D> {
         progress.finish();
         matrix
     }
+
+    /// The pattern of the stiffness, without its values.
+    pub fn pattern(
+        &self,
+        operator: &dyn super::Operator<D>,
+        progress: &dyn Progress,
+    ) -> assembly::Pattern {
+        progress.stage("pattern", Some(self.sites.len() as u64));
+        let pattern = assembly::pattern(
+            self.sites.len(),
+            |by| progress.advance(by),
+            |site, row| operator.add_row(site, row),
+        );
+        progress.finish();
+        pattern
+    }
 }

@@ -90,7 +90,7 @@ pub enum ModelError {
     },
     /// A zone holds no peridynamic point.
     #[error(
-        "the nonlocal zone holds no peridynamic point: its smallest extent is below the spacing {spacing}; enlarge the zone or refine the lattice"
+        "the nonlocal zone holds no peridynamic point: voids cover it, or its smallest extent is below the spacing {spacing}; shrink the voids, enlarge the zone or refine the lattice"
     )]
     NoPoints {
         /// Spacing of the lattice \[m\].

@@ -15,6 +15,15 @@ pub struct Sampler<'a, const D: usize> {
     bins: HashMap<[i64; D], Vec<u32>>,
 }
 
+/// What carries the displacement at a position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Carrier {
+    /// A finite element, by its cell.
+    Element(usize),
+    /// The points around; the nearest one, by its site.
+    Point(usize),
+}
+
 impl<'a, const D: usize> Sampler<'a, D> {
     /// Sorts the cells and points of a model.
     pub fn new(model: &'a Model<D>) -> Self {
@@ -42,11 +51,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
     pub fn displacement(&self, x: &Vector<D>, u: &[f64]) -> Option<Vector<D>> {
         let of_site = |s: u32| Vector::<D>::from_fn(|a, _| u[s as usize * D + a]);
         let h = self.model.spacing();
-        let near = if h > 0.0 {
-            self.points_near(x, 1.6 * h)
-        } else {
-            Vec::new()
-        };
+        let near = self.points_near(x, 1.6 * h);
         let position = |s: u32| self.model.sites[s as usize].position;
         if let Some(&s) = near.iter().find(|&&s| (position(s) - x).norm() <= 1e-9 * h) {
             return Some(of_site(s));
@@ -66,8 +71,24 @@ impl<'a, const D: usize> Sampler<'a, D> {
         Some(near.iter().zip(weights).map(|(&s, w)| of_site(s) * w).sum())
     }
 
+    /// What carries the displacement at `x` \[m\]; `None` farther than 1.6 spacings from any point and outside of all elements.
+    pub fn carrier(&self, x: &Vector<D>) -> Option<Carrier> {
+        if let Some(located) = self.elements.locate(&self.model.mesh, x, 1e-9) {
+            return Some(Carrier::Element(located.cell));
+        }
+        let h = self.model.spacing();
+        let distance = |s: &u32| (self.model.sites[*s as usize].position - x).norm();
+        self.points_near(x, 1.6 * h)
+            .into_iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)))
+            .map(|s| Carrier::Point(s as usize))
+    }
+
     fn points_near(&self, x: &Vector<D>, radius: f64) -> Vec<u32> {
         let h = self.model.spacing();
+        if h <= 0.0 {
+            return Vec::new();
+        }
         let centre = bin(x, h);
         let mut found = Vec::new();
         for index in 0..5usize.pow(D as u32) {

@@ -94,8 +94,20 @@ pub fn peak_memory_bytes() -> Option<u64> {
     peak_in_status(&std::fs::read_to_string("/proc/self/status").ok()?)
 }
 
+/// The memory that this process holds now, in bytes; `None` where the system does not tell.
+pub fn resident_memory_bytes() -> Option<u64> {
+    in_status(
+        &std::fs::read_to_string("/proc/self/status").ok()?,
+        "VmRSS:",
+    )
+}
+
 fn peak_in_status(status: &str) -> Option<u64> {
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    in_status(status, "VmHWM:")
+}
+
+fn in_status(status: &str, key: &str) -> Option<u64> {
+    let line = status.lines().find_map(|l| l.strip_prefix(key))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes * 1024)
 }

@@ -132,8 +132,8 @@ pub enum ShellError {
     },
     /// A kernel value, the spacing or the target is not usable.
     #[error(
-        "isotropic shell weights: {what} is {value}; it must be finite and {wanted}; check the influence function, \
-         the spacing and the modulus"
+        "isotropic shell weights: {what} is {value}; it must be finite and {wanted}; check the influence function \
+         (most vanish at the horizon itself), the horizon over the spacing and the modulus"
     )]
     Input {
         /// Which number.

@@ -324,7 +324,8 @@ pub(crate) fn peridynamics<const D: usize>(
             }
             let origin = match &lattice.origin {
                 Some(o) => position("peridynamics.points.lattice.origin", o)?,
-                None => lo.add_scalar(0.5 * spacing),
+                // where the mesh follows the lattice, points and nodes coincide: the seam then interpolates nothing
+                None => lo,
             };
             Points::Lattice { spacing, origin }
         }

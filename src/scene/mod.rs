@@ -10,6 +10,7 @@
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `materials.rs`, `conditions.rs` | its parts |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
+//! | `predict.rs` | what a run will need, without solving |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
 
@@ -21,6 +22,7 @@ mod expression;
 mod materials;
 mod meshing;
 mod parse;
+mod predict;
 mod region;
 mod run;
 mod source;
@@ -35,8 +37,9 @@ pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use materials::{Law, Material, Method, Peridynamics, Points};
+pub use predict::{Prediction, Share};
 pub use region::Region;
-pub use run::{RunError, Solved, sizes, solve_with};
+pub use run::{RunError, Solved, solve_with};
 pub use source::{Source, Span};
 pub use spec::SceneSpec;
 pub use template::Template;

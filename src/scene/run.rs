@@ -25,12 +25,12 @@ use crate::peridynamics::{
 };
 use crate::progress::Progress;
 use crate::solve::statics::{self, StaticError, StaticParams, StaticProblem};
-use crate::system::{BlockCsr, Symmetry};
+use crate::system::Symmetry;
 use crate::tensor::{Vector, padded};
 
 /// How far from a set a peridynamic point may lie, in its own spacings, to follow a condition on the set.
 ///
-/// The first layer lies half a spacing away, at the corner of a square 0.71 of one; the second layer one and a half.
+/// The first layer lies on the set or half a spacing away, at the corner of a square 0.71 of one; the second layer at least one.
 const FIRST_LAYER: f64 = 0.75;
 
 /// Why a scene that is right could not be run.
@@ -107,7 +107,7 @@ pub fn solve_with<const D: usize>(
     let (prescribed, holder) = supports(&model, &rest.conditions)?;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
     let mut choices = Vec::new();
-    let symmetry = symmetry(coupling.as_ref(), &stiffness, &mut choices);
+    let symmetry = symmetry(coupling.as_ref(), || stiffness.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");
     let solution = statics::solve(
         &StaticProblem {
@@ -206,40 +206,14 @@ pub fn solve_with<const D: usize>(
     Ok(summary)
 }
 
-/// Sites and directed bonds of a scene, without solving it.
-///
-/// # Errors
-/// [`RunError::Model`] if the model cannot be built.
-pub fn sizes<const D: usize>(scene: Scene<D>, progress: &dyn Progress) -> Result<Sizes, RunError> {
-    let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
-    let (problem, _) = problem(scene);
-    let (model, coupling) = Model::new(problem, progress)?;
-    let operator = coupling.operator(&model)?;
-    progress.finish();
-    let points = model
-        .sites
-        .iter()
-        .filter(|s| matches!(s.kind, SiteKind::Point(_)))
-        .count();
-    Ok(Sizes {
-        nodes,
-        cells,
-        sites: model.sites.len(),
-        points,
-        bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
-        dofs: model.sites.len() * D,
-        nonzeros: 0,
-    })
-}
-
 /// What of a scene remains once its problem is built.
-struct Rest<const D: usize> {
-    conditions: Vec<Condition<D>>,
-    solver: Solver,
+pub(super) struct Rest<const D: usize> {
+    pub conditions: Vec<Condition<D>>,
+    pub solver: Solver,
     output: Output<D>,
 }
 
-fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
+pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
     let material = scene
         .zones
         .iter()
@@ -322,7 +296,7 @@ fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
     )
 }
 
-fn params(solver: &Solver) -> StaticParams {
+pub(super) fn params(solver: &Solver) -> StaticParams {
     StaticParams {
         method: solver.method,
         ordering: solver.ordering,
@@ -333,14 +307,14 @@ fn params(solver: &Solver) -> StaticParams {
 }
 
 /// The symmetry that the coupling promises, if the matrix keeps it: a horizon that varies breaks it.
-fn symmetry<const D: usize>(
+pub(super) fn symmetry<const D: usize>(
     coupling: &dyn Coupling<D>,
-    stiffness: &BlockCsr,
+    asymmetry: impl FnOnce() -> f64,
     choices: &mut Vec<Choice>,
 ) -> Symmetry {
     const ROUND_OFF: f64 = 1e-12;
     if coupling.symmetry() == Symmetry::Symmetric {
-        let asymmetry = stiffness.asymmetry();
+        let asymmetry = asymmetry();
         if asymmetry <= ROUND_OFF {
             return Symmetry::Symmetric;
         }
@@ -424,7 +398,7 @@ fn first_layer<const D: usize>(
 type Held = (Vec<Option<f64>>, Vec<Option<usize>>);
 
 /// The prescribed displacement of each dof, and the condition that prescribes it.
-fn supports<const D: usize>(
+pub(super) fn supports<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
 ) -> Result<Held, RunError> {
@@ -482,7 +456,7 @@ fn supports<const D: usize>(
 ///
 /// Every site takes the load of its own model: a node the consistent force of all cells around it, a point its volume
 /// times the body force, and in the first layer its share of the facets' area times the traction.
-fn loads<const D: usize>(
+pub(super) fn loads<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
 ) -> Result<(Vec<f64>, f64), RunError> {

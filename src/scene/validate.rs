@@ -7,6 +7,7 @@ use super::conditions::{self, Condition, extent};
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::{self, Material, Method, Peridynamics, Points};
 use super::meshing;
+use super::predict::{self, Prediction};
 use super::region::{self, Region};
 use super::run::{self, RunError};
 use super::source::{Source, Span};
@@ -16,7 +17,7 @@ use crate::coupling::Zone;
 use crate::fem::Locator;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
-use crate::observe::summary::{RunSummary, Sizes};
+use crate::observe::summary::RunSummary;
 use crate::peridynamics::Influence;
 use crate::progress::Progress;
 use crate::shape::{Barrier, Shape};
@@ -159,15 +160,15 @@ impl AnyScene {
         }
     }
 
-    /// How large the model is, without solving it.
+    /// What a run will need, without solving.
     ///
     /// # Errors
-    /// [`RunError::Model`] if the model cannot be built.
-    pub fn sizes(self, progress: &dyn Progress) -> Result<Sizes, RunError> {
+    /// [`RunError`], each with place and remedy.
+    pub fn predict(self, progress: &dyn Progress) -> Result<Prediction, RunError> {
         match self {
-            Self::Bar(s) => run::sizes(*s, progress),
-            Self::Plane(s) => run::sizes(*s, progress),
-            Self::Solid(s) => run::sizes(*s, progress),
+            Self::Bar(s) => predict::predict(*s, progress),
+            Self::Plane(s) => predict::predict(*s, progress),
+            Self::Solid(s) => predict::predict(*s, progress),
         }
     }
 

@@ -6,12 +6,13 @@ use rayon::prelude::*;
 
 use super::run::Solved;
 use super::validate::Output;
-use crate::coupling::{SiteKind, Zone};
+use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
 use crate::fem::{self, Locator};
-use crate::mesh::{CellShape, Mesh};
+use crate::mesh::CellShape;
 use crate::observe::ObserveError;
 use crate::observe::csv::CsvTable;
 use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
+use crate::shape::Shape;
 use crate::tensor::{Tensor, Vector, padded, strain};
 
 /// Writes what the scene asks for; returns the files.
@@ -23,21 +24,21 @@ pub fn write<const D: usize>(
     solved: &Solved<'_, D>,
 ) -> Result<Vec<PathBuf>, ObserveError> {
     let mut files = Vec::new();
-    let sampler = Sampler::new(solved);
+    let solution = Solution::new(solved);
     if output.vtu {
         let path = output.directory.join(format!("{}.vtu", output.name));
-        write_vtu(&path, &snapshot(solved, &sampler), Compression::Zlib)?;
+        write_vtu(&path, &snapshot(solved, &solution), Compression::Zlib)?;
         files.push(path);
     }
     for (name, positions) in &output.lines {
         let path = output.directory.join(format!("{}_{name}.csv", output.name));
-        table(&path, positions, &sampler)?;
+        table(&path, positions, &solution)?;
         files.push(path);
     }
     if !output.probes.is_empty() {
         let path = output.directory.join(format!("{}_probes.csv", output.name));
         let positions: Vec<Vector<D>> = output.probes.iter().map(|(_, x)| *x).collect();
-        table(&path, &positions, &sampler)?;
+        table(&path, &positions, &solution)?;
         files.push(path);
     }
     Ok(files)
@@ -48,7 +49,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 fn table<const D: usize>(
     path: &std::path::Path,
     positions: &[Vector<D>],
-    sampler: &Sampler<'_, D>,
+    solution: &Solution<'_, D>,
 ) -> Result<(), ObserveError> {
     let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
     header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
@@ -58,8 +59,10 @@ fn table<const D: usize>(
     header.push("model".to_owned());
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let mut table = CsvTable::create(path, &header)?;
-    let samples: Vec<Sample<D>> = positions.par_iter().map(|x| sampler.at(x)).collect();
+    let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| solution.at(x)).collect();
     for (x, sample) in positions.iter().zip(samples) {
+        // a line may cross a slit: there is nothing to tell in it
+        let Some(sample) = sample else { continue };
         let e = strain(&sample.gradient);
         let mut row: Vec<f64> = x
             .iter()
@@ -90,28 +93,23 @@ struct Sample<const D: usize> {
     zone: Zone,
 }
 
-/// The solution between its sites.
-struct Sampler<'a, const D: usize> {
+/// The solution at sites and between them.
+struct Solution<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
-    elements: Locator<D>,
+    sampler: Sampler<'a, D>,
+    body: Locator<D>,
     tolerance: f64,
-    points: Vec<usize>,
 }
 
-impl<'a, const D: usize> Sampler<'a, D> {
+impl<'a, const D: usize> Solution<'a, D> {
     fn new(solved: &'a Solved<'a, D>) -> Self {
         let model = solved.model;
         let (lo, hi) = model.mesh.bounds();
         Self {
             solved,
-            elements: Locator::new(
-                &model.mesh,
-                (0..model.mesh.cell_count()).filter(|&c| model.is_element(c)),
-            ),
+            sampler: Sampler::new(model),
+            body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
             tolerance: 1e-9 * (hi - lo).norm(),
-            points: (0..model.sites.len())
-                .filter(|&s| matches!(model.sites[s].kind, SiteKind::Point(_)))
-                .collect(),
         }
     }
 
@@ -126,44 +124,31 @@ impl<'a, const D: usize> Sampler<'a, D> {
         Vector::from_column_slice(&self.solved.displacement[site * D..][..D])
     }
 
-    /// In an element its own interpolation; among points the affine field of the nearest point's family.
-    fn at(&self, x: &Vector<D>) -> Sample<D> {
+    /// Whether a position lies in the mesh and in no void.
+    fn is_inside(&self, x: &Vector<D>) -> bool {
         let model = self.solved.model;
-        let mesh: &Mesh<D> = &model.mesh;
-        if let Some(found) = self.elements.locate(mesh, x, self.tolerance) {
-            let displacement = mesh
-                .cell(found.cell)
-                .iter()
-                .zip(found.shape)
-                .map(|(&n, shape)| self.node(n as usize) * shape)
-                .sum();
-            return Sample {
-                displacement,
-                gradient: self.element_gradient(found.cell),
-                zone: model.zones[found.cell],
-            };
+        let in_void = model.peridynamics.as_ref().is_some_and(|p| {
+            let inside = |v: &Shape<D>| v.signed_distance(x) < -self.tolerance;
+            p.voids.iter().any(inside)
+        });
+        !in_void && self.body.locate(&model.mesh, x, self.tolerance).is_some()
+    }
+
+    /// In an element its strain; among points that of the nearest point's family. `None` outside of the body.
+    fn at(&self, x: &Vector<D>) -> Option<Sample<D>> {
+        if !self.is_inside(x) {
+            return None;
         }
-        let distance = |site: usize| (model.sites[site].position - x).norm_squared();
-        let nearest = self
-            .points
-            .iter()
-            .copied()
-            .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-        match nearest {
-            Some(site) => {
-                let gradient = self.point_gradient(site);
-                Sample {
-                    displacement: self.site(site) + gradient * (x - model.sites[site].position),
-                    gradient,
-                    zone: self.solved.zone_of_site[site],
-                }
-            }
-            None => Sample {
-                displacement: Vector::zeros(),
-                gradient: Tensor::zeros(),
-                zone: Zone::Local,
-            },
-        }
+        let displacement = self.sampler.displacement(x, self.solved.displacement)?;
+        let (gradient, zone) = match self.sampler.carrier(x)? {
+            Carrier::Element(c) => (self.element_gradient(c), self.solved.model.zones[c]),
+            Carrier::Point(site) => (self.point_gradient(site), self.solved.zone_of_site[site]),
+        };
+        Some(Sample {
+            displacement,
+            gradient,
+            zone,
+        })
     }
 
     fn element_gradient(&self, c: usize) -> Tensor<D> {
@@ -207,7 +192,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
     }
 }
 
-fn snapshot<const D: usize>(solved: &Solved<'_, D>, sampler: &Sampler<'_, D>) -> Snapshot {
+fn snapshot<const D: usize>(solved: &Solved<'_, D>, solution: &Solution<'_, D>) -> Snapshot {
     let model = solved.model;
     let mesh = &model.mesh;
     // nodes that elements use, then points
@@ -230,14 +215,14 @@ fn snapshot<const D: usize>(solved: &Solved<'_, D>, sampler: &Sampler<'_, D>) ->
             if *entry == u32::MAX {
                 *entry = snapshot.points.len() as u32;
                 snapshot.points.push(padded(&mesh.nodes[n as usize]));
-                displacement.push(sampler.node(n as usize));
+                displacement.push(solution.node(n as usize));
                 site_of_point.push(site_of_node[n as usize]);
             }
             *slot = *entry;
         }
         snapshot.push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
         zones.push(label(model.zones[c]));
-        let gradient = sampler.element_gradient(c);
+        let gradient = solution.element_gradient(c);
         strains.push(strain(&gradient));
         stresses.push(
             solved
@@ -246,21 +231,21 @@ fn snapshot<const D: usize>(solved: &Solved<'_, D>, sampler: &Sampler<'_, D>) ->
                 .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
         );
     }
-    let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = sampler
-        .points
-        .par_iter()
-        .map(|&site| {
+    let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
+        .into_par_iter()
+        .filter(|&site| matches!(model.sites[site].kind, SiteKind::Point(_)))
+        .map(|site| {
             let stress = model.point_of(site).map_or(Tensor::zeros(), |(body, p)| {
                 body.partial_stress(p, solved.displacement)
             });
-            (site, strain(&sampler.point_gradient(site)), stress)
+            (site, strain(&solution.point_gradient(site)), stress)
         })
         .collect();
     for (site, e, stress) in on_points {
         let number = snapshot.points.len() as u32;
         snapshot.points.push(padded(&model.sites[site].position));
         snapshot.push_cell(CellShape::Vertex, &[number]);
-        displacement.push(sampler.site(site));
+        displacement.push(solution.site(site));
         site_of_point.push(Some(site));
         zones.push(label(solved.zone_of_site[site]));
         strains.push(e);
@@ -269,11 +254,10 @@ fn snapshot<const D: usize>(solved: &Solved<'_, D>, sampler: &Sampler<'_, D>) ->
     let of_site = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
         site_of_point.iter().map(|s| s.map_or(0.0, f)).collect()
     };
-    let horizon = |site: usize| {
-        model
-            .peridynamics
-            .as_ref()
-            .map_or(0.0, |p| (p.horizon)(&model.sites[site].position))
+    // a local site has none
+    let horizon = |site: usize| match (&model.peridynamics, solved.zone_of_site[site]) {
+        (None, _) | (_, Zone::Local) => 0.0,
+        (Some(p), _) => (p.horizon)(&model.sites[site].position),
     };
     let residual: Vec<Vector<D>> = site_of_point
         .iter()

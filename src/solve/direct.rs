@@ -151,6 +151,12 @@ impl Analysis {
         })
     }
 
+    /// Bytes of the graph and of the tree while they are made.
+    pub fn bytes(&self) -> u64 {
+        // the rows of the graph are held twice while it is made symmetric
+        (8 * self.graph.neighbours.len() + self.symbolic.bytes()) as u64
+    }
+
     /// The cost of a Cholesky (`Symmetric`) or an LU factorisation.
     pub fn cost(&self, symmetry: Symmetry) -> FactorCost {
         self.symbolic.cost(symmetry)

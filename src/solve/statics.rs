@@ -10,6 +10,8 @@ use crate::system::{BlockCsr, Symmetry};
 
 mod methods;
 
+pub use methods::expected_method;
+
 /// A static problem; borrowed, so that assembling it is the caller's to time.
 ///
 /// Shapes: `load` and `prescribed` have one entry per dof of `stiffness`, `positions` one per site. Units: whatever

@@ -209,6 +209,12 @@ impl Symbolic {
         reversed
     }
 
+    /// Bytes of the tree itself.
+    pub fn bytes(&self) -> usize {
+        let rows: usize = self.nodes.iter().map(|n| n.rows.len()).sum();
+        4 * rows + 20 * self.order.len() + std::mem::size_of::<Supernode>() * self.nodes.len()
+    }
+
     /// The supernode that takes up the contribution of `s`.
     pub(crate) fn parent(&self, s: usize) -> Option<usize> {
         let parent = self.nodes[s].parent;

@@ -201,7 +201,8 @@ pub enum PointsSpec {
 pub struct LatticeSpec {
     /// Distance of neighbours h.
     pub spacing: Number,
-    /// Any point of the lattice; half a spacing inside the mesh's smallest corner if left out.
+    /// Any point of the lattice; the mesh's lowest corner if left out, so that points coincide with the nodes of a
+    /// mesh of the same spacing.
     #[serde(default)]
     pub origin: Option<Coordinates>,
 }

@@ -57,7 +57,7 @@ pub struct SceneSpec {
     #[serde(default)]
     pub zones: ZonesSpec,
     /// How the two models are joined; also as text where no option is set, `coupling = "splice"`.
-    #[schemars(with = "CouplingSpec")]
+    #[schemars(schema_with = "coupling_schema")]
     pub coupling: Spanned<CouplingSpec>,
     /// Displacements, tractions and body forces by name.
     #[serde(default)]
@@ -74,6 +74,18 @@ pub struct SceneSpec {
     /// What is written, and where.
     #[serde(default)]
     pub output: OutputSpec,
+}
+
+/// A table with the method's options, or the method's name alone.
+fn coupling_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    let table = generator.subschema_for::<CouplingSpec>();
+    schemars::json_schema!({
+        "description": "How the two models are joined: a table, [coupling.blending], or a name where no option is set, \"splice\".",
+        "anyOf": [
+            table,
+            { "enum": ["splice", "blending", "partial-stress", "local", "nonlocal"] }
+        ]
+    })
 }
 
 /// How a body of one, two or three dimensions stands for a solid.

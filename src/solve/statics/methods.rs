@@ -8,6 +8,7 @@ use crate::solve::singular;
 use crate::solve::statics::{
     Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticProblem, singular_error,
 };
+use crate::solve::symbolic::FactorCost;
 use crate::solve::{FreeDofs, FreeOperator};
 use crate::system::Symmetry;
 use std::time::Instant;
@@ -72,8 +73,7 @@ pub(super) fn solve_free(
         Method::Auto if problem.stiffness.nonzeros() <= ANALYSED => {
             let analysis = analyse()?;
             let cost = analysis.cost(problem.symmetry);
-            let fits = params.memory_limit.is_none_or(|limit| cost.bytes <= limit);
-            if fits && cost.flops <= DIRECT_OPERATIONS * problem.stiffness.nonzeros() as f64 {
+            if factorises(&cost, problem.stiffness.nonzeros(), params.memory_limit) {
                 return direct(problem, free, analysis, params, progress, u, info);
             }
             // not kept: its memory is better spent on the hierarchy
@@ -89,6 +89,32 @@ pub(super) fn solve_free(
         *info = before;
     }
     direct(problem, free, analyse()?, params, progress, u, info)
+}
+
+/// Whether `Auto` factorises a matrix of `nonzeros` stored scalars whose factorisation costs `cost`.
+fn factorises(cost: &FactorCost, nonzeros: usize, memory_limit: Option<u64>) -> bool {
+    let fits = memory_limit.is_none_or(|limit| cost.bytes <= limit);
+    nonzeros <= ANALYSED && fits && cost.flops <= DIRECT_OPERATIONS * nonzeros as f64
+}
+
+/// The method that [`solve`](super::solve) will take for a matrix of `nonzeros` stored scalars whose factorisation costs `cost`.
+pub fn expected_method(
+    params: &StaticParams,
+    symmetry: Symmetry,
+    cost: &FactorCost,
+    nonzeros: usize,
+) -> MethodUsed {
+    let direct = match params.method {
+        Method::Auto => factorises(cost, nonzeros, params.memory_limit),
+        Method::Direct => true,
+        Method::Krylov => false,
+    };
+    match (direct, symmetry) {
+        (true, Symmetry::Symmetric) => MethodUsed::Cholesky,
+        (true, Symmetry::Unsymmetric) => MethodUsed::Lu,
+        (false, Symmetry::Symmetric) => MethodUsed::ConjugateGradients,
+        (false, Symmetry::Unsymmetric) => MethodUsed::Gmres,
+    }
 }
 
 fn krylov(

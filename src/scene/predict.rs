@@ -1,0 +1,408 @@
+//! What a run of a scene will need: sites, bonds, non-zeros, memory and time, without solving it.
+//!
+//! The model is laid out as a run does it, so sites and bonds are exact, and what it occupies is read from the system.
+//! Each row of the stiffness is computed and dropped at once; only its pattern stays, from which ordering and symbolic
+//! factorisation follow. That costs the time of an assembly and a tenth of its memory, and no factorisation.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::materials::Method as Joining;
+use super::run::{self, RunError};
+use super::validate::Scene;
+use crate::coupling::edge::Edge;
+use crate::coupling::{Model, SiteKind, Zone};
+use crate::mesh::Mesh;
+use crate::observe::report::aligned;
+use crate::observe::summary::{
+    Choice, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
+    resident_memory_bytes,
+};
+use crate::peridynamics::{BondWeights, LatticeFamily, TIE_TOLERANCE, isotropic_shell_factors};
+use crate::progress::Progress;
+use crate::solve::FreeDofs;
+use crate::solve::direct::Analysis;
+use crate::solve::ordering::SiteGraph;
+use crate::solve::statics::{MethodUsed, StaticError, expected_method};
+use crate::system::Symmetry;
+use crate::tensor::padded;
+
+/// A share of the memory of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Share {
+    /// What holds it.
+    pub name: &'static str,
+    /// Bytes.
+    pub bytes: u64,
+}
+
+/// What a run will need.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Prediction {
+    /// The scene's name or title.
+    pub scene: String,
+    /// Space dimension.
+    pub dimension: usize,
+    /// Coupling method, as the scene names it.
+    pub coupling: String,
+    /// How large the model is; exact.
+    pub sizes: Sizes,
+    /// How it will be solved.
+    pub method: MethodUsed,
+    /// Whether the stiffness is symmetric.
+    pub symmetry: Symmetry,
+    /// Unknowns that no condition prescribes.
+    pub unknowns: usize,
+    /// Scalars in the factors; zero for an iterative method.
+    pub factor_nonzeros: u64,
+    /// Operations of the factorisation; zero for an iterative method.
+    pub operations: f64,
+    /// Most memory that a run will hold \[bytes\].
+    pub peak_memory_bytes: u64,
+    /// What holds memory; not all of it at the same time.
+    pub memory: Vec<Share>,
+    /// Seconds per stage: of the first two measured here, of the others estimated from the rates in this file.
+    pub timings: Timings,
+    /// Seconds of all stages.
+    pub total_seconds: f64,
+    /// What the scene asks for or leaves open.
+    pub choices: Vec<Choice>,
+    /// What will be costly or inaccurate.
+    pub warnings: Vec<String>,
+}
+
+/// Seconds per operation of a factorisation on one thread; measured on the cases of `benches/solvers.rs`.
+const SECONDS_PER_OPERATION: f64 = 3e-11;
+
+/// Seconds per stored scalar of the stiffness for a whole iterative solve; measured there too (0.8e-7 to 2.5e-7).
+const SECONDS_PER_SCALAR: f64 = 2e-7;
+
+/// Seconds per cell and point of the output; measured on the slit plate.
+const SECONDS_PER_CELL: f64 = 5e-6;
+
+/// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
+const OUTPUT_BYTES: u64 = 900;
+
+/// Bytes of a factorisation on two threads over those on one: two subtrees hold contribution blocks. Measured on the scenes
+/// of `tests/check.rs`: 1.23 to 1.36 for Cholesky, whose factors are the smaller part, 1.0 to 1.15 for LU.
+const CHOLESKY: f64 = 1.26;
+
+/// As [`CHOLESKY`].
+const LU: f64 = 1.1;
+
+/// Bytes of a multigrid hierarchy and of the vectors of an iteration over those of the stiffness; measured 2.1 to 2.2.
+const HIERARCHY: f64 = 2.1;
+
+/// Bytes of program and buffers that a run touches after its model is laid out; measured.
+const PROGRAM: u64 = 3_700_000;
+
+/// Predicts a run.
+///
+/// # Errors
+/// [`RunError`] if the model cannot be built or a condition meets no site, as a run would.
+pub(crate) fn predict<const D: usize>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    let mut timings = Timings::default();
+    let mut watch = Stopwatch::start();
+    let title = scene.title.clone();
+    let joining = scene.method;
+    let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
+    let (problem, rest) = run::problem(scene);
+    let (model, coupling) = Model::new(problem, progress)?;
+    let operator = coupling.operator(&model)?;
+    watch.lap(&mut timings, "sites and bonds");
+    let laid_out = resident_memory_bytes().unwrap_or(0);
+    let layout_peak = peak_memory_bytes().unwrap_or(0);
+    let pattern = model.pattern(operator.as_ref(), progress);
+    watch.lap(&mut timings, "assembly");
+
+    run::loads(&model, &rest.conditions)?;
+    let (prescribed, _) = run::supports(&model, &rest.conditions)?;
+    let free = FreeDofs::from_prescribed(&prescribed, D);
+    let mut choices = vec![Choice {
+        choice: format!("coupling {}", joining.name()),
+        why: why(joining).to_owned(),
+    }];
+    let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
+    let nonzeros = pattern.stored * D * D;
+    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+    let params = run::params(&rest.solver);
+    let graph = SiteGraph::from_pattern(&pattern.row_offsets, &pattern.columns, &free);
+    let analysis =
+        Analysis::of_graph(graph, &positions, params.ordering).map_err(StaticError::from)?;
+    let cost = analysis.cost(symmetry);
+    let method = expected_method(&params, symmetry, &cost, nonzeros);
+    let factorised = matches!(method, MethodUsed::Cholesky | MethodUsed::Lu);
+    progress.finish();
+
+    let points = model
+        .sites
+        .iter()
+        .filter(|s| matches!(s.kind, SiteKind::Point(_)))
+        .count();
+    let sizes = Sizes {
+        nodes,
+        cells,
+        sites: model.sites.len(),
+        points,
+        bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
+        dofs: model.sites.len() * D,
+        nonzeros,
+    };
+    choices.push(Choice {
+        choice: format!("{method:?}"),
+        why: format!("{symmetry:?} system of {} unknowns", free.count()),
+    });
+    if let Some(p) = &model.peridynamics {
+        choices.push(Choice {
+            choice: format!("{:?} bond weights", p.weights),
+            why: match p.weights {
+                BondWeights::Plain => "the papers' quadrature; its elastic tensor is not isotropic",
+                BondWeights::Isotropic => "the lattice carries the typed elastic constants",
+                BondWeights::Fitted => "each family carries the typed elastic constants",
+            }
+            .to_owned(),
+        });
+    }
+
+    let stiffness = (nonzeros * 8 + pattern.stored * 4 + model.sites.len() * 8) as u64;
+    let solver = match method {
+        MethodUsed::Cholesky => analysis.bytes() + (cost.bytes as f64 * CHOLESKY) as u64,
+        MethodUsed::Lu => analysis.bytes() + (cost.bytes as f64 * LU) as u64,
+        _ => analysis.bytes().max((HIERARCHY * stiffness as f64) as u64),
+    };
+    let output = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
+    let memory = vec![
+        Share {
+            name: "model",
+            bytes: laid_out,
+        },
+        Share {
+            name: "program",
+            bytes: PROGRAM,
+        },
+        Share {
+            name: "stiffness",
+            bytes: stiffness,
+        },
+        Share {
+            name: "solver",
+            bytes: solver,
+        },
+        Share {
+            name: "output",
+            bytes: output,
+        },
+    ];
+    let peak = laid_out + PROGRAM + stiffness + solver.max(output);
+    let threads = rayon::current_num_threads() as f64;
+    if factorised {
+        let seconds = cost.flops * SECONDS_PER_OPERATION / threads;
+        timings.add("factorisation", seconds);
+    } else {
+        timings.add("iteration", nonzeros as f64 * SECONDS_PER_SCALAR / threads);
+    }
+    timings.add("output", (cells + points) as f64 * SECONDS_PER_CELL);
+    let mut prediction = Prediction {
+        scene: title,
+        dimension: D,
+        coupling: joining.name().to_owned(),
+        sizes,
+        method,
+        symmetry,
+        unknowns: free.count(),
+        factor_nonzeros: if factorised { cost.factor_nnz } else { 0 },
+        operations: if factorised { cost.flops } else { 0.0 },
+        peak_memory_bytes: peak.max(layout_peak),
+        memory,
+        total_seconds: timings.total(),
+        timings,
+        choices,
+        warnings: Vec::new(),
+    };
+    prediction.warnings = warnings(&model, joining, &prediction);
+    Ok(prediction)
+}
+
+fn why(joining: Joining) -> &'static str {
+    match joining {
+        Joining::Splice => "each site takes the whole force of its own model",
+        Joining::Blending(_) => "forces are blended over the transition zone",
+        Joining::PartialStress(..) => "the transition zone carries the partial stress",
+        Joining::Local => "finite elements everywhere",
+        Joining::Nonlocal => "peridynamics everywhere",
+    }
+}
+
+/// Bonds beyond which a scene deserves a second thought.
+const MANY_BONDS: usize = 100_000_000;
+
+fn warnings<const D: usize>(
+    model: &Model<D>,
+    joining: Joining,
+    prediction: &Prediction,
+) -> Vec<String> {
+    let mut list = Vec::new();
+    if let (Some(body), Some(p)) = (model.body(), &model.peridynamics) {
+        let h = model.spacing();
+        let smallest = body
+            .cloud
+            .horizon
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        if smallest < 2.0 * h * (1.0 - 1e-9) {
+            list.push(format!(
+                "the horizon {smallest} is {:.2} spacings: families are sparse and directions distorted; 3 to 6 are usual",
+                smallest / h
+            ));
+        }
+        if p.weights == BondWeights::Isotropic
+            && let Some((low, high)) = shell_factors(model, smallest)
+            && (low < 0.5 || high > 2.0)
+        {
+            list.push(format!(
+                "isotropic weights change shells of bonds by factors from {low:.2} to {high:.2}: choose another horizon over spacing, or weights = \"plain\""
+            ));
+        }
+        if let Some(width) = transition_width(&model.mesh, &model.zones) {
+            let largest = body.cloud.horizon.iter().copied().fold(0.0, f64::max);
+            let (wanted, what) = match joining {
+                Joining::Blending(_) => (
+                    3.0,
+                    "a smooth blending over three horizons cuts spurious forces a hundredfold",
+                ),
+                Joining::PartialStress(..) => {
+                    (1.0, "families of the nonlocal zone then reach past it")
+                }
+                _ => (0.0, ""),
+            };
+            if width < (wanted - 0.01) * largest {
+                list.push(format!(
+                    "the transition zone is {width:.3e} wide, {:.2} horizons, less than {wanted}: {what}",
+                    width / largest
+                ));
+            }
+        }
+    }
+    if prediction.sizes.bonds > MANY_BONDS {
+        list.push(format!(
+            "{} bonds: shrink the nonlocal zone or the horizon over spacing",
+            grouped(prediction.sizes.bonds)
+        ));
+    }
+    if let Some(available) = available_memory()
+        && prediction.peak_memory_bytes > available
+    {
+        list.push(format!(
+            "the run needs {}, {} are free: use solver.method = \"krylov\", or coarsen the model",
+            bytes_text(prediction.peak_memory_bytes),
+            bytes_text(available)
+        ));
+    }
+    list
+}
+
+/// Smallest and largest factor of a shell of the lattice; none where the points are no lattice or no factors exist.
+fn shell_factors<const D: usize>(model: &Model<D>, horizon: f64) -> Option<(f64, f64)> {
+    let law = &model.peridynamics.as_ref()?.law;
+    let h = model.spacing();
+    let target = law.shell_target()?;
+    let lattice = LatticeFamily::<D>::new(horizon / h, TIE_TOLERANCE).ok()?;
+    let base: Vec<f64> = lattice
+        .shells
+        .iter()
+        .map(|s| law.kernel(s.length(h), horizon))
+        .collect();
+    let factors = isotropic_shell_factors(&lattice, h, &base, target).ok()?;
+    let least = factors.iter().copied().fold(f64::INFINITY, f64::min);
+    Some((least, factors.iter().copied().fold(0.0, f64::max)))
+}
+
+/// Greatest distance of a node of the transition zone from the nonlocal zone; none without either.
+fn transition_width<const D: usize>(mesh: &Mesh<D>, zones: &[Zone]) -> Option<f64> {
+    if !(zones.contains(&Zone::Transition) && zones.contains(&Zone::Nonlocal)) {
+        return None;
+    }
+    let edge = Edge::of(mesh, |c| zones[c] == Zone::Nonlocal);
+    // to the local zone, from the nonlocal one: the narrowest place
+    let mut narrowest = f64::INFINITY;
+    for c in (0..mesh.cell_count()).filter(|&c| zones[c] == Zone::Local) {
+        for &n in mesh.cell(c) {
+            if edge.within(&mesh.nodes[n as usize], narrowest) {
+                narrowest = edge.distance(&mesh.nodes[n as usize]);
+            }
+        }
+    }
+    narrowest.is_finite().then_some(narrowest)
+}
+
+/// Bytes that the system can still give; `None` where it does not tell.
+fn available_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes * 1024)
+}
+
+impl fmt::Display for Prediction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} ({}D, coupling: {}): the scene is right\n",
+            self.scene, self.dimension, self.coupling
+        )?;
+        let s = &self.sizes;
+        let mut grid = vec![vec!["size".to_owned(), "number".to_owned()]];
+        for (name, value) in [
+            ("FE nodes", s.nodes),
+            ("FE cells", s.cells),
+            ("PD points", s.points),
+            ("bonds", s.bonds),
+            ("sites", s.sites),
+            ("unknowns", self.unknowns),
+            ("non-zeros", s.nonzeros),
+            ("factor non-zeros", self.factor_nonzeros as usize),
+        ] {
+            grid.push(vec![name.to_owned(), grouped(value)]);
+        }
+        writeln!(f, "{}", aligned(&grid))?;
+        for c in &self.choices {
+            writeln!(f, "chosen: {} ({})", c.choice, c.why)?;
+        }
+        writeln!(f)?;
+        for share in &self.memory {
+            writeln!(
+                f,
+                "memory of {:<12} {}",
+                share.name,
+                bytes_text(share.bytes)
+            )?;
+        }
+        writeln!(
+            f,
+            "peak memory            {}",
+            bytes_text(self.peak_memory_bytes)
+        )?;
+        if self.operations > 0.0 {
+            writeln!(
+                f,
+                "factorisation          {:.1e} operations",
+                self.operations
+            )?;
+        }
+        writeln!(
+            f,
+            "time                   about {:.1} s on {} threads",
+            self.total_seconds,
+            rayon::current_num_threads()
+        )?;
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        Ok(())
+    }
+}

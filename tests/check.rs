@@ -1,0 +1,95 @@
+//! What `check` predicts against what `run` measures, both by the binary: one process each, so that peaks are their own.
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// The JSON that a command of the binary prints for a scene.
+fn json(command: &str, scene: &str, overrides: &[&str], folder: &std::path::Path) -> Value {
+    let mut binary = Command::cargo_bin("bondline").unwrap();
+    binary
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args([command, scene, "--json"]);
+    for set in overrides {
+        binary.args(["--set", set]);
+    }
+    if command == "run" {
+        binary.arg("--output").arg(folder);
+    }
+    let output = binary.assert().success().get_output().stdout.clone();
+    serde_json::from_slice(&output).unwrap()
+}
+
+/// Bonds and non-zeros are exact, and memory is within a fifth.
+fn compare(scene: &str, overrides: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let predicted = json("check", scene, overrides, folder.path());
+    let measured = json("run", scene, overrides, folder.path());
+    assert_eq!(
+        predicted["sizes"], measured["sizes"],
+        "{scene} {overrides:?}"
+    );
+    assert!(measured["sizes"]["sites"].as_u64().unwrap() > 0);
+    let method = predicted["method"].as_str().unwrap().replace('-', "");
+    let chosen = measured["choices"].as_array().unwrap();
+    assert!(
+        chosen
+            .iter()
+            .any(|c| c["choice"].as_str().unwrap().to_lowercase() == method),
+        "{method} was predicted, {chosen:?} was chosen"
+    );
+    let bytes = |v: &Value| v["peak_memory_bytes"].as_f64().unwrap();
+    if cfg!(target_os = "linux") {
+        let ratio = bytes(&predicted) / bytes(&measured);
+        println!(
+            "{scene} {overrides:?}: {:.1} MB predicted, {:.1} MB measured, ratio {ratio:.3}",
+            bytes(&predicted) * 1e-6,
+            bytes(&measured) * 1e-6
+        );
+        assert!(
+            (0.8..=1.2).contains(&ratio),
+            "{scene} {overrides:?}: {ratio}"
+        );
+    }
+}
+
+const SLIT_PLATE: &str = "examples/slit_plate.toml";
+
+#[test]
+fn slit_plate_by_every_method() {
+    for coupling in ["local", "splice", "blending", "partial-stress", "nonlocal"] {
+        compare(SLIT_PLATE, &[&format!("coupling={coupling}")]);
+    }
+}
+
+#[test]
+fn slit_plate_iteratively() {
+    compare(SLIT_PLATE, &["coupling=splice", "solver.method=krylov"]);
+}
+
+#[test]
+fn bar() {
+    compare("src/scene/templates/bar.toml", &[]);
+}
+
+#[test]
+fn block_of_a_linear_peridynamic_solid() {
+    let scene = "tests/fixtures/block.toml";
+    for solver in ["auto", "direct"] {
+        compare(scene, &[&format!("solver.method={solver}")]);
+    }
+}
+
+#[test]
+fn costs_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let warnings = |overrides: &[&str]| -> String {
+        let found = json("check", SLIT_PLATE, overrides, folder.path());
+        found["warnings"].to_string()
+    };
+    assert!(warnings(&["coupling=blending"]).contains("less than 3"));
+    assert!(
+        warnings(&["coupling=splice", "peridynamics.horizon=\"1.5/120\""])
+            .contains("1.50 spacings")
+    );
+    assert_eq!(warnings(&["coupling=splice"]), "[]");
+}
