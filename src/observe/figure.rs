@@ -203,6 +203,7 @@ impl LinePlot {
         Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
         let mut svg = String::new();
+        let rounded = |v: f64, zero: f64| if v.abs() < zero { 0.0 } else { v };
         {
             let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
             root.fill(&WHITE).map_err(|e| e.to_string())?;
@@ -213,6 +214,15 @@ impl LinePlot {
                 .y_label_area_size(74)
                 .build_cartesian_2d(x, y)
                 .map_err(|e| e.to_string())?;
+            // a tick at zero comes out of the axis's arithmetic as round-off
+            let zero = |scale: Scale, range: std::ops::Range<f64>| match scale {
+                Scale::Linear => 1e-10 * (range.end - range.start).abs(),
+                Scale::Log => 0.0,
+            };
+            let (zero_x, zero_y) = (
+                zero(self.x_scale, chart.x_range()),
+                zero(self.y_scale, chart.y_range()),
+            );
             chart
                 .configure_mesh()
                 .max_light_lines(0)
@@ -222,8 +232,8 @@ impl LinePlot {
                 .label_style(("sans-serif", 13))
                 .light_line_style(RGBColor(244, 244, 244))
                 .bold_line_style(RGBColor(225, 225, 225))
-                .x_label_formatter(&|v| tick(*v))
-                .y_label_formatter(&|v| tick(*v))
+                .x_label_formatter(&|v| tick(rounded(*v, zero_x)))
+                .y_label_formatter(&|v| tick(rounded(*v, zero_y)))
                 .draw()
                 .map_err(|e| e.to_string())?;
             for (i, series) in self.series.iter().enumerate() {

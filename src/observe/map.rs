@@ -234,7 +234,14 @@ impl FieldMap {
         }
         for i in 0..=4 {
             let share = f64::from(i) / 4.0;
-            let digits = format!("{:.2e}", first + share * (last - first));
+            let value = first + share * (last - first);
+            // the middle of a symmetric range is zero but for round-off
+            let value = if value.abs() < 1e-10 * (last - first).abs() {
+                0.0
+            } else {
+                value
+            };
+            let digits = format!("{value:.2e}");
             let number = digits.parse().map_or(digits, tick);
             let _ = writeln!(
                 svg,
