@@ -62,7 +62,7 @@ pub struct Prediction {
     pub peak_memory_bytes: u64,
     /// What holds memory; not all of it at the same time.
     pub memory: Vec<Share>,
-    /// Seconds per stage: of the first two measured here, of the others estimated from the rates in this file.
+    /// Seconds per stage: up to the ordering measured here, of the others estimated from the rates in this file.
     pub timings: Timings,
     /// Seconds of all stages.
     pub total_seconds: f64,
@@ -72,14 +72,15 @@ pub struct Prediction {
     pub warnings: Vec<String>,
 }
 
-/// Seconds per operation of a factorisation on one thread; measured on the cases of `benches/solvers.rs`.
-const SECONDS_PER_OPERATION: f64 = 3e-11;
+/// Seconds per operation of a factorisation on one thread. `benches/solvers.rs` takes 3e-11 in large fronts; the slit plate, on a
+/// machine in use, 1.1e-10 (3e10 operations) to 1.7e-10 (3e9).
+const SECONDS_PER_OPERATION: f64 = 6e-11;
 
 /// Seconds per stored scalar of the stiffness for a whole iterative solve; measured there too (0.8e-7 to 2.5e-7).
 const SECONDS_PER_SCALAR: f64 = 2e-7;
 
 /// Seconds per cell and point of the output; measured on the slit plate.
-const SECONDS_PER_CELL: f64 = 5e-6;
+const SECONDS_PER_CELL: f64 = 2.5e-5;
 
 /// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
 const OUTPUT_BYTES: u64 = 900;
@@ -134,6 +135,7 @@ pub(crate) fn predict<const D: usize>(
     let analysis =
         Analysis::of_graph(graph, &positions, params.ordering).map_err(StaticError::from)?;
     let cost = analysis.cost(symmetry);
+    watch.lap(&mut timings, "conditions and ordering");
     let method = expected_method(&params, symmetry, &cost, nonzeros);
     let factorised = matches!(method, MethodUsed::Cholesky | MethodUsed::Lu);
     progress.finish();
