@@ -126,8 +126,15 @@ pub fn solve_with<const D: usize>(
     timings.add("solve", info.solve_seconds);
     watch = Stopwatch::start();
     choices.push(Choice {
-        choice: format!("{:?}", info.method),
-        why: format!("{symmetry:?} system of {} unknowns", info.free_dofs),
+        choice: info.method.name().to_owned(),
+        why: format!(
+            "{} system of {} unknowns",
+            match symmetry {
+                Symmetry::Symmetric => "symmetric",
+                Symmetry::Unsymmetric => "unsymmetric",
+            },
+            info.free_dofs
+        ),
     });
 
     let u = &solution.displacement;

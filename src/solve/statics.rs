@@ -96,6 +96,19 @@ pub enum MethodUsed {
     None,
 }
 
+impl MethodUsed {
+    /// Its usual name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cholesky => "Cholesky factorisation",
+            Self::Lu => "LU factorisation",
+            Self::ConjugateGradients => "conjugate gradients with multigrid",
+            Self::Gmres => "GMRES with multigrid",
+            Self::None => "no solver",
+        }
+    }
+}
+
 /// What a static solve did.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StaticInfo {
