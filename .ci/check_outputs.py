@@ -67,6 +67,8 @@ def check_vtu(path):
     same("points", mesh.points, vtk_to_numpy(grid.GetPoints().GetData()))
     types = np.concatenate([np.full(len(block.data), VTK_TYPE[block.type]) for block in mesh.cells])
     same("cell types", types, vtk_to_numpy(grid.GetCellTypes()))
+    if not all(np.issubdtype(block.data.dtype, np.integer) for block in mesh.cells):
+        raise Wrong("meshio reads node numbers that are no integers")
     nodes = np.concatenate([np.asarray(block.data).ravel() for block in mesh.cells])
     same("cells", nodes, vtk_to_numpy(grid.GetCells().GetConnectivityArray()))
 

@@ -60,51 +60,69 @@ pub(super) fn write_whole(
     })
 }
 
-/// Passes bytes on and puts `insert` behind the first `after`: vtkio writes no field data, where VTK looks for the time.
-pub(super) struct Inserting<'a, W> {
+/// Passes bytes on and replaces the first `old`, a tag that begins with `<`, by `new`.
+///
+/// vtkio writes no field data, where VTK looks for the time, and can write the numbers of points as `UInt64` only, of which meshio makes floats.
+pub(super) struct Replacing<'a, W> {
     inner: W,
-    head: Vec<u8>,
-    after: &'static [u8],
-    insert: &'a [u8],
+    old: &'static [u8],
+    new: &'a [u8],
+    /// End of what was written so far, as far as it may be the beginning of `old`.
+    tail: Vec<u8>,
     done: bool,
 }
 
-impl<'a, W> Inserting<'a, W> {
-    /// Wraps a writer; with an empty `insert` bytes pass unchanged.
-    pub(super) fn new(inner: W, after: &'static [u8], insert: &'a [u8]) -> Self {
+impl<'a, W> Replacing<'a, W> {
+    /// Wraps a writer.
+    pub(super) fn new(inner: W, old: &'static [u8], new: &'a [u8]) -> Self {
         Self {
             inner,
-            head: Vec::new(),
-            after,
-            insert,
-            done: insert.is_empty(),
+            old,
+            new,
+            tail: Vec::new(),
+            done: false,
         }
+    }
+
+    /// Where `old` begins, complete or cut off by the end of `text`.
+    fn find(&self, text: &[u8]) -> Option<usize> {
+        let mut from = 0;
+        while let Some(at) = text[from..].iter().position(|&b| b == b'<') {
+            let rest = &text[from + at..];
+            if self.old.starts_with(rest) || rest.starts_with(self.old) {
+                return Some(from + at);
+            }
+            from += at + 1;
+        }
+        None
     }
 }
 
-impl<W: Write> Write for Inserting<'_, W> {
+impl<W: Write> Write for Replacing<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         if self.done {
             return self.inner.write(bytes);
         }
-        self.head.extend_from_slice(bytes);
-        let found = self
-            .head
-            .windows(self.after.len())
-            .position(|w| w == self.after);
-        if let Some(at) = found {
-            let cut = at + self.after.len();
-            self.inner.write_all(&self.head[..cut])?;
-            self.inner.write_all(self.insert)?;
-            self.inner.write_all(&self.head[cut..])?;
-            self.head = Vec::new();
-            self.done = true;
+        let mut text = std::mem::take(&mut self.tail);
+        text.extend_from_slice(bytes);
+        match self.find(&text) {
+            None => self.inner.write_all(&text)?,
+            Some(at) if text.len() - at < self.old.len() => {
+                self.inner.write_all(&text[..at])?;
+                self.tail = text.split_off(at);
+            }
+            Some(at) => {
+                self.inner.write_all(&text[..at])?;
+                self.inner.write_all(self.new)?;
+                self.inner.write_all(&text[at + self.old.len()..])?;
+                self.done = true;
+            }
         }
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        self.inner.write_all(&std::mem::take(&mut self.head))?;
+        self.inner.write_all(&std::mem::take(&mut self.tail))?;
         self.inner.flush()
     }
 }
@@ -151,15 +169,24 @@ mod tests {
     }
 
     #[test]
-    fn an_insert_finds_its_place_across_pieces() {
-        for pieces in [&["<a><b>x"][..], &["<a", "><", "b>", "x"], &["<a><b>", "x"]] {
+    fn a_tag_is_found_across_pieces_and_replaced_once() {
+        for pieces in [
+            &["<a><b>x<b><"][..],
+            &["<a", "><", "b", ">x<b", "><"],
+            &["<a>", "<b>", "x", "<b><"],
+        ] {
             let mut out = Vec::new();
-            let mut writer = Inserting::new(&mut out, b"<b>", b"NEW");
+            let mut writer = Replacing::new(&mut out, b"<b>", b"NEW");
             for piece in pieces {
                 writer.write_all(piece.as_bytes()).unwrap();
             }
             writer.flush().unwrap();
-            assert_eq!(out, b"<a><b>NEWx");
+            assert_eq!(out, b"<a>NEWx<b><");
         }
+        let mut out = Vec::new();
+        let mut writer = Replacing::new(&mut out, b"<b>", b"NEW");
+        writer.write_all(b"<a><b").unwrap();
+        writer.flush().unwrap();
+        assert_eq!(out, b"<a><b");
     }
 }
