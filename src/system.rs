@@ -15,6 +15,16 @@ pub enum Symmetry {
     Unsymmetric,
 }
 
+impl Symmetry {
+    /// One word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Symmetric => "symmetric",
+            Self::Unsymmetric => "unsymmetric",
+        }
+    }
+}
+
 /// A square block-sparse matrix by rows; each entry is a dense `block × block` matrix, row-major.
 ///
 /// Shapes: `row_offsets` has one entry more than block rows; `columns[e]` and

@@ -155,8 +155,8 @@ pub(crate) fn predict<const D: usize>(
         nonzeros,
     };
     choices.push(Choice {
-        choice: format!("{method:?}"),
-        why: format!("{symmetry:?} system of {} unknowns", free.count()),
+        choice: method.name().to_owned(),
+        why: format!("{} system of {} unknowns", symmetry.name(), free.count()),
     });
     if let Some(p) = &model.peridynamics {
         choices.push(Choice {

@@ -127,14 +127,7 @@ pub fn solve_with<const D: usize>(
     watch = Stopwatch::start();
     choices.push(Choice {
         choice: info.method.name().to_owned(),
-        why: format!(
-            "{} system of {} unknowns",
-            match symmetry {
-                Symmetry::Symmetric => "symmetric",
-                Symmetry::Unsymmetric => "unsymmetric",
-            },
-            info.free_dofs
-        ),
+        why: format!("{} system of {} unknowns", symmetry.name(), info.free_dofs),
     });
 
     let u = &solution.displacement;
