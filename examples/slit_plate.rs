@@ -199,6 +199,12 @@ fn compare(table: &mut Table, name: &str, coupled: &Case, pd: &Case, limits: Opt
             None => Row::info(name, quantity, value),
         });
     }
+    // the seam's opposite sides cancel where the plate is symmetric; `verify balance` has one side alone
+    table.push(Row::info(
+        name,
+        "out-of-balance force, relative",
+        coupled.summary.out_of_balance_relative,
+    ));
 }
 
 /// Rows of what a case costs.

@@ -112,6 +112,27 @@ impl BlockCsr {
         y
     }
 
+    /// The same matrix by scalar rows, for other programs: products, transposes, Matrix Market files.
+    pub fn to_csr(&self) -> sprs::CsMat<f64> {
+        let d = self.block;
+        let mut offsets = Vec::with_capacity(self.dofs() + 1);
+        let (mut columns, mut values) = (Vec::new(), Vec::new());
+        offsets.push(0);
+        for i in 0..self.rows() {
+            let (sites, blocks) = self.row(i);
+            for a in 0..d {
+                for (e, &site) in sites.iter().enumerate() {
+                    for b in 0..d {
+                        columns.push(site as usize * d + b);
+                        values.push(blocks[(e * d + a) * d + b]);
+                    }
+                }
+                offsets.push(columns.len());
+            }
+        }
+        sprs::CsMat::new((self.dofs(), self.dofs()), offsets, columns, values)
+    }
+
     /// `‖K − Kᵀ‖_F / ‖K‖_F`.
     pub fn asymmetry(&self) -> f64 {
         let d = self.block;
@@ -137,5 +158,34 @@ impl BlockCsr {
         } else {
             (diff / norm).sqrt()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_and_asymmetry_are_those_of_the_scalar_matrix() {
+        let matrix = BlockCsr {
+            block: 2,
+            row_offsets: vec![0, 2, 3, 5],
+            columns: vec![0, 2, 1, 0, 2],
+            values: (0..20).map(|k| f64::from(k * k % 7) - 2.5).collect(),
+        };
+        let scalar = matrix.to_csr();
+        let x: Vec<f64> = (0..6).map(|k| 1.0 / (1.0 + f64::from(k))).collect();
+        let expected = &scalar * &sprs::CsVec::new(6, (0..6).collect(), x.clone());
+        for (i, y) in matrix.multiply(&x).into_iter().enumerate() {
+            assert!((y - expected.get(i).copied().unwrap_or(0.0)).abs() < 1e-15);
+        }
+        let difference = &scalar - &scalar.transpose_view().to_csr();
+        let norm = |m: &sprs::CsMat<f64>| m.data().iter().map(|v| v * v).sum::<f64>().sqrt();
+        let expected = norm(&difference) / norm(&scalar);
+        assert!(
+            (matrix.asymmetry() - expected).abs() < 1e-15,
+            "{} {expected}",
+            matrix.asymmetry()
+        );
     }
 }

@@ -281,3 +281,125 @@ fn samples_of<const D: usize>(n: usize, mut visit: impl FnMut(Vector<D>)) -> usi
     }
     count
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{path::Path, sync::Arc};
+
+    use super::*;
+    use crate::{
+        coupling::{Model, Nonlocal, Problem, Splice, Surfaces},
+        mesh::{
+            generate::{Axis, CutOut, rectangle},
+            read,
+        },
+        peridynamics::{BondBased, BondWeights, Micromodulus},
+        progress::Silent,
+        tensor::Tensor4,
+    };
+
+    /// Volumes of the region and of its points.
+    fn volumes(mesh: Mesh<2>, zones: Vec<Zone>, points: PointSource<2>, horizon: f64) -> [f64; 2] {
+        let cells = mesh.cell_count();
+        let coupling: Box<dyn crate::coupling::Coupling<2>> = if zones.contains(&Zone::Local) {
+            Box::new(Splice)
+        } else {
+            Box::new(Nonlocal)
+        };
+        let problem = Problem {
+            mesh,
+            zones,
+            tensors: vec![Tensor4::isotropic(1.0, 1.0)],
+            cell_material: vec![0; cells],
+            peridynamic_material: 0,
+            peridynamics: Some(Peridynamics {
+                law: Box::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
+                horizon: Arc::new(move |_| horizon),
+                points,
+                weights: BondWeights::Plain,
+                barriers: Vec::new(),
+                voids: Vec::new(),
+                surfaces: Surfaces::Uncut,
+            }),
+            coupling,
+        };
+        let (model, _) = Model::new(problem, &Silent).expect("a model");
+        let v = model.volumes();
+        [v.region, v.points]
+    }
+
+    fn holed_plate() -> Mesh<2> {
+        let axis = || Axis::Uniform {
+            min: -1.0,
+            max: 1.0,
+            cells: 20,
+        };
+        rectangle(axis(), axis())
+            .cut_out(CutOut {
+                name: "hole".into(),
+                min: Vector::<2>::new(-0.3, -0.1),
+                max: Vector::<2>::new(0.3, 0.1),
+            })
+            .mesh()
+            .expect("a mesh")
+    }
+
+    #[test]
+    fn volumes_add_up_to_the_zone() {
+        let exact = 4.0 - 0.12;
+        for points in [
+            PointSource::Cells,
+            PointSource::Lattice {
+                spacing: 0.1,
+                origin: Vector::zeros(),
+            },
+            PointSource::Lattice {
+                spacing: 0.1,
+                origin: Vector::repeat(0.05),
+            },
+        ] {
+            let mesh = holed_plate();
+            let zones = vec![Zone::Nonlocal; mesh.cell_count()];
+            let [region, sum] = volumes(mesh, zones, points, 0.3);
+            assert!(
+                (region - exact).abs() < 1e-12 && (sum - exact).abs() < 1e-12,
+                "{points:?}: {sum}"
+            );
+            // half of the plate: points on the seam belong to elements, half of their cells to the zone
+            let mesh = holed_plate();
+            let zones = (0..mesh.cell_count())
+                .map(|c| {
+                    if mesh.centroid(c)[0] < 0.0 {
+                        Zone::Nonlocal
+                    } else {
+                        Zone::Local
+                    }
+                })
+                .collect();
+            let [region, sum] = volumes(mesh, zones, points, 0.3);
+            assert!(
+                (region - exact / 2.0).abs() < 1e-12 && (sum - exact / 2.0).abs() < 1e-12,
+                "{points:?}: {sum}"
+            );
+        }
+    }
+
+    #[test]
+    fn volumes_add_up_on_a_mesh_with_curved_edges() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes/lug.msh");
+        let mesh: Mesh<2> = read::read(&path).expect("the lug");
+        let exact: f64 = (0..mesh.cell_count())
+            .map(|c| fem::cell_volume(&mesh, c))
+            .sum();
+        let (low, high) = mesh.bounds();
+        let spacing = (high - low).amax() / 60.0;
+        let zones = vec![Zone::Nonlocal; mesh.cell_count()];
+        let points = PointSource::Lattice {
+            spacing,
+            origin: low,
+        };
+        let [region, sum] = volumes(mesh, zones, points, 3.0 * spacing);
+        assert!((region / exact - 1.0).abs() < 1e-12);
+        assert!((sum / exact - 1.0).abs() < 1e-12, "{}", sum / exact - 1.0);
+    }
+}
