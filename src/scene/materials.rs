@@ -120,6 +120,17 @@ impl Method {
         }
     }
 
+    /// What the method does, in one line.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Splice => "each site takes the whole force of its own model",
+            Self::Blending(_) => "forces are blended over the transition zone",
+            Self::PartialStress(..) => "the transition zone carries the partial stress",
+            Self::Local => "finite elements everywhere",
+            Self::Nonlocal => "peridynamics everywhere",
+        }
+    }
+
     /// Whether the method needs a zone where both models overlap.
     pub fn needs_transition(self) -> bool {
         matches!(self, Self::Blending(_) | Self::PartialStress(..))

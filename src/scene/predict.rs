@@ -125,7 +125,7 @@ pub(crate) fn predict<const D: usize>(
     let free = FreeDofs::from_prescribed(&prescribed, D);
     let mut choices = vec![Choice {
         choice: format!("coupling {}", joining.name()),
-        why: why(joining).to_owned(),
+        why: joining.about().to_owned(),
     }];
     let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
@@ -227,16 +227,6 @@ pub(crate) fn predict<const D: usize>(
     };
     prediction.warnings = warnings(&model, joining, &prediction);
     Ok(prediction)
-}
-
-fn why(joining: Joining) -> &'static str {
-    match joining {
-        Joining::Splice => "each site takes the whole force of its own model",
-        Joining::Blending(_) => "forces are blended over the transition zone",
-        Joining::PartialStress(..) => "the transition zone carries the partial stress",
-        Joining::Local => "finite elements everywhere",
-        Joining::Nonlocal => "peridynamics everywhere",
-    }
 }
 
 /// Bonds beyond which a scene deserves a second thought.
