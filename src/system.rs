@@ -25,6 +25,95 @@ impl Symmetry {
     }
 }
 
+/// Whether a pass over the bonds may break them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Breakage {
+    /// A bond beyond its critical stretch breaks, for good, and carries nothing from this pass on.
+    Allowed,
+    /// Bonds stay as they stand: trial states of an implicit solve, energies, output.
+    Held,
+}
+
+/// A system that moves: `M ü = f(t) − F(u)`, with lumped masses.
+///
+/// Shapes: `u`, `force`, `x`, `y` and the row sums have [`Dynamic::block`] numbers per site. Units: \[m\], \[N\] (per area of a bar of unit section in 1D, per
+/// thickness in 2D). Every method gives the same bits for any number of threads.
+pub trait Dynamic: Send + Sync {
+    /// Unknowns per site (the dimension).
+    fn block(&self) -> usize;
+
+    /// Lumped mass of each site \[kg\].
+    fn mass(&self) -> &[f64];
+
+    /// Overwrites `force` with the internal force `F(u)` (`K u` of a linear system); returns how many bonds this pass broke.
+    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64;
+
+    /// `y = K x` with the tangent `K` at rest, broken bonds left out.
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]);
+
+    /// For every unknown an upper bound of `Σ_b |K_ab|`, with the tangent at rest.
+    fn row_sums(&self) -> Vec<f64>;
+
+    /// Whether the tangent is symmetric, so that there is an energy to conserve.
+    fn symmetry(&self) -> Symmetry;
+
+    /// Energy stored in the bodies \[J\]; of a coupled system the sum of the bodies' own energies, which the motion conserves only as far as the seam does.
+    fn stored_energy(&self, u: &[f64]) -> f64;
+
+    /// What breaking changes (one bit per bond, and what cannot be recomputed from it), for a checkpoint; empty without damage.
+    fn damage_state(&self) -> Vec<u64> {
+        Vec::new()
+    }
+
+    /// Puts back what [`Dynamic::damage_state`] gave; false if it belongs to another model.
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        state.is_empty()
+    }
+}
+
+/// A linear system that moves: its stiffness as a matrix, for scenes in which nothing breaks.
+#[derive(Clone, Debug)]
+pub struct LinearMotion {
+    /// `K`.
+    pub stiffness: BlockCsr,
+    /// Lumped mass of each site \[kg\].
+    pub mass: Vec<f64>,
+    /// Whether `K` is symmetric.
+    pub symmetry: Symmetry,
+}
+
+impl Dynamic for LinearMotion {
+    fn block(&self) -> usize {
+        self.stiffness.block
+    }
+
+    fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], _breakage: Breakage) -> u64 {
+        self.stiffness.multiply_into(u, force);
+        0
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        self.stiffness.multiply_into(x, y);
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        self.stiffness.row_sums()
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        self.symmetry
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        let force = self.stiffness.multiply(u);
+        0.5 * u.iter().zip(&force).map(|(u, f)| u * f).sum::<f64>()
+    }
+}
+
 /// A square block-sparse matrix by rows; each entry is a dense `block × block` matrix, row-major.
 ///
 /// Shapes: `row_offsets` has one entry more than block rows; `columns[e]` and
@@ -110,6 +199,20 @@ impl BlockCsr {
         let mut y = vec![0.0; self.dofs()];
         self.multiply_into(x, &mut y);
         y
+    }
+
+    /// `Σ_b |K_ab|` of every scalar row.
+    pub fn row_sums(&self) -> Vec<f64> {
+        let d = self.block;
+        let mut sums = vec![0.0; self.dofs()];
+        for (i, sums) in sums.chunks_exact_mut(d.max(1)).enumerate() {
+            for block in self.row(i).1.chunks_exact(d * d) {
+                for (sum, row) in sums.iter_mut().zip(block.chunks_exact(d)) {
+                    *sum += row.iter().map(|k| k.abs()).sum::<f64>();
+                }
+            }
+        }
+        sums
     }
 
     /// The same matrix by scalar rows, for other programs: products, transposes, Matrix Market files.
