@@ -60,6 +60,16 @@ pub trait Dynamic: Send + Sync {
     /// Energy stored in the bodies \[J\]; of a coupled system the sum of the bodies' own energies, which the motion conserves only as far as the seam does.
     fn stored_energy(&self, u: &[f64]) -> f64;
 
+    /// Damage of each site, `1 − Σ V of intact bonds / Σ V of all`; none if nothing can break.
+    fn damage(&self) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// A site at which damage has reached the edge of the region where bonds can break, if it has: what is computed from then on is not to be trusted.
+    fn damage_at_edge(&self) -> Option<usize> {
+        None
+    }
+
     /// What breaking changes (one bit per bond, and what cannot be recomputed from it), for a checkpoint; empty without damage.
     fn damage_state(&self) -> Vec<u64> {
         Vec::new()

@@ -179,6 +179,12 @@ impl<const D: usize> Operator<D> for Blended<'_, D> {
         }
     }
 
+    fn is_body_row(&self, site: usize) -> bool {
+        self.model
+            .point_of(site)
+            .is_some_and(|(_, i)| self.beta[i] == 1.0 && self.derivatives[i].is_none())
+    }
+
     fn beta(&self, site: usize) -> f64 {
         self.model.point_of(site).map_or(0.0, |(_, i)| self.beta[i])
     }

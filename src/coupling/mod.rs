@@ -124,6 +124,11 @@ pub trait Operator<const D: usize>: Sync {
     /// The blending function β of a site: 1 where it is peridynamic, 0 where it is local.
     fn beta(&self, site: usize) -> f64;
 
+    /// Whether the row of a site is that of the peridynamic body alone, all of its bonds whole: only there may bonds be geometrically exact, and break.
+    fn is_body_row(&self, _site: usize) -> bool {
+        false
+    }
+
     /// Number of directed bonds that the method adds to those of the peridynamic body (Gauss points).
     fn additional_bonds(&self) -> usize {
         0

@@ -71,6 +71,12 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
         }
     }
 
+    fn is_body_row(&self, site: usize) -> bool {
+        self.model
+            .point_of(site)
+            .is_some_and(|(_, i)| self.model.zone_of_point(i) == Zone::Nonlocal)
+    }
+
     fn beta(&self, site: usize) -> f64 {
         match self.model.point_of(site) {
             Some((_, i)) if self.model.zone_of_point(i) == Zone::Nonlocal => 1.0,
@@ -283,6 +289,10 @@ impl<const D: usize> Operator<D> for Elements<'_, D> {
                     .add_partial_stress(self.first[c] as usize + q, &a, row);
             }
         }
+    }
+
+    fn is_body_row(&self, site: usize) -> bool {
+        self.model.point_of(site).is_some()
     }
 
     fn beta(&self, site: usize) -> f64 {

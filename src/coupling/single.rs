@@ -64,6 +64,10 @@ impl<const D: usize> Operator<D> for OwnModel<'_, D> {
         }
     }
 
+    fn is_body_row(&self, site: usize) -> bool {
+        self.model.point_of(site).is_some()
+    }
+
     fn beta(&self, site: usize) -> f64 {
         f64::from(u8::from(self.model.point_of(site).is_some()))
     }

@@ -8,12 +8,14 @@
 //! | `weights.rs` | moment-fitted weights of one irregular family | |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is; `bond_based.rs`, `lps.rs`, `correspondence.rs` | eq. (3.1), (5.16), section 7.2 |
+//! | `fracture.rs` | critical stretch from the fracture energy | [Silling2005] |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
 
 pub mod body;
 pub mod bond_based;
 pub mod correspondence;
 pub mod families;
+pub mod fracture;
 mod grid;
 pub mod influence;
 pub mod law;
@@ -27,6 +29,7 @@ pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
+pub use fracture::{BondEnergy, FractureError};
 pub use influence::{Influence, Micromodulus};
 pub use law::{BondLaw, Family, StatePart, collapsed_tensor};
 pub use lps::LinearPeridynamicSolid;

@@ -1,0 +1,230 @@
+//! Critical stretch from the fracture energy: what it costs to pull a body apart along a plane, bond by bond.
+
+use std::f64::consts::PI;
+
+use crate::peridynamics::{Influence, Micromodulus};
+
+/// The bonds of a full, continuous family, as far as breaking them costs energy.
+///
+/// Units: λ [N/m^(2D+2)] such that the energy of a bond stretched by `s` is `½ λ r⁴ s²` per volume squared, moduli of `D` dimensions \[Pa\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BondEnergy {
+    /// Bonds that act alone: λ = constant · shape.
+    Pairwise {
+        /// Shape of λ.
+        micromodulus: Micromodulus,
+        /// Its constant, [`Micromodulus::constant`].
+        constant: f64,
+    },
+    /// Linear peridynamic solid with the bulk modulus of `D` dimensions and the shear modulus.
+    Lps {
+        /// The influence function ω.
+        influence: Influence,
+        /// `k = λ + 2μ/D`.
+        bulk: f64,
+        /// `μ`.
+        shear: f64,
+    },
+}
+
+/// Why a fracture energy gives no critical stretch.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum FractureError {
+    /// Not a positive, finite energy.
+    #[error("the fracture energy is {energy}: it must be positive and finite")]
+    Energy {
+        /// What was given \[J/m²\].
+        energy: f64,
+    },
+    /// The state part gives back more than the bonds take.
+    #[error(
+        "opening a plane in this material would release energy ({per_square} J/m² at unit stretch): its Poisson ratio is too far below that of bonds that act alone; give critical-stretch instead, or raise the ratio"
+    )]
+    Releases {
+        /// Energy per area and stretch squared \[J/m²\].
+        per_square: f64,
+    },
+}
+
+impl BondEnergy {
+    /// The critical stretch `s_c` at which all bonds across a plane, stretched alike while no other bond is, hold the energy `energy` per area.
+    ///
+    /// With bonds that act alone the energy per area is
+    ///
+    /// ```text
+    /// G0 = s² ∫_0^δ dz ∫_z^δ ½ λ r⁴ A(r, z) dr ,    A = 1 (1D), 2 r acos(z/r) (2D), 2π r² (1 − z/r) (3D)
+    ///    = s² { ½ ∫ λ r⁵ dr (1D),  ∫ λ r⁶ dr (2D),  π/2 ∫ λ r⁷ dr (3D) } ,
+    /// ```
+    ///
+    /// which for `λ = c/r³` is the prototype microelastic brittle `s_c² = 10 G0/(π c δ⁵)` in 3D and `4 G0/(c δ⁴)` in 2D [Silling2005]. An LPS adds
+    /// `2 ∫ ½ K′ θ(z)² dz` with the dilatation `θ(z) = D/m s ∫ ω r² A dr` of a point at distance `z` from the plane and `K′ = k − (D + 2) μ/D`.
+    ///
+    /// Units: `energy` \[J/m²\] (J/m of crack and unit thickness in 2D, J per unit section in 1D), `horizon` \[m\].
+    ///
+    /// # Errors
+    /// [`FractureError`] if the energy is not positive or the material gives none back.
+    pub fn critical_stretch<const D: usize>(
+        self,
+        energy: f64,
+        horizon: f64,
+    ) -> Result<f64, FractureError> {
+        if !(energy.is_finite() && energy > 0.0) {
+            return Err(FractureError::Energy { energy });
+        }
+        let per_square = self.per_square::<D>(horizon);
+        if per_square.is_nan() || per_square <= 0.0 {
+            return Err(FractureError::Releases { per_square });
+        }
+        Ok((energy / per_square).sqrt())
+    }
+
+    /// `G0/s²`.
+    fn per_square<const D: usize>(self, horizon: f64) -> f64 {
+        let plane = |lambda: &dyn Fn(f64) -> f64| {
+            let (factor, power) = [(0.5, 5), (1.0, 6), (0.5 * PI, 7)][D - 1];
+            factor * integral(0.0, horizon, |r| lambda(r) * r.powi(power))
+        };
+        match self {
+            Self::Pairwise {
+                micromodulus,
+                constant,
+            } => plane(&|r| constant * micromodulus.shape(r, horizon)),
+            Self::Lps {
+                influence,
+                bulk,
+                shear,
+            } => {
+                let d = D as f64;
+                let m = influence.weighted_volume::<D>(horizon);
+                let pairs = plane(&|r| {
+                    2.0 * d * (d + 2.0) * shear / m * influence.value(r, horizon) / (r * r)
+                });
+                let dilatation = |z: f64| {
+                    d / m
+                        * integral(z, horizon, |r| {
+                            influence.value(r, horizon) * r * r * cap::<D>(r, z)
+                        })
+                };
+                let state = bulk - (d + 2.0) * shear / d;
+                pairs + state * integral(0.0, horizon, |z| dilatation(z).powi(2))
+            }
+        }
+    }
+}
+
+/// Measure of the part of a sphere of radius `r` beyond a plane at distance `z`.
+fn cap<const D: usize>(r: f64, z: f64) -> f64 {
+    match D {
+        1 => 1.0,
+        2 => 2.0 * r * (z / r).clamp(-1.0, 1.0).acos(),
+        _ => 2.0 * PI * r * (r - z),
+    }
+}
+
+/// `∫_a^b f`: Gauss–Legendre of three points on pieces that shrink towards both ends, where square roots and `1/r` sit.
+fn integral(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
+    const PIECES: usize = 96;
+    const NODE: f64 = 0.774_596_669_241_483_4;
+    // x = a + (b − a) (3 t² − 2 t³) has a vanishing slope at both ends
+    let at = |t: f64| a + (b - a) * t * t * (3.0 - 2.0 * t);
+    let slope = |t: f64| 6.0 * (b - a) * t * (1.0 - t);
+    let half = 0.5 / PIECES as f64;
+    (0..PIECES)
+        .map(|piece| {
+            let middle = (2 * piece + 1) as f64 * half;
+            [(-NODE, 5.0), (0.0, 8.0), (NODE, 5.0)]
+                .iter()
+                .map(|(x, w)| {
+                    let t = middle + x * half;
+                    w / 9.0 * half * slope(t) * f(at(t))
+                })
+                .sum::<f64>()
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peridynamics::influence::{Alpha, Degree};
+
+    #[test]
+    fn the_prototype_material_has_the_closed_forms() {
+        let (delta, g0, c1111) = (0.37, 5.2, 3.1e9);
+        let law = |constant| BondEnergy::Pairwise {
+            micromodulus: Micromodulus::InverseDistance,
+            constant,
+        };
+        let c = Micromodulus::InverseDistance.constant::<3>(delta, c1111);
+        let s = law(c).critical_stretch::<3>(g0, delta).unwrap();
+        let exact = (10.0 * g0 / (PI * c * delta.powi(5))).sqrt();
+        assert!((s / exact - 1.0).abs() < 1e-9, "{s} {exact}");
+        // with k = 5/9 C_1111 at ν = 1/4, s_c = √(5 G0 / (9 k δ))
+        let k = 5.0 / 9.0 * c1111;
+        assert!((s / (5.0 * g0 / (9.0 * k * delta)).sqrt() - 1.0).abs() < 1e-9);
+        let c = Micromodulus::InverseDistance.constant::<2>(delta, c1111);
+        let s = law(c).critical_stretch::<2>(g0, delta).unwrap();
+        // plane stress, E = 8/9 C_1111: s_c = √(4 π G0 / (9 E δ))
+        let exact = (4.0 * PI * g0 / (9.0 * c1111 * 8.0 / 9.0 * delta)).sqrt();
+        assert!((s / exact - 1.0).abs() < 1e-9, "{s} {exact}");
+        let c = Micromodulus::InverseDistance.constant::<1>(delta, c1111);
+        let s = law(c).critical_stretch::<1>(g0, delta).unwrap();
+        // G0 = s² c δ³/6 and c = 2 C/δ²
+        let exact = (3.0 * g0 / (c1111 * delta)).sqrt();
+        assert!((s / exact - 1.0).abs() < 1e-9, "{s} {exact}");
+    }
+
+    #[test]
+    fn an_lps_at_the_pairwise_ratio_breaks_like_bonds_that_act_alone() {
+        let (delta, g0, mu) = (0.2, 1.0, 7.0);
+        for degree in [Degree::P0, Degree::P1, Degree::P3] {
+            let influence = Influence::Polynomial {
+                degree,
+                alpha: Alpha::One,
+            };
+            let lps = BondEnergy::Lps {
+                influence,
+                bulk: mu * 5.0 / 3.0,
+                shear: mu,
+            };
+            let micromodulus = Micromodulus::Influence(influence);
+            let pairs = BondEnergy::Pairwise {
+                micromodulus,
+                constant: micromodulus.constant::<3>(delta, 3.0 * mu),
+            };
+            let (a, b) = (
+                lps.critical_stretch::<3>(g0, delta).unwrap(),
+                pairs.critical_stretch::<3>(g0, delta).unwrap(),
+            );
+            assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn the_dilatation_of_an_lps_counts() {
+        // ω = 1/r in 3D: θ(z) = s (3/2 − 2ζ + ζ⁴/2), so G0 = s² δ (3 μ + K′ ∫ θ²/s² dζ), the last integral 0.57778
+        let (delta, mu, bulk) = (0.4, 2.0, 9.0);
+        let lps = BondEnergy::Lps {
+            influence: Influence::Polynomial {
+                degree: Degree::P0,
+                alpha: Alpha::One,
+            },
+            bulk,
+            shear: mu,
+        };
+        let s = lps.critical_stretch::<3>(1.0, delta).unwrap();
+        let square = 2.25 + 4.0 / 3.0 + 0.25 / 9.0 - 3.0 + 0.3 - 1.0 / 3.0;
+        let exact = (1.0 / (delta * (3.0 * mu + (bulk - 5.0 / 3.0 * mu) * square))).sqrt();
+        assert!((s / exact - 1.0).abs() < 1e-8, "{s} {exact}");
+        assert!(lps.critical_stretch::<3>(-1.0, delta).is_err());
+        let auxetic = BondEnergy::Lps {
+            influence: Influence::Gaussian,
+            bulk: -100.0,
+            shear: mu,
+        };
+        assert!(matches!(
+            auxetic.critical_stretch::<3>(1.0, delta),
+            Err(FractureError::Releases { .. })
+        ));
+    }
+}
