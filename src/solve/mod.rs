@@ -1,8 +1,9 @@
 //! Solvers of `K u = f`: elimination orders, a multifrontal direct solver, Krylov methods with multigrid, and the
-//! static problem that chooses among them.
+//! static problem that chooses among them; explicit dynamics.
 
 mod aggregate;
 pub mod direct;
+pub mod explicit;
 mod front;
 pub mod krylov;
 mod multifrontal;

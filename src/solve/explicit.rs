@@ -1,0 +1,723 @@
+//! Explicit dynamics: velocity Verlet for `M ü = f(t) − F(u)` with lumped masses, loads and prescribed motion as functions of time.
+//!
+//! One step, from `(u_n, v_n, a_n)`:
+//!
+//! ```text
+//! v_{n+1/2} = v_n + Δt/2 a_n
+//! u_{n+1}   = u_n + Δt v_{n+1/2}
+//! a_{n+1}   = M⁻¹ (f(t_{n+1}) − F(u_{n+1}))
+//! v_{n+1}   = v_{n+1/2} + Δt/2 a_{n+1}
+//! ```
+//!
+//! A prescribed dof follows its displacement `g(t)` exactly, with `v_n = (g_{n+1} − g_{n−1}) / 2Δt` and `a_n = (g_{n+1} − 2 g_n + g_{n−1}) / Δt²`, so that the scheme
+//! above holds for it too, and the force that moves it is `M a + F`. Therefore the work of all external forces, supports included,
+//! balances the discrete energy `½ v_{n+1/2}ᵀ M v_{n+1/2} + ½ u_nᵀ K u_{n+1}` of a linear symmetric system to round-off:
+//!
+//! ```text
+//! H_{n+1/2} − H_{n−1/2} = ½ (u_{n+1} − u_{n−1})ᵀ f_n
+//! ```
+//!
+//! Vectors run over chunks of fixed size and sums are added in the order of the chunks: the bits do not depend on the number of threads.
+
+use std::ops::ControlFlow;
+
+use rayon::prelude::*;
+
+use crate::system::{Breakage, Dynamic};
+
+/// What drives a motion: external forces and prescribed displacements, as functions of time.
+///
+/// Nothing here may depend on what was called before, or a resumed run would differ from one that never stopped.
+pub trait Drive: Sync {
+    /// Overwrites `load` with the external force on every dof \[N\] at `time` \[s\].
+    fn load_into(&self, time: f64, load: &mut [f64]);
+
+    /// Whether the load is the same at all times; it is then evaluated once.
+    fn is_steady(&self) -> bool {
+        false
+    }
+
+    /// The dofs whose displacement is prescribed, ascending.
+    fn prescribed(&self) -> &[u32] {
+        &[]
+    }
+
+    /// Overwrites `values` with the displacements \[m\] of [`Drive::prescribed`] at `time`.
+    fn displacement_into(&self, _time: f64, _values: &mut [f64]) {}
+
+    /// Overwrites `values` with the velocities \[m/s\] of [`Drive::prescribed`] at `time`; asked for at the start only.
+    fn velocity_into(&self, _time: f64, values: &mut [f64]) {
+        values.fill(0.0);
+    }
+}
+
+/// No load and nothing prescribed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Undriven;
+
+impl Drive for Undriven {
+    fn load_into(&self, _time: f64, load: &mut [f64]) {
+        load.fill(0.0);
+    }
+
+    fn is_steady(&self) -> bool {
+        true
+    }
+}
+
+/// All that changes in a motion, but for the damage, which the system keeps ([`Dynamic::damage_state`]): both together resume a run bit for bit.
+///
+/// Shapes: one entry per dof. Units: \[s\], \[m\], \[m/s\], \[m/s²\], \[J\].
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct State {
+    /// Time.
+    pub time: f64,
+    /// Steps taken.
+    pub step: u64,
+    /// Displacement.
+    pub u: Vec<f64>,
+    /// Velocity.
+    pub v: Vec<f64>,
+    /// Acceleration; empty before the driver has seen the state for the first time.
+    pub a: Vec<f64>,
+    /// Work done by loads and supports since the start.
+    pub work: f64,
+    /// Energy at the start plus the work in absolute values: what the motion can have, to tell a runaway by.
+    pub supplied: f64,
+    /// Bonds broken since the start.
+    pub broken: u64,
+}
+
+impl State {
+    /// The start of a motion at time zero, with given fields.
+    pub fn start(u: Vec<f64>, v: Vec<f64>) -> State {
+        State {
+            u,
+            v,
+            ..State::default()
+        }
+    }
+
+    /// The start from rest, undeformed.
+    pub fn at_rest(dofs: usize) -> State {
+        State::start(vec![0.0; dofs], vec![0.0; dofs])
+    }
+}
+
+/// How a motion is stepped.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ExplicitParams {
+    /// Time step Δt \[s\]; [`crate::solve::stable_step`] finds one and refuses those that are too large.
+    pub step: f64,
+    /// The run stops once the kinetic energy exceeds this many times what was supplied.
+    pub runaway: f64,
+}
+
+impl ExplicitParams {
+    /// Steps of a given size.
+    pub fn with_step(step: f64) -> ExplicitParams {
+        // couplings that are not symmetric exchange some per cent of energy with a pulse at the seam; an instability passes any factor within a few hundred steps
+        ExplicitParams {
+            step,
+            runaway: 100.0,
+        }
+    }
+}
+
+/// Energies after a step `n → n+1` \[J\]; at the start those of the start, with no half step between.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Energies {
+    /// `½ vᵀ M v` at `n+1`.
+    pub kinetic: f64,
+    /// `½ vᵀ M v` at `n+½`.
+    pub kinetic_half: f64,
+    /// `½ v_{n+½}ᵀ M v_{n+½} + ½ u_nᵀ F(u_{n+1})`: of a linear symmetric system it differs from its start by `work_half` only.
+    pub discrete: f64,
+    /// Work of loads and supports up to `n+1`.
+    pub work: f64,
+    /// Work of loads and supports up to `n+½`.
+    pub work_half: f64,
+}
+
+/// What a run did.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ExplicitInfo {
+    /// Steps taken by this call.
+    pub steps: u64,
+    /// Time reached \[s\].
+    pub time: f64,
+    /// Bonds broken by this call.
+    pub broken: u64,
+    /// Why it ended.
+    pub end: End,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum End {
+    /// The last step was taken.
+    Finished,
+    /// The observer asked for it.
+    Stopped,
+}
+
+/// Why a motion cannot start or go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExplicitError {
+    /// An input has the wrong length.
+    #[error("{what} has {found} entries, the model has {expected}: it belongs to another model")]
+    Shape {
+        /// Name of the input.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length needed.
+        expected: usize,
+    },
+    /// The step is no step.
+    #[error(
+        "the time step is {step}: it must be positive and finite; leave it out to get the stable one"
+    )]
+    Step {
+        /// Its value \[s\].
+        step: f64,
+    },
+    /// A site without mass.
+    #[error(
+        "site {site} has the mass {mass}: explicit dynamics needs a positive density of every material"
+    )]
+    Mass {
+        /// The site.
+        site: usize,
+        /// Its mass \[kg\].
+        mass: f64,
+    },
+    /// A field at the start is not finite.
+    #[error("the {what} of site {site} is {value} at the start; check its expression")]
+    Start {
+        /// Displacement or velocity.
+        what: &'static str,
+        /// The site.
+        site: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A number is no longer finite.
+    #[error(
+        "the motion is no longer finite at step {step}, t = {time:e} s, site {site}: the load or the prescribed motion there is not a number, or the time step is too large; check the expressions, or take the stable step"
+    )]
+    NotFinite {
+        /// Step at which it was found.
+        step: u64,
+        /// Time \[s\].
+        time: f64,
+        /// The first such site.
+        site: usize,
+    },
+    /// The energy grew beyond everything that was put in.
+    #[error(
+        "the motion ran away at step {step}, t = {time:e} s: its kinetic energy {energy:e} J is more than {factor} times the {supplied:e} J put in, fastest at site {site}; the time step is too large or the coupling unstable: take the stable step, or coupling.splice"
+    )]
+    Runaway {
+        /// Step at which it was found.
+        step: u64,
+        /// Time \[s\].
+        time: f64,
+        /// The fastest site.
+        site: usize,
+        /// Kinetic energy \[J\].
+        energy: f64,
+        /// Energy at the start plus work in absolute values \[J\].
+        supplied: f64,
+        /// [`ExplicitParams::runaway`].
+        factor: f64,
+    },
+}
+
+/// Sites per chunk: the chunks, not the threads, decide the order of sums.
+const SITES: usize = 1024;
+
+/// Partial sums of one chunk.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    /// `Σ m v²`.
+    kinetic: f64,
+    /// `Σ m v²` before the last half kick.
+    kinetic_half: f64,
+    /// `Σ f v`.
+    power: f64,
+    /// `Σ |f v|`.
+    absolute: f64,
+    /// `Σ u_n F_{n+1}`.
+    pair: f64,
+}
+
+/// A motion under way.
+pub struct Explicit<'a> {
+    system: &'a mut dyn Dynamic,
+    drive: &'a dyn Drive,
+    params: ExplicitParams,
+    state: State,
+    energies: Energies,
+    block: usize,
+    inverse_mass: Vec<f64>,
+    /// Internal force at `n`.
+    force: Vec<f64>,
+    /// External force at `n`; on prescribed dofs all that moves them.
+    load: Vec<f64>,
+    prescribed: Vec<u32>,
+    /// The load alone on prescribed dofs.
+    applied: Vec<f64>,
+    /// Displacement of prescribed dofs at `n−1` and `n+1`.
+    previous: Vec<f64>,
+    next: Vec<f64>,
+    sums: Vec<Sums>,
+}
+
+impl<'a> Explicit<'a> {
+    /// Starts or resumes a motion: a state with accelerations is taken up as it stands, one without gets them from the system.
+    ///
+    /// The damage of a resumed run must have been put back into the system before.
+    ///
+    /// # Errors
+    /// [`ExplicitError`] if state, step, masses or drive are not those of a motion of this system.
+    pub fn new(
+        system: &'a mut dyn Dynamic,
+        drive: &'a dyn Drive,
+        params: ExplicitParams,
+        mut state: State,
+    ) -> Result<Explicit<'a>, ExplicitError> {
+        let block = system.block().max(1);
+        let sites = system.mass().len();
+        let dofs = sites * block;
+        let prescribed = drive.prescribed().to_vec();
+        check(system, &params, &state, &prescribed)?;
+        let mut values = vec![0.0; prescribed.len()];
+        let starts = state.a.is_empty();
+        if starts {
+            drive.displacement_into(state.time, &mut values);
+            set(&prescribed, &values, &mut state.u);
+            drive.velocity_into(state.time, &mut values);
+            set(&prescribed, &values, &mut state.v);
+        }
+        let mut load = vec![0.0; dofs];
+        drive.load_into(state.time, &mut load);
+        let mut force = vec![0.0; dofs];
+        // a resumed state has broken its bonds already
+        let breakage = if starts {
+            Breakage::Allowed
+        } else {
+            Breakage::Held
+        };
+        state.broken += system.internal_force_into(&state.u, &mut force, breakage);
+        let inverse_mass: Vec<f64> = system.mass().iter().map(|m| 1.0 / m).collect();
+        let mut motion = Explicit {
+            system,
+            drive,
+            params,
+            state,
+            energies: Energies::default(),
+            block,
+            inverse_mass,
+            force,
+            load,
+            applied: values.clone(),
+            previous: values.clone(),
+            next: values,
+            prescribed,
+            sums: vec![Sums::default(); sites.div_ceil(SITES)],
+        };
+        if starts {
+            motion.begin();
+        }
+        motion.look_ahead();
+        motion.add_reactions(Reading::Fresh);
+        motion.energies = motion.energies_at_start();
+        if starts {
+            let stored = motion.system.stored_energy(&motion.state.u);
+            motion.state.supplied = motion.energies.kinetic + stored.abs();
+        }
+        motion.check_numbers()?;
+        Ok(motion)
+    }
+
+    /// Accelerations at the start.
+    fn begin(&mut self) {
+        let (d, dt) = (self.block, self.params.step);
+        self.state.a = self
+            .load
+            .iter()
+            .zip(&self.force)
+            .enumerate()
+            .map(|(k, (f, r))| (f - r) * self.inverse_mass[k / d])
+            .collect();
+        self.look_ahead();
+        for (&k, next) in self.prescribed.iter().zip(&self.next) {
+            let k = k as usize;
+            // so that the first half step arrives where the prescribed motion is
+            self.state.a[k] = 2.0 * ((next - self.state.u[k]) / dt - self.state.v[k]) / dt;
+        }
+    }
+
+    /// Prescribed displacements of the next step.
+    fn look_ahead(&mut self) {
+        self.drive
+            .displacement_into(self.state.time + self.params.step, &mut self.next);
+    }
+
+    /// On prescribed dofs, the load becomes all that moves them, `M a + F`.
+    fn add_reactions(&mut self, reading: Reading) {
+        for (p, &k) in self.prescribed.iter().enumerate() {
+            let k = k as usize;
+            if reading == Reading::Fresh {
+                self.applied[p] = self.load[k];
+            }
+            self.load[k] = self.state.a[k] / self.inverse_mass[k / self.block] + self.force[k];
+        }
+    }
+
+    fn energies_at_start(&self) -> Energies {
+        let kinetic = self.kinetic();
+        let pair = crate::solve::krylov::dot(&self.state.u, &self.force);
+        Energies {
+            kinetic,
+            kinetic_half: kinetic,
+            discrete: kinetic + 0.5 * pair,
+            work: self.state.work,
+            work_half: self.state.work,
+        }
+    }
+
+    /// `½ vᵀ M v`, in the order of the steps.
+    fn kinetic(&self) -> f64 {
+        let d = self.block;
+        let sums: Vec<f64> = self
+            .state
+            .v
+            .par_chunks(SITES * d)
+            .zip(self.system.mass().par_chunks(SITES))
+            .map(|(v, mass)| {
+                let mut sum = 0.0;
+                for (v, m) in v.chunks_exact(d).zip(mass) {
+                    sum += m * v.iter().map(|v| v * v).sum::<f64>();
+                }
+                sum
+            })
+            .collect();
+        0.5 * sums.iter().sum::<f64>()
+    }
+
+    /// Takes one step; allocates nothing.
+    ///
+    /// # Errors
+    /// [`ExplicitError::NotFinite`] or [`ExplicitError::Runaway`], with step, time and site.
+    pub fn step(&mut self) -> Result<(), ExplicitError> {
+        let (d, dt) = (self.block, self.params.step);
+        for (previous, &k) in self.previous.iter_mut().zip(&self.prescribed) {
+            *previous = self.state.u[k as usize];
+        }
+        self.kick_and_drift();
+        for (p, &k) in self.prescribed.iter().enumerate() {
+            let k = k as usize;
+            self.state.v[k] = (self.next[p] - self.previous[p]) / dt;
+            self.state.u[k] = self.next[p];
+        }
+        let before = total(&self.sums);
+        self.state.time += dt;
+        self.state.step += 1;
+        let reading = if self.drive.is_steady() {
+            Reading::Kept
+        } else {
+            self.drive.load_into(self.state.time, &mut self.load);
+            Reading::Fresh
+        };
+        self.state.broken +=
+            self.system
+                .internal_force_into(&self.state.u, &mut self.force, Breakage::Allowed);
+        self.look_ahead();
+        for (p, &k) in self.prescribed.iter().enumerate() {
+            let k = k as usize;
+            let (last, now, next) = (self.previous[p], self.state.u[k], self.next[p]);
+            self.state.a[k] = ((next - now) - (now - last)) / (dt * dt);
+        }
+        self.add_reactions(reading);
+        self.accelerate_and_kick();
+        for (p, &k) in self.prescribed.iter().enumerate() {
+            let k = k as usize;
+            let (last, now, next) = (self.previous[p], self.state.u[k], self.next[p]);
+            self.state.a[k] = ((next - now) - (now - last)) / (dt * dt);
+            self.state.v[k] = (next - last) / (2.0 * dt);
+        }
+        let after = total(&self.sums);
+        let work_half = self.state.work + 0.5 * dt * before.power;
+        self.state.work = work_half + 0.5 * dt * after.power;
+        self.state.supplied += 0.5 * dt * (before.absolute + after.absolute);
+        self.energies = Energies {
+            kinetic: 0.5 * after.kinetic,
+            kinetic_half: 0.5 * after.kinetic_half,
+            discrete: 0.5 * (after.kinetic_half + after.pair),
+            work: self.state.work,
+            work_half,
+        };
+        debug_assert_eq!(self.state.u.len(), self.inverse_mass.len() * d);
+        self.check_numbers()
+    }
+
+    /// `v += Δt/2 a`, `u += Δt v`; sums the power of the external forces at `n`.
+    fn kick_and_drift(&mut self) {
+        let (d, dt) = (self.block, self.params.step);
+        let State { u, v, a, .. } = &mut self.state;
+        u.par_chunks_mut(SITES * d)
+            .zip(v.par_chunks_mut(SITES * d))
+            .zip(a.par_chunks(SITES * d))
+            .zip(self.load.par_chunks(SITES * d))
+            .zip(self.sums.par_iter_mut())
+            .for_each(|((((u, v), a), load), sums)| {
+                *sums = Sums::default();
+                for (((u, v), a), f) in u.iter_mut().zip(v).zip(a).zip(load) {
+                    *v += 0.5 * dt * a;
+                    *u += dt * *v;
+                    let power = f * *v;
+                    sums.power += power;
+                    sums.absolute += power.abs();
+                }
+            });
+    }
+
+    /// `a = M⁻¹ (f − F)`, `v += Δt/2 a`, with all sums of the step.
+    fn accelerate_and_kick(&mut self) {
+        let (d, dt) = (self.block, self.params.step);
+        let State { u, v, a, .. } = &mut self.state;
+        let mass = self.system.mass();
+        v.par_chunks_mut(SITES * d)
+            .zip(a.par_chunks_mut(SITES * d))
+            .zip(u.par_chunks(SITES * d))
+            .zip(self.load.par_chunks(SITES * d))
+            .zip(self.force.par_chunks(SITES * d))
+            .zip(mass.par_chunks(SITES))
+            .zip(self.inverse_mass.par_chunks(SITES))
+            .zip(self.sums.par_iter_mut())
+            .for_each(|(((((((v, a), u), load), force), mass), inverse), sums)| {
+                *sums = Sums::default();
+                for (i, (m, w)) in mass.iter().zip(inverse).enumerate() {
+                    let (mut half, mut full) = (0.0, 0.0);
+                    for k in i * d..(i + 1) * d {
+                        let (f, r) = (load[k], force[k]);
+                        half += v[k] * v[k];
+                        let power = f * v[k];
+                        sums.power += power;
+                        sums.absolute += power.abs();
+                        sums.pair += (u[k] - dt * v[k]) * r;
+                        a[k] = (f - r) * w;
+                        v[k] += 0.5 * dt * a[k];
+                        full += v[k] * v[k];
+                    }
+                    sums.kinetic_half += m * half;
+                    sums.kinetic += m * full;
+                }
+            });
+    }
+
+    /// Whether numbers are finite and the energy is one that was put in.
+    fn check_numbers(&self) -> Result<(), ExplicitError> {
+        let Energies {
+            kinetic, discrete, ..
+        } = self.energies;
+        let (step, time) = (self.state.step, self.state.time);
+        if !(kinetic.is_finite() && discrete.is_finite() && self.state.work.is_finite()) {
+            let State { u, v, a, .. } = &self.state;
+            let bad = |k: &usize| !(u[*k].is_finite() && v[*k].is_finite() && a[*k].is_finite());
+            // finite numbers whose squares are not: the fastest dof
+            let dof = (0..u.len()).find(bad).unwrap_or_else(|| self.fastest());
+            return Err(ExplicitError::NotFinite {
+                step,
+                time,
+                site: dof / self.block,
+            });
+        }
+        if kinetic > self.params.runaway * self.state.supplied {
+            return Err(ExplicitError::Runaway {
+                step,
+                time,
+                site: self.fastest() / self.block,
+                energy: kinetic,
+                supplied: self.state.supplied,
+                factor: self.params.runaway,
+            });
+        }
+        Ok(())
+    }
+
+    /// The dof of largest speed.
+    fn fastest(&self) -> usize {
+        let speed = |k: usize| self.state.v[k].abs();
+        (0..self.state.v.len()).fold(0, |best, k| if speed(k) > speed(best) { k } else { best })
+    }
+
+    /// Steps until `last` steps have been taken since the start of the motion; after each, `observe` may stop it.
+    ///
+    /// # Errors
+    /// Those of [`Explicit::step`].
+    pub fn run(
+        &mut self,
+        last: u64,
+        observe: &mut dyn FnMut(&Explicit<'_>) -> ControlFlow<()>,
+    ) -> Result<ExplicitInfo, ExplicitError> {
+        let (first, broken) = (self.state.step, self.state.broken);
+        let mut end = End::Finished;
+        while self.state.step < last {
+            self.step()?;
+            if observe(self).is_break() {
+                end = End::Stopped;
+                break;
+            }
+        }
+        Ok(ExplicitInfo {
+            steps: self.state.step - first,
+            time: self.state.time,
+            broken: self.state.broken - broken,
+            end,
+        })
+    }
+
+    /// Where the motion stands.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Ends the motion and keeps its state.
+    pub fn into_state(self) -> State {
+        self.state
+    }
+
+    /// Energies of the last step.
+    pub fn energies(&self) -> Energies {
+        self.energies
+    }
+
+    /// What moves.
+    pub fn system(&self) -> &dyn Dynamic {
+        &*self.system
+    }
+
+    /// The time step \[s\].
+    pub fn time_step(&self) -> f64 {
+        self.params.step
+    }
+
+    /// Internal force \[N\] at the present state.
+    pub fn internal_force(&self) -> &[f64] {
+        &self.force
+    }
+
+    /// External force \[N\] at the present state; on prescribed dofs with the force of the support.
+    pub fn external_force(&self) -> &[f64] {
+        &self.load
+    }
+
+    /// The force of the supports \[N\], `M a + F − f`: pairs of prescribed dof and force.
+    pub fn reactions(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.prescribed
+            .iter()
+            .zip(&self.applied)
+            .map(|(&k, applied)| (k, self.load[k as usize] - applied))
+    }
+
+    /// Momentum `Σ m v` \[kg m/s\], one entry per direction.
+    pub fn momentum(&self) -> Vec<f64> {
+        let mut sum = vec![0.0; self.block];
+        for (v, m) in self
+            .state
+            .v
+            .chunks_exact(self.block)
+            .zip(self.system.mass())
+        {
+            sum.iter_mut().zip(v).for_each(|(s, v)| *s += m * v);
+        }
+        sum
+    }
+}
+
+/// Whether the load of prescribed dofs has just been evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reading {
+    Fresh,
+    Kept,
+}
+
+fn set(dofs: &[u32], values: &[f64], field: &mut [f64]) {
+    for (&k, v) in dofs.iter().zip(values) {
+        field[k as usize] = *v;
+    }
+}
+
+/// Adds the chunks in their order.
+fn total(sums: &[Sums]) -> Sums {
+    sums.iter().fold(Sums::default(), |a, b| Sums {
+        kinetic: a.kinetic + b.kinetic,
+        kinetic_half: a.kinetic_half + b.kinetic_half,
+        power: a.power + b.power,
+        absolute: a.absolute + b.absolute,
+        pair: a.pair + b.pair,
+    })
+}
+
+fn check(
+    system: &dyn Dynamic,
+    params: &ExplicitParams,
+    state: &State,
+    prescribed: &[u32],
+) -> Result<(), ExplicitError> {
+    let block = system.block().max(1);
+    let dofs = system.mass().len() * block;
+    if !(params.step > 0.0 && params.step.is_finite()) {
+        return Err(ExplicitError::Step { step: params.step });
+    }
+    if let Some((site, &mass)) = system
+        .mass()
+        .iter()
+        .enumerate()
+        .find(|(_, m)| !(**m > 0.0 && m.is_finite()))
+    {
+        return Err(ExplicitError::Mass { site, mass });
+    }
+    let shapes = [
+        ("the displacement", state.u.len()),
+        ("the velocity", state.v.len()),
+        (
+            "the acceleration",
+            state.a.len().max(if state.a.is_empty() { dofs } else { 0 }),
+        ),
+    ];
+    for (what, found) in shapes {
+        if found != dofs {
+            return Err(ExplicitError::Shape {
+                what,
+                found,
+                expected: dofs,
+            });
+        }
+    }
+    for (what, field) in [("displacement", &state.u), ("velocity", &state.v)] {
+        if let Some((k, &value)) = field.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            return Err(ExplicitError::Start {
+                what,
+                site: k / block,
+                value,
+            });
+        }
+    }
+    match prescribed.iter().find(|&&k| k as usize >= dofs) {
+        Some(&k) => Err(ExplicitError::Shape {
+            what: "the list of prescribed dofs",
+            found: k as usize + 1,
+            expected: dofs,
+        }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+#[path = "explicit_tests.rs"]
+mod tests;
