@@ -7,6 +7,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, SceneErrorKind};
+use super::spec::CouplingSpec;
 
 const SHAPES: &[&str] = &[
     "any",
@@ -23,7 +24,6 @@ const SHAPES: &[&str] = &[
 ];
 const TRANSITIONS: &[&str] = &["any", "around", "ball", "box", "near", "set", "without"];
 const AXES: &[&str] = &["cells", "graded", "spacing"];
-const COUPLINGS: &[&str] = &["blending", "local", "nonlocal", "partial-stress", "splice"];
 const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
 const MATERIALS: &[&str] = &["bond-based", "correspondence", "lps"];
 const CONDITIONS: &[&str] = &["body-force", "displacement", "traction"];
@@ -39,7 +39,7 @@ const MICROMODULI: &[&str] = &[
 /// The choices at `path`, if the table there is one of exactly one key.
 pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
     match path {
-        ["coupling"] => Some(COUPLINGS),
+        ["coupling"] => Some(CouplingSpec::names()),
         ["mesh"] => Some(MESHES),
         ["mesh", _, "x" | "y" | "z"] => Some(AXES),
         ["materials", _] => Some(MATERIALS),

@@ -2,15 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use toml::Spanned;
-
 use super::check;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::{cells_of_set, position};
 use super::spec::{
-    BetaSpec, CouplingSpec, FormSpec, InfluenceSpec, InterfaceSpec, MaterialSpec, MicromodulusSpec,
-    PeridynamicsSpec, PointsSpec, SurfacesSpec, WeightsSpec,
+    InfluenceSpec, MaterialSpec, MicromodulusSpec, PeridynamicsSpec, PointsSpec, SurfacesSpec,
+    WeightsSpec,
 };
 use super::value::{Number, Text};
 use crate::material::{Elastic, Kinematics};
@@ -80,60 +78,6 @@ impl<const D: usize> Peridynamics<D> {
     /// The horizon at a position.
     pub fn horizon_at(&self, x: &Vector<D>) -> f64 {
         self.horizon.eval(&crate::tensor::padded(x))
-    }
-}
-
-/// How the two models are joined.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Method {
-    /// Splice.
-    Splice,
-    /// Force-based blending.
-    Blending(BetaSpec),
-    /// Partial stress.
-    PartialStress(FormSpec, InterfaceSpec),
-    /// Finite elements alone.
-    Local,
-    /// Peridynamics alone.
-    Nonlocal,
-}
-
-impl Method {
-    pub(crate) fn of(spec: &Spanned<CouplingSpec>) -> Self {
-        match spec.get_ref() {
-            CouplingSpec::Splice(_) => Self::Splice,
-            CouplingSpec::Blending(b) => Self::Blending(b.beta),
-            CouplingSpec::PartialStress(p) => Self::PartialStress(p.form, p.interface),
-            CouplingSpec::Local(_) => Self::Local,
-            CouplingSpec::Nonlocal(_) => Self::Nonlocal,
-        }
-    }
-
-    /// The name, as a scene spells it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Splice => "splice",
-            Self::Blending(_) => "blending",
-            Self::PartialStress(..) => "partial-stress",
-            Self::Local => "local",
-            Self::Nonlocal => "nonlocal",
-        }
-    }
-
-    /// What the method does, in one line.
-    pub fn about(self) -> &'static str {
-        match self {
-            Self::Splice => "each site takes the whole force of its own model",
-            Self::Blending(_) => "forces are blended over the transition zone",
-            Self::PartialStress(..) => "the transition zone carries the partial stress",
-            Self::Local => "finite elements everywhere",
-            Self::Nonlocal => "peridynamics everywhere",
-        }
-    }
-
-    /// Whether the method needs a zone where both models overlap.
-    pub fn needs_transition(self) -> bool {
-        matches!(self, Self::Blending(_) | Self::PartialStress(..))
     }
 }
 

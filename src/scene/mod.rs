@@ -36,7 +36,7 @@ mod zones;
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
-pub use materials::{Law, Material, Method, Peridynamics, Points};
+pub use materials::{Law, Material, Peridynamics, Points};
 pub use predict::{Prediction, Share};
 pub use region::Region;
 pub use run::{RunError, Solved, solve_with};

@@ -8,8 +8,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::materials::Method as Joining;
 use super::run::{self, RunError};
+use super::spec::{Joining, ZonesNeeded};
 use super::validate::Scene;
 use crate::coupling::edge::Edge;
 use crate::coupling::{Model, SiteKind, Zone};
@@ -109,7 +109,7 @@ pub(crate) fn predict<const D: usize>(
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
     let title = scene.title.clone();
-    let joining = scene.method;
+    let joining = scene.coupling.joining();
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
     let (problem, rest) = run::problem(scene);
     let (model, coupling) = Model::new(problem, progress)?;
@@ -124,8 +124,8 @@ pub(crate) fn predict<const D: usize>(
     let (prescribed, _) = run::supports(&model, &rest.conditions)?;
     let free = FreeDofs::from_prescribed(&prescribed, D);
     let mut choices = vec![Choice {
-        choice: format!("coupling {}", joining.name()),
-        why: joining.about().to_owned(),
+        choice: format!("coupling {}", joining.name),
+        why: joining.about.to_owned(),
     }];
     let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
@@ -211,7 +211,7 @@ pub(crate) fn predict<const D: usize>(
     let mut prediction = Prediction {
         scene: title,
         dimension: D,
-        coupling: joining.name().to_owned(),
+        coupling: joining.name.to_owned(),
         sizes,
         method,
         symmetry,
@@ -262,19 +262,13 @@ fn warnings<const D: usize>(
         }
         if let Some(width) = transition_width(&model.mesh, &model.zones) {
             let largest = body.cloud.horizon.iter().copied().fold(0.0, f64::max);
-            let (wanted, what) = match joining {
-                Joining::Blending(_) => (
-                    3.0,
-                    "a smooth blending over three horizons cuts spurious forces a hundredfold",
-                ),
-                Joining::PartialStress(..) => {
-                    (1.0, "families of the nonlocal zone then reach past it")
-                }
+            let (wanted, why) = match joining.zones {
+                ZonesNeeded::Transition { width, why } => (width, why),
                 _ => (0.0, ""),
             };
             if width < (wanted - 0.01) * largest {
                 list.push(format!(
-                    "the transition zone is {width:.3e} wide, {:.2} horizons, less than {wanted}: {what}",
+                    "the transition zone is {width:.3e} wide, {:.2} horizons, less than {wanted}: {why}",
                     width / largest
                 ));
             }

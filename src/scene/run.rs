@@ -5,14 +5,12 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::conditions::{Components, Condition, Prescribed, Support};
-use super::materials::{Law, Method, Points};
-use super::spec::{BetaSpec, FormSpec, InterfaceSpec, SurfacesSpec, WeightsSpec};
+use super::materials::{Law, Points};
+use super::spec::{SurfacesSpec, WeightsSpec};
 use super::validate::{Output, Scene, Solver};
 use crate::coupling::Surfaces;
 use crate::coupling::{
-    self, Blending, BlendingFunction, Coupling, FitDegree, Local, Model, ModelError, Nonlocal,
-    Operator, PartialStressElements, PartialStressMeshfree, PointSource, Problem, SiteKind, Splice,
-    Zone,
+    self, Coupling, Model, ModelError, Operator, PointSource, Problem, SiteKind, Zone,
 };
 use crate::fem;
 use crate::mesh::{Facet, Mesh};
@@ -94,7 +92,7 @@ pub fn solve_with<const D: usize>(
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
     let name = scene.title.clone();
-    let method = scene.method;
+    let joining = scene.coupling.joining();
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
     let (problem, rest) = problem(scene);
     let (model, coupling) = Model::new(problem, progress)?;
@@ -159,7 +157,7 @@ pub fn solve_with<const D: usize>(
     let summary = RunSummary {
         scene: name,
         dimension: D,
-        coupling: method.name().to_owned(),
+        coupling: joining.name.to_owned(),
         sizes: Sizes {
             nodes,
             cells,
@@ -233,27 +231,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             Box::new(Correspondence::new(influence, lambda, mu, stabilisation))
         }
     };
-    let method: Box<dyn Coupling<D>> = match scene.method {
-        Method::Splice => Box::new(Splice),
-        Method::Blending(beta) => Box::new(Blending {
-            function: match beta {
-                BetaSpec::Constant => BlendingFunction::Constant,
-                BetaSpec::Linear => BlendingFunction::Linear,
-                BetaSpec::Smooth => BlendingFunction::Smooth,
-            },
-        }),
-        Method::PartialStress(FormSpec::Elements, interface) => Box::new(PartialStressElements {
-            fit: match interface {
-                InterfaceSpec::Affine => FitDegree::Affine,
-                InterfaceSpec::Quadratic => FitDegree::Quadratic,
-            },
-        }),
-        Method::PartialStress(FormSpec::Meshfree, _) => {
-            Box::new(PartialStressMeshfree { influence })
-        }
-        Method::Local => Box::new(Local),
-        Method::Nonlocal => Box::new(Nonlocal),
-    };
+    let method = scene.coupling.build(influence);
     let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
     let peridynamics = scene.peridynamics.map(|p| {

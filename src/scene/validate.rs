@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use super::check;
 use super::conditions::{self, Condition, extent};
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::{self, Material, Method, Peridynamics, Points};
+use super::materials::{self, Material, Peridynamics, Points};
 use super::meshing;
 use super::predict::{self, Prediction};
 use super::region::{self, Region};
 use super::run::{self, RunError};
 use super::source::{Source, Span};
-use super::spec::{InfluenceSpec, KinematicsSpec, SceneSpec, ShapeSpec};
+use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ShapeSpec, ZonesNeeded};
 use super::zones;
 use crate::coupling::Zone;
 use crate::fem::Locator;
@@ -42,7 +42,7 @@ pub struct Scene<const D: usize> {
     /// The peridynamic choices; none if the scene is local throughout.
     pub peridynamics: Option<Peridynamics<D>>,
     /// How the models are joined.
-    pub method: Method,
+    pub coupling: CouplingSpec,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
     /// Empty regions: no point lies inside.
@@ -191,16 +191,16 @@ fn scene<const D: usize>(
     directory: &Path,
     name: &str,
 ) -> Result<Scene<D>, SceneError> {
-    let method = Method::of(&spec.coupling);
+    let joining = spec.coupling.get_ref().joining();
     let solver = solver(spec)?;
     let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
-    let peridynamics = match (&spec.peridynamics, method) {
+    let peridynamics = match (&spec.peridynamics, joining.zones) {
         (Some(p), _) => Some(materials::peridynamics(p, &mesh)?),
-        (None, Method::Local) => None,
+        (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
         (None, _) => {
             return Err(SceneError::new(
                 SceneErrorKind::Missing,
-                format!("coupling `{}` needs [peridynamics]", method.name()),
+                format!("coupling `{}` needs [peridynamics]", joining.name),
             )
             .label(spec.coupling.span(), "has a peridynamic side")
             .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
@@ -216,7 +216,7 @@ fn scene<const D: usize>(
     };
     let (found, cell_material) =
         materials::materials(&spec.materials, influence, kinematics, &mesh)?;
-    let zones = zones::zones(spec, method, &mesh)?;
+    let zones = zones::zones(spec, joining, &mesh)?;
     one_peridynamic_material(spec, &found, &cell_material, &zones)?;
     if let Some(p) = &peridynamics {
         horizon(spec, p, &mesh, &zones)?;
@@ -232,7 +232,7 @@ fn scene<const D: usize>(
         materials: found,
         cell_material,
         peridynamics,
-        method,
+        coupling: spec.coupling.get_ref().clone(),
         conditions,
         voids,
         barriers,

@@ -5,30 +5,28 @@ use rayon::prelude::*;
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::Method;
 use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{SceneSpec, ShapeSpec, TransitionSpec};
+use super::spec::{Joining, SceneSpec, ShapeSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 
 /// The model of each cell.
 pub(crate) fn zones<const D: usize>(
     spec: &SceneSpec,
-    method: Method,
+    joining: Joining,
     mesh: &Mesh<D>,
 ) -> Result<Vec<Zone>, SceneError> {
     let count = mesh.cell_count();
-    match method {
-        Method::Local => return Ok(vec![Zone::Local; count]),
-        Method::Nonlocal => return Ok(vec![Zone::Nonlocal; count]),
-        _ => {}
+    if let ZonesNeeded::Everywhere(zone) = joining.zones {
+        return Ok(vec![zone; count]);
     }
+    let needs_transition = matches!(joining.zones, ZonesNeeded::Transition { .. });
     let chosen = spec.coupling.span();
     let Some(nonlocal) = &spec.zones.nonlocal else {
         return Err(SceneError::new(
             SceneErrorKind::Missing,
-            format!("coupling `{}` needs a nonlocal zone", method.name()),
+            format!("coupling `{}` needs a nonlocal zone", joining.name),
         )
         .label(chosen, "couples a local and a nonlocal zone")
         .help(
@@ -69,13 +67,13 @@ pub(crate) fn zones<const D: usize>(
             zones[c] = Zone::Transition;
             any = true;
         }
-        if !any && method.needs_transition() {
+        if !any && needs_transition {
             return Err(empty("zones.transition", span, mesh));
         }
-    } else if method.needs_transition() {
+    } else if needs_transition {
         return Err(SceneError::new(
             SceneErrorKind::Missing,
-            format!("coupling `{}` needs a transition zone", method.name()),
+            format!("coupling `{}` needs a transition zone", joining.name),
         )
         .label(chosen, "works where both models overlap")
         .help("add [zones.transition] with around = ..., at least one horizon"));

@@ -1,4 +1,4 @@
-//! Materials, peridynamics and coupling of a scene.
+//! Materials and peridynamics of a scene.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -216,81 +216,4 @@ pub enum SurfacesSpec {
     Cut,
     /// Bonds reach across holes.
     Uncut,
-}
-
-/// How finite elements and peridynamics are joined.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum CouplingSpec {
-    /// Each site takes the whole force of its own model (SAND2015-7998 eq. 2.30).
-    Splice(NoOptionsSpec),
-    /// Forces blended by β over the transition zone (eq. 3.9 to 3.14).
-    Blending(BlendingSpec),
-    /// Partial stress in the transition zone (eq. 2.19 to 2.29).
-    PartialStress(PartialStressSpec),
-    /// Finite elements everywhere.
-    Local(NoOptionsSpec),
-    /// Peridynamics everywhere.
-    Nonlocal(NoOptionsSpec),
-}
-
-/// A coupling without options.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NoOptionsSpec {}
-
-/// Force-based blending.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct BlendingSpec {
-    /// Shape of β from 1 at the nonlocal zone to 0 at the local one.
-    #[serde(default)]
-    pub beta: BetaSpec,
-}
-
-/// Shape of the blending function.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum BetaSpec {
-    /// One half throughout the transition zone.
-    Constant,
-    /// Straight.
-    Linear,
-    /// The cubic `3 s² - 2 s³`.
-    #[default]
-    Smooth,
-}
-
-/// Partial stress.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct PartialStressSpec {
-    /// How the divergence of the partial stress is taken.
-    #[serde(default)]
-    pub form: FormSpec,
-    /// Order of the least-squares constraint where mesh and points meet.
-    #[serde(default)]
-    pub interface: InterfaceSpec,
-}
-
-/// How the divergence of the partial stress is taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum FormSpec {
-    /// Finite elements whose stress is the partial stress at their Gauss points (SAND2015-7998 section 7.3).
-    #[default]
-    Elements,
-    /// Points, through the shape tensor (section 7.2).
-    Meshfree,
-}
-
-/// Order of the constraint where mesh and points meet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum InterfaceSpec {
-    /// Affine fields pass exactly.
-    Affine,
-    /// Quadratic fields pass exactly.
-    #[default]
-    Quadratic,
 }

@@ -4,17 +4,20 @@
 
 mod condition;
 mod control;
+mod coupling;
 mod material;
 mod mesh;
 mod region;
 
 pub use condition::{BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VoidSpec};
 pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec};
+pub use coupling::{
+    BetaSpec, BlendingSpec, CouplingSpec, FormSpec, InterfaceSpec, Joining, NoOptionsSpec,
+    PartialStressSpec, ZonesNeeded,
+};
 pub use material::{
-    BetaSpec, BlendingSpec, BondBasedSpec, CorrespondenceSpec, CouplingSpec, FormSpec,
-    InfluenceSpec, InterfaceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec, NoOptionsSpec,
-    PartialStressSpec, PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec,
-    WeightsSpec,
+    BondBasedSpec, CorrespondenceSpec, InfluenceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec,
+    PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec, WeightsSpec,
 };
 pub use mesh::{
     AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
@@ -57,7 +60,7 @@ pub struct SceneSpec {
     #[serde(default)]
     pub zones: ZonesSpec,
     /// How the two models are joined; also as text where no option is set, `coupling = "splice"`.
-    #[schemars(schema_with = "coupling_schema")]
+    #[schemars(schema_with = "coupling::coupling_schema")]
     pub coupling: Spanned<CouplingSpec>,
     /// Displacements, tractions and body forces by name.
     #[serde(default)]
@@ -74,18 +77,6 @@ pub struct SceneSpec {
     /// What is written, and where.
     #[serde(default)]
     pub output: OutputSpec,
-}
-
-/// A table with the method's options, or the method's name alone.
-fn coupling_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
-    let table = generator.subschema_for::<CouplingSpec>();
-    schemars::json_schema!({
-        "description": "How the two models are joined: a table, [coupling.blending], or a name where no option is set, \"splice\".",
-        "anyOf": [
-            table,
-            { "enum": ["splice", "blending", "partial-stress", "local", "nonlocal"] }
-        ]
-    })
 }
 
 /// How a body of one, two or three dimensions stands for a solid.

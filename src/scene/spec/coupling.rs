@@ -1,0 +1,230 @@
+//! The coupling of a scene: what is typed, what a run asks of it, and the method that it makes.
+//!
+//! A coupling enters a scene here and nowhere else: a variant of [`CouplingSpec`], its [`Joining`] and the value that
+//! [`CouplingSpec::build`] makes of it. Parser, JSON Schema, overrides and messages follow from the variant.
+
+use std::sync::LazyLock;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::Deserialize;
+
+use crate::coupling::{
+    Blending, BlendingFunction, Coupling, FitDegree, Local, Nonlocal, PartialStressElements,
+    PartialStressMeshfree, Splice, Zone,
+};
+use crate::peridynamics::Influence;
+
+/// How finite elements and peridynamics are joined.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CouplingSpec {
+    /// Each site takes the whole force of its own model (SAND2015-7998 eq. 2.30).
+    Splice(NoOptionsSpec),
+    /// Forces blended by β over the transition zone (eq. 3.9 to 3.14).
+    Blending(BlendingSpec),
+    /// Partial stress in the transition zone (eq. 2.19 to 2.29).
+    PartialStress(PartialStressSpec),
+    /// Finite elements everywhere.
+    Local(NoOptionsSpec),
+    /// Peridynamics everywhere.
+    Nonlocal(NoOptionsSpec),
+}
+
+/// What a coupling asks of the zones of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ZonesNeeded {
+    /// None: every cell is of this zone.
+    Everywhere(Zone),
+    /// A nonlocal zone; a transition zone has no meaning of its own.
+    Nonlocal,
+    /// A nonlocal zone and a transition zone, which should be at least so many horizons wide.
+    Transition {
+        /// The least width over the largest horizon.
+        width: f64,
+        /// What that width gives.
+        why: &'static str,
+    },
+}
+
+/// What is told of a coupling: its name, a line about it, and what it needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joining {
+    /// The name, as a scene spells it.
+    pub name: &'static str,
+    /// What the method does, in one line.
+    pub about: &'static str,
+    /// The zones that it needs.
+    pub zones: ZonesNeeded,
+}
+
+impl CouplingSpec {
+    /// Name, description and needs of the coupling.
+    pub fn joining(&self) -> Joining {
+        match self {
+            Self::Splice(_) => Joining {
+                name: "splice",
+                about: "each site takes the whole force of its own model",
+                zones: ZonesNeeded::Nonlocal,
+            },
+            Self::Blending(_) => Joining {
+                name: "blending",
+                about: "forces are blended over the transition zone",
+                zones: ZonesNeeded::Transition {
+                    width: 3.0,
+                    why: "a smooth blending over three horizons cuts spurious forces a hundredfold",
+                },
+            },
+            Self::PartialStress(_) => Joining {
+                name: "partial-stress",
+                about: "the transition zone carries the partial stress",
+                zones: ZonesNeeded::Transition {
+                    width: 1.0,
+                    why: "families of the nonlocal zone then reach past it",
+                },
+            },
+            Self::Local(_) => Joining {
+                name: "local",
+                about: "finite elements everywhere",
+                zones: ZonesNeeded::Everywhere(Zone::Local),
+            },
+            Self::Nonlocal(_) => Joining {
+                name: "nonlocal",
+                about: "peridynamics everywhere",
+                zones: ZonesNeeded::Everywhere(Zone::Nonlocal),
+            },
+        }
+    }
+
+    /// The method; `influence` is that of the material's bonds.
+    pub fn build<const D: usize>(&self, influence: Influence) -> Box<dyn Coupling<D>> {
+        match self {
+            Self::Splice(_) => Box::new(Splice),
+            Self::Blending(b) => Box::new(Blending {
+                function: match b.beta {
+                    BetaSpec::Constant => BlendingFunction::Constant,
+                    BetaSpec::Linear => BlendingFunction::Linear,
+                    BetaSpec::Smooth => BlendingFunction::Smooth,
+                },
+            }),
+            Self::PartialStress(p) => match p.form {
+                FormSpec::Elements => Box::new(PartialStressElements {
+                    fit: match p.interface {
+                        InterfaceSpec::Affine => FitDegree::Affine,
+                        InterfaceSpec::Quadratic => FitDegree::Quadratic,
+                    },
+                }),
+                FormSpec::Meshfree => Box::new(PartialStressMeshfree { influence }),
+            },
+            Self::Local(_) => Box::new(Local),
+            Self::Nonlocal(_) => Box::new(Nonlocal),
+        }
+    }
+
+    /// The names of all couplings, sorted; read off the schema, which the variants make.
+    pub fn names() -> &'static [&'static str] {
+        static OWNED: LazyLock<Vec<String>> = LazyLock::new(|| {
+            let schema = schemars::schema_for!(CouplingSpec);
+            let variants = schema.get("oneOf").and_then(|v| v.as_array());
+            let mut names: Vec<String> = variants
+                .into_iter()
+                .flatten()
+                .filter_map(|variant| variant.get("required")?.get(0)?.as_str())
+                .map(str::to_owned)
+                .collect();
+            names.sort();
+            names
+        });
+        static NAMES: LazyLock<Vec<&'static str>> =
+            LazyLock::new(|| OWNED.iter().map(String::as_str).collect());
+        &NAMES
+    }
+}
+
+/// A table with the method's options, or the method's name alone.
+pub(super) fn coupling_schema(generator: &mut SchemaGenerator) -> Schema {
+    let table = generator.subschema_for::<CouplingSpec>();
+    json_schema!({
+        "description": "How the two models are joined: a table, [coupling.blending], or a name where no option is set, \"splice\".",
+        "anyOf": [table, { "enum": CouplingSpec::names() }]
+    })
+}
+
+/// A coupling without options.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoOptionsSpec {}
+
+/// Force-based blending.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BlendingSpec {
+    /// Shape of β from 1 at the nonlocal zone to 0 at the local one.
+    #[serde(default)]
+    pub beta: BetaSpec,
+}
+
+/// Shape of the blending function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BetaSpec {
+    /// One half throughout the transition zone.
+    Constant,
+    /// Straight.
+    Linear,
+    /// The cubic `3 s² - 2 s³`.
+    #[default]
+    Smooth,
+}
+
+/// Partial stress.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct PartialStressSpec {
+    /// How the divergence of the partial stress is taken.
+    #[serde(default)]
+    pub form: FormSpec,
+    /// Order of the least-squares constraint where mesh and points meet.
+    #[serde(default)]
+    pub interface: InterfaceSpec,
+}
+
+/// How the divergence of the partial stress is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FormSpec {
+    /// Finite elements whose stress is the partial stress at their Gauss points (SAND2015-7998 section 7.3).
+    #[default]
+    Elements,
+    /// Points, through the shape tensor (section 7.2).
+    Meshfree,
+}
+
+/// Order of the constraint where mesh and points meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum InterfaceSpec {
+    /// Affine fields pass exactly.
+    Affine,
+    /// Quadratic fields pass exactly.
+    #[default]
+    Quadratic,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_coupling_is_called_what_its_variant_is_called() {
+        assert_eq!(
+            CouplingSpec::names(),
+            ["blending", "local", "nonlocal", "partial-stress", "splice"]
+        );
+        for name in CouplingSpec::names() {
+            let typed = format!("[coupling.{name}]");
+            let table: std::collections::BTreeMap<String, CouplingSpec> =
+                toml::from_str(&typed).expect("no option is compulsory");
+            assert_eq!(table["coupling"].joining().name, *name);
+        }
+    }
+}
