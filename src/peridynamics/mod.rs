@@ -10,6 +10,7 @@
 //! | `law.rs` | what a law is; `bond_based.rs`, `lps.rs`, `correspondence.rs` | eq. (3.1), (5.16), section 7.2 |
 //! | `fracture.rs` | critical stretch from the fracture energy | [Silling2005] |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
+//! | `kernel/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
 
 pub mod body;
 pub mod bond_based;
@@ -18,6 +19,7 @@ pub mod families;
 pub mod fracture;
 mod grid;
 pub mod influence;
+pub mod kernel;
 pub mod law;
 mod least_change;
 pub mod lps;

@@ -1,0 +1,569 @@
+//! The pass over neighbour lists.
+
+use rayon::prelude::*;
+
+use super::{BondForce, BondPass, BondSetup, Kinematics, Storage, bond::psi};
+use crate::system::Breakage;
+
+/// Points per task; a constant, so that no result depends on the number of threads.
+const BLOCK: usize = 256;
+
+/// Bond weights.
+enum Weights {
+    Double(Vec<f64>),
+    Single(Vec<f32>),
+}
+
+impl Weights {
+    #[inline(always)]
+    fn get(&self, bond: usize) -> f64 {
+        match self {
+            Self::Double(w) => w[bond],
+            Self::Single(w) => f64::from(w[bond]),
+        }
+    }
+}
+
+/// When bonds break, as a limit of `t`.
+enum Limit {
+    Never,
+    Uniform(f64),
+    PerBond(Vec<f64>),
+}
+
+impl Limit {
+    #[inline(always)]
+    fn get(&self, bond: usize) -> f64 {
+        match self {
+            Self::Never => f64::INFINITY,
+            Self::Uniform(t) => *t,
+            Self::PerBond(t) => t[bond],
+        }
+    }
+}
+
+/// Coefficients of the state-based law, per point.
+struct Solid {
+    /// `D/m`.
+    dilatation: Vec<f64>,
+    /// `(D k − (D+2) μ)/m`.
+    volumetric: Vec<f64>,
+    /// `D (D+2) μ/m`.
+    deviatoric: Vec<f64>,
+    /// Dilatation of the pass at hand.
+    theta: Vec<f64>,
+}
+
+/// A bond pass over lists: four bytes of neighbour, eight (or four) of weight and one bit per directed bond.
+pub(super) struct List<const D: usize> {
+    position: Vec<[f64; D]>,
+    volume: Vec<f64>,
+    row: Vec<bool>,
+    no_fail: Vec<bool>,
+    offsets: Vec<usize>,
+    neighbours: Vec<u32>,
+    weights: Weights,
+    limit: Limit,
+    kinematics: Kinematics,
+    solid: Option<Solid>,
+    /// Start of each point's bits, which fill whole bytes.
+    bytes: Vec<usize>,
+    intact: Vec<u8>,
+    reference: u64,
+}
+
+/// What one bond gives: `t`, and what multiplies `w V` times the direction.
+struct Stretched<const D: usize> {
+    t: f64,
+    /// `ξ + η`, or ξ of a linear bond.
+    direction: [f64; D],
+}
+
+#[inline(always)]
+fn stretched<const D: usize, const EXACT: bool>(
+    xi: &[f64; D],
+    here: &[f64; D],
+    there: &[f64],
+) -> Stretched<D> {
+    let (mut cross, mut square, mut length) = (0.0, 0.0, 0.0);
+    let mut direction = *xi;
+    for a in 0..D {
+        let eta = there[a] - here[a];
+        cross += xi[a] * eta;
+        length += xi[a] * xi[a];
+        if EXACT {
+            square += eta * eta;
+            direction[a] += eta;
+        }
+    }
+    Stretched {
+        t: (2.0 * cross + square) / length,
+        direction,
+    }
+}
+
+/// `1 − r/|ξ+η|`, linear: `ξ·η/r²`.
+#[inline(always)]
+fn shortening<const EXACT: bool>(t: f64) -> f64 {
+    if EXACT { t * psi(t) } else { 0.5 * t }
+}
+
+/// Extension over length, `(|ξ+η| − r)/r`, linear: `ξ·η/r²`.
+#[inline(always)]
+fn extension<const EXACT: bool>(t: f64) -> f64 {
+    if EXACT {
+        t * (1.0 - (1.0 + t) * psi(t))
+    } else {
+        0.5 * t
+    }
+}
+
+/// `r/|ξ+η|`, linear: 1.
+#[inline(always)]
+fn ratio<const EXACT: bool>(t: f64) -> f64 {
+    if EXACT { 1.0 - t * psi(t) } else { 1.0 }
+}
+
+#[inline(always)]
+fn vector<const D: usize>(u: &[f64], i: usize) -> [f64; D] {
+    std::array::from_fn(|a| u[i * D + a])
+}
+
+impl<const D: usize> List<D> {
+    pub(super) fn new(setup: &BondSetup<'_, D>) -> Self {
+        let points = setup.position.len();
+        let families = setup.families;
+        let per_bond = |f: &(dyn Fn(usize, usize) -> f64 + Sync)| -> Vec<f64> {
+            let rows: Vec<Vec<f64>> = (0..points)
+                .into_par_iter()
+                .with_min_len(BLOCK)
+                .map(|i| (0..families.of(i).len()).map(|k| f(i, k)).collect())
+                .collect();
+            rows.concat()
+        };
+        let xi = |i: usize, k: usize| setup.bond(i, families.of(i)[k] as usize);
+        let weights = per_bond(&|i, k| setup.weight(i, k, &xi(i, k)));
+        let limit = match setup.failure.map(|f| f.critical) {
+            None => Limit::Never,
+            Some(super::CriticalStretch::Uniform(_)) => {
+                Limit::Uniform(setup.limit(0, 0, &crate::tensor::Vector::zeros()))
+            }
+            Some(super::CriticalStretch::PerBond(_)) => {
+                Limit::PerBond(per_bond(&|i, k| setup.limit(i, k, &xi(i, k))))
+            }
+        };
+        let solid = match setup.force {
+            BondForce::Pairwise { .. } => None,
+            BondForce::Solid { bulk, shear, .. } => {
+                let d = D as f64;
+                let inverse: Vec<f64> = (0..points)
+                    .map(|i| {
+                        let m = setup.weighted_volume(i);
+                        if m == 0.0 { 0.0 } else { 1.0 / m }
+                    })
+                    .collect();
+                Some(Solid {
+                    dilatation: inverse.iter().map(|m| d * m).collect(),
+                    volumetric: inverse
+                        .iter()
+                        .map(|m| (d * bulk - (d + 2.0) * shear) * m)
+                        .collect(),
+                    deviatoric: inverse.iter().map(|m| d * (d + 2.0) * shear * m).collect(),
+                    theta: vec![0.0; points],
+                })
+            }
+        };
+        let mut bytes = vec![0];
+        let mut intact = Vec::new();
+        for i in 0..points {
+            let family = families.of(i);
+            let first = intact.len();
+            intact.resize(first + family.len().div_ceil(8), 0u8);
+            for (k, &j) in family.iter().enumerate() {
+                if !setup.precracked.is_some_and(|cut| cut(i, j as usize)) {
+                    intact[first + k / 8] |= 1 << (k % 8);
+                }
+            }
+            bytes.push(intact.len());
+        }
+        Self {
+            position: setup.position.iter().map(|x| (*x).into()).collect(),
+            volume: setup.volume.to_vec(),
+            row: (0..points).map(|i| setup.row(i)).collect(),
+            no_fail: (0..points).map(|i| setup.no_fail(i)).collect(),
+            offsets: families.offsets.clone(),
+            neighbours: families.neighbours.clone(),
+            weights: match setup.storage {
+                Storage::Double => Weights::Double(weights),
+                Storage::Single => Weights::Single(weights.iter().map(|&w| w as f32).collect()),
+            },
+            limit,
+            kinematics: setup.kinematics,
+            solid,
+            bytes,
+            intact,
+            reference: families.neighbours.len() as u64,
+        }
+    }
+
+    #[inline(always)]
+    fn xi(&self, i: usize, j: usize) -> [f64; D] {
+        let (a, b) = (&self.position[i], &self.position[j]);
+        std::array::from_fn(|k| b[k] - a[k])
+    }
+
+    #[inline(always)]
+    fn stands(&self, i: usize, k: usize) -> bool {
+        self.intact[self.bytes[i] + k / 8] >> (k % 8) & 1 == 1
+    }
+
+    /// Clears the bits of bonds beyond their limit; returns how many.
+    fn break_bonds<const EXACT: bool>(&mut self, u: &[f64]) -> u64 {
+        if matches!(self.limit, Limit::Never) {
+            return 0;
+        }
+        let mut intact = std::mem::take(&mut self.intact);
+        let mut blocks = Vec::new();
+        let mut rest = intact.as_mut_slice();
+        for start in (0..self.points()).step_by(BLOCK) {
+            let end = (start + BLOCK).min(self.points());
+            let (head, tail) = rest.split_at_mut(self.bytes[end] - self.bytes[start]);
+            blocks.push((start..end, head));
+            rest = tail;
+        }
+        let broken = blocks
+            .into_par_iter()
+            .map(|(range, bits)| {
+                let first = self.bytes[range.start];
+                let mut broken = 0;
+                for i in range {
+                    let here = vector(u, i);
+                    for bond in self.offsets[i]..self.offsets[i + 1] {
+                        let k = bond - self.offsets[i];
+                        let byte = &mut bits[self.bytes[i] - first + k / 8];
+                        let j = self.neighbours[bond] as usize;
+                        if *byte >> (k % 8) & 1 == 0 || self.no_fail[i] || self.no_fail[j] {
+                            continue;
+                        }
+                        let xi = self.xi(i, j);
+                        let s = stretched::<D, EXACT>(&xi, &here, &u[j * D..][..D]);
+                        if s.t > self.limit.get(bond) {
+                            *byte &= !(1 << (k % 8));
+                            broken += 1;
+                        }
+                    }
+                }
+                broken
+            })
+            .sum();
+        self.intact = intact;
+        broken
+    }
+
+    /// The sum over intact bonds of point `i` of `f(bond, j, ξ, t, direction)`.
+    #[inline(always)]
+    fn each<const EXACT: bool>(
+        &self,
+        i: usize,
+        u: &[f64],
+        mut f: impl FnMut(usize, usize, &Stretched<D>),
+    ) {
+        let here = vector(u, i);
+        for bond in self.offsets[i]..self.offsets[i + 1] {
+            if self.stands(i, bond - self.offsets[i]) {
+                let j = self.neighbours[bond] as usize;
+                let s = stretched::<D, EXACT>(&self.xi(i, j), &here, &u[j * D..][..D]);
+                f(bond, j, &s);
+            }
+        }
+    }
+
+    fn dilatation<const EXACT: bool>(&self, solid: &Solid, i: usize, u: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        self.each::<EXACT>(i, u, |bond, j, s| {
+            let xi = self.xi(i, j);
+            let length: f64 = xi.iter().map(|x| x * x).sum();
+            sum += self.weights.get(bond) * length * self.volume[j] * extension::<EXACT>(s.t);
+        });
+        sum * solid.dilatation[i]
+    }
+
+    fn dilatations<const EXACT: bool>(&self, solid: &Solid, u: &[f64], theta: &mut [f64]) {
+        theta
+            .par_iter_mut()
+            .with_min_len(BLOCK)
+            .enumerate()
+            .for_each(|(i, theta)| *theta = self.dilatation::<EXACT>(solid, i, u));
+    }
+
+    fn forces<const EXACT: bool>(&self, theta: &[f64], u: &[f64], force: &mut [f64]) {
+        force
+            .par_chunks_exact_mut(D)
+            .with_min_len(BLOCK)
+            .enumerate()
+            .for_each(|(i, force)| {
+                let mut sum = [0.0; D];
+                if self.row[i] {
+                    self.each::<EXACT>(i, u, |bond, j, s| {
+                        let f = self.weights.get(bond)
+                            * self.volume[j]
+                            * match &self.solid {
+                                None => shortening::<EXACT>(s.t),
+                                Some(c) => {
+                                    (c.volumetric[i] * theta[i]
+                                        + c.volumetric[j] * theta[j]
+                                        + (c.deviatoric[i] + c.deviatoric[j])
+                                            * extension::<EXACT>(s.t))
+                                        * ratio::<EXACT>(s.t)
+                                }
+                            };
+                        for a in 0..D {
+                            sum[a] += f * s.direction[a];
+                        }
+                    });
+                }
+                for a in 0..D {
+                    force[a] = -self.volume[i] * sum[a];
+                }
+            });
+    }
+
+    fn pass<const EXACT: bool>(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+        let broken = match breakage {
+            Breakage::Allowed => self.break_bonds::<EXACT>(u),
+            Breakage::Held => 0,
+        };
+        let mut theta = Vec::new();
+        if let Some(solid) = &mut self.solid {
+            theta = std::mem::take(&mut solid.theta);
+        }
+        if let Some(solid) = &self.solid {
+            self.dilatations::<EXACT>(solid, u, &mut theta);
+        }
+        self.forces::<EXACT>(&theta, u, force);
+        if let Some(solid) = &mut self.solid {
+            solid.theta = theta;
+        }
+        broken
+    }
+
+    fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
+        let energies: Vec<f64> = (0..self.points())
+            .into_par_iter()
+            .with_min_len(BLOCK)
+            .map(|i| {
+                if !self.row[i] {
+                    return 0.0;
+                }
+                let mut sum = 0.0;
+                self.each::<EXACT>(i, u, |bond, j, s| {
+                    let e = extension::<EXACT>(s.t);
+                    let mut w = self.weights.get(bond) * self.volume[j] * e * e;
+                    let xi = self.xi(i, j);
+                    let length: f64 = xi.iter().map(|x| x * x).sum();
+                    w *= length;
+                    sum += w;
+                });
+                // pairwise: 2 p r² e² r² / 4; state-based: B ω e² r² / 2
+                self.volume[i]
+                    * match &self.solid {
+                        None => 0.25 * sum,
+                        Some(c) => {
+                            let theta = self.dilatation::<EXACT>(c, i, u);
+                            // (k − (D+2) μ/D) = A m/D
+                            let a = if c.dilatation[i] == 0.0 {
+                                0.0
+                            } else {
+                                c.volumetric[i] / c.dilatation[i]
+                            };
+                            0.5 * (a * theta * theta + c.deviatoric[i] * sum)
+                        }
+                    }
+            })
+            .collect();
+        energies.iter().sum()
+    }
+}
+
+impl<const D: usize> BondPass<D> for List<D> {
+    fn points(&self) -> usize {
+        self.position.len()
+    }
+
+    fn name(&self) -> &'static str {
+        "list"
+    }
+
+    fn bonds(&self) -> u64 {
+        self.reference
+    }
+
+    fn force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+        match self.kinematics {
+            Kinematics::Exact => self.pass::<true>(u, force, breakage),
+            Kinematics::Linear => self.pass::<false>(u, force, breakage),
+        }
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        let mut theta = Vec::new();
+        if let Some(solid) = &self.solid {
+            theta = vec![0.0; self.points()];
+            self.dilatations::<false>(solid, x, &mut theta);
+        }
+        self.forces::<false>(&theta, x, y);
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        let points = self.points();
+        // Σ_l |∂θ_i/∂u_l| in the maximum norm over components
+        let sums: Vec<f64> = match &self.solid {
+            None => Vec::new(),
+            Some(c) => (0..points)
+                .into_par_iter()
+                .with_min_len(BLOCK)
+                .map(|i| {
+                    let (mut own, mut others) = ([0.0; D], 0.0);
+                    for bond in self.offsets[i]..self.offsets[i + 1] {
+                        if self.stands(i, bond - self.offsets[i]) {
+                            let j = self.neighbours[bond] as usize;
+                            let w = self.weights.get(bond) * self.volume[j];
+                            for (own, x) in own.iter_mut().zip(self.xi(i, j)) {
+                                *own += w * x;
+                                others += (w * x).abs();
+                            }
+                        }
+                    }
+                    (others + own.iter().map(|x| x.abs()).sum::<f64>()) * c.dilatation[i]
+                })
+                .collect(),
+        };
+        let mut result = vec![0.0; points * D];
+        result
+            .par_chunks_exact_mut(D)
+            .with_min_len(BLOCK)
+            .enumerate()
+            .for_each(|(i, row)| {
+                if !self.row[i] {
+                    return;
+                }
+                let mut own = [[0.0; D]; D];
+                let mut first = [0.0; D];
+                for bond in self.offsets[i]..self.offsets[i + 1] {
+                    if !self.stands(i, bond - self.offsets[i]) {
+                        continue;
+                    }
+                    let j = self.neighbours[bond] as usize;
+                    let xi = self.xi(i, j);
+                    let length: f64 = xi.iter().map(|x| x * x).sum();
+                    let w = self.weights.get(bond) * self.volume[i] * self.volume[j];
+                    let stiffness = match &self.solid {
+                        None => w / length,
+                        Some(c) => (c.deviatoric[i] + c.deviatoric[j]) * w / length,
+                    };
+                    for a in 0..D {
+                        for b in 0..D {
+                            let k = stiffness * xi[a] * xi[b];
+                            own[a][b] += k;
+                            row[a] += k.abs();
+                        }
+                        if let Some(c) = &self.solid {
+                            first[a] += w * xi[a];
+                            row[a] += (w * xi[a] * c.volumetric[j]).abs() * sums[j];
+                        }
+                    }
+                }
+                for a in 0..D {
+                    row[a] += own[a].iter().map(|k| k.abs()).sum::<f64>();
+                    if let Some(c) = &self.solid {
+                        row[a] += (first[a] * c.volumetric[i]).abs() * sums[i];
+                    }
+                }
+            });
+        result
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        match self.kinematics {
+            Kinematics::Exact => self.energy::<true>(u),
+            Kinematics::Linear => self.energy::<false>(u),
+        }
+    }
+
+    fn damage_into(&self, damage: &mut [f64]) {
+        for (i, damage) in damage.iter_mut().enumerate() {
+            let (mut all, mut lost) = (0.0, 0.0);
+            for bond in self.offsets[i]..self.offsets[i + 1] {
+                let v = self.volume[self.neighbours[bond] as usize];
+                all += v;
+                if !self.stands(i, bond - self.offsets[i]) {
+                    lost += v;
+                }
+            }
+            *damage = if lost == 0.0 { 0.0 } else { lost / all };
+        }
+    }
+
+    fn broken(&self) -> u64 {
+        let standing: u64 = self
+            .intact
+            .par_iter()
+            .with_min_len(4096)
+            .map(|b| u64::from(b.count_ones()))
+            .sum();
+        self.reference - standing
+    }
+
+    fn damage_state(&self) -> Vec<u64> {
+        if matches!(self.limit, Limit::Never) {
+            return Vec::new();
+        }
+        let mut state: Vec<u64> = self
+            .intact
+            .chunks(8)
+            .map(|c| {
+                let mut word = [0; 8];
+                word[..c.len()].copy_from_slice(c);
+                u64::from_le_bytes(word)
+            })
+            .collect();
+        state.push(self.reference);
+        state
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        if matches!(self.limit, Limit::Never) {
+            return state.is_empty();
+        }
+        let words = self.intact.len().div_ceil(8);
+        if state.len() != words + 1 || state[words] != self.reference {
+            return false;
+        }
+        for (bytes, word) in self.intact.chunks_mut(8).zip(state) {
+            bytes.copy_from_slice(&word.to_le_bytes()[..bytes.len()]);
+        }
+        true
+    }
+
+    fn memory_bytes(&self) -> usize {
+        let bytes = std::mem::size_of::<f64>();
+        let solid = self.solid.as_ref().map_or(0, |s| 4 * s.theta.len() * bytes);
+        let weights = match &self.weights {
+            Weights::Double(w) => w.len() * 8,
+            Weights::Single(w) => w.len() * 4,
+        };
+        let limit = match &self.limit {
+            Limit::PerBond(t) => t.len() * bytes,
+            _ => 0,
+        };
+        solid
+            + weights
+            + limit
+            + self.position.len() * (D + 1) * bytes
+            + self.row.len()
+            + self.no_fail.len()
+            + (self.offsets.len() + self.bytes.len()) * std::mem::size_of::<usize>()
+            + self.neighbours.len() * 4
+            + self.intact.len()
+    }
+}

@@ -1,0 +1,603 @@
+//! Passes against a plain double loop with textbook formulas, and what holds for any force that derives from an energy.
+
+use super::*;
+use crate::{
+    peridynamics::{Families, TIE_TOLERANCE},
+    tensor::{Tensor, Vector},
+};
+
+/// Reproducible numbers in [-1, 1).
+fn random(state: &mut u64) -> f64 {
+    *state = state
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+fn noise(n: usize, scale: f64, seed: u64) -> Vec<f64> {
+    let mut state = seed;
+    (0..n).map(|_| scale * random(&mut state)).collect()
+}
+
+/// A cloud with families, some bonds cut, some points without a row, some of those without a family.
+struct Case<const D: usize> {
+    position: Vec<Vector<D>>,
+    volume: Vec<f64>,
+    families: Families,
+    rows: Vec<bool>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Law {
+    Pmb,
+    Solid,
+}
+
+const H: f64 = 0.1;
+const BULK: f64 = 3.0;
+const SHEAR: f64 = 1.3;
+
+fn coefficient<const D: usize>(_: usize, _: usize, xi: &Vector<D>) -> f64 {
+    1.0 / xi.norm()
+}
+
+fn omega<const D: usize>(_: usize, _: usize, xi: &Vector<D>) -> f64 {
+    1.0 - 0.5 * xi.norm() / (3.0 * H)
+}
+
+/// A lattice with a hole, a cut and halved volumes at its lower sides; `jitter` in spacings moves the points.
+fn case<const D: usize>(counts: [usize; D], jitter: f64, ghosts: bool) -> Case<D> {
+    let n: usize = counts.iter().product();
+    let (mut position, mut volume) = (Vec::new(), Vec::new());
+    let mut state = 17;
+    for k in 0..n {
+        let mut rest = k;
+        let index: [usize; D] = std::array::from_fn(|a| {
+            let i = rest % counts[a];
+            rest /= counts[a];
+            i
+        });
+        if D > 1 && index.iter().all(|&i| i == 4) {
+            continue;
+        }
+        position.push(Vector::<D>::from_fn(|a, _| {
+            0.37 + H * (index[a] as f64 + jitter * random(&mut state))
+        }));
+        volume.push(
+            H.powi(D as i32)
+                * index
+                    .iter()
+                    .map(|&i| if i == 0 { 0.5 } else { 1.0 })
+                    .product::<f64>(),
+        );
+    }
+    let points = position.len();
+    let mut families = Families::search(&position, &vec![3.0 * H; points], TIE_TOLERANCE).unwrap();
+    let side = |i: usize| position[i][D - 1] > 0.37 + 2.5 * H && position[i][0] < 0.37 + 2.6 * H;
+    families.retain(|i, j| side(i) == side(j as usize));
+    let mut rows = vec![true; points];
+    if ghosts {
+        let far = |i: usize| position[i][0] > 0.37 + H * (counts[0] as f64 - 6.5);
+        let farther = |i: usize| position[i][0] > 0.37 + H * (counts[0] as f64 - 3.5);
+        rows = (0..points).map(|i| !far(i)).collect();
+        // those beyond have no family, and nobody with a row sees them but through dilatations
+        families.retain(|i, _| !farther(i));
+    }
+    Case {
+        position,
+        volume,
+        families,
+        rows,
+    }
+}
+
+fn with<const D: usize, T>(
+    case: &Case<D>,
+    law: Law,
+    kinematics: Kinematics,
+    failure: Option<Failure<'_, D>>,
+    layout: Layout,
+    run: impl FnOnce(Box<dyn BondPass<D>>) -> T,
+) -> T {
+    let setup = BondSetup {
+        position: &case.position,
+        volume: &case.volume,
+        families: &case.families,
+        rows: &case.rows,
+        force: match law {
+            Law::Pmb => BondForce::Pairwise {
+                coefficient: &coefficient,
+            },
+            Law::Solid => BondForce::Solid {
+                omega: &omega,
+                bulk: BULK,
+                shear: SHEAR,
+            },
+        },
+        kinematics,
+        failure,
+        precracked: None,
+        layout,
+        storage: Storage::Double,
+    };
+    run(bond_pass(&setup).unwrap())
+}
+
+/// Textbook formulas in a double loop; `intact(i, j)` says which bonds of the families count.
+fn naive<const D: usize>(
+    case: &Case<D>,
+    law: Law,
+    kinematics: Kinematics,
+    u: &[f64],
+    intact: &dyn Fn(usize, usize) -> bool,
+) -> (Vec<f64>, f64) {
+    let points = case.position.len();
+    let d = D as f64;
+    let at = |i: usize| Vector::<D>::from_fn(|a, _| u[i * D + a]);
+    let geometry = |i: usize, j: usize| {
+        let xi = case.position[j] - case.position[i];
+        let eta = at(j) - at(i);
+        match kinematics {
+            Kinematics::Exact => {
+                let y = xi + eta;
+                (xi, y.norm() - xi.norm(), y / y.norm())
+            }
+            Kinematics::Linear => (xi, xi.dot(&eta) / xi.norm(), xi / xi.norm()),
+        }
+    };
+    let (mut m, mut theta) = (vec![0.0; points], vec![0.0; points]);
+    for i in 0..points {
+        for &j in case.families.of(i) {
+            let j = j as usize;
+            let (xi, e, _) = geometry(i, j);
+            let w = omega(i, 0, &xi) * case.volume[j];
+            m[i] += w * xi.norm_squared();
+            if intact(i, j) {
+                theta[i] += w * xi.norm() * e;
+            }
+        }
+        if m[i] > 0.0 {
+            theta[i] *= d / m[i];
+        }
+    }
+    let state = |i: usize, j: usize| {
+        let (xi, e, _) = geometry(i, j);
+        match law {
+            Law::Pmb => coefficient(i, 0, &xi) * xi.norm_squared() * e,
+            Law::Solid if m[i] == 0.0 => 0.0,
+            Law::Solid => {
+                omega(i, 0, &xi) / m[i]
+                    * ((d * BULK - (d + 2.0) * SHEAR) * theta[i] * xi.norm()
+                        + d * (d + 2.0) * SHEAR * e)
+            }
+        }
+    };
+    let (mut force, mut energy) = (vec![0.0; points * D], 0.0);
+    for i in (0..points).filter(|&i| case.rows[i]) {
+        for &j in case.families.of(i) {
+            let j = j as usize;
+            if !intact(i, j) {
+                continue;
+            }
+            let (xi, e, direction) = geometry(i, j);
+            let vv = case.volume[i] * case.volume[j];
+            let f = direction * ((state(i, j) + state(j, i)) * vv);
+            for a in 0..D {
+                force[i * D + a] -= f[a];
+            }
+            energy += match law {
+                Law::Pmb => 0.5 * coefficient(i, 0, &xi) * xi.norm_squared() * e * e * vv,
+                Law::Solid => 0.5 * d * (d + 2.0) * SHEAR / m[i] * omega(i, 0, &xi) * e * e * vv,
+            };
+        }
+        if law == Law::Solid {
+            energy += 0.5 * (BULK - (d + 2.0) / d * SHEAR) * theta[i] * theta[i] * case.volume[i];
+        }
+    }
+    (force, energy)
+}
+
+fn largest(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()))
+}
+
+const LAWS: [Law; 2] = [Law::Pmb, Law::Solid];
+const BOTH: [Kinematics; 2] = [Kinematics::Exact, Kinematics::Linear];
+
+/// Layouts that a case has a pass for.
+fn layouts(jitter: f64) -> &'static [Layout] {
+    if jitter == 0.0 {
+        &[Layout::List, Layout::Automatic]
+    } else {
+        &[Layout::List]
+    }
+}
+
+fn against_naive<const D: usize>(counts: [usize; D], jitter: f64, ghosts: bool) {
+    let case = case(counts, jitter, ghosts);
+    let n = case.position.len() * D;
+    for law in LAWS {
+        for kinematics in BOTH {
+            for (amplitude, &layout) in [1e-5, 0.2]
+                .into_iter()
+                .flat_map(|a| layouts(jitter).iter().map(move |l| (a, l)))
+            {
+                let u = noise(n, amplitude * H, 3);
+                let (expected, energy) = naive(&case, law, kinematics, &u, &|_, _| true);
+                with(&case, law, kinematics, None, layout, |mut pass| {
+                    let mut force = vec![f64::NAN; n];
+                    assert_eq!(pass.force_into(&u, &mut force, Breakage::Allowed), 0);
+                    // the textbook's difference of lengths loses what the amplitude has less than the length
+                    let error = difference(&force, &expected) / largest(&expected);
+                    let tolerance = if amplitude < 1e-3 && kinematics == Kinematics::Exact {
+                        1e-9
+                    } else {
+                        1e-13
+                    };
+                    assert!(
+                        error < tolerance,
+                        "{D}D {law:?} {kinematics:?} {amplitude} {}: {error:e}",
+                        pass.name()
+                    );
+                    let error = (pass.stored_energy(&u) - energy).abs() / energy;
+                    assert!(
+                        error < tolerance,
+                        "{D}D {law:?} {kinematics:?} {amplitude} {} energy: {error:e}",
+                        pass.name()
+                    );
+                });
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_and_energies_are_those_of_a_double_loop() {
+    for ghosts in [false, true] {
+        for jitter in [0.0, 0.2] {
+            against_naive([40], jitter, ghosts);
+            against_naive([19, 11], jitter, ghosts);
+            against_naive([14, 7, 8], jitter, ghosts);
+        }
+    }
+}
+
+fn derivatives<const D: usize>(counts: [usize; D], jitter: f64) {
+    let case = case(counts, jitter, false);
+    let n = case.position.len() * D;
+    for law in LAWS {
+        for &layout in layouts(jitter) {
+            with(&case, law, Kinematics::Exact, None, layout, |mut pass| {
+                let name = format!("{D}D {law:?} {}", pass.name());
+                let direction = noise(n, H, 5);
+                let (mut plus, mut minus, mut tangent) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+                let scaled = |s: f64| -> Vec<f64> { direction.iter().map(|x| s * x).collect() };
+                pass.force_into(&scaled(1e-5), &mut plus, Breakage::Held);
+                pass.force_into(&scaled(-1e-5), &mut minus, Breakage::Held);
+                pass.tangent_into(&direction, &mut tangent);
+                let numeric: Vec<f64> = plus
+                    .iter()
+                    .zip(&minus)
+                    .map(|(p, m)| (p - m) / 2e-5)
+                    .collect();
+                let error = difference(&numeric, &tangent) / largest(&tangent);
+                assert!(error < 1e-8, "{name}: tangent {error:e}");
+
+                // force = dE/du about a strained state
+                let u = noise(n, 0.1 * H, 8);
+                let at = |s: f64| -> Vec<f64> {
+                    u.iter().zip(&direction).map(|(u, d)| u + s * d).collect()
+                };
+                let slope = (pass.stored_energy(&at(1e-5)) - pass.stored_energy(&at(-1e-5))) / 2e-5;
+                pass.force_into(&u, &mut plus, Breakage::Held);
+                let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
+                assert!(
+                    (slope - work).abs() < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
+                    "{name}: {slope} {work}"
+                );
+
+                // momentum and angular momentum of the deformed body
+                let scale = largest(&plus) * n as f64;
+                for a in 0..D {
+                    let total: f64 = plus.iter().skip(a).step_by(D).sum();
+                    assert!(total.abs() < 1e-15 * scale, "{name}: momentum {total:e}");
+                    for b in 0..a {
+                        let y = |i: usize, a: usize| case.position[i][a] + u[i * D + a];
+                        let moment: f64 = (0..n / D)
+                            .map(|i| y(i, a) * plus[i * D + b] - y(i, b) * plus[i * D + a])
+                            .sum();
+                        assert!(moment.abs() < 1e-14 * scale, "{name}: moment {moment:e}");
+                    }
+                }
+
+                // row sums bound the rows: take each row's own signs
+                let sums = pass.row_sums();
+                for row in [0, n / 2, n - 1] {
+                    let mut sum = 0.0;
+                    for c in 0..n {
+                        let mut x = vec![0.0; n];
+                        x[c] = 1.0;
+                        pass.tangent_into(&x, &mut tangent);
+                        sum += tangent[row].abs();
+                    }
+                    assert!(
+                        sum <= sums[row] * (1.0 + 1e-12) && sum > 0.2 * sums[row],
+                        "{name}: {sum} {}",
+                        sums[row]
+                    );
+                }
+            });
+        }
+    }
+}
+
+#[test]
+fn tangents_forces_and_energies_belong_together() {
+    for jitter in [0.0, 0.2] {
+        derivatives([40], jitter);
+        derivatives([12, 11], jitter);
+        derivatives([7, 6, 8], jitter);
+    }
+}
+
+#[test]
+fn a_large_rotation_turns_the_forces() {
+    let case = case([7, 6, 8], 0.0, false);
+    let n = case.position.len() * 3;
+    let rotation = {
+        let (s, c) = 2.1f64.sin_cos();
+        Tensor::<3>::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
+            * Tensor::<3>::new(1.0, 0.0, 0.0, 0.0, 0.6, -0.8, 0.0, 0.8, 0.6)
+    };
+    let u = noise(n, 0.1 * H, 4);
+    let mut turned = vec![0.0; n];
+    for (i, x) in case.position.iter().enumerate() {
+        let y = rotation * (x + Vector::<3>::from_column_slice(&u[3 * i..3 * i + 3])) - x;
+        turned[3 * i..3 * i + 3].copy_from_slice(y.as_slice());
+    }
+    for law in LAWS {
+        for &layout in layouts(0.0) {
+            with(&case, law, Kinematics::Exact, None, layout, |mut pass| {
+                let (mut force, mut other) = (vec![0.0; n], vec![0.0; n]);
+                pass.force_into(&u, &mut force, Breakage::Held);
+                pass.force_into(&turned, &mut other, Breakage::Held);
+                let expected: Vec<f64> = force
+                    .chunks(3)
+                    .flat_map(|f| {
+                        let f = rotation * Vector::<3>::from_column_slice(f);
+                        [f.x, f.y, f.z]
+                    })
+                    .collect();
+                let error = difference(&other, &expected) / largest(&expected);
+                assert!(error < 1e-13, "{law:?} {}: {error:e}", pass.name());
+            });
+        }
+    }
+}
+
+fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
+    let case = case(counts, jitter, false);
+    let points = case.position.len();
+    let n = points * D;
+    let critical = 0.1;
+    let no_fail: Vec<bool> = case
+        .position
+        .iter()
+        .map(|x| x[0] < 0.37 + 1.5 * H)
+        .collect();
+    let stretch = |u: &[f64], i: usize, j: usize| {
+        let at = |i: usize| Vector::<D>::from_fn(|a, _| u[i * D + a]);
+        let xi = case.position[j] - case.position[i];
+        (xi + at(j) - at(i)).norm() / xi.norm() - 1.0
+    };
+    let (first, second) = (noise(n, 0.1 * H, 21), noise(n, 0.1 * H, 22));
+    let breaks =
+        |u: &[f64], i: usize, j: usize| !no_fail[i] && !no_fail[j] && stretch(u, i, j) > critical;
+    for law in LAWS {
+        for &layout in layouts(jitter) {
+            let failure = Failure {
+                critical: CriticalStretch::Uniform(critical),
+                no_fail: &no_fail,
+            };
+            with(
+                &case,
+                law,
+                Kinematics::Exact,
+                Some(failure),
+                layout,
+                |mut pass| {
+                    let name = format!("{D}D {law:?} {}", pass.name());
+                    let mut force = vec![0.0; n];
+                    let fresh = pass.damage_state();
+                    assert_eq!(pass.force_into(&first, &mut force, Breakage::Held), 0);
+                    let whole = force.clone();
+                    let mut lost = pass.force_into(&first, &mut force, Breakage::Allowed);
+                    let (expected, energy) =
+                        naive(&case, law, Kinematics::Exact, &first, &|i, j| {
+                            !breaks(&first, i, j)
+                        });
+                    assert!(
+                        difference(&force, &expected) < 1e-13 * largest(&expected),
+                        "{name}"
+                    );
+                    assert!(
+                        (pass.stored_energy(&first) - energy).abs() < 1e-13 * energy,
+                        "{name}"
+                    );
+                    assert!(lost > 0 && lost < pass.bonds() && lost % 2 == 0);
+                    // once broken, a bond stays so
+                    let state = pass.damage_state();
+                    lost += pass.force_into(&second, &mut force, Breakage::Allowed);
+                    let stands =
+                        |i: usize, j: usize| !breaks(&first, i, j) && !breaks(&second, i, j);
+                    let (expected, _) = naive(&case, law, Kinematics::Exact, &second, &stands);
+                    assert!(
+                        difference(&force, &expected) < 1e-13 * largest(&expected),
+                        "{name}"
+                    );
+                    let count = (0..points)
+                        .flat_map(|i| case.families.of(i).iter().map(move |&j| (i, j as usize)))
+                        .filter(|&(i, j)| !stands(i, j))
+                        .count() as u64;
+                    assert_eq!((lost, pass.broken()), (count, count), "{name}");
+                    let mut damage = vec![0.0; points];
+                    pass.damage_into(&mut damage);
+                    for i in 0..points {
+                        let volume = |all: bool| {
+                            case.families
+                                .of(i)
+                                .iter()
+                                .filter(|&&j| all || stands(i, j as usize))
+                                .map(|&j| case.volume[j as usize])
+                                .sum::<f64>()
+                        };
+                        assert!(
+                            (damage[i] - (1.0 - volume(false) / volume(true))).abs() < 1e-14,
+                            "{name}"
+                        );
+                    }
+                    // and comes back only with a saved state
+                    assert!(pass.restore_damage(&state) && !pass.restore_damage(&state[1..]));
+                    assert_eq!(pass.damage_state(), state);
+                    assert!(pass.restore_damage(&fresh) && pass.broken() == 0);
+                    pass.force_into(&first, &mut force, Breakage::Held);
+                    assert_eq!(force, whole);
+                },
+            );
+        }
+    }
+}
+
+#[test]
+fn bonds_break_from_both_ends_and_for_good() {
+    for jitter in [0.0, 0.2] {
+        breaking([40], jitter);
+        breaking([19, 11], jitter);
+        breaking([9, 7, 8], jitter);
+    }
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let case = case([23, 14, 12], 0.0, true);
+    let n = case.position.len() * 3;
+    let u = noise(n, 0.05 * H, 31);
+    let failure = Failure {
+        critical: CriticalStretch::Uniform(0.08),
+        no_fail: &[],
+    };
+    for law in LAWS {
+        for &layout in layouts(0.0) {
+            let run = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build()
+                    .unwrap();
+                pool.install(|| {
+                    with(
+                        &case,
+                        law,
+                        Kinematics::Exact,
+                        Some(failure),
+                        layout,
+                        |mut pass| {
+                            let (mut force, mut y) = (vec![0.0; n], vec![0.0; n]);
+                            let broken = pass.force_into(&u, &mut force, Breakage::Allowed);
+                            pass.tangent_into(&u, &mut y);
+                            let energy = pass.stored_energy(&u);
+                            (
+                                broken,
+                                force,
+                                y,
+                                energy.to_bits(),
+                                pass.damage_state(),
+                                pass.row_sums(),
+                            )
+                        },
+                    )
+                })
+            };
+            let one = run(1);
+            assert!(one.0 > 0);
+            assert!(one == run(2) && one == run(5), "{law:?} {layout:?}");
+        }
+    }
+}
+
+#[test]
+fn precracks_count_as_damage_and_single_weights_err_by_little() {
+    let case = case([19, 11], 0.2, false);
+    let n = case.position.len() * 2;
+    let u = noise(n, 0.1 * H, 2);
+    let cut = |i: usize, j: usize| (case.position[i].x < 1.0) != (case.position[j].x < 1.0);
+    let setup = BondSetup {
+        position: &case.position,
+        volume: &case.volume,
+        families: &case.families,
+        rows: &[],
+        force: BondForce::Solid {
+            omega: &omega,
+            bulk: BULK,
+            shear: SHEAR,
+        },
+        kinematics: Kinematics::Exact,
+        failure: None,
+        precracked: Some(&cut),
+        layout: Layout::List,
+        storage: Storage::Double,
+    };
+    let (mut force, mut single) = (vec![0.0; n], vec![0.0; n]);
+    let mut pass = bond_pass(&setup).unwrap();
+    pass.force_into(&u, &mut force, Breakage::Held);
+    let (expected, _) = naive(&case, Law::Solid, Kinematics::Exact, &u, &|i, j| !cut(i, j));
+    assert!(difference(&force, &expected) < 1e-13 * largest(&expected));
+    assert!(pass.broken() > 0);
+
+    let mut pass = bond_pass(&BondSetup {
+        storage: Storage::Single,
+        ..setup
+    })
+    .unwrap();
+    pass.force_into(&u, &mut single, Breakage::Held);
+    let error = difference(&force, &single) / largest(&force);
+    assert!(error > 1e-10 && error < 1e-7, "{error:e}");
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let mut case = case([12, 9], 0.0, false);
+    let setup = |case: &Case<2>, f: &BondFunction<'_, 2>| {
+        bond_pass(&BondSetup {
+            position: &case.position,
+            volume: &case.volume,
+            families: &case.families,
+            rows: &[],
+            force: BondForce::Pairwise { coefficient: f },
+            kinematics: Kinematics::Exact,
+            failure: None,
+            precracked: None,
+            layout: Layout::Automatic,
+            storage: Storage::Double,
+        })
+        .err()
+        .map(|e| e.to_string())
+        .unwrap_or_default()
+    };
+    assert_eq!(setup(&case, &coefficient), "");
+    let lopsided = setup(&case, &|i, _, _| 1.0 + i as f64);
+    assert!(
+        lopsided.contains("bond of points 0 and 1 has weight"),
+        "{lopsided}"
+    );
+    case.families.retain(|i, j| i != 5 || j != 6);
+    assert!(setup(&case, &coefficient).contains("point 6 has a bond to point 5"));
+    case.volume.pop();
+    assert!(setup(&case, &coefficient).contains("volume has"));
+}
