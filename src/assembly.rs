@@ -181,21 +181,31 @@ pub fn assemble<const D: usize>(
     advance: impl Fn(u64) + Sync,
     add_row: impl Fn(usize, &mut Row<D>) + Sync,
 ) -> BlockCsr {
+    assemble_rows(sites, sites, advance, add_row)
+}
+
+/// As [`assemble`], with `rows` rows that need not be those of sites.
+pub fn assemble_rows<const D: usize>(
+    rows: usize,
+    sites: usize,
+    advance: impl Fn(u64) + Sync,
+    add_row: impl Fn(usize, &mut Row<D>) + Sync,
+) -> BlockCsr {
     let mut matrix = BlockCsr {
         block: D,
-        row_offsets: Vec::with_capacity(sites + 1),
+        row_offsets: Vec::with_capacity(rows + 1),
         columns: Vec::new(),
         values: Vec::new(),
     };
     matrix.row_offsets.push(0);
-    let chunks = sites.div_ceil(CHUNK);
+    let chunks = rows.div_ceil(CHUNK);
     for wave in (0..chunks).step_by(WAVE) {
         let parts: Vec<(Vec<usize>, Vec<u32>, Vec<f64>)> = (wave..(wave + WAVE).min(chunks))
             .into_par_iter()
             .map_init(
                 || Row::<D>::new(sites),
                 |row, chunk| {
-                    let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(sites);
+                    let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(rows);
                     let (mut ends, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
                     let count = range.len() as u64;
                     for site in range {

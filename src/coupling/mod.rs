@@ -10,6 +10,7 @@
 //! | `model.rs` | shared: sites, families, what completes them | |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `derivative.rs`, `edge.rs`, `sample.rs` | shared: least squares, distances, displacements anywhere | |
+//! | `motion.rs` | a model that moves: bonds that stretch and break beside the rows of the rest | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
 //! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
@@ -22,6 +23,7 @@ mod bonds;
 pub mod derivative;
 pub mod edge;
 pub mod model;
+pub mod motion;
 pub mod partial_stress;
 mod place;
 pub mod points;
@@ -33,6 +35,7 @@ pub mod splice;
 pub use blending::{Blending, BlendingFunction};
 pub use derivative::FitDegree;
 pub use model::{Model, Site, SiteKind};
+pub use motion::Motion;
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
 pub use problem::{ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
 pub use sample::{Carrier, Sampler};

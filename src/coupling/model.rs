@@ -56,6 +56,7 @@ pub struct Model<const D: usize> {
     pub peridynamics: Option<Peridynamics<D>>,
     tensors: Vec<Tensor4<D>>,
     cell_material: Vec<u16>,
+    peridynamic_material: u16,
     body: Option<PdBody<D>>,
     /// All quadrature points in and around elements whose stress is a partial stress.
     surroundings: Option<Cloud<D>>,
@@ -99,6 +100,7 @@ impl<const D: usize> Model<D> {
             peridynamics,
             tensors,
             cell_material,
+            peridynamic_material,
             body: None,
             surroundings: None,
             point_zone: Vec::new(),
@@ -443,6 +445,16 @@ impl<const D: usize> Model<D> {
         self.volumes
     }
 
+    /// The number of a cell's material.
+    pub fn material_of_cell(&self, cell: usize) -> u16 {
+        self.cell_material[cell]
+    }
+
+    /// The number of the material that peridynamic points have.
+    pub fn peridynamic_material(&self) -> u16 {
+        self.peridynamic_material
+    }
+
     /// The local elastic tensor of a cell.
     pub fn tensor_of_cell(&self, cell: usize) -> &Tensor4<D> {
         &self.tensors[self.cell_material[cell] as usize]
@@ -477,6 +489,26 @@ impl<const D: usize> Model<D> {
             }
             fem::row(&self.mesh, c, self.tensor_of_cell(c), local, &mut blocks);
             for (b, &n) in self.mesh.cell(c).iter().enumerate() {
+                row.add(&self.node_transfer, n as usize, &blocks[b]);
+            }
+        }
+    }
+
+    /// Adds the force that the finite elements around a node of the mesh exert on it, all by their classical law and none that overlaps: the gradient of their own energy.
+    pub fn add_own_element_rows(&self, node: u32, row: &mut Row<D>) {
+        let mut blocks = [Tensor::zeros(); 8];
+        let (offsets, cells) = &self.node_cells;
+        for &c in &cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize] {
+            let c = c as usize;
+            let cell = self.mesh.cell(c);
+            let Some(local) = cell.iter().position(|&n| n == node) else {
+                continue;
+            };
+            if !self.is_element(c) {
+                continue;
+            }
+            fem::row(&self.mesh, c, self.tensor_of_cell(c), local, &mut blocks);
+            for (b, &n) in cell.iter().enumerate() {
                 row.add(&self.node_transfer, n as usize, &blocks[b]);
             }
         }

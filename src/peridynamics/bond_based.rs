@@ -1,7 +1,9 @@
 //! The linearised bond-based material, `T⟨ξ⟩ = ½ λ(|ξ|) ξ (ξ · η)`.
 
 use crate::{
-    peridynamics::{BondLaw, Conditions, Family, Micromodulus, PdError, ShellTarget, StatePart},
+    peridynamics::{
+        BondEnergy, BondLaw, Conditions, Family, Micromodulus, PdError, ShellTarget, StatePart,
+    },
     tensor::{Tensor4, Vector},
 };
 
@@ -37,6 +39,14 @@ impl<const D: usize> BondLaw<D> for BondBased<D> {
 
     fn tensor(&self) -> &Tensor4<D> {
         &self.tensor
+    }
+
+    fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
+        let c1111 = self.tensor.get(0, 0, 0, 0);
+        Some(BondEnergy::Pairwise {
+            micromodulus: self.micromodulus,
+            constant: self.micromodulus.constant::<D>(horizon, c1111),
+        })
     }
 
     fn kernel(&self, r: f64, horizon: f64) -> f64 {

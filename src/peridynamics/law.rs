@@ -12,7 +12,7 @@
 //! density `W = ½ Σ [p (ξ · η)² + q ω η²] V + ½ Ḡ : 𝓜 : Ḡ`, so a body of such points alone has a symmetric stiffness.
 
 use crate::{
-    peridynamics::{Conditions, PdError, ShellTarget},
+    peridynamics::{BondEnergy, Conditions, PdError, ShellTarget},
     tensor::{Tensor, Tensor4, Vector},
 };
 
@@ -52,6 +52,11 @@ pub trait BondLaw<const D: usize>: Send + Sync {
 
     /// The classical elastic tensor that the law is calibrated to \[Pa\].
     fn tensor(&self) -> &Tensor4<D>;
+
+    /// What its bonds store and what breaking them costs, if they can stretch and break one by one; `horizon` is δ \[m\].
+    fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
+        None
+    }
 
     /// The kernel whose fourth moment the weights of a lattice's shells are to make isotropic, at bond length `r`.
     fn kernel(&self, r: f64, horizon: f64) -> f64;

@@ -2,7 +2,8 @@
 
 use crate::{
     peridynamics::{
-        BondLaw, Conditions, Family, Influence, PdError, ShellTarget, StatePart, weights,
+        BondEnergy, BondLaw, Conditions, Family, Influence, PdError, ShellTarget, StatePart,
+        weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -48,6 +49,14 @@ impl<const D: usize> BondLaw<D> for LinearPeridynamicSolid<D> {
 
     fn tensor(&self) -> &Tensor4<D> {
         &self.tensor
+    }
+
+    fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
+        Some(BondEnergy::Lps {
+            influence: self.influence,
+            bulk: self.bulk,
+            shear: self.shear,
+        })
     }
 
     fn kernel(&self, r: f64, horizon: f64) -> f64 {

@@ -72,7 +72,7 @@ impl Method {
         }
     }
 
-    fn coupling<const D: usize>(self) -> Box<dyn Coupling<D>> {
+    pub(crate) fn coupling<const D: usize>(self) -> Box<dyn Coupling<D>> {
         match self {
             Self::Splice => Box::new(Splice),
             Self::Blending(function) => Box::new(Blending { function }),

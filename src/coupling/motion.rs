@@ -1,0 +1,456 @@
+//! A coupled model that moves: bonds that stretch, and break, beside the rows of finite elements and of the seam.
+//!
+//! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`]) take their force from a pass over the bonds, which may be geometrically exact
+//! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
+
+use rayon::prelude::*;
+
+use crate::{
+    assembly::{self, Transfer},
+    coupling::{CellRole, Model, Operator, SiteKind},
+    fem,
+    peridynamics::{
+        BondEnergy,
+        kernel::{
+            BondForce, BondPass, BondSetup, CriticalStretch, Failure, KernelError, Kinematics,
+            Layout, Storage, bond_pass,
+        },
+    },
+    system::{BlockCsr, Breakage, Dynamic, Symmetry},
+    tensor::Vector,
+};
+
+#[cfg(test)]
+#[path = "motion_tests.rs"]
+mod tests;
+
+const NONE: u32 = u32::MAX;
+
+/// Points per task of the copies between sites and points.
+const CHUNK: usize = 4096;
+
+/// How the bonds of a moving model behave.
+pub struct BondBehaviour<'a, const D: usize> {
+    /// Whether bonds turn with the body, or are linear in the displacement.
+    pub kinematics: Kinematics,
+    /// Critical stretch s_c; none if nothing breaks.
+    pub critical_stretch: Option<f64>,
+    /// Where bonds never break.
+    pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
+}
+
+/// Why a model cannot move bond by bond.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The law has no bonds that could stretch or break one by one.
+    #[error(
+        "bonds of the material {law} are known to first order only: they can neither break nor turn; use bond-based or lps, or leave fracture-energy, critical-stretch and bonds = \"exact\" out"
+    )]
+    Law {
+        /// Its name.
+        law: &'static str,
+    },
+    /// The bonds cannot be passed over.
+    #[error(transparent)]
+    Kernel(#[from] KernelError),
+}
+
+/// A coupled model as a system that moves.
+pub struct Motion<'a, const D: usize> {
+    model: &'a Model<D>,
+    symmetry: Symmetry,
+    mass: Vec<f64>,
+    /// Rows of all sites but those of the body alone.
+    linear: BlockCsr,
+    body: Option<MovingBody<D>>,
+    energy: ElementEnergy,
+}
+
+/// The points and their bonds.
+struct MovingBody<const D: usize> {
+    pass: Box<dyn BondPass<D>>,
+    /// The site of each point; `NONE` for a point that follows sites.
+    site_of_point: Vec<u32>,
+    /// All points follow this many sites later, if they do.
+    shift: Option<usize>,
+    transfer: Transfer,
+    /// Sites whose row is that of the body alone, with their points.
+    rows: Vec<(u32, u32)>,
+    /// Points at the edge of the region where bonds can break, none if nothing can.
+    edge: Vec<u32>,
+    displacement: Vec<f64>,
+    force: Vec<f64>,
+}
+
+impl<'a, const D: usize> Motion<'a, D> {
+    /// Lays out masses, rows and bonds.
+    ///
+    /// `density` gives ρ [kg/m^D] of a material's number; `symmetry` is that of the assembled stiffness.
+    ///
+    /// # Errors
+    /// [`MotionError`] if the bonds cannot be passed over: a horizon that varies, fitted weights, a law without a kernel. A model in which nothing breaks moves as
+    /// [`crate::system::LinearMotion`] instead.
+    pub fn new(
+        model: &'a Model<D>,
+        operator: &dyn Operator<D>,
+        symmetry: Symmetry,
+        density: impl Fn(u16) -> f64 + Sync,
+        behaviour: &BondBehaviour<'_, D>,
+    ) -> Result<Self, MotionError> {
+        let sites = model.sites.len();
+        let body = MovingBody::new(model, operator, behaviour)?;
+        let mut in_body = vec![false; sites];
+        if let Some(body) = &body {
+            for &(site, _) in &body.rows {
+                in_body[site as usize] = true;
+            }
+        }
+        let linear = assembly::assemble(
+            sites,
+            |_| (),
+            |site, row| {
+                if !in_body[site] {
+                    operator.add_row(site, row);
+                }
+            },
+        );
+        let mass = masses(model, density);
+        let energy = ElementEnergy::new(model);
+        Ok(Self {
+            model,
+            symmetry,
+            mass,
+            linear,
+            body,
+            energy,
+        })
+    }
+
+    /// The pass over the bonds, if there is a peridynamic body.
+    pub fn pass(&self) -> Option<&dyn BondPass<D>> {
+        self.body.as_ref().map(|b| b.pass.as_ref())
+    }
+
+    /// Bytes held by rows and bonds.
+    pub fn memory_bytes(&self) -> usize {
+        let rows = self.linear.values.len() * 8 + self.linear.columns.len() * 4;
+        rows + self.body.as_ref().map_or(0, |b| {
+            b.pass.memory_bytes() + (b.displacement.len() + b.force.len()) * 8
+        })
+    }
+}
+
+/// Lumped mass of every site \[kg\]: the integral of a node's shape function or the volume of a point, times the density.
+pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) -> Vec<f64> {
+    let nodes = fem::lumped_mass(&model.mesh, |c| density(model.material_of_cell(c)));
+    let points = density(model.peridynamic_material());
+    model
+        .sites
+        .iter()
+        .map(|site| match site.kind {
+            SiteKind::Node(n) => nodes[n as usize],
+            SiteKind::Point(_) => points * site.volume,
+        })
+        .collect()
+}
+
+impl<const D: usize> MovingBody<D> {
+    fn new(
+        model: &Model<D>,
+        operator: &dyn Operator<D>,
+        behaviour: &BondBehaviour<'_, D>,
+    ) -> Result<Option<Self>, MotionError> {
+        let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref()) else {
+            return Ok(None);
+        };
+        let points = body.cloud.position.len();
+        let mut site_of_point = vec![NONE; points];
+        let mut rows = Vec::new();
+        let mut own_row = vec![false; points];
+        for (site, s) in model.sites.iter().enumerate() {
+            if let SiteKind::Point(point) = s.kind {
+                site_of_point[point as usize] = site as u32;
+                if operator.is_body_row(site) {
+                    own_row[point as usize] = true;
+                    rows.push((site as u32, point));
+                }
+            }
+        }
+        let is_site: Vec<bool> = site_of_point.iter().map(|&s| s != NONE).collect();
+        let no_fail: Vec<bool> = (0..points)
+            .into_par_iter()
+            .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
+            .collect();
+        let edge = if behaviour.critical_stretch.is_some() {
+            (0..points as u32)
+                .filter(|&i| {
+                    own_row[i as usize]
+                        && body
+                            .families
+                            .of(i as usize)
+                            .iter()
+                            .any(|&j| !own_row[j as usize])
+                })
+                .collect()
+        } else {
+            Vec::new()
+        };
+        let pair = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).0[k];
+        let omega = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).1[k];
+        let force = match p.law.bond_energy(body.cloud.horizon[0]) {
+            Some(BondEnergy::Pairwise { .. }) => BondForce::Pairwise { coefficient: &pair },
+            Some(BondEnergy::Lps { bulk, shear, .. }) => BondForce::Solid {
+                omega: &omega,
+                bulk,
+                shear,
+            },
+            None => return Err(MotionError::Law { law: p.law.name() }),
+        };
+        let pass = bond_pass(&BondSetup {
+            position: &body.cloud.position,
+            volume: &body.cloud.volume,
+            families: &body.families,
+            rows: &is_site,
+            force,
+            kinematics: behaviour.kinematics,
+            failure: behaviour.critical_stretch.map(|s| Failure {
+                critical: CriticalStretch::Uniform(s),
+                no_fail: &no_fail,
+            }),
+            precracked: None,
+            layout: Layout::Automatic,
+            storage: Storage::Double,
+        })?;
+        let first = site_of_point.first().copied().unwrap_or(0);
+        let shift = site_of_point
+            .iter()
+            .zip(first..)
+            .all(|(&site, wanted)| site == wanted && site != NONE)
+            .then_some(first as usize);
+        Ok(Some(Self {
+            pass,
+            site_of_point,
+            shift,
+            transfer: body.cloud.transfer.clone(),
+            rows,
+            edge,
+            displacement: vec![0.0; points * D],
+            force: vec![0.0; points * D],
+        }))
+    }
+
+    /// The displacement of every point, from those of the sites.
+    fn spread(&self, u: &[f64], points: &mut [f64]) {
+        if let Some(shift) = self.shift {
+            points.copy_from_slice(&u[shift * D..][..points.len()]);
+            return;
+        }
+        points
+            .par_chunks_mut(CHUNK * D)
+            .enumerate()
+            .for_each(|(chunk, values)| {
+                for (k, value) in values.chunks_exact_mut(D).enumerate() {
+                    let point = chunk * CHUNK + k;
+                    match self.site_of_point[point] {
+                        NONE => {
+                            let x: Vector<D> = self.transfer.displacement(point, u);
+                            value.copy_from_slice(x.as_slice());
+                        }
+                        site => value.copy_from_slice(&u[site as usize * D..][..D]),
+                    }
+                }
+            });
+    }
+
+    /// Writes the forces of the points into those of their sites.
+    fn gather(&self, points: &[f64], force: &mut [f64]) {
+        for &(site, point) in &self.rows {
+            force[site as usize * D..][..D].copy_from_slice(&points[point as usize * D..][..D]);
+        }
+    }
+}
+
+impl<const D: usize> Dynamic for Motion<'_, D> {
+    fn block(&self) -> usize {
+        D
+    }
+
+    fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+        self.linear.multiply_into(u, force);
+        let Some(body) = &mut self.body else { return 0 };
+        let mut points = std::mem::take(&mut body.displacement);
+        body.spread(u, &mut points);
+        let broken = body.pass.force_into(&points, &mut body.force, breakage);
+        body.displacement = points;
+        body.gather(&body.force, force);
+        broken
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        self.linear.multiply_into(x, y);
+        let Some(body) = &self.body else { return };
+        let mut points = vec![0.0; body.displacement.len()];
+        let mut force = points.clone();
+        body.spread(x, &mut points);
+        body.pass.tangent_into(&points, &mut force);
+        body.gather(&force, y);
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        let mut sums = self.linear.row_sums();
+        let Some(body) = &self.body else { return sums };
+        let points = body.pass.row_sums();
+        // a point that follows sites spreads its column over them: at most the sum of its weights' sizes
+        let spread = (0..body.site_of_point.len())
+            .map(|p| body.transfer.row(p).map(|(_, w)| w.abs()).sum::<f64>())
+            .fold(1.0, f64::max);
+        for &(site, point) in &body.rows {
+            for k in 0..D {
+                sums[site as usize * D + k] = points[point as usize * D + k] * spread;
+            }
+        }
+        sums
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        self.symmetry
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        let elements = self
+            .energy
+            .of::<D>(&self.linear, &self.model.node_transfer, u);
+        let bonds = self.body.as_ref().map_or(0.0, |body| {
+            let mut points = vec![0.0; body.displacement.len()];
+            body.spread(u, &mut points);
+            body.pass.stored_energy(&points)
+        });
+        elements + bonds
+    }
+
+    fn damage(&self) -> Option<Vec<f64>> {
+        let body = self.body.as_ref()?;
+        let mut points = vec![0.0; body.site_of_point.len()];
+        body.pass.damage_into(&mut points);
+        let mut damage = vec![0.0; self.mass.len()];
+        for (point, &site) in body.site_of_point.iter().enumerate() {
+            if site != NONE {
+                damage[site as usize] = points[point];
+            }
+        }
+        Some(damage)
+    }
+
+    fn damage_at_edge(&self) -> Option<usize> {
+        let body = self.body.as_ref()?;
+        if body.edge.is_empty() || body.pass.broken() == 0 {
+            return None;
+        }
+        let mut points = vec![0.0; body.site_of_point.len()];
+        body.pass.damage_into(&mut points);
+        body.edge
+            .iter()
+            .find(|&&p| points[p as usize] > 0.0)
+            .map(|&p| body.site_of_point[p as usize] as usize)
+    }
+
+    fn damage_state(&self) -> Vec<u64> {
+        self.body
+            .as_ref()
+            .map_or_else(Vec::new, |b| b.pass.damage_state())
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        match &mut self.body {
+            Some(body) => body.pass.restore_damage(state),
+            None => state.is_empty(),
+        }
+    }
+}
+
+/// Energy of the cells that are finite elements, without those that only overlap: `½ Σ_a u_a · F_a`, the sum over their nodes of the forces that these cells alone exert.
+///
+/// A node within the finite elements has that force in its own row. One at the seam, whose row knows of overlapping cells or of partial stress, needs a row of its own.
+struct ElementEnergy {
+    /// Sites whose row is that of all cells around a node.
+    inner: Vec<u32>,
+    /// Nodes with other rows, and these.
+    seam: Vec<u32>,
+    rows: BlockCsr,
+}
+
+impl ElementEnergy {
+    fn new<const D: usize>(model: &Model<D>) -> Self {
+        let nodes = model.mesh.nodes.len();
+        let (mut touched, mut whole) = (vec![false; nodes], vec![true; nodes]);
+        for c in 0..model.mesh.cell_count() {
+            for &n in model.mesh.cell(c) {
+                touched[n as usize] |= model.is_element(c);
+                whole[n as usize] &= model.roles[c] == CellRole::Element;
+            }
+        }
+        let inner = (0..model.sites.len() as u32)
+            .filter(
+                |&s| matches!(model.sites[s as usize].kind, SiteKind::Node(n) if whole[n as usize]),
+            )
+            .collect();
+        let seam: Vec<u32> = (0..nodes as u32)
+            .filter(|&n| touched[n as usize] && !whole[n as usize])
+            .collect();
+        let rows = assembly::assemble_rows(
+            seam.len(),
+            model.sites.len(),
+            |_| (),
+            |r, row| model.add_own_element_rows(seam[r], row),
+        );
+        Self { inner, seam, rows }
+    }
+
+    fn of<const D: usize>(&self, linear: &BlockCsr, nodes: &Transfer, u: &[f64]) -> f64 {
+        let inner: f64 = self
+            .inner
+            .par_chunks(CHUNK)
+            .map(|sites| {
+                sites
+                    .iter()
+                    .map(|&site| {
+                        let force = row_product::<D>(linear, site as usize, u);
+                        (0..D)
+                            .map(|k| force[k] * u[site as usize * D + k])
+                            .sum::<f64>()
+                    })
+                    .sum::<f64>()
+            })
+            .collect::<Vec<_>>()
+            .iter()
+            .sum();
+        let seam: f64 = self
+            .seam
+            .iter()
+            .enumerate()
+            .map(|(r, &n)| {
+                let here: Vector<D> = nodes.displacement(n as usize, u);
+                here.dot(&row_product::<D>(&self.rows, r, u))
+            })
+            .sum();
+        0.5 * (inner + seam)
+    }
+}
+
+/// One block row times a vector.
+fn row_product<const D: usize>(matrix: &BlockCsr, row: usize, u: &[f64]) -> Vector<D> {
+    let (columns, blocks) = matrix.row(row);
+    let mut sum = Vector::zeros();
+    for (&c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+        for a in 0..D {
+            for b in 0..D {
+                sum[a] += block[a * D + b] * u[c as usize * D + b];
+            }
+        }
+    }
+    sum
+}
