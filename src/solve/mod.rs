@@ -11,6 +11,7 @@ pub mod multigrid;
 pub mod ordering;
 mod singular;
 pub mod smoother;
+pub mod stable_step;
 pub mod statics;
 pub mod stencils;
 pub mod symbolic;

@@ -8,6 +8,7 @@
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
 //! | `bar` | the coupled bar of [SAND2015-7998] section 7.3 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
+//! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
 //!
 //! A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 
@@ -16,6 +17,8 @@ pub mod bar;
 pub mod enclosed;
 pub mod fields;
 pub mod patch;
+pub mod spectrum;
+pub mod strip;
 pub mod tangents;
 pub mod variable_horizon;
 pub mod weights;
@@ -78,6 +81,11 @@ pub const SUITES: &[Suite] = &[
         name: "variable-horizon",
         about: "the bar of variable horizon, SAND2015-7998 section 7.2: accelerations under linear and quadratic fields",
         run: variable_horizon::run,
+    },
+    Suite {
+        name: "spectrum",
+        about: "eigenvalues of coupled strips: whether their motion is bounded, and the stable step against its limit",
+        run: spectrum::run,
     },
 ];
 

@@ -1,0 +1,617 @@
+//! The stable step of velocity Verlet, and whether a model is stable at any step.
+//!
+//! A mode with `K w = λ M w` is stepped by `w_{n+1} − 2 w_n + w_{n−1} = −Δt² λ w_n`, which is bounded if and only if λ is real and `0 ≤ λ ≤ 4/Δt²`.
+//! So there are two questions. How large is the largest λ? And, where `K` is not symmetric, is any λ negative or complex? Such a mode grows as
+//! `exp(σ t)`, `σ = |Re √(−λ)|`, whatever the step.
+//!
+//! * **Certified**: `λ ≤ max_a Σ_b |K_ab| / m_a` (Gershgorin), valid for any `K`.
+//! * **Sharp**: the largest Ritz value θ of Lanczos (symmetric) or Arnoldi in the inner product of the masses, from a random start. With
+//!   `k` products on `n` unknowns `λ ≤ θ/(1 − ε)` fails with a probability of at most `1.648 √n exp(−√ε (2k − 1))` ([Kuczynski1992], theorem 3, symmetric);
+//!   `ε` is [`MARGIN`], and `k` is chosen for one in 10⁹. Without symmetry there is no such theorem and the same margin is kept.
+//! * **Growth**: the eigenvalues themselves while the model is small. Beyond, the motion is run from noise: the scheme is the Chebyshev polynomial that is bounded by 1
+//!   where λ is stable and grows fastest elsewhere, so that no other sequence of as many products shows less growth to a stable and more to an unstable mode.
+
+use crate::{
+    solve::{
+        FreeDofs,
+        krylov::{add_scaled, dot, norm},
+    },
+    system::{Dynamic, Symmetry},
+};
+
+/// `ε`: the largest eigenvalue is taken to be `1/(1 − ε)` times the largest Ritz value, which costs 2 % of the step.
+pub const MARGIN: f64 = 0.04;
+
+/// Probability with which the sharp bound of a symmetric model may fail.
+const FAILURE: f64 = 1e-9;
+
+/// Unknowns up to which eigenvalues are computed one and all: a second of time.
+pub const DENSE: usize = 600;
+
+/// Basis vectors of Arnoldi may take this many bytes.
+const BASIS_BYTES: usize = 512 << 20;
+
+/// A growth of this factor in a run from noise is no chance: where every mode is bounded the norm keeps within tens of per cent.
+const SHOWN: f64 = 4.0;
+
+/// Growth by `exp` of this over a planned run is refused.
+pub const LARGEST_GAIN: f64 = 0.5;
+
+/// The limits of the time step of a model \[s\].
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct StepLimit {
+    /// What row sums guarantee.
+    pub certified: f64,
+    /// The site of that row.
+    pub certified_site: usize,
+    /// `2/√θ` of the largest Ritz value: the true limit, or a little above.
+    pub estimate: f64,
+    /// The step to take: the larger of the certified one and the estimate less its margin.
+    pub stable: f64,
+    /// Products with the stiffness that it took.
+    pub products: usize,
+}
+
+/// How fast the fastest growing mode of a model grows.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Growth {
+    /// σ of the fastest growing mode \[1/s\]; 0 if none was found.
+    pub rate: f64,
+    /// Slower growth than this would not have been seen \[1/s\].
+    pub resolution: f64,
+    /// Its eigenvalue λ, real and imaginary part \[1/s²\].
+    pub eigenvalue: [f64; 2],
+    /// The site where it is largest.
+    pub site: usize,
+    /// Products with the stiffness that it took.
+    pub products: usize,
+}
+
+/// Why a step, or a model, is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// The step is too large.
+    #[error(
+        "the time step {requested:e} s is larger than the stable step {stable:e} s of this model (the limit itself is at most {limit:e} s, and the highest mode is largest at site {site}); leave the step out to take the stable one, or make the cells or the spacing around that site larger"
+    )]
+    TooLarge {
+        /// The step asked for \[s\].
+        requested: f64,
+        /// The stable step \[s\].
+        stable: f64,
+        /// The limit as estimated \[s\].
+        limit: f64,
+        /// Where the highest mode is largest.
+        site: usize,
+    },
+    /// The step is no step.
+    #[error(
+        "the time step is {requested}: it must be positive; leave it out to take the stable one"
+    )]
+    NoStep {
+        /// The step asked for \[s\].
+        requested: f64,
+    },
+    /// A site without mass or a row that is no number.
+    #[error(
+        "the row of site {site} gives no frequency (mass {mass}, sum of the row {sum}): every site needs a positive density and a finite stiffness"
+    )]
+    Row {
+        /// The site.
+        site: usize,
+        /// Its mass \[kg\].
+        mass: f64,
+        /// The sum of its row \[N/m\].
+        sum: f64,
+    },
+    /// A mode grows at any step.
+    #[error(
+        "this model is unstable in time at any step: a mode largest at site {site} grows as exp({rate:e} t), by exp({gain:.1}) over the run (eigenvalue {real:e} + {imaginary:e} i of M⁻¹K, which should be real and positive); {remedy}"
+    )]
+    Unstable {
+        /// σ \[1/s\].
+        rate: f64,
+        /// `σ` times the duration of the run.
+        gain: f64,
+        /// Real part of λ.
+        real: f64,
+        /// Imaginary part of λ.
+        imaginary: f64,
+        /// Where the mode is largest.
+        site: usize,
+        /// What to do.
+        remedy: String,
+    },
+    /// Eigenvalues did not come out.
+    #[error(
+        "the eigenvalues of the model could not be computed; check its materials for extreme contrasts"
+    )]
+    Eigenvalues,
+}
+
+/// `M^{-1/2} K M^{-1/2}` on the free dofs: the eigenvalues of `M⁻¹ K`, and symmetric if `K` is.
+struct Scaled<'a> {
+    system: &'a dyn Dynamic,
+    free: FreeDofs,
+    /// `1/√m` of every dof.
+    root: Vec<f64>,
+    scratch: Vec<f64>,
+    products: usize,
+}
+
+impl<'a> Scaled<'a> {
+    fn new(system: &'a dyn Dynamic, prescribed: &[u32]) -> Result<Self, StepError> {
+        let d = system.block().max(1);
+        let mass = system.mass();
+        if let Some((site, &mass)) = mass
+            .iter()
+            .enumerate()
+            .find(|(_, m)| !(**m > 0.0 && m.is_finite()))
+        {
+            let sum = f64::NAN;
+            return Err(StepError::Row { site, mass, sum });
+        }
+        let dofs = mass.len() * d;
+        let mut values = vec![None; dofs];
+        for &k in prescribed {
+            if let Some(value) = values.get_mut(k as usize) {
+                *value = Some(0.0);
+            }
+        }
+        Ok(Self {
+            system,
+            free: FreeDofs::from_prescribed(&values, d),
+            root: (0..dofs).map(|k| 1.0 / mass[k / d].sqrt()).collect(),
+            scratch: vec![0.0; dofs],
+            products: 0,
+        })
+    }
+
+    fn dofs(&self) -> usize {
+        self.root.len()
+    }
+
+    fn apply_into(&mut self, x: &[f64], y: &mut [f64]) {
+        for ((s, x), r) in self.scratch.iter_mut().zip(x).zip(&self.root) {
+            *s = x * r;
+        }
+        self.system.tangent_into(&self.scratch, y);
+        y.iter_mut().zip(&self.root).for_each(|(y, r)| *y *= r);
+        self.free.clear_prescribed(y);
+        self.products += 1;
+    }
+
+    /// Noise of unit norm on the free dofs, the same in every run.
+    fn noise(&self) -> Vec<f64> {
+        let mut x = normal_numbers(self.dofs());
+        self.free.clear_prescribed(&mut x);
+        let size = norm(&x);
+        if size > 0.0 {
+            x.iter_mut().for_each(|x| *x /= size);
+        }
+        x
+    }
+
+    /// The site where a mode is largest, in displacements.
+    fn site_of(&self, mode: &[f64]) -> usize {
+        let size = |k: usize| (mode[k] * self.root[k]).abs();
+        let dof = (0..mode.len()).fold(0, |best, k| if size(k) > size(best) { k } else { best });
+        dof / self.system.block().max(1)
+    }
+}
+
+/// Normally distributed numbers (splitmix64, Box and Muller): the direction of such a vector is uniform, as the bound on Lanczos wants it.
+fn normal_numbers(count: usize) -> Vec<f64> {
+    let mut state = 0x0b0d_11e5_u64;
+    let mut uniform = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    };
+    (0..count)
+        .map(|_| {
+            let radius = (-2.0 * (1.0 - uniform()).ln()).sqrt();
+            radius * (2.0 * std::f64::consts::PI * uniform()).cos()
+        })
+        .collect()
+}
+
+/// The limits of the time step; `prescribed` lists the dofs that are not free.
+///
+/// # Errors
+/// [`StepError::Row`] for a site without mass or a row that is not finite, [`StepError::Eigenvalues`].
+pub fn stable_step(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepError> {
+    let mut operator = Scaled::new(system, prescribed)?;
+    let d = system.block().max(1);
+    let (mut largest, mut certified_site) = (0.0, 0);
+    for (k, &sum) in system.row_sums().iter().enumerate() {
+        let (site, mass) = (k / d, system.mass()[k / d]);
+        if !sum.is_finite() {
+            return Err(StepError::Row { site, mass, sum });
+        }
+        if operator.free.is_free(site, k % d) && sum / mass > largest {
+            (largest, certified_site) = (sum / mass, site);
+        }
+    }
+    let certified = 2.0 / largest.sqrt();
+    let theta = highest(&mut operator)?.0;
+    let estimate = 2.0 / theta.max(0.0).sqrt();
+    Ok(StepLimit {
+        certified,
+        certified_site,
+        // a Ritz value may exceed the bound on eigenvalues by rounding
+        estimate: estimate.max(certified),
+        // where the row sum is the eigenvalue, rounding must not decide
+        stable: certified.max(estimate * (1.0 - MARGIN).sqrt()) * (1.0 - 1e-9),
+        products: operator.products,
+    })
+}
+
+impl StepLimit {
+    /// The step to take: the stable one, or a smaller one that is asked for.
+    ///
+    /// # Errors
+    /// [`StepError::TooLarge`] for a larger one, [`StepError::NoStep`] for one that is not positive.
+    pub fn admit(
+        &self,
+        requested: Option<f64>,
+        system: &dyn Dynamic,
+        prescribed: &[u32],
+    ) -> Result<f64, StepError> {
+        let Some(requested) = requested else {
+            return Ok(self.stable);
+        };
+        if !(requested > 0.0 && requested.is_finite()) {
+            return Err(StepError::NoStep { requested });
+        }
+        if requested <= self.stable {
+            return Ok(requested);
+        }
+        let mut operator = Scaled::new(system, prescribed)?;
+        let mode = highest(&mut operator)?.1;
+        Err(StepError::TooLarge {
+            requested,
+            stable: self.stable,
+            limit: self.estimate,
+            site: operator.site_of(&mode),
+        })
+    }
+}
+
+/// Products that make the sharp bound fail once in 1/[`FAILURE`] symmetric models.
+fn products_for(unknowns: usize) -> usize {
+    let needed = (1.648 * (unknowns.max(1) as f64).sqrt() / FAILURE).ln() / MARGIN.sqrt();
+    (0.5 * (needed + 1.0)).ceil() as usize
+}
+
+/// The largest Ritz value in size, and its vector.
+fn highest(operator: &mut Scaled<'_>) -> Result<(f64, Vec<f64>), StepError> {
+    let count = products_for(operator.free.count()).min(operator.free.count());
+    if count == 0 {
+        return Ok((0.0, vec![0.0; operator.dofs()]));
+    }
+    let bytes = count * operator.dofs() * size_of::<f64>();
+    match operator.system.symmetry() {
+        Symmetry::Symmetric if bytes > BASIS_BYTES => lanczos(operator, count),
+        // in one go, or in as many cycles as memory asks for
+        _ => {
+            let cycle = count.min((BASIS_BYTES / (operator.dofs() * size_of::<f64>())).max(20));
+            let mut start = operator.noise();
+            let mut best = (0.0, Vec::new());
+            for _ in 0..count.div_ceil(cycle).max(1) * if cycle < count { 2 } else { 1 } {
+                let space = Space::new(operator, start, cycle);
+                let ([re, im], mode) = space.extreme(|[re, im]| re.hypot(im))?;
+                best = (re.hypot(im), mode.clone());
+                start = mode;
+            }
+            Ok(best)
+        }
+    }
+}
+
+/// Lanczos with three vectors; the basis is gone through a second time for the vector.
+fn lanczos(operator: &mut Scaled<'_>, count: usize) -> Result<(f64, Vec<f64>), StepError> {
+    let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut coefficients: Vec<f64> = Vec::new();
+    let mut theta = 0.0;
+    let mut mode = vec![0.0; operator.dofs()];
+    for pass in 0..2 {
+        let mut last = vec![0.0; operator.dofs()];
+        let mut q = operator.noise();
+        let mut w = vec![0.0; operator.dofs()];
+        for k in 0..count {
+            if pass == 1 {
+                if k == coefficients.len() {
+                    break;
+                }
+                add_scaled(coefficients[k], &q, &mut mode);
+            }
+            operator.apply_into(&q, &mut w);
+            let a = dot(&q, &w);
+            add_scaled(-a, &q, &mut w);
+            if k > 0 {
+                add_scaled(-off[k - 1], &last, &mut w);
+            }
+            let b = norm(&w);
+            if pass == 0 {
+                diagonal.push(a);
+                if b <= 1e-12 * a.abs() {
+                    break;
+                }
+                off.push(b);
+            }
+            std::mem::swap(&mut last, &mut q);
+            q.iter_mut().zip(&w).for_each(|(q, w)| *q = w / b);
+        }
+        if pass == 0 {
+            let n = diagonal.len();
+            let small = faer::Mat::from_fn(n, n, |i, j| match i.abs_diff(j) {
+                0 => diagonal[i],
+                1 => off[i.min(j)],
+                _ => 0.0,
+            });
+            let eigen = small
+                .self_adjoint_eigen(faer::Side::Lower)
+                .map_err(|_| StepError::Eigenvalues)?;
+            theta = eigen.S().column_vector()[n - 1];
+            coefficients = (0..n).map(|i| eigen.U()[(i, n - 1)]).collect();
+        }
+    }
+    Ok((theta, mode))
+}
+
+/// A Krylov space with its orthonormal basis and the operator in it.
+struct Space {
+    basis: Vec<Vec<f64>>,
+    /// Columns of the Hessenberg matrix.
+    columns: Vec<Vec<f64>>,
+}
+
+impl Space {
+    fn new(operator: &mut Scaled<'_>, start: Vec<f64>, count: usize) -> Space {
+        let mut w = vec![0.0; operator.dofs()];
+        let size = norm(&start);
+        let mut space = Space {
+            basis: vec![start.iter().map(|x| x / size).collect()],
+            columns: Vec::new(),
+        };
+        for k in 0..count {
+            operator.apply_into(&space.basis[k], &mut w);
+            let before = norm(&w);
+            let mut column = vec![0.0; k + 1];
+            for _ in 0..2 {
+                for (h, q) in column.iter_mut().zip(&space.basis) {
+                    let c = dot(q, &w);
+                    *h += c;
+                    add_scaled(-c, q, &mut w);
+                }
+            }
+            let size = norm(&w);
+            column.push(size);
+            space.columns.push(column);
+            if size <= 1e-12 * before || k + 1 == count {
+                break;
+            }
+            space.basis.push(w.iter().map(|x| x / size).collect());
+        }
+        space
+    }
+
+    /// The Ritz value for which `rank` is largest, and the real part of its vector.
+    fn extreme(&self, rank: impl Fn([f64; 2]) -> f64) -> Result<([f64; 2], Vec<f64>), StepError> {
+        let n = self.columns.len();
+        let small = faer::Mat::from_fn(n, n, |i, j| self.columns[j].get(i).copied().unwrap_or(0.0));
+        let eigen = small.eigen().map_err(|_| StepError::Eigenvalues)?;
+        let values: Vec<[f64; 2]> = (0..n)
+            .map(|k| {
+                let s = eigen.S().column_vector()[k];
+                [s.re, s.im]
+            })
+            .collect();
+        let best = (0..n).fold(0, |best, k| {
+            if rank(values[k]) > rank(values[best]) {
+                k
+            } else {
+                best
+            }
+        });
+        let mut mode = vec![0.0; self.basis[0].len()];
+        for (k, q) in self.basis.iter().enumerate() {
+            add_scaled(eigen.U()[(k, best)].re, q, &mut mode);
+        }
+        Ok((values[best], mode))
+    }
+}
+
+/// `σ = |Re √(−λ)|`.
+pub fn growth_rate(real: f64, imaginary: f64) -> f64 {
+    let size = real.hypot(imaginary);
+    // without cancellation where λ is nearly real and positive
+    let twice = if real > 0.0 {
+        imaginary * imaginary / (size + real)
+    } else {
+        size - real
+    };
+    (0.5 * twice).sqrt()
+}
+
+/// How fast the model's motion grows, for a run of `steps` steps of size `step`; `prescribed` lists the dofs that are not free.
+///
+/// Up to [`DENSE`] unknowns all eigenvalues are computed; beyond, a tenth of the steps is run from noise (at least 200 and at most 4000).
+///
+/// # Errors
+/// [`StepError::Row`] for a site without mass, [`StepError::Eigenvalues`].
+pub fn growth(
+    system: &dyn Dynamic,
+    prescribed: &[u32],
+    step: f64,
+    steps: u64,
+) -> Result<Growth, StepError> {
+    let mut operator = Scaled::new(system, prescribed)?;
+    if operator.free.count() <= DENSE {
+        growth_by_eigenvalues(&mut operator)
+    } else {
+        growth_from_noise(&mut operator, step, (steps / 10).clamp(200, 4000))
+    }
+}
+
+/// All eigenvalues of a small model, real and imaginary parts \[1/s²\].
+///
+/// # Errors
+/// [`StepError::Row`] for a site without mass, [`StepError::Eigenvalues`].
+pub fn eigenvalues(system: &dyn Dynamic, prescribed: &[u32]) -> Result<Vec<[f64; 2]>, StepError> {
+    let mut operator = Scaled::new(system, prescribed)?;
+    dense(&mut operator)?
+        .eigenvalues()
+        .map(|values| values.iter().map(|s| [s.re, s.im]).collect())
+        .map_err(|_| StepError::Eigenvalues)
+}
+
+/// The operator on its free dofs.
+fn dense(operator: &mut Scaled<'_>) -> Result<faer::Mat<f64>, StepError> {
+    let free = free_dofs(operator);
+    let (mut x, mut y) = (vec![0.0; operator.dofs()], vec![0.0; operator.dofs()]);
+    let mut matrix = faer::Mat::zeros(free.len(), free.len());
+    for (j, &k) in free.iter().enumerate() {
+        x[k] = 1.0;
+        operator.apply_into(&x, &mut y);
+        x[k] = 0.0;
+        for (i, &k) in free.iter().enumerate() {
+            matrix[(i, j)] = y[k];
+        }
+    }
+    if operator.system.symmetry() == Symmetry::Symmetric {
+        // to round-off it is, and then eigenvalues are real
+        matrix = faer::Mat::from_fn(free.len(), free.len(), |i, j| {
+            0.5 * (matrix[(i, j)] + matrix[(j, i)])
+        });
+    }
+    Ok(matrix)
+}
+
+fn free_dofs(operator: &Scaled<'_>) -> Vec<usize> {
+    let d = operator.system.block().max(1);
+    (0..operator.dofs())
+        .filter(|k| operator.free.is_free(k / d, k % d))
+        .collect()
+}
+
+fn growth_by_eigenvalues(operator: &mut Scaled<'_>) -> Result<Growth, StepError> {
+    let free = free_dofs(operator);
+    let matrix = dense(operator)?;
+    let eigen = matrix.eigen().map_err(|_| StepError::Eigenvalues)?;
+    let values = eigen.S().column_vector();
+    let largest = (0..free.len()).fold(0.0_f64, |m, k| m.max(values[k].re.hypot(values[k].im)));
+    // zero comes out as round-off of the largest, and its square root is what counts
+    let resolution = (1e-13 * largest).sqrt();
+    let rate = |k: usize| growth_rate(values[k].re, values[k].im);
+    let best = (0..free.len()).fold(0, |best, k| if rate(k) > rate(best) { k } else { best });
+    let mut found = Growth {
+        rate: 0.0,
+        resolution,
+        eigenvalue: [0.0; 2],
+        site: 0,
+        products: operator.products,
+    };
+    if !free.is_empty() && rate(best) > resolution {
+        let mut mode = vec![0.0; operator.dofs()];
+        for (i, &k) in free.iter().enumerate() {
+            let c = eigen.U()[(i, best)];
+            mode[k] = c.re.hypot(c.im);
+        }
+        found.rate = rate(best);
+        found.eigenvalue = [values[best].re, values[best].im];
+        found.site = operator.site_of(&mode);
+    }
+    Ok(found)
+}
+
+fn growth_from_noise(
+    operator: &mut Scaled<'_>,
+    step: f64,
+    steps: u64,
+) -> Result<Growth, StepError> {
+    // x_k = T_k(1 − Δt² λ/2) x_0
+    let mut last = operator.noise();
+    let mut y = vec![0.0; operator.dofs()];
+    operator.apply_into(&last, &mut y);
+    let mut x: Vec<f64> = last
+        .iter()
+        .zip(&y)
+        .map(|(x, y)| x - 0.5 * step * step * y)
+        .collect();
+    let mut early: f64 = 1.0;
+    let mut late: f64 = 0.0;
+    let mut taken = 1;
+    while taken < steps {
+        operator.apply_into(&x, &mut y);
+        for ((last, x), y) in last.iter_mut().zip(&x).zip(&y) {
+            *last = 2.0 * x - *last - step * step * y;
+        }
+        std::mem::swap(&mut last, &mut x);
+        taken += 1;
+        if taken % 10 == 0 || taken == steps {
+            let size = norm(&x);
+            if 4 * taken <= steps {
+                early = early.max(size);
+            } else if 4 * taken >= 3 * steps {
+                late = late.max(size);
+            }
+            // growth that is beyond doubt needs no more steps
+            if size > 1e8 || !size.is_finite() {
+                late = size;
+                break;
+            }
+        }
+    }
+    let duration = taken as f64 * step;
+    let unknowns = operator.free.count() as f64;
+    let mut found = Growth {
+        rate: 0.0,
+        resolution: (SHOWN * unknowns.sqrt()).ln() / duration,
+        eigenvalue: [0.0; 2],
+        site: 0,
+        products: operator.products,
+    };
+    if late > SHOWN * early || !late.is_finite() {
+        // what has grown is nearly alone in x, and a small space tells its eigenvalue
+        let site = operator.site_of(&x);
+        let space = Space::new(operator, x, 12);
+        let ([re, im], _) = space.extreme(|[re, im]| growth_rate(re, im))?;
+        found = Growth {
+            rate: growth_rate(re, im),
+            eigenvalue: [re, im],
+            site,
+            products: operator.products,
+            ..found
+        };
+    }
+    Ok(found)
+}
+
+impl Growth {
+    /// Refuses a model whose motion grows by more than `exp(`[`LARGEST_GAIN`]`)` over `duration` \[s\].
+    ///
+    /// # Errors
+    /// [`StepError::Unstable`] with `remedy`.
+    pub fn admit(&self, duration: f64, remedy: &str) -> Result<(), StepError> {
+        let gain = self.rate * duration;
+        if gain <= LARGEST_GAIN {
+            return Ok(());
+        }
+        Err(StepError::Unstable {
+            rate: self.rate,
+            gain,
+            real: self.eigenvalue[0],
+            imaginary: self.eigenvalue[1],
+            site: self.site,
+            remedy: remedy.to_owned(),
+        })
+    }
+}
+
+#[cfg(test)]
+#[path = "stable_step_tests.rs"]
+mod tests;

@@ -1,0 +1,182 @@
+use super::*;
+use crate::system::{BlockCsr, LinearMotion};
+
+/// A full matrix as a system with one dof per site.
+fn system(n: usize, symmetry: Symmetry, entry: impl Fn(usize, usize) -> f64) -> LinearMotion {
+    let values: Vec<f64> = (0..n * n).map(|k| entry(k / n, k % n)).collect();
+    LinearMotion {
+        stiffness: BlockCsr {
+            block: 1,
+            row_offsets: (0..=n).map(|i| i * n).collect(),
+            columns: (0..n * n).map(|k| (k % n) as u32).collect(),
+            values,
+        },
+        mass: (0..n).map(|i| 1.0 + (i % 5) as f64).collect(),
+        symmetry,
+    }
+}
+
+/// Springs of uneven stiffness between all pairs of near points.
+fn springs(n: usize) -> LinearMotion {
+    let spring = |i: usize, j: usize| match i.abs_diff(j) {
+        d @ 1..=3 => 1.0 + ((i * j) % 7) as f64 / d as f64,
+        _ => 0.0,
+    };
+    system(n, Symmetry::Symmetric, |i, j| {
+        if i == j {
+            (0..n).map(|k| spring(i, k)).sum()
+        } else {
+            -spring(i, j)
+        }
+    })
+}
+
+/// Largest eigenvalue by nalgebra, on the free dofs.
+fn largest(system: &LinearMotion, free: &[usize]) -> f64 {
+    let k = &system.stiffness;
+    let matrix = nalgebra::DMatrix::from_fn(free.len(), free.len(), |i, j| {
+        let m = (system.mass[free[i]] * system.mass[free[j]]).sqrt();
+        k.row(free[i]).1[free[j]] / m
+    });
+    matrix.symmetric_eigenvalues().max()
+}
+
+#[test]
+fn the_step_is_below_the_limit_and_near_it() {
+    for n in [1, 2, 7, 60, 300] {
+        let system = springs(n);
+        let prescribed: Vec<u32> = if n > 10 { vec![0, 5] } else { vec![] };
+        let free: Vec<usize> = (0..n)
+            .filter(|k| !prescribed.contains(&(*k as u32)))
+            .collect();
+        let limit = 2.0 / largest(&system, &free).max(0.0).sqrt();
+        let found = stable_step(&system, &prescribed).expect("positive masses");
+        if n == 1 {
+            assert!(found.stable == f64::INFINITY);
+            continue;
+        }
+        assert!(found.certified <= limit * (1.0 + 1e-12));
+        assert!(
+            found.stable <= limit && found.stable >= 0.979 * limit,
+            "{n}: {found:?} {limit}"
+        );
+        assert!(found.estimate >= limit * (1.0 - 1e-12) && found.estimate <= 1.001 * limit);
+        let refused = found.admit(Some(1.02 * limit), &system, &prescribed);
+        assert!(
+            matches!(&refused, Err(StepError::TooLarge { requested, .. }) if *requested == 1.02 * limit)
+        );
+        assert_eq!(found.admit(None, &system, &prescribed), Ok(found.stable));
+        assert_eq!(
+            found.admit(Some(0.5 * limit), &system, &prescribed),
+            Ok(0.5 * limit)
+        );
+        for bad in [0.0, -1.0, f64::NAN] {
+            assert!(matches!(
+                found.admit(Some(bad), &system, &prescribed),
+                Err(StepError::NoStep { .. })
+            ));
+        }
+    }
+}
+
+#[test]
+fn lanczos_without_its_basis_finds_the_same_pair() {
+    let mut system = springs(200);
+    // one stiff pair, where the highest mode is
+    for (i, j, k) in [
+        (77, 78, -40.0),
+        (78, 77, -40.0),
+        (77, 77, 60.0),
+        (78, 78, 60.0),
+    ] {
+        system.stiffness.values[i * 200 + j] = k;
+    }
+    let mut operator = Scaled::new(&system, &[]).expect("masses");
+    let (theta, mode) = lanczos(&mut operator, 60).expect("converges");
+    let exact = largest(&system, &(0..200).collect::<Vec<_>>());
+    assert!((theta / exact - 1.0).abs() < 1e-10, "{theta} {exact}");
+    let site = operator.site_of(&mode);
+    assert!(site == 77 || site == 78, "{site}");
+}
+
+#[test]
+fn growth_is_that_of_the_eigenvalues() {
+    // two uncoupled chains, then a pair [[2, w], [−w, 2]] with eigenvalues 2 ± i w, or one site of negative stiffness
+    for n in [40, 620] {
+        for (case, expected) in [("complex", [2.0, 0.04]), ("negative", [-0.003, 0.0])] {
+            let mut system = springs(n);
+            let (i, j) = (n / 2, n / 2 + 1);
+            for k in 0..n {
+                for (a, b) in [(i, k), (j, k), (k, i), (k, j)] {
+                    system.stiffness.values[a * n + b] = 0.0;
+                }
+            }
+            (system.mass[i], system.mass[j]) = (1.0, 1.0);
+            let mut set = |a: usize, b: usize, v: f64| system.stiffness.values[a * n + b] = v;
+            if case == "complex" {
+                set(i, i, 2.0);
+                set(j, j, 2.0);
+                set(i, j, 0.04);
+                set(j, i, -0.04);
+            } else {
+                set(i, i, -0.003);
+                set(j, j, 1.0);
+            }
+            for k in 0..n {
+                // rows stay balanced, or rigid motion would not be free and diagonals too large only
+                let row: f64 = (0..n)
+                    .filter(|&c| c != k)
+                    .map(|c| system.stiffness.values[k * n + c])
+                    .sum();
+                if k != i && k != j {
+                    system.stiffness.values[k * n + k] = -row;
+                }
+            }
+            system.symmetry = Symmetry::Unsymmetric;
+            let step = stable_step(&system, &[]).expect("masses").stable;
+            let found = growth(&system, &[], step, 20_000).expect("eigenvalues");
+            let [re, im]: [f64; 2] = expected;
+            let root = nalgebra::Complex::new(-re, -im).sqrt().re.abs();
+            assert!(
+                (found.rate / root - 1.0).abs() < 1e-3 && (found.site == i || found.site == j),
+                "{n} {case}: {found:?} {root}"
+            );
+            assert!((found.eigenvalue[1].abs() - im).abs() < 1e-4);
+            let refused = found.admit(1000.0, "use coupling.splice");
+            assert!(
+                matches!(&refused, Err(StepError::Unstable { remedy, .. }) if remedy.contains("splice"))
+            );
+            assert_eq!(found.admit(1e-3, ""), Ok(()));
+        }
+        let stable = springs(n);
+        let step = stable_step(&stable, &[]).expect("masses").stable;
+        let found = growth(&stable, &[], step, 20_000).expect("eigenvalues");
+        assert!(found.rate == 0.0 && found.resolution < 0.02, "{found:?}");
+    }
+}
+
+#[test]
+fn rows_without_mass_or_number_are_named() {
+    let mut system = springs(20);
+    system.mass[4] = 0.0;
+    let found = stable_step(&system, &[]);
+    assert!(
+        matches!(found, Err(StepError::Row { site: 4, .. })),
+        "{found:?}"
+    );
+    let mut system = springs(20);
+    system.stiffness.values[20 * 6 + 6] = f64::INFINITY;
+    let found = stable_step(&system, &[]);
+    assert!(
+        matches!(found, Err(StepError::Row { site: 6, .. })),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn growth_rates_keep_their_digits() {
+    assert_eq!(growth_rate(4.0, 0.0), 0.0);
+    assert!((growth_rate(-9.0, 0.0) - 3.0).abs() < 1e-15);
+    // √(−1 − i w) ≈ ±(w/2 − i)
+    assert!((growth_rate(1.0, 1e-9) / 5e-10 - 1.0).abs() < 1e-12);
+}
