@@ -8,12 +8,16 @@
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
 //! | `bar` | the coupled bar of [SAND2015-7998] section 7.3 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
+//! | `bobaru` | the tables of \[Bobaru2009\] |
+//! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
 //!
 //! A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 
 pub mod balance;
 pub mod bar;
+pub mod bobaru;
+pub mod emmrich_weckner;
 pub mod enclosed;
 pub mod fields;
 pub mod patch;
@@ -86,6 +90,16 @@ pub const SUITES: &[Suite] = &[
         name: "spectrum",
         about: "eigenvalues of coupled strips: whether their motion is bounded, and the stable step against its limit",
         run: spectrum::run,
+    },
+    Suite {
+        name: "bobaru",
+        about: "the tables of Bobaru et al. 2009 beside ours: matrix, statics, waves",
+        run: bobaru::run,
+    },
+    Suite {
+        name: "emmrich-weckner",
+        about: "the nonlocal bar of Emmrich and Weckner 2007: exact solution, three discretisations, energies",
+        run: emmrich_weckner::run,
     },
 ];
 
