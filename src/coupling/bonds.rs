@@ -1,6 +1,6 @@
 //! Bonds that voids, cracks and holes cut, and the weights of those of a lattice.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::{
     coupling::{ModelError, Peridynamics, Surfaces, points::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, cutter::SegmentCutter},
     peridynamics::{
-        BondWeights, Families, Family, LatticeFamily, TIE_TOLERANCE, collapsed_tensor,
+        BondWeights, Families, Family, LatticeFamily, StatePart, TIE_TOLERANCE, collapsed_tensor,
         isotropic_shell_factors,
     },
     shape::Barriers,
@@ -146,12 +146,12 @@ impl LatticeFactors {
             .unwrap_or(1.0)
     }
 
-    /// The elastic tensor of the plain full lattice; none without a lattice.
-    pub fn tensor<const D: usize>(
+    /// The whole family of a lattice point with the coefficients that the law gives it; none without a lattice.
+    pub fn whole_family<const D: usize>(
         &self,
         p: &Peridynamics<D>,
         horizon: f64,
-    ) -> Result<Option<Tensor4<D>>, ModelError> {
+    ) -> Result<Option<WholeFamily<D>>, ModelError> {
         if !self.is_lattice {
             return Ok(None);
         }
@@ -166,11 +166,11 @@ impl LatticeFactors {
             })
             .collect();
         let volumes = vec![self.spacing.powi(D as i32); bonds.len()];
-        let ones = vec![1.0; bonds.len()];
+        let factors: Vec<f64> = bonds.iter().map(|xi| self.factor(horizon, xi)).collect();
         let family = Family {
             bonds: &bonds,
             volumes: &volumes,
-            factors: &ones,
+            factors: &factors,
             horizon,
         };
         let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);
@@ -183,6 +183,56 @@ impl LatticeFactors {
                 bonds: bonds.len(),
                 source,
             })?;
-        Ok(Some(collapsed_tensor(&family, &pair, state.as_ref())))
+        let tensor = collapsed_tensor(&family, &pair, state.as_ref());
+        let coefficients = bonds
+            .iter()
+            .zip(pair.iter().zip(&omega))
+            .map(|(xi, (&p, &w))| (offset_of(xi, self.spacing), (p, w)))
+            .collect();
+        Ok(Some(WholeFamily {
+            spacing: self.spacing,
+            coefficients,
+            state,
+            tensor,
+        }))
+    }
+
+    /// The elastic tensor of the plain full lattice; none without a lattice.
+    pub fn tensor<const D: usize>(
+        &self,
+        p: &Peridynamics<D>,
+        horizon: f64,
+    ) -> Result<Option<Tensor4<D>>, ModelError> {
+        Ok(self.whole_family(p, horizon)?.map(|whole| whole.tensor))
+    }
+}
+
+/// Integer offset of a lattice's bond.
+fn offset_of<const D: usize>(xi: &Vector<D>, spacing: f64) -> [i32; D] {
+    std::array::from_fn(|i| (xi[i] / spacing).round() as i32)
+}
+
+/// The family of a lattice point far from all surfaces, with its coefficients.
+pub(super) struct WholeFamily<const D: usize> {
+    spacing: f64,
+    coefficients: BTreeMap<[i32; D], (f64, f64)>,
+    /// The state part of the law, if it has one.
+    pub state: Option<StatePart<D>>,
+    /// The classical tensor that the family carries.
+    pub tensor: Tensor4<D>,
+}
+
+impl<const D: usize> WholeFamily<D> {
+    /// All bonds by their integer offsets, in their order, with `p` and `ω`.
+    pub fn bonds(&self) -> impl Iterator<Item = ([i32; D], (f64, f64))> + '_ {
+        self.coefficients.iter().map(|(&k, &c)| (k, c))
+    }
+
+    /// The coefficients `p` and `ω` of a bond; zero for one that the lattice does not have.
+    pub fn of(&self, xi: &Vector<D>) -> (f64, f64) {
+        self.coefficients
+            .get(&offset_of(xi, self.spacing))
+            .copied()
+            .unwrap_or((0.0, 0.0))
     }
 }

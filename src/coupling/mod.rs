@@ -5,6 +5,7 @@
 //! | `single.rs` | pure FE, pure PD: ordinary values of the same switch | |
 //! | `splice.rs` | each site takes the equation of its own model | [SAND2015-7998] eq. (2.30) |
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
+//! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs` | shared: sites, families, what completes them | |
@@ -31,6 +32,7 @@ pub mod problem;
 pub mod sample;
 pub mod single;
 pub mod splice;
+pub mod truncated;
 
 pub use blending::{Blending, BlendingFunction};
 pub use derivative::FitDegree;
@@ -41,6 +43,7 @@ pub use problem::{ModelError, Peridynamics, PointSource, Problem, ScalarField, S
 pub use sample::{Carrier, Sampler};
 pub use single::{Local, Nonlocal};
 pub use splice::Splice;
+pub use truncated::Truncated;
 
 use crate::{assembly::Row, mesh::Mesh, peridynamics::BondLaw, system::Symmetry};
 
@@ -83,6 +86,8 @@ pub enum Interface {
     Overlap,
     /// Nodes of the seam follow a least-squares fit to the sites within a horizon, [SAND2015-7998] section 7.3.
     Constrained(FitDegree),
+    /// Nodes of the seam are sites with the rows of their own elements only: nothing overlaps, and bonds end on the faces of elements.
+    Faces,
 }
 
 /// A method that couples both regions.

@@ -6,7 +6,7 @@ use crate::{
     assembly::{self, Row, Transfer},
     coupling::{
         CellRole, Coupling, FitDegree, Interface, ModelError, Peridynamics, Problem, Reach, Zone,
-        bonds::{self, LatticeFactors},
+        bonds::{self, LatticeFactors, WholeFamily},
         derivative, place,
         points::{PointCloud, Volumes},
     },
@@ -40,6 +40,14 @@ pub struct Site<const D: usize> {
 
 const NONE: u32 = u32::MAX;
 
+/// What bonds that end on the faces of elements need: the lattice as it goes on behind the faces.
+pub(super) struct Passing<const D: usize> {
+    /// Families of the points in elements, over the cloud of the body.
+    pub families: Families,
+    /// The family of any point far from surfaces.
+    pub whole: WholeFamily<D>,
+}
+
 /// A problem with its sites and families; a coupling turns it into rows.
 pub struct Model<const D: usize> {
     /// The mesh of the whole part.
@@ -62,6 +70,8 @@ pub struct Model<const D: usize> {
     surroundings: Option<Cloud<D>>,
     point_zone: Vec<Zone>,
     node_cells: (Vec<u32>, Vec<u32>),
+    interface: Interface,
+    passing: Option<Passing<D>>,
     spacing: f64,
     volumes: Volumes,
 }
@@ -105,6 +115,8 @@ impl<const D: usize> Model<D> {
             surroundings: None,
             point_zone: Vec::new(),
             node_cells,
+            interface: coupling.interface(),
+            passing: None,
             spacing: 0.0,
             volumes: Volumes::default(),
         };
@@ -159,7 +171,8 @@ impl<const D: usize> Model<D> {
                 flags[n as usize] = true;
             }
         }
-        let volumes = fem::nodal_volumes(&self.mesh, 0..self.mesh.cell_count());
+        let own = (0..self.mesh.cell_count()).filter(|&c| self.node_takes(c));
+        let volumes = fem::nodal_volumes(&self.mesh, own);
         let mut node_site = vec![NONE; self.mesh.nodes.len()];
         for n in 0..self.mesh.nodes.len() {
             let constrained = matches!(interface, Interface::Constrained(_)) && points[n];
@@ -236,7 +249,14 @@ impl<const D: usize> Model<D> {
             Reach::Own if constant => Reach::Own,
             _ => Reach::Neighbours,
         };
-        let keep = cloud.prune(&families, reach);
+        let (keep, passing) = match self.interface {
+            Interface::Faces => {
+                let (keep, passing) = cloud.prune_through(&families);
+                let families = families.restrict(&keep.renumbered, &passing);
+                (keep, Some(families))
+            }
+            _ => (cloud.prune(&families, reach), None),
+        };
         let families = families.restrict(&keep.renumbered, &keep.active);
         let wide = self
             .roles
@@ -286,6 +306,16 @@ impl<const D: usize> Model<D> {
             // the local side carries the stiffness of the peridynamic quadrature, or the seam would be a jump of material
             self.tensors[peridynamic_material as usize] = tensor;
         }
+        if let Some(families) = passing {
+            let whole = lattice.whole_family(p, cloud.horizon[0])?;
+            let (true, Some(whole)) = (constant && p.weights != BondWeights::Fitted, whole) else {
+                return Err(ModelError::Unsupported {
+                    what: "a seam of truncated bonds without a regular lattice of one horizon and one weight per shell of bonds",
+                    remedy: "give peridynamics.points a lattice, a constant horizon and isotropic or plain weights, or couple by splice or blending",
+                });
+            };
+            self.passing = Some(Passing { families, whole });
+        }
         self.point_zone = cloud.zone;
         let cloud = Cloud {
             position: cloud.position,
@@ -333,7 +363,11 @@ impl<const D: usize> Model<D> {
         cloud: &PointCloud<D>,
     ) -> Result<Transfer, ModelError> {
         let mut wanted = vec![false; self.mesh.nodes.len()];
-        for c in 0..self.mesh.cell_count() {
+        let cells = match interface {
+            Interface::Faces => 0,
+            _ => self.mesh.cell_count(),
+        };
+        for c in 0..cells {
             let cell = self.mesh.cell(c);
             if self.roles[c] != CellRole::Points
                 || cell.iter().any(|&n| node_site[n as usize] != NONE)
@@ -344,7 +378,7 @@ impl<const D: usize> Model<D> {
             }
         }
         let (degree, with_nodes) = match interface {
-            Interface::Overlap => (FitDegree::Quadratic, false),
+            Interface::Overlap | Interface::Faces => (FitDegree::Quadratic, false),
             Interface::Constrained(degree) => (degree, true),
         };
         let largest = cloud.horizon.iter().copied().fold(0.0, f64::max);
@@ -480,11 +514,21 @@ impl<const D: usize> Model<D> {
         })
     }
 
+    /// Whether the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.
+    pub fn node_takes(&self, cell: usize) -> bool {
+        self.interface != Interface::Faces || self.is_element(cell)
+    }
+
+    /// The lattice behind the faces at which bonds end, if they do.
+    pub(super) fn passing(&self) -> Option<&Passing<D>> {
+        self.passing.as_ref()
+    }
+
     /// Adds the finite-element row of a node: all cells around it but those whose stress is a partial stress.
     pub fn add_element_rows(&self, site: usize, row: &mut Row<D>) {
         let mut blocks = [Tensor::zeros(); 8];
         for (c, local) in self.cells_of_site(site) {
-            if self.roles[c] == CellRole::StressElement {
+            if self.roles[c] == CellRole::StressElement || !self.node_takes(c) {
                 continue;
             }
             fem::row(&self.mesh, c, self.tensor_of_cell(c), local, &mut blocks);

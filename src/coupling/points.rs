@@ -1,5 +1,7 @@
 //! Peridynamic points before they are sites: those of the peridynamic region, and those that complete their families.
 
+use std::collections::HashSet;
+
 use crate::{
     coupling::{Reach, Zone},
     peridynamics::Families,
@@ -80,6 +82,48 @@ impl<const D: usize> PointCloud<D> {
             })
             .collect();
         Kept { renumbered, active }
+    }
+
+    /// Keeps also the points from which a bond may pass through the peridynamic region without ending in it, and tells which these are.
+    ///
+    /// Such a point lies within a horizon of the region, and some site within a cell's diagonal of it.
+    pub fn prune_through(&self, families: &Families) -> (Kept, Vec<bool>) {
+        let kept = self.prune(families, Reach::Own);
+        let largest = self.horizon.iter().copied().fold(0.0, f64::max);
+        let size = largest + 2.0 * self.spacing * (D as f64).sqrt();
+        let bin =
+            |x: &Vector<D>| -> [i64; D] { std::array::from_fn(|i| (x[i] / size).floor() as i64) };
+        let mut near = HashSet::new();
+        for (x, element) in self.position.iter().zip(&self.element) {
+            if element.is_none() {
+                let centre = bin(x);
+                for index in 0..3usize.pow(D as u32) {
+                    let mut rest = index;
+                    near.insert(std::array::from_fn(|i| {
+                        let k = rest % 3;
+                        rest /= 3;
+                        centre[i] + k as i64 - 1
+                    }));
+                }
+            }
+        }
+        let mut next = 0;
+        let mut renumbered = kept.renumbered;
+        let mut passing = vec![false; renumbered.len()];
+        for (i, number) in renumbered.iter_mut().enumerate() {
+            passing[i] = self.element[i].is_some() && near.contains(&bin(&self.position[i]));
+            if *number != DROPPED || passing[i] {
+                *number = next;
+                next += 1;
+            }
+        }
+        (
+            Kept {
+                renumbered,
+                active: kept.active,
+            },
+            passing,
+        )
     }
 
     /// Drops the points that have no new number.

@@ -7,8 +7,8 @@ use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::{cells_of_set, position};
 use super::spec::{
-    InfluenceSpec, MaterialSpec, MicromodulusSpec, PeridynamicsSpec, PointsSpec, SurfacesSpec,
-    WeightsSpec,
+    InfluenceSpec, LatticeStart, MaterialSpec, MicromodulusSpec, PeridynamicsSpec, PointsSpec,
+    SurfacesSpec, WeightsSpec,
 };
 use super::value::{Number, Text};
 use crate::material::{Elastic, Kinematics};
@@ -251,6 +251,7 @@ pub(crate) fn influence(place: &str, spec: &InfluenceSpec) -> Result<Influence, 
 /// The peridynamic choices; `dimensions of the body` come from the mesh.
 pub(crate) fn peridynamics<const D: usize>(
     spec: &PeridynamicsSpec,
+    start: LatticeStart,
     mesh: &Mesh<D>,
 ) -> Result<Peridynamics<D>, SceneError> {
     no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
@@ -279,8 +280,11 @@ pub(crate) fn peridynamics<const D: usize>(
             }
             let origin = match &lattice.origin {
                 Some(o) => position("peridynamics.points.lattice.origin", o)?,
-                // where the mesh follows the lattice, points and nodes coincide: the seam then interpolates nothing
-                None => lo,
+                None => match start {
+                    // where the mesh follows the lattice, points and nodes coincide: the seam then interpolates nothing
+                    LatticeStart::OnCorner => lo,
+                    LatticeStart::Halfway => lo.add_scalar(0.5 * spacing),
+                },
             };
             Points::Lattice { spacing, origin }
         }

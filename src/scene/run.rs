@@ -451,7 +451,7 @@ pub(super) fn loads<const D: usize>(
             }
             Prescribed::BodyForce(region) => {
                 for c in 0..model.mesh.cell_count() {
-                    if !region.contains(&model.mesh.centroid(c), 0.0) {
+                    if !region.contains(&model.mesh.centroid(c), 0.0) || !model.node_takes(c) {
                         continue;
                     }
                     for (n, f) in fem::body_force_vector(&model.mesh, c, field) {
@@ -489,20 +489,22 @@ fn traction<const D: usize>(
 ) {
     let mesh: &Mesh<D> = &model.mesh;
     let field = |x: &Vector<D>| components.vector(x);
-    for facet in facets {
-        for (n, f) in fem::traction_vector(mesh, facet, field) {
-            own.extend(site_of[n as usize].map(|s| (s as usize, f)));
+    // a facet without a cell is an element's as far as anybody knows, and carries no point
+    let located = mesh.locate_facets(facets).ok();
+    let cell = |f: usize| located.as_ref().map(|l| l[f].cell as usize);
+    for (f, facet) in facets.iter().enumerate() {
+        if cell(f).is_none_or(|c| model.node_takes(c)) {
+            for (n, f) in fem::traction_vector(mesh, facet, field) {
+                own.extend(site_of[n as usize].map(|s| (s as usize, f)));
+            }
         }
     }
-    let on_points: Vec<Facet> = match mesh.locate_facets(facets) {
-        Ok(located) => located
-            .into_iter()
-            .filter(|f| !model.is_element(f.cell as usize))
-            .map(|f| f.nodes)
-            .collect(),
-        // a facet without a cell carries no point either
-        Err(_) => Vec::new(),
-    };
+    let on_points: Vec<Facet> = located
+        .into_iter()
+        .flatten()
+        .filter(|f| !model.is_element(f.cell as usize))
+        .map(|f| f.nodes)
+        .collect();
     let mut nodes: Vec<u32> = on_points.iter().flatten().copied().collect();
     nodes.sort_unstable();
     nodes.dedup();

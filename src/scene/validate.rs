@@ -195,7 +195,7 @@ fn scene<const D: usize>(
     let solver = solver(spec)?;
     let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
     let peridynamics = match (&spec.peridynamics, joining.zones) {
-        (Some(p), _) => Some(materials::peridynamics(p, &mesh)?),
+        (Some(p), _) => Some(materials::peridynamics(p, joining.lattice, &mesh)?),
         (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
         (None, _) => {
             return Err(SceneError::new(

@@ -23,9 +23,12 @@ use crate::{
     verify::{
         Effort,
         enclosed::{Case, Cells, Enclosed, INFLUENCE, Law, Method, SPACING, Widths},
-        patch::{out_of_balance, spurious_force},
+        patch::{out_of_balance, relative_out_of_balance, spurious_force},
     },
 };
+
+/// Largest out-of-balance force of a method in exact equilibrium, over the force on a face.
+pub const EQUILIBRIUM_LIMIT: f64 = 1e-12;
 
 /// Largest relative distance from the leading term.
 pub const LEADING_TERM_LIMIT: f64 = 0.01;
@@ -101,10 +104,10 @@ pub fn leading_term(case: &Case, degree: u32) -> Option<f64> {
 }
 
 fn bar(method: Method, law: Law, ratio: u32, transition: u32) -> Case {
-    let transition = if method == Method::Splice {
-        0
-    } else {
+    let transition = if method.has_transition() {
         transition
+    } else {
+        0
     };
     Case {
         method,
@@ -180,6 +183,9 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
                     3 * ratio,
                 ),
             ));
+            if Method::Truncated.is_offered(law) {
+                cases.push((name, bar(Method::Truncated, law, ratio, 0)));
+            }
         }
     }
     progress.stage("out-of-balance force", Some(cases.len() as u64));
@@ -206,6 +212,14 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
                         match leading_term(&case, degree) {
                             Some(term) => {
                                 Row::within(&name, quantity, force, term, LEADING_TERM_LIMIT)
+                            }
+                            None if case.method == Method::Truncated => {
+                                let force = relative_out_of_balance(&bar, degree).abs();
+                                let quantity = match degree {
+                                    3 => "cubic, over the force on a face",
+                                    _ => "quartic, over the force on a face",
+                                };
+                                Row::at_most(&name, quantity, force, EQUILIBRIUM_LIMIT)
                             }
                             None => Row::info(&name, quantity, force),
                         }
@@ -245,17 +259,22 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
         Method::Blending(BlendingFunction::Smooth),
         Method::Meshfree(INFLUENCE),
         Method::Elements(FitDegree::Quadratic),
+        Method::Truncated,
     ];
     for (name, law) in laws(effort) {
+        let methods: Vec<Method> = offered(&methods, law);
         for &ratio in ratios {
             progress.stage("spurious force", None);
-            let cases = methods.map(|method| Case {
-                widths: Widths {
-                    nonlocal: 12 * ratio,
-                    ..bar(method, law, ratio, 3 * ratio).widths
-                },
-                ..bar(method, law, ratio, 3 * ratio)
-            });
+            let cases: Vec<Case> = methods
+                .iter()
+                .map(|&method| Case {
+                    widths: Widths {
+                        nonlocal: 12 * ratio,
+                        ..bar(method, law, ratio, 3 * ratio).widths
+                    },
+                    ..bar(method, law, ratio, 3 * ratio)
+                })
+                .collect();
             push_spurious::<1>(
                 &mut table,
                 &format!("1D {name}, m = {ratio}"),
@@ -266,17 +285,20 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
     }
     if effort == Effort::Full {
         for law in Law::ALL {
-            let cases = methods.map(|method| Case {
-                method,
-                law,
-                cells: Cells::Matching,
-                widths: Widths {
-                    nonlocal: 6,
-                    transition: if method == Method::Splice { 0 } else { 9 },
-                    local: 9,
-                },
-                ratio: 3,
-            });
+            let cases: Vec<Case> = offered(&methods, law)
+                .into_iter()
+                .map(|method| Case {
+                    method,
+                    law,
+                    cells: Cells::Matching,
+                    widths: Widths {
+                        nonlocal: 6,
+                        transition: if method.has_transition() { 9 } else { 0 },
+                        local: 9,
+                    },
+                    ratio: 3,
+                })
+                .collect();
             push_spurious::<2>(
                 &mut table,
                 &format!("2D {}, m = 3", law.name()),
@@ -288,10 +310,18 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
     table
 }
 
+fn offered(methods: &[Method], law: Law) -> Vec<Method> {
+    methods
+        .iter()
+        .copied()
+        .filter(|m| m.is_offered(law))
+        .collect()
+}
+
 fn push_spurious<const D: usize>(
     table: &mut Table,
     name: &str,
-    cases: &[Case; 6],
+    cases: &[Case],
     limit: Option<f64>,
 ) {
     let forces: Vec<Result<f64, String>> = cases

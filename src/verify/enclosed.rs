@@ -6,7 +6,7 @@ use crate::{
     coupling::{
         Blending, BlendingFunction, Coupling, FitDegree, Local, Model, ModelError,
         PartialStressElements, PartialStressMeshfree, Peridynamics, PointSource, Problem, Splice,
-        Surfaces, Zone,
+        Surfaces, Truncated, Zone,
     },
     mesh::{
         Mesh, MeshError,
@@ -45,11 +45,13 @@ pub enum Method {
     Meshfree(Influence),
     /// [`PartialStressElements`].
     Elements(FitDegree),
+    /// [`Truncated`].
+    Truncated,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Splice,
         Self::Blending(BlendingFunction::Constant),
         Self::Blending(BlendingFunction::Linear),
@@ -57,6 +59,7 @@ impl Method {
         Self::Meshfree(INFLUENCE),
         Self::Elements(FitDegree::Affine),
         Self::Elements(FitDegree::Quadratic),
+        Self::Truncated,
     ];
 
     /// Its name in tables.
@@ -69,7 +72,18 @@ impl Method {
             Self::Meshfree(_) => "partial stress meshfree",
             Self::Elements(FitDegree::Affine) => "partial stress elements affine",
             Self::Elements(FitDegree::Quadratic) => "partial stress elements quadratic",
+            Self::Truncated => "truncated",
         }
+    }
+
+    /// Whether a transition zone has a meaning of its own.
+    pub fn has_transition(self) -> bool {
+        !matches!(self, Self::Splice | Self::Truncated)
+    }
+
+    /// Whether the method takes a law.
+    pub fn is_offered(self, law: Law) -> bool {
+        self != Self::Truncated || !matches!(law, Law::Correspondence(_))
     }
 
     pub(crate) fn coupling<const D: usize>(self) -> Box<dyn Coupling<D>> {
@@ -78,6 +92,7 @@ impl Method {
             Self::Blending(function) => Box::new(Blending { function }),
             Self::Meshfree(influence) => Box::new(PartialStressMeshfree { influence }),
             Self::Elements(fit) => Box::new(PartialStressElements { fit }),
+            Self::Truncated => Box::new(Truncated),
         }
     }
 }
@@ -237,7 +252,7 @@ pub struct Enclosed<const D: usize> {
 }
 
 impl<const D: usize> Enclosed<D> {
-    /// Builds and assembles a case; the lattice's points are the integer multiples of h.
+    /// Builds and assembles a case; the lattice's points are the integer multiples of h, or with truncated bonds halfway between.
     ///
     /// # Errors
     /// [`EnclosedError`] of the mesh or the model.
@@ -258,6 +273,11 @@ impl<const D: usize> Enclosed<D> {
         let law = case.law.law::<D>();
         let tensor = *law.tensor();
         let horizon = f64::from(case.ratio) * SPACING;
+        // truncated bonds want the seam halfway between points
+        let origin = match case.method {
+            Method::Truncated => Vector::repeat(0.5 * SPACING),
+            _ => Vector::zeros(),
+        };
         let problem = Problem {
             cell_material: vec![0; mesh.cell_count()],
             mesh,
@@ -269,7 +289,7 @@ impl<const D: usize> Enclosed<D> {
                 horizon: Arc::new(move |_| horizon),
                 points: PointSource::Lattice {
                     spacing: SPACING,
-                    origin: Vector::zeros(),
+                    origin,
                 },
                 weights: BondWeights::Isotropic,
                 barriers: Vec::new(),

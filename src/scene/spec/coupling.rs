@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use crate::coupling::{
     Blending, BlendingFunction, Coupling, FitDegree, Local, Nonlocal, PartialStressElements,
-    PartialStressMeshfree, Splice, Zone,
+    PartialStressMeshfree, Splice, Truncated, Zone,
 };
 use crate::peridynamics::Influence;
 
@@ -24,6 +24,8 @@ pub enum CouplingSpec {
     Blending(BlendingSpec),
     /// Partial stress in the transition zone (eq. 2.19 to 2.29).
     PartialStress(PartialStressSpec),
+    /// Bonds that end on the faces of elements: symmetric, in exact equilibrium.
+    Truncated(NoOptionsSpec),
     /// Finite elements everywhere.
     Local(NoOptionsSpec),
     /// Peridynamics everywhere.
@@ -46,6 +48,15 @@ pub enum ZonesNeeded {
     },
 }
 
+/// Where a lattice lies whose origin is not typed, relative to the mesh's lowest corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LatticeStart {
+    /// A point lies on the corner: on a mesh of the same spacing points coincide with nodes, and a seam interpolates nothing.
+    OnCorner,
+    /// The corner lies halfway between points: faces of the zone then pass between layers of points.
+    Halfway,
+}
+
 /// What is told of a coupling: its name, a line about it, and what it needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joining {
@@ -55,6 +66,8 @@ pub struct Joining {
     pub about: &'static str,
     /// The zones that it needs.
     pub zones: ZonesNeeded,
+    /// Where a lattice lies whose origin is not typed.
+    pub lattice: LatticeStart,
 }
 
 impl CouplingSpec {
@@ -65,6 +78,7 @@ impl CouplingSpec {
                 name: "splice",
                 about: "each site takes the whole force of its own model",
                 zones: ZonesNeeded::Nonlocal,
+                lattice: LatticeStart::OnCorner,
             },
             Self::Blending(_) => Joining {
                 name: "blending",
@@ -73,6 +87,7 @@ impl CouplingSpec {
                     width: 3.0,
                     why: "a smooth blending over three horizons cuts spurious forces a hundredfold",
                 },
+                lattice: LatticeStart::OnCorner,
             },
             Self::PartialStress(_) => Joining {
                 name: "partial-stress",
@@ -81,16 +96,25 @@ impl CouplingSpec {
                     width: 1.0,
                     why: "families of the nonlocal zone then reach past it",
                 },
+                lattice: LatticeStart::OnCorner,
+            },
+            Self::Truncated(_) => Joining {
+                name: "truncated",
+                about: "bonds that leave the nonlocal zone end on the faces of elements",
+                zones: ZonesNeeded::Nonlocal,
+                lattice: LatticeStart::Halfway,
             },
             Self::Local(_) => Joining {
                 name: "local",
                 about: "finite elements everywhere",
                 zones: ZonesNeeded::Everywhere(Zone::Local),
+                lattice: LatticeStart::OnCorner,
             },
             Self::Nonlocal(_) => Joining {
                 name: "nonlocal",
                 about: "peridynamics everywhere",
                 zones: ZonesNeeded::Everywhere(Zone::Nonlocal),
+                lattice: LatticeStart::OnCorner,
             },
         }
     }
@@ -115,6 +139,7 @@ impl CouplingSpec {
                 }),
                 FormSpec::Meshfree => Box::new(PartialStressMeshfree { influence }),
             },
+            Self::Truncated(_) => Box::new(Truncated),
             Self::Local(_) => Box::new(Local),
             Self::Nonlocal(_) => Box::new(Nonlocal),
         }
@@ -218,7 +243,14 @@ mod tests {
     fn a_coupling_is_called_what_its_variant_is_called() {
         assert_eq!(
             CouplingSpec::names(),
-            ["blending", "local", "nonlocal", "partial-stress", "splice"]
+            [
+                "blending",
+                "local",
+                "nonlocal",
+                "partial-stress",
+                "splice",
+                "truncated"
+            ]
         );
         for name in CouplingSpec::names() {
             let typed = format!("[coupling.{name}]");

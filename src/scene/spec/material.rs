@@ -202,7 +202,7 @@ pub struct LatticeSpec {
     /// Distance of neighbours h.
     pub spacing: Number,
     /// Any point of the lattice; the mesh's lowest corner if left out, so that points coincide with the nodes of a
-    /// mesh of the same spacing.
+    /// mesh of the same spacing; with the coupling `truncated` half a spacing inside of that corner.
     #[serde(default)]
     pub origin: Option<Coordinates>,
 }

@@ -12,8 +12,8 @@ mod region;
 pub use condition::{BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VoidSpec};
 pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec};
 pub use coupling::{
-    BetaSpec, BlendingSpec, CouplingSpec, FormSpec, InterfaceSpec, Joining, NoOptionsSpec,
-    PartialStressSpec, ZonesNeeded,
+    BetaSpec, BlendingSpec, CouplingSpec, FormSpec, InterfaceSpec, Joining, LatticeStart,
+    NoOptionsSpec, PartialStressSpec, ZonesNeeded,
 };
 pub use material::{
     BondBasedSpec, CorrespondenceSpec, InfluenceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec,

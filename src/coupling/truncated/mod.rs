@@ -1,0 +1,133 @@
+//! Truncated bonds: a seam that is symmetric, patch-exact and in exact equilibrium.
+//!
+//! | file | what |
+//! |---|---|
+//! | `seam.rs` | the faces of the peridynamic zone, and the pieces of a bond inside of it |
+//! | `segments.rs` | pieces with their ends, and their springs |
+//! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
+//! | `edges.rs` | strings along the edges of a zone in 3D |
+//!
+//! The energy is that of the finite elements, of the bonds within the peridynamic zone, and of the pieces of all other bonds of the lattice, continued behind the faces, that lie within the zone:
+//!
+//! ```text
+//! s · w(ξ, (u(q) − u(p)) / s)
+//! ```
+//!
+//! for a piece from `p` to `q` of the length `s`, a fraction of its bond ξ; an end within the zone is a point, an end on a face follows the trace of the element behind it. Under `u = G x` every piece
+//! pulls like the whole bond, so the forces on points cancel as far from the seam, and the forces on a face add up to the traction of the lattice. Pieces of bonds with both ends in elements
+//! (through a corner of the zone, or a zone thinner than a horizon) belong to the sum.
+
+mod dilatation;
+mod edges;
+mod seam;
+mod segments;
+
+use self::{
+    dilatation::Dilatations,
+    edges::Strings,
+    segments::{Segments, Springs},
+};
+use crate::{
+    assembly::Row,
+    coupling::{CellRole, Coupling, Interface, Model, ModelError, Operator, Reach, Zone},
+    mesh::Mesh,
+    peridynamics::BondLaw,
+    system::Symmetry,
+};
+
+/// Bonds that leave the peridynamic zone end on the faces of the elements around it.
+///
+/// Source: none; derived in `docs/truncated.md`. A transition zone, if the scene has one, is local. Pairwise laws and LPS on a regular lattice with one horizon.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Truncated;
+
+impl<const D: usize> Coupling<D> for Truncated {
+    fn name(&self) -> &'static str {
+        "truncated"
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Symmetric
+    }
+
+    fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
+        zones
+            .iter()
+            .map(|zone| match zone {
+                Zone::Nonlocal => CellRole::Points,
+                Zone::Transition | Zone::Local => CellRole::Element,
+            })
+            .collect()
+    }
+
+    fn reach(&self, _law: &dyn BondLaw<D>) -> Reach {
+        Reach::Own
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Faces
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        let (Some(body), Some(passing)) = (model.body(), model.passing()) else {
+            return Ok(Box::new(super::single::OwnModel { model }));
+        };
+        let segments = Segments::new(model, body, passing);
+        // a state reaches one family farther than a bond
+        let mut listed = segments.at_seam.clone();
+        if passing.whole.state.is_some() {
+            for i in (0..listed.len()).filter(|&i| segments.at_seam[i]) {
+                for &j in body.families.of(i) {
+                    listed[j as usize] |= segments.is_point(j);
+                }
+            }
+        }
+        let springs = Springs::new(&segments, &listed);
+        let dilatations = Dilatations::new(&segments, &listed)?;
+        let strings = Strings::new(&segments);
+        Ok(Box::new(TruncatedRows {
+            model,
+            strings,
+            springs,
+            dilatations,
+            listed,
+        }))
+    }
+}
+
+struct TruncatedRows<'a, const D: usize> {
+    model: &'a Model<D>,
+    springs: Springs<D>,
+    dilatations: Dilatations<D>,
+    strings: Strings<D>,
+    /// Points whose rows are sums of springs and dilatations, not rows of the body.
+    listed: Vec<bool>,
+}
+
+impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
+    fn add_row(&self, site: usize, row: &mut Row<D>) {
+        match self.model.point_of(site) {
+            Some((body, i)) if !self.listed[i] => {
+                body.add_force_row(i, |_| 1.0, row);
+                return;
+            }
+            Some(_) => {}
+            None => {
+                self.model.add_element_rows(site, row);
+                self.strings.add_row(site, row);
+            }
+        }
+        self.springs.add_row(site, row);
+        self.dilatations.add_row(site, row);
+    }
+
+    fn is_body_row(&self, site: usize) -> bool {
+        self.model
+            .point_of(site)
+            .is_some_and(|(_, i)| !self.listed[i])
+    }
+
+    fn beta(&self, site: usize) -> f64 {
+        f64::from(u8::from(self.model.point_of(site).is_some()))
+    }
+}

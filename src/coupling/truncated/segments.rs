@@ -1,0 +1,283 @@
+//! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and what they hand to dilatations.
+
+use std::collections::HashSet;
+
+use rayon::prelude::*;
+
+use super::seam::{Foot, Piece, Seam};
+use crate::{
+    assembly::{Row, Transfer},
+    coupling::{Model, SiteKind, model::Passing},
+    peridynamics::PdBody,
+    tensor::{Tensor, Vector},
+};
+
+const NONE: u32 = u32::MAX;
+
+/// An end of a piece.
+#[derive(Clone, Debug)]
+pub(super) enum End {
+    /// The point at which the bond ends, by its number in the cloud.
+    Point(u32),
+    /// A place on the faces.
+    Face(Foot),
+}
+
+/// A piece of the bond from point `i` to point `j` of the cloud.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    pub i: u32,
+    pub j: u32,
+    pub piece: Piece,
+    pub ends: [End; 2],
+}
+
+/// Which bonds are whole, and the pieces of those that are not.
+pub(super) struct Segments<'a, const D: usize> {
+    pub model: &'a Model<D>,
+    pub body: &'a PdBody<D>,
+    pub passing: &'a Passing<D>,
+    /// Site of each point of the cloud; `u32::MAX` for a point in an element.
+    pub site: Vec<u32>,
+    /// Pieces of bonds that leave the zone or pass through it.
+    pub cut: Vec<Segment>,
+    /// Bonds between points of the zone that are not whole, lower number first.
+    broken: HashSet<(u32, u32)>,
+    /// Whether a point has a bond that is not whole.
+    pub at_seam: Vec<bool>,
+}
+
+impl<'a, const D: usize> Segments<'a, D> {
+    /// Cuts all bonds near the seam.
+    pub fn new(model: &'a Model<D>, body: &'a PdBody<D>, passing: &'a Passing<D>) -> Self {
+        let cloud = &body.cloud;
+        let mut site = vec![NONE; cloud.position.len()];
+        for (s, of) in model.sites.iter().enumerate() {
+            if let SiteKind::Point(p) = of.kind {
+                site[p as usize] = s as u32;
+            }
+        }
+        let horizon = cloud.horizon.iter().copied().fold(0.0, f64::max);
+        let seam = Seam::new(model, horizon);
+        let found: Vec<Vec<(u32, u32, Vec<Segment>)>> = (0..cloud.position.len())
+            .into_par_iter()
+            .map(|i| {
+                let family = if site[i] == NONE {
+                    passing.families.of(i)
+                } else {
+                    body.families.of(i)
+                };
+                let mut list = Vec::new();
+                let mut pieces = Vec::new();
+                for &j in family.iter().filter(|&&j| j as usize > i) {
+                    let (a, b) = (&cloud.position[i], &cloud.position[j as usize]);
+                    if !seam.near(a, b) {
+                        continue;
+                    }
+                    seam.pieces(a, b, &mut pieces);
+                    let both = site[i] != NONE && site[j as usize] != NONE;
+                    let whole = |p: &Piece| p.from == 0.0 && p.to == 1.0 && p.share == 1.0;
+                    if both && pieces.len() == 1 && whole(&pieces[0]) {
+                        continue;
+                    }
+                    let segments = pieces
+                        .iter()
+                        .filter_map(|piece| {
+                            let end = |t: f64, point: u32, is_end: bool| {
+                                if is_end && site[point as usize] != NONE {
+                                    Some(End::Point(point))
+                                } else {
+                                    seam.foot(&(a + (b - a) * t)).map(End::Face)
+                                }
+                            };
+                            Some(Segment {
+                                i: i as u32,
+                                j,
+                                piece: *piece,
+                                ends: [
+                                    end(piece.from, i as u32, piece.from == 0.0)?,
+                                    end(piece.to, j, piece.to == 1.0)?,
+                                ],
+                            })
+                        })
+                        .collect();
+                    list.push((i as u32, j, segments));
+                }
+                list
+            })
+            .collect();
+        let mut cut = Vec::new();
+        let mut broken = HashSet::new();
+        let mut at_seam = vec![false; site.len()];
+        for (i, j, segments) in found.into_iter().flatten() {
+            for p in [i, j] {
+                at_seam[p as usize] |= site[p as usize] != NONE;
+            }
+            if site[i as usize] != NONE && site[j as usize] != NONE {
+                broken.insert((i, j));
+            }
+            cut.extend(segments);
+        }
+        Self {
+            model,
+            body,
+            passing,
+            site,
+            cut,
+            broken,
+            at_seam,
+        }
+    }
+
+    /// Whether a point of the cloud is a site.
+    pub fn is_point(&self, i: u32) -> bool {
+        self.site[i as usize] != NONE
+    }
+
+    /// Whether the bond between two points of the cloud lies in the zone as a whole.
+    pub fn is_whole(&self, i: u32, j: u32) -> bool {
+        self.site[i as usize] != NONE
+            && self.site[j as usize] != NONE
+            && !self.broken.contains(&(i.min(j), i.max(j)))
+    }
+
+    /// The coefficients `p` and `ω` that point `i` gives its bond to `j`; those of a whole family if it lies in an element.
+    pub fn coefficients(&self, i: u32, j: u32) -> (f64, f64) {
+        let xi = self.body.bond(i as usize, j as usize);
+        if self.site[i as usize] == NONE {
+            return self.passing.whole.of(&xi);
+        }
+        let (pair, omega) = self.body.kernel(i as usize);
+        match self.body.families.of(i as usize).binary_search(&j) {
+            Ok(k) => (pair[k], omega.get(k).copied().unwrap_or(0.0)),
+            Err(_) => (0.0, 0.0),
+        }
+    }
+
+    /// Stiffness of the bond's energy `½ k (ξ·η)²`.
+    pub fn stiffness(&self, i: u32, j: u32) -> f64 {
+        let volume = &self.body.cloud.volume;
+        (self.coefficients(i, j).0 + self.coefficients(j, i).0)
+            * volume[i as usize]
+            * volume[j as usize]
+    }
+
+    /// Sites and weights of the difference of displacement over a piece.
+    pub fn difference(&self, segment: &Segment) -> Vec<(u32, f64)> {
+        let mut row = Vec::new();
+        for (end, sign) in segment.ends.iter().zip([-1.0, 1.0]) {
+            match end {
+                End::Point(p) => row.push((self.site[*p as usize], sign)),
+                End::Face(foot) => row.extend(foot.trace.iter().map(|&(s, w)| (s, sign * w))),
+            }
+        }
+        row
+    }
+}
+
+/// Springs along bonds: the energy `½ k (ξ·D)²` of each, with `D = Σ w u`.
+pub(super) struct Springs<const D: usize> {
+    direction: Vec<Vector<D>>,
+    stiffness: Vec<f64>,
+    difference: Transfer,
+    of_site: BySite,
+}
+
+impl<const D: usize> Springs<D> {
+    /// All pieces, and the whole bonds of the points that `listed` names.
+    ///
+    /// A piece of the length s, as a fraction of its bond, has the energy `s w(D/s)`, so the stiffness `k/s`.
+    pub fn new(segments: &Segments<'_, D>, listed: &[bool]) -> Self {
+        let mut springs = Self {
+            direction: Vec::new(),
+            stiffness: Vec::new(),
+            difference: Transfer::new(),
+            of_site: BySite::default(),
+        };
+        let body = segments.body;
+        for s in &segments.cut {
+            let length = s.piece.to - s.piece.from;
+            springs
+                .direction
+                .push(body.bond(s.i as usize, s.j as usize));
+            springs
+                .stiffness
+                .push(segments.stiffness(s.i, s.j) * s.piece.share / length);
+            springs.difference.push(&segments.difference(s));
+        }
+        for i in 0..segments.site.len() as u32 {
+            if segments.site[i as usize] == NONE {
+                continue;
+            }
+            for &j in body.families.of(i as usize) {
+                let wanted = listed[i as usize] || listed[j as usize];
+                if j > i && wanted && segments.is_whole(i, j) {
+                    springs.direction.push(body.bond(i as usize, j as usize));
+                    springs.stiffness.push(segments.stiffness(i, j));
+                    springs.difference.push(&[
+                        (segments.site[i as usize], -1.0),
+                        (segments.site[j as usize], 1.0),
+                    ]);
+                }
+            }
+        }
+        let rows = springs.stiffness.len();
+        let difference = &springs.difference;
+        springs.of_site = BySite::new(segments.model.sites.len(), rows, |s, visit| {
+            difference.row(s).for_each(|(site, _)| visit(site));
+        });
+        springs
+    }
+
+    /// Adds the row of a site.
+    pub fn add_row(&self, site: usize, row: &mut Row<D>) {
+        for &s in self.of_site.of(site) {
+            let s = s as usize;
+            let weight = self
+                .difference
+                .row(s)
+                .find(|&(other, _)| other as usize == site)
+                .map_or(0.0, |(_, w)| w);
+            let xi = &self.direction[s];
+            let block: Tensor<D> = xi * xi.transpose() * (self.stiffness[s] * weight);
+            row.add(&self.difference, s, &block);
+        }
+    }
+}
+
+/// For each site the rows of a list that involve it.
+#[derive(Default)]
+pub(super) struct BySite {
+    offsets: Vec<usize>,
+    rows: Vec<u32>,
+}
+
+impl BySite {
+    /// Inverts a list of rows; `sites(row, visit)` visits the sites of one, each once.
+    pub fn new(count: usize, rows: usize, sites: impl Fn(usize, &mut dyn FnMut(u32))) -> Self {
+        let mut offsets = vec![0usize; count + 1];
+        for row in 0..rows {
+            sites(row, &mut |site| offsets[site as usize + 1] += 1);
+        }
+        for site in 0..count {
+            offsets[site + 1] += offsets[site];
+        }
+        let mut next = offsets.clone();
+        let mut list = vec![0u32; offsets[count]];
+        for row in 0..rows {
+            sites(row, &mut |site| {
+                list[next[site as usize]] = row as u32;
+                next[site as usize] += 1;
+            });
+        }
+        Self {
+            offsets,
+            rows: list,
+        }
+    }
+
+    /// The rows that involve a site.
+    pub fn of(&self, site: usize) -> &[u32] {
+        &self.rows[self.offsets[site]..self.offsets[site + 1]]
+    }
+}
