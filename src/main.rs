@@ -78,6 +78,9 @@ enum Command {
         /// Only a part, in seconds.
         #[arg(long)]
         quick: bool,
+        /// Also what takes an hour: all of the three-dimensional convergence study.
+        #[arg(long, conflicts_with = "quick")]
+        long: bool,
     },
 }
 
@@ -166,8 +169,17 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             let text = serde_json::to_string_pretty(&scene::schema());
             print(text.map_err(|e| miette::miette!("{e}"))?)?;
         }
-        Command::Verify { name, json, quick } => {
-            let effort = if quick { Effort::Quick } else { Effort::Full };
+        Command::Verify {
+            name,
+            json,
+            quick,
+            long,
+        } => {
+            let effort = match (quick, long) {
+                (true, _) => Effort::Quick,
+                (_, true) => Effort::Long,
+                _ => Effort::Full,
+            };
             let progress = TerminalProgress::on_stderr();
             let tables: Vec<report::Table> = verify::SUITES
                 .iter()

@@ -3,7 +3,7 @@
 use bondline::{
     observe::report::{Table, Verdict},
     progress::Silent,
-    verify::{Effort, balance, tangents, weights},
+    verify::{Effort, balance, partial_volumes, tangents, weights},
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -53,4 +53,13 @@ fn tangents_are_derivatives_of_energies() {
     assert_no_short(&tables);
     assert_eq!(count(&tables, "difference", Verdict::Pass), 3 * 3 * 2);
     assert!(count(&tables, "threads", Verdict::Pass) >= 6);
+}
+
+#[test]
+fn partial_volumes_fill_the_ball() {
+    let tables = partial_volumes::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    // exact in three dimensions, the ramp of HHB in one; rectangles, boxes, hexahedra
+    assert_eq!(count(&tables, "largest", Verdict::Pass), 4 + 1);
+    assert_eq!(count(&tables, "sum against", Verdict::Pass), 2);
 }

@@ -9,6 +9,7 @@
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is; `bond_based.rs`, `lps.rs`, `correspondence.rs` | eq. (3.1), (5.16), section 7.2 |
 //! | `fracture.rs` | critical stretch from the fracture energy | [Silling2005] |
+//! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
 //! | `kernel/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
 
@@ -23,6 +24,7 @@ pub mod kernel;
 pub mod law;
 mod least_change;
 pub mod lps;
+pub mod partial_volume;
 pub mod shape_tensor;
 pub mod shells;
 pub mod weights;
@@ -35,6 +37,7 @@ pub use fracture::{BondEnergy, FractureError};
 pub use influence::{Influence, Micromodulus};
 pub use law::{BondLaw, Family, StatePart, collapsed_tensor};
 pub use lps::LinearPeridynamicSolid;
+pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shells::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
 pub use weights::{Bound, Conditions, FitError};

@@ -7,6 +7,8 @@
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
 //! | `bar` | the coupled bar of [SAND2015-7998] section 7.3 |
+//! | `partial-volumes` | weights of full families, other cells, cost of the closed forms |
+//! | `convergence` | the studies of [SAND2015-7998] chapter 5 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
@@ -17,9 +19,11 @@
 pub mod balance;
 pub mod bar;
 pub mod bobaru;
+pub mod convergence;
 pub mod emmrich_weckner;
 pub mod enclosed;
 pub mod fields;
+pub mod partial_volumes;
 pub mod patch;
 pub mod spectrum;
 pub mod strip;
@@ -35,12 +39,16 @@ pub use weights::weights;
 use crate::{observe::report::Table, progress::Progress};
 
 /// How much of a suite is run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+///
+/// Ordered: what runs at one effort runs at every greater one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effort {
     /// Every method, law and dimension at least once, in seconds.
     Quick,
-    /// Everything.
+    /// Everything that takes minutes.
     Full,
+    /// Everything, also what takes hours.
+    Long,
 }
 
 /// A named set of measurements.
@@ -80,6 +88,16 @@ pub const SUITES: &[Suite] = &[
         name: "bar",
         about: "the coupled bar of SAND2015-7998 section 7.3: deviation from the straight line",
         run: bar::run,
+    },
+    Suite {
+        name: "partial-volumes",
+        about: "partial lengths, areas and volumes: sums over full families, other cells, cost",
+        run: partial_volumes::run,
+    },
+    Suite {
+        name: "convergence",
+        about: "SAND2015-7998 chapter 5, figures 5.3, 5.5 and 5.8: errors and orders of every kernel; --long for all of 3D",
+        run: convergence::run,
     },
     Suite {
         name: "variable-horizon",

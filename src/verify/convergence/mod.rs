@@ -1,0 +1,111 @@
+//! Convergence of meshfree quadratures: the studies of [SAND2015-7998] chapter 5, figures 5.3, 5.5 and 5.8.
+//!
+//! | file | what |
+//! |---|---|
+//! | `problem.rs` | the manufactured problems (5.9), (5.13), (5.19) |
+//! | `stencil.rs` | the operator of a lattice, without a list of bonds |
+//! | `transform.rs` | the convolution that applies it |
+//! | `norms.rs` | error norms, observed orders, medians |
+//! | `study.rs` | all kernels over a range of N |
+//! | `statements.rs` | what the text concludes from its figures, row by row |
+//!
+//! The figures have no numbers in the text; what it concludes from them does, and each conclusion is a row. The norm decides the order: the text
+//! says "L²", and only the norm of the piecewise constant function shows what it reports.
+
+pub mod norms;
+pub mod problem;
+mod statements;
+pub mod stencil;
+pub mod study;
+pub mod transform;
+
+use crate::{
+    observe::report::{Columns, Row, Table},
+    progress::Progress,
+    verify::Effort,
+};
+use study::{KERNELS, Study, grid_sizes};
+
+/// The suite `convergence`.
+pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let mut tables = of_dimension::<1>(effort, progress);
+    tables.extend(of_dimension::<2>(effort, progress));
+    tables.extend(of_dimension::<3>(effort, progress));
+    progress.finish();
+    tables
+}
+
+fn of_dimension<const D: usize>(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let sizes = grid_sizes::<D>(effort);
+    if sizes.is_empty() {
+        return Vec::new();
+    }
+    let cases = (2 * KERNELS.len() * sizes.len()) as u64;
+    progress.stage(&format!("convergence, {D}D"), Some(cases));
+    let study = Study::run::<D>(&sizes, progress);
+    let mut tables = vec![figures::<D>(&study)];
+    if let Some(table) = statements::table::<D>(&study) {
+        tables.push(table);
+    }
+    tables
+}
+
+/// Name of a figure of the report.
+fn figure<const D: usize>() -> &'static str {
+    ["figure 5.3", "figure 5.5", "figure 5.8"][D - 1]
+}
+
+/// Medians and orders of every kernel, in all norms.
+fn figures<const D: usize>(study: &Study) -> Table {
+    let sizes = study.sizes();
+    let range = match (sizes.first(), sizes.last()) {
+        (Some(a), Some(b)) if a != b => format!("{} values of N from {a} to {b}", sizes.len()),
+        (Some(a), _) => format!("N = {a}"),
+        _ => String::new(),
+    };
+    let mut table = Table::new(
+        format!(
+            "{D}D, {}: error of {range} (median), and observed order over N >= {}",
+            figure::<D>(),
+            study::FIT_FROM
+        ),
+        Columns::ByQuantity,
+    );
+    for curve in &study.curves {
+        let case = format!("{D}D {}", curve.name::<D>());
+        if let Some(why) = &curve.failure {
+            table.push(Row::refused(case, "median, nodal L2", why.clone()));
+            continue;
+        }
+        for norm in study::Norm::ALL {
+            table.push(Row::info(
+                &case,
+                format!("median, {}", norm.name()),
+                curve.median(norm),
+            ));
+        }
+        if study.fits() {
+            for norm in study::Norm::ALL {
+                table.push(order_row(
+                    &case,
+                    format!("order, {}", norm.name()),
+                    curve.order(norm),
+                ));
+            }
+        }
+    }
+    table
+}
+
+/// An order; a kernel that is exact at some N (1D, α = 1, exact lengths at whole δ/h) has none.
+fn order_row(case: &str, quantity: String, order: f64) -> Row {
+    if order.is_finite() {
+        Row::info(case, quantity, order)
+    } else {
+        Row::refused(
+            case,
+            quantity,
+            "the error is zero at some N, so that there is no order",
+        )
+    }
+}
