@@ -69,7 +69,7 @@ enum Command {
     Schema,
     /// Measure what the code claims, as tables with limits; the exit status is 1 if any row is short.
     Verify {
-        /// One suite; all of them if left out.
+        /// One suite; all of them if left out, but for those that take an hour.
         #[arg(value_parser = suites())]
         name: Option<String>,
         /// Print one JSON array of all rows.
@@ -78,9 +78,6 @@ enum Command {
         /// Only a part, in seconds.
         #[arg(long)]
         quick: bool,
-        /// Also what takes an hour: all of the three-dimensional convergence study.
-        #[arg(long, conflicts_with = "quick")]
-        long: bool,
     },
 }
 
@@ -169,21 +166,15 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             let text = serde_json::to_string_pretty(&scene::schema());
             print(text.map_err(|e| miette::miette!("{e}"))?)?;
         }
-        Command::Verify {
-            name,
-            json,
-            quick,
-            long,
-        } => {
-            let effort = match (quick, long) {
-                (true, _) => Effort::Quick,
-                (_, true) => Effort::Long,
-                _ => Effort::Full,
-            };
+        Command::Verify { name, json, quick } => {
+            let effort = if quick { Effort::Quick } else { Effort::Full };
             let progress = TerminalProgress::on_stderr();
-            let tables: Vec<report::Table> = verify::SUITES
-                .iter()
-                .filter(|s| name.as_ref().is_none_or(|name| name == s.name))
+            let chosen: Vec<&verify::Suite> = match &name {
+                None => verify::SUITES.iter().collect(),
+                Some(name) => verify::suite(name).into_iter().collect(),
+            };
+            let tables: Vec<report::Table> = chosen
+                .into_iter()
                 .flat_map(|s| (s.run)(effort, &progress))
                 .collect();
             let format = if json {
@@ -202,6 +193,7 @@ fn suites() -> PossibleValuesParser {
     PossibleValuesParser::new(
         verify::SUITES
             .iter()
+            .chain(verify::LONG_SUITES)
             .map(|s| PossibleValue::new(s.name).help(s.about)),
     )
 }

@@ -130,7 +130,7 @@ fn laws(effort: Effort) -> Vec<(&'static str, Law)> {
         ),
         ("LPS", Law::StateBased(INFLUENCE)),
     ];
-    if effort >= Effort::Full {
+    if effort == Effort::Full {
         laws.extend([
             ("bond-based c", Law::BondBased(Micromodulus::Uniform)),
             (
@@ -149,7 +149,7 @@ fn laws(effort: Effort) -> Vec<(&'static str, Law)> {
 
 /// Out-of-balance force at one seam of a bar, under cubic and quartic fields.
 pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
-    let ratios: &[u32] = if effort >= Effort::Full {
+    let ratios: &[u32] = if effort == Effort::Full {
         &[3, 4, 6]
     } else {
         &[3]
@@ -247,7 +247,7 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
         "Largest spurious force per unit displacement of a single site, times h/C over the face of a point; transition zones 3 delta wide",
         Columns::Full,
     );
-    let ratios: &[u32] = if effort >= Effort::Full {
+    let ratios: &[u32] = if effort == Effort::Full {
         &[3, 4, 6]
     } else {
         &[3]
@@ -283,7 +283,7 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
             );
         }
     }
-    if effort >= Effort::Full {
+    if effort == Effort::Full {
         for law in Law::ALL {
             let cases: Vec<Case> = offered(&methods, law)
                 .into_iter()

@@ -219,7 +219,7 @@ pub fn cases<const D: usize>(effort: Effort) -> Vec<Case> {
             for kind in Cells::ALL {
                 let wanted = match (effort, D) {
                     _ if D == 1 && kind == Cells::Simplices => false,
-                    (Effort::Full | Effort::Long, _) | (Effort::Quick, 1) => true,
+                    (Effort::Full, _) | (Effort::Quick, 1) => true,
                     (Effort::Quick, 2) => {
                         !matches!(kind, Cells::Jittered)
                             && method != Method::ALL[2]
@@ -328,7 +328,7 @@ pub fn patch(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         table::<2>(effort, progress),
         table::<3>(effort, progress),
     ];
-    if effort >= Effort::Full {
+    if effort == Effort::Full {
         tables.push(influence::table(progress));
     }
     progress.finish();

@@ -416,7 +416,7 @@ pub fn tangents(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             add(&mut bodies, local_rows::<1>(cells), cells.name());
         }
         add(&mut bodies, local_rows::<2>(cells), cells.name());
-        if effort >= Effort::Full {
+        if effort == Effort::Full {
             add(&mut bodies, local_rows::<3>(cells), cells.name());
         }
     }

@@ -332,7 +332,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     dimension::<1>(SPACING_1D, 1, &laws, &mut table, progress);
     let laws = match effort {
         Effort::Quick => &laws[..1],
-        Effort::Full | Effort::Long => &laws,
+        Effort::Full => &laws,
     };
     dimension::<3>(SPACING_3D, ACROSS, laws, &mut table, progress);
     let constant = profile::<1>(

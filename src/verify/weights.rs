@@ -169,7 +169,7 @@ fn kernels() -> Vec<(String, Law)> {
 
 /// The table of a dimension.
 pub fn table<const D: usize>(effort: Effort, progress: &dyn Progress) -> Table {
-    let ratios = if effort >= Effort::Full { 2..=6 } else { 2..=3 };
+    let ratios = if effort == Effort::Full { 2..=6 } else { 2..=3 };
     let cases: Vec<(String, Law, u32)> = kernels()
         .into_iter()
         .flat_map(|(name, law)| ratios.clone().map(move |m| (name.clone(), law, m)))

@@ -26,27 +26,35 @@ use crate::{
 };
 use study::{KERNELS, Study, grid_sizes};
 
-/// The suite `convergence`.
+/// The suite `convergence`: bars and plates in full, solids to N = 90.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let mut tables = of_dimension::<1>(effort, progress);
-    tables.extend(of_dimension::<2>(effort, progress));
-    tables.extend(of_dimension::<3>(effort, progress));
+    let mut tables = of_dimension::<1>(&grid_sizes(1), progress);
+    let planes = grid_sizes(if effort == Effort::Quick { 15 } else { 1 });
+    tables.extend(of_dimension::<2>(&planes, progress));
+    if effort == Effort::Full {
+        tables.extend(of_dimension::<3>(&[75, 90], progress));
+    }
     progress.finish();
     tables
 }
 
-fn of_dimension<const D: usize>(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let sizes = grid_sizes::<D>(effort);
-    if sizes.is_empty() {
-        return Vec::new();
+/// The suite `convergence-3d`: solids from N = 75 to 150 in steps of 15, quickly only the first.
+pub fn run_solid(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let mut sizes = grid_sizes(15);
+    if effort == Effort::Quick {
+        sizes.truncate(1);
     }
+    let tables = of_dimension::<3>(&sizes, progress);
+    progress.finish();
+    tables
+}
+
+fn of_dimension<const D: usize>(sizes: &[usize], progress: &dyn Progress) -> Vec<Table> {
     let cases = (2 * KERNELS.len() * sizes.len()) as u64;
     progress.stage(&format!("convergence, {D}D"), Some(cases));
-    let study = Study::run::<D>(&sizes, progress);
+    let study = Study::run::<D>(sizes, progress);
     let mut tables = vec![figures::<D>(&study)];
-    if let Some(table) = statements::table::<D>(&study) {
-        tables.push(table);
-    }
+    tables.extend(statements::table::<D>(&study));
     tables
 }
 

@@ -12,7 +12,6 @@ use crate::{
         influence::{Alpha, Degree},
     },
     progress::Progress,
-    verify::Effort,
 };
 
 /// First N of the fitted orders, up to 150; before it the curves of smooth kernels still bend.
@@ -145,15 +144,9 @@ pub struct Study {
     pub curves: Vec<Curve>,
 }
 
-/// The numbers of points along an edge that an effort runs.
-pub fn grid_sizes<const D: usize>(effort: Effort) -> Vec<usize> {
-    match (D, effort) {
-        (1, _) | (2, Effort::Full | Effort::Long) => (75..=150).collect(),
-        (2, Effort::Quick) => (75..=150).step_by(15).collect(),
-        (_, Effort::Quick) => vec![],
-        (_, Effort::Full) => vec![75, 90],
-        (_, Effort::Long) => (75..=150).step_by(15).collect(),
-    }
+/// The numbers of points along an edge in the figures of the report: every one, or every so many.
+pub fn grid_sizes(step: usize) -> Vec<usize> {
+    (75..=150).step_by(step).collect()
 }
 
 impl Study {
