@@ -518,31 +518,14 @@ impl<const D: usize> BondPass<D> for List<D> {
         if matches!(self.limit, Limit::Never) {
             return Vec::new();
         }
-        let mut state: Vec<u64> = self
-            .intact
-            .chunks(8)
-            .map(|c| {
-                let mut word = [0; 8];
-                word[..c.len()].copy_from_slice(c);
-                u64::from_le_bytes(word)
-            })
-            .collect();
-        state.push(self.reference);
-        state
+        super::pack(&self.intact, self.reference)
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
         if matches!(self.limit, Limit::Never) {
             return state.is_empty();
         }
-        let words = self.intact.len().div_ceil(8);
-        if state.len() != words + 1 || state[words] != self.reference {
-            return false;
-        }
-        for (bytes, word) in self.intact.chunks_mut(8).zip(state) {
-            bytes.copy_from_slice(&word.to_le_bytes()[..bytes.len()]);
-        }
-        true
+        super::unpack(state, self.reference, &mut self.intact)
     }
 
     fn memory_bytes(&self) -> usize {

@@ -5,15 +5,27 @@
 //! | `setup.rs` | what a pass is made from, and the errors |
 //! | `bond.rs` | one bond: stretch, force and extension without cancellation |
 //! | `list.rs` | the pass over neighbour lists, for any cloud |
-//! | `tests.rs` | passes against a plain double loop |
+//! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
+//! | `lattice_build.rs` | how that one is made |
+//! | `stencil.rs` | the lattice's padded box, its offsets and bits |
+//! | `sweep.rs` | the inner loops of the lattice pass |
+//! | `lanes.rs` | eight numbers at a time, by the machine's widest instructions |
+//! | `oracle.rs`, `tests.rs` | passes against a plain double loop |
 //!
 //! A bond is seen through `t = (2 ξ·η + η·η)/r²`, so that `|ξ + η| = r √(1 + t)`: no length is ever the difference of two long ones, and the stretch
 //! `s = √(1 + t) − 1` exceeds `s_c` exactly where `t > s_c (2 + s_c)`, without a root. Both ends of a bond compute the same `t` from the same numbers,
 //! hence break together without telling each other. Every method gives the same bits for any number of threads.
 
 mod bond;
+mod lanes;
+mod lattice;
+mod lattice_build;
 mod list;
+#[cfg(test)]
+mod oracle;
 mod setup;
+mod stencil;
+mod sweep;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +33,8 @@ pub use setup::{
     BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Kinematics, Layout,
     Storage,
 };
+
+pub use stencil::BlockSetup;
 
 use crate::system::Breakage;
 
@@ -70,10 +84,59 @@ pub trait BondPass<const D: usize>: Send + Sync {
 /// The pass that suits the setup: over the lattice where the points fill one, over lists otherwise.
 ///
 /// # Errors
-/// [`KernelError`] if lists do not belong together, or if a bond does not weigh the same from both ends.
+/// [`KernelError`] if lists do not belong together, if a bond does not weigh the same from both ends, or if the lattice pass was asked for where there is no lattice.
 pub fn bond_pass<const D: usize>(
     setup: &BondSetup<'_, D>,
 ) -> Result<Box<dyn BondPass<D>>, KernelError> {
     setup.check()?;
+    if setup.layout != Layout::List {
+        match lattice::Lattice::new(setup) {
+            Ok(pass) => return Ok(Box::new(pass)),
+            Err(why) if setup.layout == Layout::Lattice => {
+                return Err(KernelError::NoLattice { why });
+            }
+            Err(_) => {}
+        }
+    }
     Ok(Box::new(list::List::new(setup)))
+}
+
+/// The pass of a full block of a lattice, without lists on the way.
+///
+/// # Errors
+/// [`KernelError::NoLattice`] if its box is too large to be numbered.
+pub fn block_pass<const D: usize>(
+    setup: &BlockSetup<'_, D>,
+) -> Result<Box<dyn BondPass<D>>, KernelError> {
+    match lattice::Lattice::block(setup) {
+        Ok(pass) => Ok(Box::new(pass)),
+        Err(why) => Err(KernelError::NoLattice { why }),
+    }
+}
+
+/// The instruction set that passes run with on this machine; results do not depend on it.
+pub fn instructions() -> &'static str {
+    lanes::instructions()
+}
+
+/// Bits as words, with a last word by which [`unpack`] knows them.
+fn pack(bits: &[u8], reference: u64) -> Vec<u64> {
+    let word = |c: &[u8]| {
+        let mut word = [0; 8];
+        word[..c.len()].copy_from_slice(c);
+        u64::from_le_bytes(word)
+    };
+    bits.chunks(8).map(word).chain([reference]).collect()
+}
+
+/// Bits from words; false, and nothing changed, if they are not what [`pack`] gave for as many bits and bonds.
+fn unpack(state: &[u64], reference: u64, bits: &mut [u8]) -> bool {
+    let words = bits.len().div_ceil(8);
+    if state.len() != words + 1 || state[words] != reference {
+        return false;
+    }
+    for (bits, word) in bits.chunks_mut(8).zip(state) {
+        bits.copy_from_slice(&word.to_le_bytes()[..bits.len()]);
+    }
+    true
 }

@@ -20,6 +20,8 @@ pub enum Layout {
     Automatic,
     /// Lists, whatever the points.
     List,
+    /// The lattice pass, or an error that says why it cannot be.
+    Lattice,
 }
 
 /// How the list pass stores the weights of its bonds.
@@ -145,6 +147,12 @@ pub enum KernelError {
         point: usize,
         /// Its weighted volume.
         weighted_volume: f64,
+    },
+    /// The lattice pass was asked for where there is none.
+    #[error("bond pass: no lattice pass, {why}; choose the automatic layout")]
+    NoLattice {
+        /// What stands against it.
+        why: String,
     },
 }
 
