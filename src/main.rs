@@ -4,19 +4,30 @@ use std::fmt::Display;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use bondline::observe::checkpoint::Pace;
 use bondline::observe::progress::TerminalProgress;
 use bondline::observe::report;
-use bondline::scene::{self, AnyScene, Template};
+use bondline::observe::summary::Ended;
+use bondline::scene::{self, AnyScene, RunOptions, StartFrom, Template};
 use bondline::verify::{self, Effort};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Parser, Subcommand, ValueEnum};
+
+/// Exit status of a run that stopped where damage reached the edge of the nonlocal zone.
+const AT_EDGE: u8 = 3;
+
+/// Exit status of a run that was interrupted and left a checkpoint, as shells have it.
+const INTERRUPTED: u8 = 130;
 
 const EXAMPLES: &str = "Examples:
   bondline new plate.toml                     write a commented scene to start from
   bondline check plate.toml                   say what is wrong with it, and how large it is
   bondline run plate.toml                     solve it and write out/plate.vtu for ParaView
   bondline run plate.toml --set coupling=splice --set peridynamics.horizon=0.04
+  bondline run wave.toml --checkpoint-every 10min   a scene in time; Ctrl-C leaves a checkpoint
+  bondline run wave.toml --resume             go on where it stopped
   bondline run plate.toml --json              the summary as JSON on standard output
   bondline schema > bondline.schema.json      completion and checks in an editor";
 
@@ -33,7 +44,8 @@ enum Command {
     /// Solve a scene and write its results.
     #[command(
         after_help = "Any key of the scene can be set: --set mesh.rectangle.x.cells=240, --set coupling=local, \
-                            --set 'conditions.top.displacement.y=\"1e-3*x\"'. A choice that differs replaces the whole table."
+                            --set 'conditions.top.displacement.y=\"1e-3*x\"'. A choice that differs replaces the whole table.\n\n\
+                            Exit status: 0 done, 1 wrong or impossible, 2 wrong arguments, 3 damage reached the edge of the nonlocal zone, 130 interrupted."
     )]
     Run {
         #[command(flatten)]
@@ -47,6 +59,12 @@ enum Command {
         /// Number of threads; all cores if left out.
         #[arg(long, value_name = "N")]
         threads: Option<usize>,
+        /// Write a checkpoint after so many steps, or so much time: 1000, 30s, 10min, 2h.
+        #[arg(long, value_name = "PACE")]
+        checkpoint_every: Option<Pace>,
+        /// Go on from the last checkpoint in the output folder; from the beginning if there is none yet.
+        #[arg(long)]
+        resume: bool,
     },
     /// Validate a scene and predict its size, memory and time, without solving it.
     Check {
@@ -117,6 +135,8 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             json,
             output,
             threads,
+            checkpoint_every,
+            resume,
         } => {
             if let Some(n) = threads {
                 rayon::ThreadPoolBuilder::new()
@@ -128,14 +148,34 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             if let Some(directory) = output {
                 scene.set_output_directory(directory);
             }
+            if !scene.moves() && (resume || checkpoint_every.is_some()) {
+                return Err(miette::miette!(
+                    "a static scene has no checkpoints: leave out --resume and --checkpoint-every, or add [solve.explicit]"
+                ));
+            }
+            let options = RunOptions {
+                start: if resume {
+                    StartFrom::Checkpoint
+                } else {
+                    StartFrom::Beginning
+                },
+                checkpoint_every,
+                interrupt: scene.moves().then(interrupt).transpose()?,
+            };
             let summary = scene
-                .run(&TerminalProgress::on_stderr())
+                .run_with(&options, &TerminalProgress::on_stderr())
                 .map_err(|e| miette::miette!("{e}"))?;
+            let code = match summary.motion.as_ref().map(|m| m.ended) {
+                None | Some(Ended::Finished) => ExitCode::SUCCESS,
+                Some(Ended::DamageAtEdge) => ExitCode::from(AT_EDGE),
+                Some(Ended::Interrupted) => ExitCode::from(INTERRUPTED),
+            };
             if json {
                 print(summary.json().map_err(|e| miette::miette!("{e}"))?)?;
             } else {
                 print(summary)?;
             }
+            return Ok(code);
         }
         Command::Check { scene, json } => {
             let scene = load(&scene)?;
@@ -187,6 +227,18 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A flag that Ctrl-C or a termination sets; the second one ends the program at once.
+fn interrupt() -> miette::Result<&'static AtomicBool> {
+    static FLAG: AtomicBool = AtomicBool::new(false);
+    ctrlc::set_handler(|| {
+        if FLAG.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(INTERRUPTED));
+        }
+    })
+    .map_err(|e| miette::miette!("cannot watch for Ctrl-C: {e}"))?;
+    Ok(&FLAG)
 }
 
 fn suites() -> PossibleValuesParser {

@@ -14,6 +14,9 @@ pub trait Progress: Sync {
     /// Reports `by` further steps of the current stage.
     fn advance(&self, by: u64);
 
+    /// Says how the current stage stands, in a few words; for whoever watches.
+    fn tell(&self, _text: &str) {}
+
     /// Ends the last stage.
     fn finish(&self);
 }

@@ -180,13 +180,21 @@ fn expression_that_ends_early() {
 
 #[test]
 fn expression_in_time() {
-    let e = error("\"1 + x\"", "\"sin(t)\"");
+    let e = wrong("\"1 + x\"", "\"sin(t)\"");
     check(
         &e,
-        SceneErrorKind::WrongValue,
+        SceneErrorKind::Conflict,
         "\"sin(t)\"",
-        "explicit driver",
-        "",
+        "time t in a static scene",
+        "[solve.explicit]",
+    );
+    let e = wrong("\"3/10\"", "\"0.3 + 0 * t\"");
+    check(
+        &e,
+        SceneErrorKind::Conflict,
+        "\"0.3 + 0 * t\"",
+        "`peridynamics.horizon` depends on the time",
+        "conditions",
     );
 }
 

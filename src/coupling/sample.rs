@@ -49,26 +49,30 @@ impl<'a, const D: usize> Sampler<'a, D> {
     /// The displacement at `x` \[m\]: a site's own where one lies there, else by shape functions, else by an affine fit to the points within 1.6 spacings.
     /// `None` outside of the body.
     pub fn displacement(&self, x: &Vector<D>, u: &[f64]) -> Option<Vector<D>> {
+        let weights = self.weights(x)?;
         let of_site = |s: u32| Vector::<D>::from_fn(|a, _| u[s as usize * D + a]);
+        Some(weights.into_iter().map(|(s, w)| of_site(s) * w).sum())
+    }
+
+    /// The sites, with their weights, that the displacement at `x` \[m\] follows; the same for velocities. `None` outside of the body.
+    pub fn weights(&self, x: &Vector<D>) -> Option<Vec<(u32, f64)>> {
         let h = self.model.spacing();
         let near = self.points_near(x, 1.6 * h);
         let position = |s: u32| self.model.sites[s as usize].position;
         if let Some(&s) = near.iter().find(|&&s| (position(s) - x).norm() <= 1e-9 * h) {
-            return Some(of_site(s));
+            return Some(vec![(s, 1.0)]);
         }
         if let Some(located) = self.elements.locate(&self.model.mesh, x, 1e-9) {
             let nodes = self.model.mesh.cell(located.cell);
-            return Some(
-                nodes
-                    .iter()
-                    .zip(&located.shape)
-                    .map(|(&n, &w)| self.model.node_transfer.displacement::<D>(n as usize, u) * w)
-                    .sum(),
-            );
+            let row = |(&n, &w): (&u32, &f64)| {
+                let row = self.model.node_transfer.row(n as usize);
+                row.map(move |(site, v)| (site, v * w)).collect::<Vec<_>>()
+            };
+            return Some(nodes.iter().zip(&located.shape).flat_map(row).collect());
         }
         let data: Vec<Vector<D>> = near.iter().map(|&s| position(s)).collect();
         let weights = derivative::fit(x, &data, FitDegree::Affine)?;
-        Some(near.iter().zip(weights).map(|(&s, w)| of_site(s) * w).sum())
+        Some(near.into_iter().zip(weights).collect())
     }
 
     /// What carries the displacement at `x` \[m\]; `None` farther than 1.6 spacings from any point and outside of all elements.

@@ -1,7 +1,7 @@
 //! Tables of numbers that grow row by row: values along a line, at probes, over steps.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::ObserveError;
@@ -74,6 +74,49 @@ impl CsvTable {
         Ok(table)
     }
 
+    /// Goes on with a table of which the first `bytes` stand; what follows them is cut off.
+    ///
+    /// # Errors
+    /// [`ObserveError::Write`], or [`ObserveError::Shortened`] if the file holds less.
+    pub fn resume(path: &Path, header: &[&str], bytes: u64) -> Result<Self, ObserveError> {
+        let fail = |source| ObserveError::Write {
+            path: path.to_path_buf(),
+            source,
+        };
+        let mut file = File::options().write(true).open(path).map_err(fail)?;
+        let found = file.metadata().map_err(fail)?.len();
+        if found < bytes {
+            return Err(ObserveError::Shortened {
+                path: path.to_path_buf(),
+                expected: bytes,
+                found,
+            });
+        }
+        file.set_len(bytes).map_err(fail)?;
+        file.seek(SeekFrom::End(0)).map_err(fail)?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            out: BufWriter::new(file),
+            header: header.iter().map(|&h| h.to_owned()).collect(),
+            rows: 0,
+        })
+    }
+
+    /// Forces all rows to the disk; returns the length of the file.
+    ///
+    /// # Errors
+    /// [`ObserveError::Write`].
+    pub fn mark(&self) -> Result<u64, ObserveError> {
+        let file = self.out.get_ref();
+        file.sync_data()
+            .and_then(|()| file.metadata())
+            .map(|m| m.len())
+            .map_err(|source| ObserveError::Write {
+                path: self.path.clone(),
+                source,
+            })
+    }
+
     /// Appends a row of numbers.
     ///
     /// # Errors
@@ -117,7 +160,7 @@ impl CsvTable {
         Ok(())
     }
 
-    /// Rows written so far, the header not counted.
+    /// Rows written since the table was made or resumed, the header not counted.
     pub fn rows(&self) -> usize {
         self.rows
     }

@@ -60,6 +60,34 @@ pub(super) fn write_whole(
     })
 }
 
+/// Forces a renamed file's entry in its folder to the disk, where the system knows of such a thing.
+pub(super) fn sync_folder(path: &Path) {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    // not every system opens folders; the file itself is on the disk by then
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+}
+
+/// Removes what killed runs left of files whose names begin with `name`.
+pub fn remove_parts(folder: &Path, name: &str) {
+    let beginning = format!(".{name}");
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let file = entry.file_name();
+        let file = file.to_string_lossy();
+        if file.starts_with(&beginning) && file.ends_with(".part") {
+            // what cannot be removed does no harm
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// Passes bytes on and replaces the first `old`, a tag that begins with `<`, by `new`.
 ///
 /// vtkio writes no field data, where VTK looks for the time, and can write the numbers of points as `UInt64` only, of which meshio makes floats.

@@ -3,6 +3,9 @@
 //! | file | what |
 //! |---|---|
 //! | `vtu.rs` | FE cells and PD points in one VTU, and a PVD over several |
+//! | `series.rs` | VTU files over time and their PVD |
+//! | `history.rs` | tables that grow with a run, and are cut where it resumes |
+//! | `checkpoint.rs` | the state of a run, whole or not at all |
 //! | `csv.rs` | values along a line or at probes, row by row |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs` | what one run did: sizes, choices, timings, balance |
@@ -10,12 +13,15 @@
 //! | `figure.rs`, `map.rs` | line plots and coloured fields as SVG |
 //! | `file.rs` | whole files or none: written beside, then renamed |
 
+pub mod checkpoint;
 pub mod csv;
 pub mod figure;
-mod file;
+pub mod file;
+pub mod history;
 pub mod map;
 pub mod progress;
 pub mod report;
+pub mod series;
 pub mod summary;
 pub mod vtu;
 
@@ -97,6 +103,16 @@ pub enum ObserveError {
         path: PathBuf,
         /// What is missing.
         what: &'static str,
+    },
+    /// A table that a run goes on with has lost rows.
+    #[error("{} holds {found} bytes, its checkpoint knows of {expected}; put the file back, or start again without --resume", path.display())]
+    Shortened {
+        /// The file.
+        path: PathBuf,
+        /// Bytes at the checkpoint.
+        expected: u64,
+        /// Bytes found.
+        found: u64,
     },
     /// A row of a table has the wrong number of entries.
     #[error("a row of {} has {found} entries where its header has {expected}; give one per column", path.display())]

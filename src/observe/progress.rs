@@ -91,7 +91,7 @@ fn record(bar: &ProgressBar) -> String {
 fn style(total: Option<u64>) -> ProgressStyle {
     let (template, plain) = match total {
         Some(_) => (
-            "{prefix:<24} [{bar:30}] {percent:>3} %  {elapsed} gone, {eta} left",
+            "{prefix:<24} [{bar:30}] {percent:>3} %  {elapsed} gone, {eta} left  {msg}",
             ProgressStyle::default_bar(),
         ),
         None => (
@@ -126,6 +126,13 @@ impl Progress for TerminalProgress {
         let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(bar) = &*bar {
             bar.inc(by);
+        }
+    }
+
+    fn tell(&self, text: &str) {
+        let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(bar) = &*bar {
+            bar.set_message(text.to_owned());
         }
     }
 

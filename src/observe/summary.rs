@@ -181,8 +181,106 @@ pub struct RunSummary {
     pub reactions: Vec<Reaction>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
     pub energy: Option<f64>,
+    /// What became of a scene in time; none of a static one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionSummary>,
     /// Files written.
     pub files: Vec<PathBuf>,
+}
+
+/// Why a run in time ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ended {
+    /// It reached the end of the scene.
+    Finished,
+    /// It was interrupted; its checkpoint takes it up again.
+    Interrupted,
+    /// Damage reached the edge of the nonlocal zone.
+    DamageAtEdge,
+}
+
+/// What became of a scene in time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionSummary {
+    /// Why it ended.
+    pub ended: Ended,
+    /// Steps since the beginning, those before a checkpoint included.
+    pub steps: u64,
+    /// Steps to the end of the scene.
+    pub of_steps: u64,
+    /// Time reached.
+    pub time: f64,
+    /// The time step.
+    pub step: f64,
+    /// The largest step that is taken to be stable; none where load steps are solved.
+    pub stable_step: Option<f64>,
+    /// Kinetic energy at the end.
+    pub kinetic_energy: f64,
+    /// Energy stored in the bodies at the end.
+    pub stored_energy: f64,
+    /// Work of loads and supports.
+    pub external_work: f64,
+    /// Energy at the start and work, less kinetic and stored energy: what broken bonds took, and what the seam did.
+    pub missing_energy: f64,
+    /// Bonds broken, each once for each direction.
+    pub broken_bonds: u64,
+    /// When damage reached the edge of the nonlocal zone, and where.
+    pub edge_reached: Option<(f64, Vec<f64>)>,
+    /// Steps per second of this run, writing included.
+    pub steps_per_second: f64,
+}
+
+impl MotionSummary {
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let share = self.stable_step.map_or_else(String::new, |stable| {
+            format!(" ({:.1} % of the stable step)", 100.0 * self.step / stable)
+        });
+        writeln!(
+            f,
+            "time                   {} after {} of {} steps of {}{share}",
+            number(self.time),
+            self.steps,
+            self.of_steps,
+            number(self.step)
+        )?;
+        writeln!(
+            f,
+            "speed                  {} steps/s",
+            number(self.steps_per_second)
+        )?;
+        for (name, value) in [
+            ("kinetic energy", self.kinetic_energy),
+            ("stored energy", self.stored_energy),
+            ("external work", self.external_work),
+            ("energy not accounted", self.missing_energy),
+        ] {
+            writeln!(f, "{name:<22} {}", number(value))?;
+        }
+        if self.broken_bonds > 0 {
+            writeln!(
+                f,
+                "broken bonds           {}",
+                grouped(self.broken_bonds as usize)
+            )?;
+        }
+        if let Some((time, place)) = &self.edge_reached {
+            writeln!(
+                f,
+                "warning: damage reached the edge of the nonlocal zone at t = {}, ({}): enlarge [zones.nonlocal] there",
+                number(*time),
+                components(place)
+            )?;
+        }
+        match self.ended {
+            Ended::Finished => Ok(()),
+            Ended::Interrupted => writeln!(f, "interrupted            go on with --resume"),
+            Ended::DamageAtEdge => writeln!(
+                f,
+                "stopped                where damage reached that edge; zones.damage-at-edge = \"warn\" goes on"
+            ),
+        }
+    }
 }
 
 impl RunSummary {
@@ -236,6 +334,10 @@ impl fmt::Display for RunSummary {
             ("unknowns", s.dofs),
             ("non-zeros", s.nonzeros),
         ] {
+            if self.motion.is_some() && name == "non-zeros" {
+                // bonds are passed over, not assembled
+                continue;
+            }
             grid.push(vec![name.to_owned(), grouped(value)]);
         }
         writeln!(f, "{}", aligned(&grid))?;
@@ -257,13 +359,18 @@ impl fmt::Display for RunSummary {
         if let Some(bytes) = self.peak_memory_bytes {
             writeln!(f, "peak memory            {}", bytes_text(bytes))?;
         }
-        writeln!(f, "relative residual      {}", number(self.residual))?;
-        writeln!(
-            f,
-            "out-of-balance force   {} relative to the applied force ({})",
-            number(self.out_of_balance_relative),
-            components(&self.out_of_balance_force)
-        )?;
+        match &self.motion {
+            Some(motion) => motion.write(f)?,
+            None => {
+                writeln!(f, "relative residual      {}", number(self.residual))?;
+                writeln!(
+                    f,
+                    "out-of-balance force   {} relative to the applied force ({})",
+                    number(self.out_of_balance_relative),
+                    components(&self.out_of_balance_force)
+                )?;
+            }
+        }
         if let Some(energy) = self.energy {
             writeln!(f, "stored energy          {}", number(energy))?;
         }

@@ -26,7 +26,9 @@ const TRANSITIONS: &[&str] = &["any", "around", "ball", "box", "near", "set", "w
 const AXES: &[&str] = &["cells", "graded", "spacing"];
 const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
 const MATERIALS: &[&str] = &["bond-based", "correspondence", "lps"];
-const CONDITIONS: &[&str] = &["body-force", "displacement", "traction"];
+const CONDITIONS: &[&str] = &["body-force", "displacement", "traction", "velocity"];
+const SOLVES: &[&str] = &["explicit", "quasi-static", "static"];
+const INITIAL: &[&str] = &["displacement", "velocity"];
 const POINTS: &[&str] = &["cells", "lattice"];
 const MICROMODULI: &[&str] = &[
     "constant",
@@ -40,6 +42,8 @@ const MICROMODULI: &[&str] = &[
 pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
     match path {
         ["coupling"] => Some(CouplingSpec::names()),
+        ["solve"] => Some(SOLVES),
+        ["initial", _] => Some(INITIAL),
         ["mesh"] => Some(MESHES),
         ["mesh", _, "x" | "y" | "z"] => Some(AXES),
         ["materials", _] => Some(MATERIALS),
@@ -47,16 +51,18 @@ pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
         ["peridynamics", "points"] => Some(POINTS),
         ["conditions", _] => Some(CONDITIONS),
         ["zones", "transition"] => Some(TRANSITIONS),
-        ["zones", _] | ["conditions", _, _, "inside"] | ["voids", _, "inside"] | ["cracks", _] => {
-            Some(SHAPES)
-        }
+        ["zones", "nonlocal"]
+        | ["conditions" | "initial", _, _, "inside"]
+        | ["voids", _, "inside"]
+        | ["output", "tips", _, "inside"]
+        | ["cracks" | "no-fail", _] => Some(SHAPES),
         _ => None,
     }
 }
 
 /// Choices that may be written as text for an empty table.
 fn as_text(path: &[&str]) -> bool {
-    matches!(path, ["coupling"])
+    matches!(path, ["coupling"] | ["solve"])
 }
 
 /// Writes `over` into `base`, table by table.
@@ -164,7 +170,7 @@ fn check(
             .help(format!(
                 "keep exactly one of {}; `--set {place}={}` replaces the one that stands there",
                 quoted(options),
-                if borrowed == ["coupling"] {
+                if as_text(&borrowed) {
                     names[0].to_owned()
                 } else {
                     format!("{{{} = ...}}", names[0])

@@ -7,8 +7,9 @@ use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::materials::no_further_axes;
 use super::region::{Region, region, unknown_set};
+use super::solve::{Clock, Pacing};
 use super::source::Span;
-use super::spec::{ConditionSpec, ShapeSpec};
+use super::spec::{ConditionSpec, DisplacementSpec, ShapeSpec, VelocitySpec};
 use super::value::Text;
 use crate::mesh::{Facet, Mesh};
 use crate::tensor::{Vector, padded};
@@ -29,9 +30,24 @@ impl<const D: usize> Components<D> {
         self.0[axis].as_ref().map(|e| e.eval(&padded(x)))
     }
 
-    /// The vector at `x`, zero where nothing is given.
-    pub fn vector(&self, x: &Vector<D>) -> Vector<D> {
-        Vector::from_fn(|k, _| self.at(k, x).unwrap_or(0.0))
+    /// The component along `axis` at `x` and time `t`, if it is given.
+    pub fn at_time(&self, axis: usize, x: &Vector<D>, t: f64) -> Option<f64> {
+        self.0[axis].as_ref().map(|e| e.eval_at(&padded(x), t))
+    }
+
+    /// The vector at `x` and time `t`, zero where nothing is given.
+    pub fn vector(&self, x: &Vector<D>, t: f64) -> Vector<D> {
+        Vector::from_fn(|k, _| self.at_time(k, x, t).unwrap_or(0.0))
+    }
+
+    /// Whether any component changes with time.
+    pub fn depends_on_time(&self) -> bool {
+        self.0.iter().flatten().any(Expression::depends_on_time)
+    }
+
+    /// Whether any component changes in space.
+    pub fn depends_on_position(&self) -> bool {
+        self.0.iter().flatten().any(Expression::depends_on_position)
     }
 }
 
@@ -86,6 +102,8 @@ impl<const D: usize> PartialEq for Field<D> {
 pub enum Prescribed<const D: usize> {
     /// Displacement.
     Displacement(Support<D>),
+    /// Velocity, in a scene that moves; the displacement begins with the one at time zero.
+    Velocity(Support<D>),
     /// Displacement as a function of position; the components of the condition are not used.
     Field(Field<D>),
     /// Force per area on facets.
@@ -95,6 +113,19 @@ pub enum Prescribed<const D: usize> {
 }
 
 impl<const D: usize> Condition<D> {
+    /// The sites that the condition holds, if it prescribes how they move.
+    pub fn support(&self) -> Option<&Support<D>> {
+        match &self.prescribed {
+            Prescribed::Displacement(support) | Prescribed::Velocity(support) => Some(support),
+            _ => None,
+        }
+    }
+
+    /// Whether the condition prescribes how sites move.
+    pub fn holds(&self) -> bool {
+        self.support().is_some() || matches!(self.prescribed, Prescribed::Field(_))
+    }
+
     /// A displacement given by a function.
     pub fn field(name: &str, field: Field<D>) -> Self {
         Self {
@@ -120,15 +151,14 @@ pub struct Condition<const D: usize> {
 pub(crate) fn conditions<const D: usize>(
     spec: &BTreeMap<Text, ConditionSpec>,
     mesh: &Mesh<D>,
+    clock: Clock,
 ) -> Result<Vec<Condition<D>>, SceneError> {
     let mut found = Vec::with_capacity(spec.len());
     for (name, condition) in spec {
-        found.push(one(name, condition, mesh)?);
+        found.push(one(name, condition, mesh, clock)?);
     }
-    if !found
-        .iter()
-        .any(|c| matches!(c.prescribed, Prescribed::Displacement(_)))
-    {
+    let holds = |c: &Condition<D>| matches!(c.prescribed, Prescribed::Displacement(_));
+    if clock.pacing != Pacing::Moving && !found.iter().any(holds) {
         return Err(SceneError::new(
             SceneErrorKind::Missing,
             "no condition prescribes a displacement: nothing holds the body",
@@ -136,7 +166,7 @@ pub(crate) fn conditions<const D: usize>(
         .label(0..0, "no [conditions.NAME.displacement] in this scene")
         .help("add one, for example [conditions.base.displacement] with on = \"bottom\", y = 0"));
     }
-    agree(spec, &found, mesh)?;
+    agree(spec, &found, mesh, clock)?;
     Ok(found)
 }
 
@@ -144,17 +174,28 @@ fn one<const D: usize>(
     name: &Text,
     spec: &ConditionSpec,
     mesh: &Mesh<D>,
+    clock: Clock,
 ) -> Result<Condition<D>, SceneError> {
     let (kind, given) = match spec {
         ConditionSpec::Displacement(c) => ("displacement", [&c.x, &c.y, &c.z]),
+        ConditionSpec::Velocity(c) => ("velocity", [&c.x, &c.y, &c.z]),
         ConditionSpec::Traction(c) => ("traction", [&c.x, &c.y, &c.z]),
         ConditionSpec::BodyForce(c) => ("body-force", [&c.x, &c.y, &c.z]),
     };
     let place = format!("conditions.{name}.{kind}");
     let components = components::<D>(&place, name, given)?;
+    for (axis, e) in ["x", "y", "z"].iter().zip(&components.0) {
+        if let Some(e) = e {
+            clock.admits(&format!("{place}.{axis}"), e)?;
+        }
+    }
     let prescribed = match spec {
-        ConditionSpec::Displacement(c) => {
-            let support = match (&c.on, &c.inside) {
+        ConditionSpec::Displacement(DisplacementSpec { on, inside, .. })
+        | ConditionSpec::Velocity(VelocitySpec { on, inside, .. }) => {
+            if kind == "velocity" {
+                moves(&place, name, &components, clock)?;
+            }
+            let support = match (on, inside) {
                 (Some(set), None) => {
                     let at = format!("{place}.on");
                     let known = mesh.set_names();
@@ -168,7 +209,7 @@ fn one<const D: usize>(
                         facets: mesh.facet_sets.get(&set.value).cloned().unwrap_or_default(),
                     }
                 }
-                (None, Some(shape)) => Support::Inside(inside(&place, name, shape, mesh)?),
+                (None, Some(shape)) => Support::Inside(self::inside(&place, name, shape, mesh)?),
                 (both, _) => {
                     let (what, label) = match both {
                         Some(_) => ("both `on` and `inside`", "two places"),
@@ -187,10 +228,15 @@ fn one<const D: usize>(
                     &place,
                     name,
                     &components,
+                    clock,
                     nodes.iter().map(|&n| mesh.nodes[n as usize]),
                 )?;
             }
-            Prescribed::Displacement(support)
+            if kind == "velocity" {
+                Prescribed::Velocity(support)
+            } else {
+                Prescribed::Displacement(support)
+            }
         }
         ConditionSpec::Traction(c) => {
             let Some(facets) = mesh.facet_sets.get(&c.on.value) else {
@@ -206,7 +252,7 @@ fn one<const D: usize>(
             };
             not_empty(&format!("{place}.on"), &c.on, facets.len())?;
             let nodes = facets.iter().flatten().map(|&n| mesh.nodes[n as usize]);
-            finite(&place, name, &components, nodes)?;
+            finite(&place, name, &components, clock, nodes)?;
             Prescribed::Traction(facets.clone())
         }
         ConditionSpec::BodyForce(c) => {
@@ -220,7 +266,7 @@ fn one<const D: usize>(
             let within = (0..mesh.cell_count())
                 .map(|i| mesh.centroid(i))
                 .filter(|x| region.contains(x, 0.0));
-            finite(&place, name, &components, within)?;
+            finite(&place, name, &components, clock, within)?;
             Prescribed::BodyForce(region)
         }
     };
@@ -231,7 +277,38 @@ fn one<const D: usize>(
     })
 }
 
-fn components<const D: usize>(
+/// Checks that a velocity is one that a run can follow.
+fn moves<const D: usize>(
+    place: &str,
+    name: &Text,
+    components: &Components<D>,
+    clock: Clock,
+) -> Result<(), SceneError> {
+    if clock.pacing != Pacing::Moving {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`{place}` in a scene that does not move"),
+        )
+        .label(name.span.clone(), "a velocity")
+        .help("add [solve.explicit] with duration = ..., or prescribe a displacement"));
+    }
+    match components
+        .0
+        .iter()
+        .flatten()
+        .find(|e| e.depends_on_time() && e.depends_on_position())
+    {
+        None => Ok(()),
+        Some(e) => Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`{place}` depends on time and on position"),
+        )
+        .label(e.span.clone(), "has no displacement in closed form")
+        .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
+    }
+}
+
+pub(crate) fn components<const D: usize>(
     place: &str,
     name: &Text,
     given: [&Option<Expression>; 3],
@@ -264,7 +341,7 @@ fn components<const D: usize>(
     Ok(Components(std::array::from_fn(|k| given[k].clone())))
 }
 
-fn inside<const D: usize>(
+pub(crate) fn inside<const D: usize>(
     place: &str,
     name: &Text,
     shape: &ShapeSpec,
@@ -315,67 +392,81 @@ fn not_empty(place: &str, set: &Text, count: usize) -> Result<(), SceneError> {
     .help("put facets or nodes into it, or name another set"))
 }
 
-fn finite<const D: usize>(
+pub(crate) fn finite<const D: usize>(
     place: &str,
     name: &Text,
     components: &Components<D>,
+    clock: Clock,
     positions: impl Iterator<Item = Vector<D>>,
 ) -> Result<(), SceneError> {
+    let moving = components.depends_on_time();
     for x in positions {
-        for k in 0..D {
-            let Some(value) = components.at(k, &x).filter(|v| !v.is_finite()) else {
-                continue;
-            };
-            let span = components.0[k]
-                .as_ref()
-                .map_or(name.span.clone(), |e| e.span.clone());
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!(
-                    "`{place}.{}` is {value} at {:?}",
-                    ["x", "y", "z"][k],
-                    x.as_slice()
-                ),
-            )
-            .label(span, "no finite number there")
-            .help("choose between branches with if(condition, a, b), or restrict the condition"));
+        for &t in clock.instants(moving) {
+            for k in 0..D {
+                let Some(value) = components.at_time(k, &x, t).filter(|v| !v.is_finite()) else {
+                    continue;
+                };
+                let span = components.0[k]
+                    .as_ref()
+                    .map_or(name.span.clone(), |e| e.span.clone());
+                let when = if moving {
+                    format!(", t = {t}")
+                } else {
+                    String::new()
+                };
+                return Err(SceneError::new(
+                    SceneErrorKind::WrongValue,
+                    format!(
+                        "`{place}.{}` is {value} at {:?}{when}",
+                        ["x", "y", "z"][k],
+                        x.as_slice()
+                    ),
+                )
+                .label(span, "no finite number there")
+                .help(
+                    "choose between branches with if(condition, a, b), or restrict the condition",
+                ));
+            }
         }
     }
     Ok(())
 }
 
-/// Refuses two displacements of one node that differ.
+/// Refuses two motions of one node that differ.
 fn agree<const D: usize>(
     spec: &BTreeMap<Text, ConditionSpec>,
     conditions: &[Condition<D>],
     mesh: &Mesh<D>,
+    clock: Clock,
 ) -> Result<(), SceneError> {
-    let mut seen: BTreeMap<(u32, usize), (usize, f64)> = BTreeMap::new();
+    let mut seen: BTreeMap<(u32, usize), usize> = BTreeMap::new();
     for (number, condition) in conditions.iter().enumerate() {
-        let Prescribed::Displacement(Support::Set { nodes, .. }) = &condition.prescribed else {
+        let Some(Support::Set { nodes, .. }) = condition.support() else {
             continue;
         };
         for &n in nodes {
-            let x = &mesh.nodes[n as usize];
-            for k in 0..D {
-                let Some(value) = condition.components.at(k, x) else {
+            for k in (0..D).filter(|&k| condition.components.0[k].is_some()) {
+                let Some(other) = seen.insert((n, k), number).map(|o| &conditions[o]) else {
                     continue;
                 };
-                let Some((other, before)) = seen.insert((n, k), (number, value)) else {
+                let x = &mesh.nodes[n as usize];
+                let Some((before, value, t)) = difference(other, condition, k, x, clock) else {
                     continue;
                 };
-                if (before - value).abs() <= 1e-9 * before.abs().max(value.abs()) {
-                    continue;
-                }
                 let span = |name: &str| -> Span {
                     spec.get_key_value(name)
                         .map_or(0..0, |(k, _)| k.span.clone())
                 };
-                let (first, second) = (&conditions[other].name, &condition.name);
+                let (first, second) = (&other.name, &condition.name);
+                let when = if t > 0.0 {
+                    format!(", t = {t}")
+                } else {
+                    String::new()
+                };
                 return Err(SceneError::new(
                     SceneErrorKind::Conflict,
                     format!(
-                        "`{first}` and `{second}` prescribe the {} displacements {before} and {value} at {:?}",
+                        "`{first}` and `{second}` prescribe the {} displacements {before} and {value} at {:?}{when}",
                         ["x", "y", "z"][k],
                         x.as_slice()
                     ),
@@ -387,4 +478,29 @@ fn agree<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// Two values that differ, and when.
+fn difference<const D: usize>(
+    a: &Condition<D>,
+    b: &Condition<D>,
+    axis: usize,
+    x: &Vector<D>,
+    clock: Clock,
+) -> Option<(f64, f64, f64)> {
+    let kinds = [a, b].map(|c| matches!(c.prescribed, Prescribed::Velocity(_)));
+    let moving = [a, b].iter().any(|c| c.components.depends_on_time());
+    clock.instants(moving).iter().find_map(|&t| {
+        let (p, q) = (
+            a.components.at_time(axis, x, t)?,
+            b.components.at_time(axis, x, t)?,
+        );
+        // a displacement and a velocity agree only where both are zero
+        let agree = if kinds[0] == kinds[1] {
+            (p - q).abs() <= 1e-9 * p.abs().max(q.abs())
+        } else {
+            p == 0.0 && q == 0.0
+        };
+        (!agree).then_some((p, q, t))
+    })
 }

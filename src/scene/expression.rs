@@ -1,4 +1,4 @@
-//! Expressions in `x`, `y`, `z`, as scenes write them: `"-1e-3 * x^2"`, `"if(x < 0, 1, exp(-x))"`.
+//! Expressions in `x`, `y`, `z` and the time `t`, as scenes write them: `"-1e-3 * x^2"`, `"if(t < 1e-6, 1, exp(-x))"`.
 //!
 //! Precedence is that of written mathematics: `-x^2` is `-(x^2)` and `2^3^2` is `2^(3^2)`. A crate that read either
 //! otherwise would set a wrong boundary condition without a word, so this parser is our own. Measured at `x = 3`:
@@ -20,7 +20,10 @@ use super::source::Span;
 /// The deepest nesting that is read; deeper input is refused before it exhausts the stack.
 const DEEPEST: usize = 64;
 
-/// A parsed expression in `x`, `y` and `z`.
+/// The number of the variable `t` beside those of the axes.
+const TIME: usize = 3;
+
+/// A parsed expression in `x`, `y`, `z` and `t`.
 #[derive(Clone)]
 pub struct Expression {
     /// The expression as typed.
@@ -97,7 +100,7 @@ const BINARY: &[(&str, Binary)] = &[
 ];
 
 impl Expression {
-    /// Reads an expression in `x`, `y` and `z`.
+    /// Reads an expression in `x`, `y`, `z` and `t`.
     ///
     /// # Errors
     /// [`ExpressionError`] with the character where the text stops making sense.
@@ -136,26 +139,41 @@ impl Expression {
         self
     }
 
-    /// The value at the position `x` (components beyond the dimension are zero).
+    /// The value at the position `x` (components beyond the dimension are zero) at time zero.
     pub fn eval(&self, x: &[f64; 3]) -> f64 {
-        self.root.eval(x)
+        self.eval_at(x, 0.0)
+    }
+
+    /// The value at the position `x` (components beyond the dimension are zero) and the time `t`.
+    pub fn eval_at(&self, x: &[f64; 3], t: f64) -> f64 {
+        self.root.eval(&[x[0], x[1], x[2], t])
     }
 
     /// The value, if the expression has no variable.
     pub fn as_constant(&self) -> Option<f64> {
-        (0..3)
-            .all(|axis| !self.depends_on(axis))
+        (0..=TIME)
+            .all(|variable| !self.depends_on(variable))
             .then(|| self.eval(&[0.0; 3]))
     }
 
-    /// Whether the variable of `axis` (0 for `x`, 1 for `y`, 2 for `z`) appears.
+    /// Whether the time `t` appears.
+    pub fn depends_on_time(&self) -> bool {
+        self.depends_on(TIME)
+    }
+
+    /// Whether a coordinate appears.
+    pub fn depends_on_position(&self) -> bool {
+        (0..TIME).any(|axis| self.depends_on(axis))
+    }
+
+    /// Whether the variable of `axis` (0 for `x`, 1 for `y`, 2 for `z`, 3 for `t`) appears.
     pub fn depends_on(&self, axis: usize) -> bool {
         self.root.depends_on(axis)
     }
 }
 
 impl Term {
-    fn eval(&self, x: &[f64; 3]) -> f64 {
+    fn eval(&self, x: &[f64; 4]) -> f64 {
         match self {
             Self::Constant(value) => *value,
             Self::Variable(axis) => x[*axis],
@@ -299,12 +317,10 @@ impl Parser<'_> {
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_alphabetic() || c == '_' => self.name(),
             Some(c) => Err(self.error(format!(
-                "a number, x, y, z or a bracket is expected, not `{c}`"
+                "a number, x, y, z, t or a bracket is expected, not `{c}`"
             ))),
-            None => {
-                Err(self
-                    .error("the expression ends where a number, x, y, z or a bracket is expected"))
-            }
+            None => Err(self
+                .error("the expression ends where a number, x, y, z, t or a bracket is expected")),
         }
     }
 
@@ -343,11 +359,7 @@ impl Parser<'_> {
             "y" => return Ok(self.advance(length, Term::Variable(1))),
             "z" => return Ok(self.advance(length, Term::Variable(2))),
             "pi" => return Ok(self.advance(length, Term::Constant(std::f64::consts::PI))),
-            "t" => {
-                return Err(self.error(
-                    "time-dependent conditions arrive with the explicit driver; use x, y, z",
-                ));
-            }
+            "t" => return Ok(self.advance(length, Term::Variable(TIME))),
             _ => {}
         }
         let unary = UNARY.iter().find(|(n, _)| *n == name);
@@ -360,7 +372,7 @@ impl Parser<'_> {
                 .collect::<Vec<_>>()
                 .join(", ");
             return Err(self.error(format!(
-                "`{name}` is unknown; the variables are x, y, z, the constant is pi, the functions are {known} and if"
+                "`{name}` is unknown; the variables are x, y, z, t, the constant is pi, the functions are {known} and if"
             )));
         }
         self.at += length;
@@ -430,6 +442,12 @@ mod tests {
         assert!(e.depends_on(1) && !e.depends_on(0));
         assert_eq!(e.as_constant(), None);
         assert_eq!(Expression::parse("1/4").unwrap().as_constant(), Some(0.25));
+        let e = Expression::parse("if(t < 2, x * t, -1)").unwrap();
+        assert!(e.depends_on_time() && e.depends_on_position() && !e.depends_on(1));
+        assert_eq!(e.as_constant(), None);
+        assert_eq!(e.eval_at(&[4.0, 0.0, 0.0], 1.5), 6.0);
+        assert_eq!(e.eval_at(&[4.0, 0.0, 0.0], 2.0), -1.0);
+        assert!(!Expression::parse("2*t").unwrap().depends_on_position());
     }
 
     #[test]
@@ -440,7 +458,7 @@ mod tests {
             ("sin x", 5, "expected `(`"),
             ("(1", 3, "expected `)`"),
             ("1 + foo", 5, "`foo` is unknown"),
-            ("t", 1, "time-dependent"),
+            ("tt", 1, "`tt` is unknown"),
             ("1..2", 1, "no number"),
             ("1 # 2", 3, "operator"),
             ("", 1, "ends where"),

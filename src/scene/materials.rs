@@ -38,6 +38,17 @@ pub struct Material<const D: usize> {
     pub lame: (f64, f64),
     /// Density [kg/m³]; zero if not given.
     pub density: f64,
+    /// When its bonds break; never if there is none.
+    pub fracture: Option<Fracture>,
+}
+
+/// When a bond breaks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fracture {
+    /// At the stretch at which a new crack takes this energy per area \[J/m²\].
+    Energy(f64),
+    /// At this stretch.
+    Stretch(f64),
 }
 
 impl<const D: usize> Material<D> {
@@ -105,6 +116,7 @@ pub(crate) fn materials<const D: usize>(
             law,
             lame,
             density,
+            fracture: fracture(name, material)?,
         });
         match (cells, rest) {
             (Some(set), _) => {
@@ -184,6 +196,36 @@ fn law_and_cells<'a>(
     })
 }
 
+fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneError> {
+    let (kind, energy, stretch) = match spec {
+        MaterialSpec::BondBased(m) => ("bond-based", &m.fracture_energy, &m.critical_stretch),
+        MaterialSpec::Lps(m) => ("lps", &m.fracture_energy, &m.critical_stretch),
+        // the bonds of all others are known to first order only
+        _ => return Ok(None),
+    };
+    let place = |key: &str| format!("materials.{name}.{kind}.{key}");
+    match (energy, stretch) {
+        (None, None) => Ok(None),
+        (Some(e), None) => {
+            let energy = check::positive(&place("fracture-energy"), e)?;
+            Ok(Some(Fracture::Energy(energy)))
+        }
+        (None, Some(s)) => {
+            let stretch = check::positive(&place("critical-stretch"), s)?;
+            Ok(Some(Fracture::Stretch(stretch)))
+        }
+        (Some(e), Some(s)) => Err(SceneError::new(
+            SceneErrorKind::Choice,
+            format!(
+                "`materials.{name}.{kind}` holds `fracture-energy`, `critical-stretch` at once"
+            ),
+        )
+        .label(e.span.clone(), "one")
+        .label(s.span.clone(), "and another")
+        .help("keep one of them: the critical stretch follows from the energy")),
+    }
+}
+
 fn constants<const D: usize>(
     name: &Text,
     spec: &MaterialSpec,
@@ -255,6 +297,7 @@ pub(crate) fn peridynamics<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Peridynamics<D>, SceneError> {
     no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
+    super::solve::still("peridynamics.horizon", &spec.horizon)?;
     if let Some(value) = spec.horizon.as_constant() {
         let number = Number {
             value,

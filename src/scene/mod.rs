@@ -8,23 +8,30 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `materials.rs`, `conditions.rs` | its parts |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `materials.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs` | its parts |
+//! | `loads.rs` | which sites conditions hold, and the force that each site takes |
+//! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
 //! | `predict.rs` | what a run will need, without solving |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
 
+mod breaking;
 mod check;
 mod choice;
 mod conditions;
 mod error;
 mod expression;
+mod initial;
+mod loads;
 mod materials;
 mod meshing;
+mod motion;
 mod parse;
 mod predict;
 mod region;
 mod run;
+mod solve;
 mod source;
 pub mod spec;
 mod template;
@@ -33,17 +40,21 @@ mod value;
 mod write;
 mod zones;
 
+pub use breaking::{Breaking, Contact};
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
-pub use materials::{Law, Material, Peridynamics, Points};
-pub use predict::{Prediction, Share};
+pub use initial::{Initial, InitialKind};
+pub use materials::{Fracture, Law, Material, Peridynamics, Points};
+pub use motion::{RunOptions, StartFrom};
+pub use predict::{MotionPrediction, Prediction, Share};
 pub use region::Region;
 pub use run::{RunError, Solved, solve_with};
+pub use solve::{Explicit, QuasiStatic, Solve};
 pub use source::{Source, Span};
 pub use spec::SceneSpec;
 pub use template::Template;
-pub use validate::{AnyScene, Output, Scene, Solver};
+pub use validate::{AnyScene, Output, Scene, Solver, Tip};
 pub use value::{Coordinates, Count, Number, Text};
 pub use write::write;
 

@@ -8,13 +8,16 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::loads;
+use super::motion;
 use super::run::{self, RunError};
+use super::solve::Solve;
 use super::spec::{Joining, ZonesNeeded};
 use super::validate::Scene;
 use crate::coupling::edge::Edge;
 use crate::coupling::{Model, SiteKind, Zone};
 use crate::mesh::Mesh;
-use crate::observe::report::aligned;
+use crate::observe::report::{aligned, number};
 use crate::observe::summary::{
     Choice, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
     resident_memory_bytes,
@@ -48,8 +51,8 @@ pub struct Prediction {
     pub coupling: String,
     /// How large the model is; exact.
     pub sizes: Sizes,
-    /// How it will be solved.
-    pub method: MethodUsed,
+    /// How it will be solved; none of a scene in time.
+    pub method: Option<MethodUsed>,
     /// Whether the stiffness is symmetric.
     pub symmetry: Symmetry,
     /// Unknowns that no condition prescribes.
@@ -70,6 +73,26 @@ pub struct Prediction {
     pub choices: Vec<Choice>,
     /// What will be costly or inaccurate.
     pub warnings: Vec<String>,
+    /// The steps of a scene in time; none of a static one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionPrediction>,
+}
+
+/// The steps of a scene in time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionPrediction {
+    /// The time step.
+    pub step: f64,
+    /// Steps to the end.
+    pub steps: u64,
+    /// The largest step that is taken to be stable.
+    pub stable_step: f64,
+    /// The step that row sums guarantee.
+    pub certified_step: f64,
+    /// Where the row with the largest sum is.
+    pub certified_at: Vec<f64>,
+    /// Seconds of a step, measured here.
+    pub seconds_per_step: f64,
 }
 
 /// Seconds per operation of a factorisation on one thread. `benches/solvers.rs` takes 3e-11 in large fronts; the slit plate, on a
@@ -80,10 +103,10 @@ const SECONDS_PER_OPERATION: f64 = 6e-11;
 const SECONDS_PER_SCALAR: f64 = 2e-7;
 
 /// Seconds per cell and point of the output; measured on the slit plate.
-const SECONDS_PER_CELL: f64 = 2.5e-5;
+pub(super) const SECONDS_PER_CELL: f64 = 2.5e-5;
 
 /// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
-const OUTPUT_BYTES: u64 = 900;
+pub(super) const OUTPUT_BYTES: u64 = 900;
 
 /// Bytes of a factorisation on two threads over those on one: two subtrees hold contribution blocks. Measured on the scenes
 /// of `tests/check.rs`: 1.23 to 1.36 for Cholesky, whose factors are the smaller part, 1.0 to 1.15 for LU.
@@ -106,6 +129,9 @@ pub(crate) fn predict<const D: usize>(
     scene: Scene<D>,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
+    if scene.solve != Solve::Static {
+        return motion::predict(scene, progress);
+    }
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
     let title = scene.title.clone();
@@ -120,8 +146,8 @@ pub(crate) fn predict<const D: usize>(
     let pattern = model.pattern(operator.as_ref(), progress);
     watch.lap(&mut timings, "assembly");
 
-    run::loads(&model, &rest.conditions)?;
-    let (prescribed, _) = run::supports(&model, &rest.conditions)?;
+    loads::loads(&model, &rest.conditions)?;
+    let (prescribed, _) = loads::supports(&model, &rest.conditions)?;
     let free = FreeDofs::from_prescribed(&prescribed, D);
     let mut choices = vec![Choice {
         choice: format!("coupling {}", joining.name),
@@ -213,7 +239,7 @@ pub(crate) fn predict<const D: usize>(
         dimension: D,
         coupling: joining.name.to_owned(),
         sizes,
-        method,
+        method: Some(method),
         symmetry,
         unknowns: free.count(),
         factor_nonzeros: if factorised { cost.factor_nnz } else { 0 },
@@ -224,6 +250,7 @@ pub(crate) fn predict<const D: usize>(
         timings,
         choices,
         warnings: Vec::new(),
+        motion: None,
     };
     prediction.warnings = warnings(&model, joining, &prediction);
     Ok(prediction)
@@ -232,7 +259,7 @@ pub(crate) fn predict<const D: usize>(
 /// Bonds beyond which a scene deserves a second thought.
 const MANY_BONDS: usize = 100_000_000;
 
-fn warnings<const D: usize>(
+pub(super) fn warnings<const D: usize>(
     model: &Model<D>,
     joining: Joining,
     prediction: &Prediction,
@@ -284,9 +311,13 @@ fn warnings<const D: usize>(
         && prediction.peak_memory_bytes > available
     {
         list.push(format!(
-            "the run needs {}, {} are free: use solver.method = \"krylov\", or coarsen the model",
+            "the run needs {}, {} are free: {}coarsen the model",
             bytes_text(prediction.peak_memory_bytes),
-            bytes_text(available)
+            bytes_text(available),
+            match prediction.motion {
+                Some(_) => "",
+                None => "use solver.method = \"krylov\", or ",
+            }
         ));
     }
     list
@@ -353,6 +384,10 @@ impl fmt::Display for Prediction {
             ("non-zeros", s.nonzeros),
             ("factor non-zeros", self.factor_nonzeros as usize),
         ] {
+            if self.motion.is_some() && name.ends_with("non-zeros") {
+                // bonds are passed over, not assembled
+                continue;
+            }
             grid.push(vec![name.to_owned(), grouped(value)]);
         }
         writeln!(f, "{}", aligned(&grid))?;
@@ -378,6 +413,22 @@ impl fmt::Display for Prediction {
                 f,
                 "factorisation          {:.1e} operations",
                 self.operations
+            )?;
+        }
+        if let Some(m) = &self.motion {
+            writeln!(
+                f,
+                "stable step            {} (row sums guarantee {}; their largest is at {:?})",
+                number(m.stable_step),
+                number(m.certified_step),
+                m.certified_at
+            )?;
+            writeln!(
+                f,
+                "steps                  {} of {}, {:.3e} s each",
+                grouped(m.steps as usize),
+                number(m.step),
+                m.seconds_per_step
             )?;
         }
         writeln!(

@@ -2,34 +2,35 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
-use super::conditions::{Components, Condition, Prescribed, Support};
+use super::breaking::Breaking;
+use super::conditions::Condition;
+use super::initial::Initial;
+use super::loads::{loads, supports};
 use super::materials::{Law, Points};
+use super::motion::{self, RunOptions};
+use super::solve::Solve;
 use super::spec::{SurfacesSpec, WeightsSpec};
 use super::validate::{Output, Scene, Solver};
 use crate::coupling::Surfaces;
+use crate::coupling::motion::MotionError;
 use crate::coupling::{
     self, Coupling, Model, ModelError, Operator, PointSource, Problem, SiteKind, Zone,
 };
-use crate::fem;
-use crate::mesh::{Facet, Mesh};
 use crate::observe::ObserveError;
+use crate::observe::checkpoint::{CheckpointError, Fingerprint};
 use crate::observe::summary::{
     Choice, Reaction, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
+use crate::peridynamics::FractureError;
 use crate::peridynamics::{
     BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
 };
 use crate::progress::Progress;
+use crate::solve::explicit::ExplicitError;
+use crate::solve::stable_step::StepError;
 use crate::solve::statics::{self, StaticError, StaticParams, StaticProblem};
 use crate::system::Symmetry;
 use crate::tensor::{Vector, padded};
-
-/// How far from a set a peridynamic point may lie, in its own spacings, to follow a condition on the set.
-///
-/// The first layer lies on the set or half a spacing away, at the corner of a square 0.71 of one; the second layer at least one.
-const FIRST_LAYER: f64 = 0.75;
 
 /// Why a scene that is right could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -43,6 +44,29 @@ pub enum RunError {
     /// A result cannot be written.
     #[error(transparent)]
     Observe(#[from] ObserveError),
+    /// The motion cannot start or go on.
+    #[error(transparent)]
+    Explicit(#[from] ExplicitError),
+    /// The run cannot go on from a checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The time step, or the model at any step, is not stable.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// The bonds cannot move.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// The fracture energy gives no critical stretch.
+    #[error("the material of the points cannot break: {0}")]
+    Fracture(#[from] FractureError),
+    /// Something that is planned and not there yet.
+    #[error("{what}: {remedy}")]
+    Later {
+        /// What was asked for.
+        what: &'static str,
+        /// What to do instead.
+        remedy: &'static str,
+    },
     /// A condition meets no site.
     #[error("the condition `{condition}` meets no site of the model; {remedy}")]
     Idle {
@@ -73,14 +97,18 @@ pub struct Solved<'a, const D: usize> {
 /// [`RunError`], each with place and remedy.
 pub fn run<const D: usize>(
     scene: Scene<D>,
+    options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
+    if scene.solve != Solve::Static {
+        return motion::run(scene, options, progress);
+    }
     solve_with(scene, progress, |output, solved| {
         super::write::write(output, solved)
     })
 }
 
-/// Runs a scene and hands the solution to `visit`, which returns the files that it wrote.
+/// Solves a static scene and hands the solution to `visit`, which returns the files that it wrote.
 ///
 /// # Errors
 /// [`RunError`], each with place and remedy.
@@ -186,12 +214,7 @@ pub fn solve_with<const D: usize>(
             .conditions
             .iter()
             .zip(&reactions)
-            .filter(|(c, _)| {
-                matches!(
-                    c.prescribed,
-                    Prescribed::Displacement(_) | Prescribed::Field(_)
-                )
-            })
+            .filter(|(c, _)| c.holds())
             .map(|(c, r)| Reaction {
                 condition: c.name.clone(),
                 force: r.iter().copied().collect(),
@@ -199,6 +222,7 @@ pub fn solve_with<const D: usize>(
             .collect(),
         energy: (symmetry == Symmetry::Symmetric)
             .then(|| 0.5 * u.iter().zip(&internal).map(|(u, f)| u * f).sum::<f64>()),
+        motion: None,
         files,
     };
     Ok(summary)
@@ -208,7 +232,12 @@ pub fn solve_with<const D: usize>(
 pub(super) struct Rest<const D: usize> {
     pub conditions: Vec<Condition<D>>,
     pub solver: Solver,
-    output: Output<D>,
+    pub output: Output<D>,
+    pub initial: Vec<Initial<D>>,
+    pub breaking: Breaking<D>,
+    pub fingerprint: Fingerprint,
+    /// Density of each material.
+    pub density: Vec<f64>,
 }
 
 pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
@@ -233,6 +262,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
     };
     let method = scene.coupling.build(influence);
     let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
+    let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
     let peridynamics = scene.peridynamics.map(|p| {
         let horizon = p.horizon;
@@ -270,6 +300,10 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             conditions: scene.conditions,
             solver: scene.solver,
             output: scene.output,
+            initial: scene.initial,
+            breaking: scene.breaking,
+            fingerprint: scene.fingerprint,
+            density,
         },
     )
 }
@@ -304,18 +338,7 @@ pub(super) fn symmetry<const D: usize>(
     Symmetry::Unsymmetric
 }
 
-/// For each node of the mesh its site, if it is one.
-fn site_of_node<const D: usize>(model: &Model<D>) -> Vec<Option<u32>> {
-    let mut site_of = vec![None; model.mesh.nodes.len()];
-    for (site, s) in model.sites.iter().enumerate() {
-        if let SiteKind::Node(n) = s.kind {
-            site_of[n as usize] = Some(site as u32);
-        }
-    }
-    site_of
-}
-
-fn zone_of_site<const D: usize>(model: &Model<D>) -> Vec<Zone> {
+pub(super) fn zone_of_site<const D: usize>(model: &Model<D>) -> Vec<Zone> {
     let node_zone = |site: usize| {
         model
             .cells_of_site(site)
@@ -331,192 +354,4 @@ fn zone_of_site<const D: usize>(model: &Model<D>) -> Vec<Zone> {
             SiteKind::Node(_) => node_zone(site),
         })
         .collect()
-}
-
-/// The points in the first layer along facets or nodes, with their spacing.
-fn first_layer<const D: usize>(
-    model: &Model<D>,
-    nodes: &[u32],
-    facets: &[Facet],
-) -> Vec<(usize, f64)> {
-    let mesh = &model.mesh;
-    let (mut lo, mut hi) = (
-        Vector::<D>::repeat(f64::INFINITY),
-        Vector::<D>::repeat(f64::NEG_INFINITY),
-    );
-    for &n in nodes {
-        lo = lo.inf(&mesh.nodes[n as usize]);
-        hi = hi.sup(&mesh.nodes[n as usize]);
-    }
-    (0..model.sites.len())
-        .into_par_iter()
-        .filter_map(|site| {
-            let s = &model.sites[site];
-            if !matches!(s.kind, SiteKind::Point(_)) {
-                return None;
-            }
-            let h = s.volume.powf(1.0 / D as f64);
-            let reach = FIRST_LAYER * h;
-            let x = &s.position;
-            if (0..D).any(|k| x[k] < lo[k] - reach || x[k] > hi[k] + reach) {
-                return None;
-            }
-            let near = if facets.is_empty() {
-                nodes
-                    .iter()
-                    .any(|&n| (mesh.nodes[n as usize] - x).norm() <= reach)
-            } else {
-                facets.iter().any(|f| mesh.distance_to_facet(x, f) <= reach)
-            };
-            near.then_some((site, h))
-        })
-        .collect()
-}
-
-type Held = (Vec<Option<f64>>, Vec<Option<usize>>);
-
-/// The prescribed displacement of each dof, and the condition that prescribes it.
-pub(super) fn supports<const D: usize>(
-    model: &Model<D>,
-    conditions: &[Condition<D>],
-) -> Result<Held, RunError> {
-    let dofs = model.sites.len() * D;
-    let (mut prescribed, mut holder) = (vec![None; dofs], vec![None; dofs]);
-    let site_of = site_of_node(model);
-    let (lo, hi) = model.mesh.bounds();
-    let tolerance = 1e-9 * (hi - lo).norm();
-    for (number, condition) in conditions.iter().enumerate() {
-        let support = match &condition.prescribed {
-            Prescribed::Displacement(support) => support,
-            Prescribed::Field(field) => {
-                for (site, s) in model.sites.iter().enumerate() {
-                    for (k, value) in field.at(&s.position).iter().flatten().enumerate() {
-                        prescribed[site * D + k] = Some(*value);
-                        holder[site * D + k] = Some(number);
-                    }
-                }
-                continue;
-            }
-            Prescribed::Traction(_) | Prescribed::BodyForce(_) => continue,
-        };
-        let sites: Vec<usize> = match support {
-            Support::Set { nodes, facets, .. } => {
-                let on_nodes = nodes.iter().filter_map(|&n| site_of[n as usize]);
-                let layer = first_layer(model, nodes, facets);
-                on_nodes
-                    .map(|s| s as usize)
-                    .chain(layer.into_iter().map(|(s, _)| s))
-                    .collect()
-            }
-            Support::Inside(region) => (0..model.sites.len())
-                .filter(|&s| region.contains(&model.sites[s].position, tolerance))
-                .collect(),
-        };
-        if sites.is_empty() {
-            return Err(RunError::Idle {
-                condition: condition.name.clone(),
-                remedy: "name a set on the boundary, or enlarge the shape to hold nodes or points",
-            });
-        }
-        for site in sites {
-            for k in 0..D {
-                if let Some(value) = condition.components.at(k, &model.sites[site].position) {
-                    prescribed[site * D + k] = Some(value);
-                    holder[site * D + k] = Some(number);
-                }
-            }
-        }
-    }
-    Ok((prescribed, holder))
-}
-
-/// The applied force of each dof, and the sum of the sizes of the forces of all conditions.
-///
-/// Every site takes the load of its own model: a node the consistent force of all cells around it, a point its volume
-/// times the body force, and in the first layer its share of the facets' area times the traction.
-pub(super) fn loads<const D: usize>(
-    model: &Model<D>,
-    conditions: &[Condition<D>],
-) -> Result<(Vec<f64>, f64), RunError> {
-    let mut load = vec![Vector::<D>::zeros(); model.sites.len()];
-    let site_of = site_of_node(model);
-    let mut applied = 0.0;
-    for condition in conditions {
-        let mut own: Vec<(usize, Vector<D>)> = Vec::new();
-        let field = |x: &Vector<D>| condition.components.vector(x);
-        match &condition.prescribed {
-            Prescribed::Displacement(_) | Prescribed::Field(_) => continue,
-            Prescribed::Traction(facets) => {
-                traction(model, facets, &condition.components, &site_of, &mut own);
-            }
-            Prescribed::BodyForce(region) => {
-                for c in 0..model.mesh.cell_count() {
-                    if !region.contains(&model.mesh.centroid(c), 0.0) || !model.node_takes(c) {
-                        continue;
-                    }
-                    for (n, f) in fem::body_force_vector(&model.mesh, c, field) {
-                        own.extend(site_of[n as usize].map(|s| (s as usize, f)));
-                    }
-                }
-                for (site, s) in model.sites.iter().enumerate() {
-                    if matches!(s.kind, SiteKind::Point(_)) && region.contains(&s.position, 0.0) {
-                        own.push((site, field(&s.position) * s.volume));
-                    }
-                }
-            }
-        }
-        if own.is_empty() {
-            return Err(RunError::Idle {
-                condition: condition.name.clone(),
-                remedy: "name a set on the boundary of the body, or enlarge the shape",
-            });
-        }
-        applied += own.iter().map(|(_, f)| f).sum::<Vector<D>>().norm();
-        for (site, f) in own {
-            load[site] += f;
-        }
-    }
-    let flat = load.iter().flat_map(|f| f.iter().copied()).collect();
-    Ok((flat, applied))
-}
-
-fn traction<const D: usize>(
-    model: &Model<D>,
-    facets: &[Facet],
-    components: &Components<D>,
-    site_of: &[Option<u32>],
-    own: &mut Vec<(usize, Vector<D>)>,
-) {
-    let mesh: &Mesh<D> = &model.mesh;
-    let field = |x: &Vector<D>| components.vector(x);
-    // a facet without a cell is an element's as far as anybody knows, and carries no point
-    let located = mesh.locate_facets(facets).ok();
-    let cell = |f: usize| located.as_ref().map(|l| l[f].cell as usize);
-    for (f, facet) in facets.iter().enumerate() {
-        if cell(f).is_none_or(|c| model.node_takes(c)) {
-            for (n, f) in fem::traction_vector(mesh, facet, field) {
-                own.extend(site_of[n as usize].map(|s| (s as usize, f)));
-            }
-        }
-    }
-    let on_points: Vec<Facet> = located
-        .into_iter()
-        .flatten()
-        .filter(|f| !model.is_element(f.cell as usize))
-        .map(|f| f.nodes)
-        .collect();
-    let mut nodes: Vec<u32> = on_points.iter().flatten().copied().collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    if nodes.is_empty() {
-        return;
-    }
-    let layer = first_layer(model, &nodes, &on_points);
-    let area: f64 = on_points.iter().map(|f| fem::facet_area(mesh, f)).sum();
-    let face = |h: f64| h.powi(D as i32 - 1);
-    let shares: f64 = layer.iter().map(|(_, h)| face(*h)).sum();
-    for (site, h) in layer {
-        let share = area * face(h) / shares;
-        own.push((site, field(&model.sites[site].position) * share));
-    }
 }

@@ -5,10 +5,11 @@
 
 use miette::NamedSource;
 use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 use super::choice;
 use super::error::{SceneError, SceneErrorKind};
+use crate::observe::checkpoint::Fingerprint;
 
 /// A range of bytes of a [`Source`].
 pub type Span = std::ops::Range<usize>;
@@ -126,6 +127,17 @@ impl Source {
         Ok(root)
     }
 
+    /// A number for all that determines the results of the scene: not how it is typed, where files go, or how often a
+    /// checkpoint is written.
+    ///
+    /// # Errors
+    /// As [`Source::merged`].
+    pub(crate) fn fingerprint(&self) -> Result<Fingerprint, SceneError> {
+        let mut print = Fingerprint::default();
+        add_table(self.merged()?.get_ref(), &mut Vec::new(), &mut print);
+        Ok(print)
+    }
+
     fn parse<'a>(&self, piece: &'a Piece) -> Result<Spanned<DeTable<'a>>, SceneError> {
         let text = if piece.start == 0 {
             &piece.text
@@ -141,5 +153,43 @@ impl Source {
             .help("a line reads `key = value` or `[table]`; text needs quotes")
             .shown_in(self)
         })
+    }
+}
+/// Keys that change no result.
+const WITHOUT_EFFECT: &[&[&str]] = &[
+    &["title"],
+    &["output", "directory"],
+    &["zones", "damage-at-edge"],
+    &["solve", "explicit", "checkpoint-every"],
+    &["solve", "quasi-static", "checkpoint-every"],
+];
+
+fn add_table(table: &DeTable<'_>, path: &mut Vec<String>, print: &mut Fingerprint) {
+    // the tables of the toml crate are sorted by key
+    for (key, value) in table.iter() {
+        path.push(key.get_ref().to_string());
+        if !WITHOUT_EFFECT.iter().any(|p| path.iter().eq(p.iter())) {
+            print.add(key.get_ref().as_bytes());
+            add_value(value.get_ref(), path, print);
+        }
+        path.pop();
+    }
+    print.add(b"end of table");
+}
+
+fn add_value(value: &DeValue<'_>, path: &mut Vec<String>, print: &mut Fingerprint) {
+    match value {
+        DeValue::Table(table) => add_table(table, path, print),
+        DeValue::Array(items) => {
+            for item in items.iter() {
+                add_value(item.get_ref(), path, print);
+            }
+            print.add(b"end of list");
+        }
+        DeValue::String(text) => print.add(text.as_bytes()),
+        DeValue::Integer(i) => print.add(format!("{i}").as_bytes()),
+        DeValue::Float(f) => print.add(f.as_str().as_bytes()),
+        DeValue::Boolean(b) => print.add(&[u8::from(*b)]),
+        DeValue::Datetime(d) => print.add(d.to_string().as_bytes()),
     }
 }

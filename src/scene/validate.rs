@@ -2,21 +2,29 @@
 
 use std::path::{Path, PathBuf};
 
+use super::breaking::Breaking;
 use super::check;
 use super::conditions::{self, Condition, extent};
 use super::error::{SceneError, SceneErrorKind};
+use super::initial::Initial;
 use super::materials::{self, Material, Peridynamics, Points};
 use super::meshing;
+use super::motion::RunOptions;
 use super::predict::{self, Prediction};
 use super::region::{self, Region};
 use super::run::{self, RunError};
+use super::solve::Solve;
 use super::source::{Source, Span};
-use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ShapeSpec, ZonesNeeded};
-use super::zones;
+use super::spec::{
+    CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ShapeSpec, TipSpec, ZonesNeeded,
+};
+use super::value::Text;
+use super::{breaking, initial, solve, zones};
 use crate::coupling::Zone;
 use crate::fem::Locator;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
+use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::RunSummary;
 use crate::peridynamics::Influence;
 use crate::progress::Progress;
@@ -49,10 +57,18 @@ pub struct Scene<const D: usize> {
     pub voids: Vec<Shape<D>>,
     /// Voids and cracks that cut bonds.
     pub barriers: Vec<Barrier<D>>,
+    /// What is computed.
+    pub solve: Solve,
+    /// Displacements and velocities at time zero.
+    pub initial: Vec<Initial<D>>,
+    /// How bonds deform and break.
+    pub breaking: Breaking<D>,
     /// The linear solver.
     pub solver: Solver,
     /// What is written.
     pub output: Output<D>,
+    /// A number for the scene's text, by which a checkpoint knows that it belongs to it.
+    pub fingerprint: Fingerprint,
 }
 
 /// The linear solver of a scene.
@@ -81,6 +97,21 @@ pub struct Output<const D: usize> {
     pub lines: Vec<(String, Vec<Vector<D>>)>,
     /// Probes: name and position.
     pub probes: Vec<(String, Vector<D>)>,
+    /// Tips of cracks to follow.
+    pub tips: Vec<Tip<D>>,
+}
+
+/// The tip of a crack: the farthest damaged point along a direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tip<const D: usize> {
+    /// Its name.
+    pub name: String,
+    /// The direction, of length 1.
+    pub direction: Vector<D>,
+    /// Where to look.
+    pub inside: Region<D>,
+    /// Damage from which a point counts.
+    pub threshold: f64,
 }
 
 /// A validated scene of any dimension.
@@ -124,16 +155,19 @@ impl AnyScene {
     /// A [`SceneError`] with place, value and remedy.
     pub fn from_source(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
         let spec = SceneSpec::parse(source)?;
+        let print = source.fingerprint()?;
         let found = match spec.kinematics.get_ref() {
-            KinematicsSpec::Bar => scene(&spec, Kinematics::Bar, directory, name).map(Self::bar),
+            KinematicsSpec::Bar => {
+                scene(&spec, Kinematics::Bar, directory, name, print).map(Self::bar)
+            }
             KinematicsSpec::PlaneStress => {
-                scene(&spec, Kinematics::PlaneStress, directory, name).map(Self::plane)
+                scene(&spec, Kinematics::PlaneStress, directory, name, print).map(Self::plane)
             }
             KinematicsSpec::PlaneStrain => {
-                scene(&spec, Kinematics::PlaneStrain, directory, name).map(Self::plane)
+                scene(&spec, Kinematics::PlaneStrain, directory, name, print).map(Self::plane)
             }
             KinematicsSpec::Solid => {
-                scene(&spec, Kinematics::Solid, directory, name).map(Self::solid)
+                scene(&spec, Kinematics::Solid, directory, name, print).map(Self::solid)
             }
         };
         found.map_err(|error| error.shown_in(source))
@@ -148,15 +182,37 @@ impl AnyScene {
         }
     }
 
-    /// Solves the scene and writes its outputs.
+    /// Whether the scene has a history, so that it can be interrupted and resumed.
+    pub fn moves(&self) -> bool {
+        let solve = match self {
+            Self::Bar(s) => &s.solve,
+            Self::Plane(s) => &s.solve,
+            Self::Solid(s) => &s.solve,
+        };
+        *solve != Solve::Static
+    }
+
+    /// Runs the scene from its beginning and writes its outputs.
     ///
     /// # Errors
     /// [`RunError`], each with place and remedy.
     pub fn run(self, progress: &dyn Progress) -> Result<RunSummary, RunError> {
+        self.run_with(&RunOptions::default(), progress)
+    }
+
+    /// Runs the scene and writes its outputs.
+    ///
+    /// # Errors
+    /// [`RunError`], each with place and remedy.
+    pub fn run_with(
+        self,
+        options: &RunOptions<'_>,
+        progress: &dyn Progress,
+    ) -> Result<RunSummary, RunError> {
         match self {
-            Self::Bar(s) => run::run(*s, progress),
-            Self::Plane(s) => run::run(*s, progress),
-            Self::Solid(s) => run::run(*s, progress),
+            Self::Bar(s) => run::run(*s, options, progress),
+            Self::Plane(s) => run::run(*s, options, progress),
+            Self::Solid(s) => run::run(*s, options, progress),
         }
     }
 
@@ -190,6 +246,7 @@ fn scene<const D: usize>(
     kinematics: Kinematics,
     directory: &Path,
     name: &str,
+    mut fingerprint: Fingerprint,
 ) -> Result<Scene<D>, SceneError> {
     let joining = spec.coupling.get_ref().joining();
     let solver = solver(spec)?;
@@ -222,7 +279,20 @@ fn scene<const D: usize>(
         horizon(spec, p, &mesh, &zones)?;
     }
     let (voids, barriers) = barriers(spec, &mesh, &zones)?;
-    let conditions = conditions::conditions(&spec.conditions, &mesh)?;
+    add_mesh(&mesh, &mut fingerprint);
+    let solve = solve::solve(spec.solve.as_ref())?;
+    let clock = solve.clock();
+    let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
+    let initial = initial::initial(&spec.initial, &mesh, clock)?;
+    if matches!(solve, Solve::Explicit(_)) {
+        densities(spec, &found)?;
+    }
+    let peridynamic = cell_material
+        .iter()
+        .zip(&zones)
+        .find(|(_, zone)| **zone != Zone::Local)
+        .map_or(0, |(m, _)| *m);
+    let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
     let output = output(spec, &mesh, name)?;
     Ok(Scene {
         title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
@@ -236,9 +306,40 @@ fn scene<const D: usize>(
         conditions,
         voids,
         barriers,
+        solve,
+        initial,
+        breaking,
         solver,
         output,
+        fingerprint,
     })
+}
+
+/// A mesh from a file may change while its name stays.
+fn add_mesh<const D: usize>(mesh: &Mesh<D>, print: &mut Fingerprint) {
+    for x in mesh.nodes.iter().flatten() {
+        print.add(&x.to_le_bytes());
+    }
+    for n in &mesh.connectivity {
+        print.add(&n.to_le_bytes());
+    }
+}
+
+/// Refuses a motion without inertia.
+fn densities<const D: usize>(spec: &SceneSpec, found: &[Material<D>]) -> Result<(), SceneError> {
+    let Some(light) = found.iter().find(|m| m.density <= 0.0) else {
+        return Ok(());
+    };
+    let span = spec
+        .materials
+        .get_key_value(light.name.as_str())
+        .map_or(0..0, |(k, _)| k.span.clone());
+    Err(SceneError::new(
+        SceneErrorKind::Missing,
+        format!("the material `{}` has no density, which [solve.explicit] needs", light.name),
+    )
+    .label(span, "has no inertia")
+    .help("add density = ..., in the units of the scene (kg/m³ beside N and m; t/mm³ beside N and mm)"))
 }
 
 fn default_influence() -> Result<Influence, SceneError> {
@@ -517,6 +618,10 @@ fn output<const D: usize>(
         }
         probes.push((key.value.clone(), at));
     }
+    let mut tips = Vec::with_capacity(o.tips.len());
+    for (key, tip) in &o.tips {
+        tips.push(self::tip(key, tip, mesh)?);
+    }
     Ok(Output {
         directory: o
             .directory
@@ -526,6 +631,39 @@ fn output<const D: usize>(
         vtu: o.vtu.unwrap_or(true),
         lines,
         probes,
+        tips,
+    })
+}
+
+fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip<D>, SceneError> {
+    let place = format!("output.tips.{key}");
+    let direction = region::position::<D>(&format!("{place}.direction"), &spec.direction)?;
+    if direction.norm() <= 0.0 {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`{place}.direction` is zero"),
+        )
+        .label(spec.direction.span.clone(), "points nowhere")
+        .help("give the direction in which the crack runs"));
+    }
+    let threshold = match &spec.threshold {
+        Some(t) => check::within(
+            &format!("{place}.threshold"),
+            t,
+            t.value > 0.0 && t.value < 1.0,
+            "must lie between 0 and 1",
+            "0.35 suits most scenes: a straight crack cuts up to half of the bonds",
+        )?,
+        None => 0.35,
+    };
+    Ok(Tip {
+        name: key.value.clone(),
+        direction: direction.normalize(),
+        inside: match &spec.inside {
+            Some(shape) => region::region(&format!("{place}.inside"), shape, mesh)?,
+            None => Scene::everywhere(),
+        },
+        threshold,
     })
 }
 

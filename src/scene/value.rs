@@ -9,6 +9,7 @@ use toml::Spanned;
 
 use super::expression::Expression;
 use super::source::Span;
+use crate::observe::checkpoint::Pace;
 
 /// A number, typed as `0.05` or as a constant expression in quotes, `"6/120"`.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +25,24 @@ pub struct Number {
 pub struct Count {
     /// The value.
     pub value: usize,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A number, or "auto".
+#[derive(Clone, Debug, Default)]
+pub struct Automatic {
+    /// The value; none for "auto".
+    pub value: Option<f64>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// How often something is done: 1000 (steps), or "10 min" of the clock.
+#[derive(Clone, Debug)]
+pub struct Every {
+    /// How often.
+    pub pace: Pace,
     /// Where it stands.
     pub span: Span,
 }
@@ -164,6 +183,64 @@ impl<'de> Deserialize<'de> for Constant {
     }
 }
 
+/// A number, or none for "auto".
+struct Chosen(Option<f64>);
+
+impl<'de> Deserialize<'de> for Chosen {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Numbers;
+        impl Visitor<'_> for Numbers {
+            type Value = Chosen;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or \"auto\"")
+            }
+
+            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Chosen, E> {
+                Ok(Chosen(Some(v as f64)))
+            }
+
+            fn visit_f64<E: de::Error>(self, v: f64) -> Result<Chosen, E> {
+                let constant = Scalars::Constant.visit_f64::<E>(v)?;
+                Ok(Chosen(constant.as_constant()))
+            }
+
+            fn visit_str<E: de::Error>(self, v: &str) -> Result<Chosen, E> {
+                if v == "auto" {
+                    return Ok(Chosen(None));
+                }
+                Ok(Chosen(Scalars::Constant.visit_str::<E>(v)?.as_constant()))
+            }
+        }
+        deserializer.deserialize_any(Numbers)
+    }
+}
+
+/// A pace, typed as a number of steps or as text with a unit.
+struct Typed(Pace);
+
+impl<'de> Deserialize<'de> for Typed {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Paces;
+        impl Visitor<'_> for Paces {
+            type Value = Typed;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number of steps, or a time such as \"10 min\"")
+            }
+
+            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Typed, E> {
+                self.visit_str(&v.to_string())
+            }
+
+            fn visit_str<E: de::Error>(self, v: &str) -> Result<Typed, E> {
+                v.parse().map(Typed).map_err(E::custom)
+            }
+        }
+        deserializer.deserialize_any(Paces)
+    }
+}
+
 struct Whole(usize);
 
 impl<'de> Deserialize<'de> for Whole {
@@ -197,6 +274,26 @@ impl<'de> Deserialize<'de> for Count {
         Ok(Self {
             span: spanned.span(),
             value: spanned.into_inner().0,
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Automatic {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<Chosen>::deserialize(deserializer)?;
+        Ok(Self {
+            span: spanned.span(),
+            value: spanned.into_inner().0,
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Every {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<Typed>::deserialize(deserializer)?;
+        Ok(Self {
+            span: spanned.span(),
+            pace: spanned.into_inner().0,
         })
     }
 }
@@ -286,8 +383,16 @@ schema!(Count, "Count", {
     "type": ["integer", "string"],
     "minimum": 0
 });
+schema!(Automatic, "Automatic", {
+    "description": "A number, or \"auto\".",
+    "type": ["number", "string"]
+});
+schema!(Every, "Every", {
+    "description": "A number of steps, or a time of the clock such as \"30 s\", \"10 min\", \"2 h\".",
+    "type": ["integer", "string"]
+});
 schema!(Expression, "Expression", {
-    "description": "A number, or an expression in x, y, z in quotes such as \"1e-3 * x^2\".",
+    "description": "A number, or an expression in x, y, z (in conditions that move also t) in quotes such as \"1e-3 * x^2\".",
     "type": ["number", "string"]
 });
 schema!(Coordinates, "Coordinates", {

@@ -27,7 +27,7 @@ pub fn write<const D: usize>(
     let solution = Solution::new(solved);
     if output.vtu {
         let path = output.directory.join(format!("{}.vtu", output.name));
-        write_vtu(&path, &snapshot(solved, &solution), Compression::Zlib)?;
+        write_vtu(&path, &snapshot(solved, &[]), Compression::Zlib)?;
         files.push(path);
     }
     for (name, positions) in &output.lines {
@@ -113,17 +113,6 @@ impl<'a, const D: usize> Solution<'a, D> {
         }
     }
 
-    fn node(&self, n: usize) -> Vector<D> {
-        self.solved
-            .model
-            .node_transfer
-            .displacement(n, self.solved.displacement)
-    }
-
-    fn site(&self, site: usize) -> Vector<D> {
-        Vector::from_column_slice(&self.solved.displacement[site * D..][..D])
-    }
-
     /// Whether a position lies in the mesh and in no void.
     fn is_inside(&self, x: &Vector<D>) -> bool {
         let model = self.solved.model;
@@ -141,8 +130,11 @@ impl<'a, const D: usize> Solution<'a, D> {
         }
         let displacement = self.sampler.displacement(x, self.solved.displacement)?;
         let (gradient, zone) = match self.sampler.carrier(x)? {
-            Carrier::Element(c) => (self.element_gradient(c), self.solved.model.zones[c]),
-            Carrier::Point(site) => (self.point_gradient(site), self.solved.zone_of_site[site]),
+            Carrier::Element(c) => (self.solved.element_gradient(c), self.solved.model.zones[c]),
+            Carrier::Point(site) => (
+                self.solved.point_gradient(site),
+                self.solved.zone_of_site[site],
+            ),
         };
         Some(Sample {
             displacement,
@@ -150,14 +142,25 @@ impl<'a, const D: usize> Solution<'a, D> {
             zone,
         })
     }
+}
+
+impl<const D: usize> Solved<'_, D> {
+    fn node(&self, n: usize) -> Vector<D> {
+        let transfer = &self.model.node_transfer;
+        transfer.displacement(n, self.displacement)
+    }
+
+    fn site(&self, site: usize) -> Vector<D> {
+        Vector::from_column_slice(&self.displacement[site * D..][..D])
+    }
 
     fn element_gradient(&self, c: usize) -> Tensor<D> {
-        fem::displacement_gradient_at_centre(&self.solved.model.mesh, c, |n| self.node(n))
+        fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
     }
 
     /// Least-squares gradient over the nearest bonds of a point, weighted by 1/|ξ|²: sharper than over the whole family.
     fn point_gradient(&self, site: usize) -> Tensor<D> {
-        let Some((body, p)) = self.solved.model.point_of(site) else {
+        let Some((body, p)) = self.model.point_of(site) else {
             return Tensor::zeros();
         };
         let here = self.site(site);
@@ -176,11 +179,8 @@ impl<'a, const D: usize> Solution<'a, D> {
             let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
             for (xi, j) in bonds.iter().filter(|(xi, _)| xi.norm() <= reach) {
                 let w = 1.0 / xi.norm_squared();
-                let eta: Vector<D> = body
-                    .cloud
-                    .transfer
-                    .displacement::<D>(*j, self.solved.displacement)
-                    - here;
+                let eta: Vector<D> =
+                    body.cloud.transfer.displacement::<D>(*j, self.displacement) - here;
                 shape += xi * xi.transpose() * w;
                 moment += eta * xi.transpose() * w;
             }
@@ -192,13 +192,25 @@ impl<'a, const D: usize> Solution<'a, D> {
     }
 }
 
-fn snapshot<const D: usize>(solved: &Solved<'_, D>, solution: &Solution<'_, D>) -> Snapshot {
+/// Cells and points with the fields of a solved.
+/// A field over sites, beside those that every solution has.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum OverSites<'a> {
+    /// A vector, like the displacement.
+    Vector(&'static str, &'a [f64]),
+    /// A number, zero at nodes that are no sites.
+    Scalar(&'static str, &'a [f64]),
+}
+
+/// Cells and points with the fields of a solution; without a residual, that field is left out.
+pub(super) fn snapshot<const D: usize>(solved: &Solved<'_, D>, more: &[OverSites<'_>]) -> Snapshot {
     let model = solved.model;
     let mesh = &model.mesh;
     // nodes that elements use, then points
     let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
     let mut snapshot = Snapshot::default();
     let mut site_of_point: Vec<Option<usize>> = Vec::new();
+    let mut node_of_point: Vec<Option<usize>> = Vec::new();
     let mut displacement: Vec<Vector<D>> = Vec::new();
     let mut zones = Vec::new();
     let (mut strains, mut stresses) = (Vec::new(), Vec::new());
@@ -215,14 +227,15 @@ fn snapshot<const D: usize>(solved: &Solved<'_, D>, solution: &Solution<'_, D>) 
             if *entry == u32::MAX {
                 *entry = snapshot.points.len() as u32;
                 snapshot.points.push(padded(&mesh.nodes[n as usize]));
-                displacement.push(solution.node(n as usize));
+                displacement.push(solved.node(n as usize));
                 site_of_point.push(site_of_node[n as usize]);
+                node_of_point.push(Some(n as usize));
             }
             *slot = *entry;
         }
         snapshot.push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
         zones.push(label(model.zones[c]));
-        let gradient = solution.element_gradient(c);
+        let gradient = solved.element_gradient(c);
         strains.push(strain(&gradient));
         stresses.push(
             solved
@@ -238,15 +251,16 @@ fn snapshot<const D: usize>(solved: &Solved<'_, D>, solution: &Solution<'_, D>) 
             let stress = model.point_of(site).map_or(Tensor::zeros(), |(body, p)| {
                 body.partial_stress(p, solved.displacement)
             });
-            (site, strain(&solution.point_gradient(site)), stress)
+            (site, strain(&solved.point_gradient(site)), stress)
         })
         .collect();
     for (site, e, stress) in on_points {
         let number = snapshot.points.len() as u32;
         snapshot.points.push(padded(&model.sites[site].position));
         snapshot.push_cell(CellShape::Vertex, &[number]);
-        displacement.push(solution.site(site));
+        displacement.push(solved.site(site));
         site_of_point.push(Some(site));
+        node_of_point.push(None);
         zones.push(label(solved.zone_of_site[site]));
         strains.push(e);
         stresses.push(stress);
@@ -259,20 +273,36 @@ fn snapshot<const D: usize>(solved: &Solved<'_, D>, solution: &Solution<'_, D>) 
         (None, _) | (_, Zone::Local) => 0.0,
         (Some(p), _) => (p.horizon)(&model.sites[site].position),
     };
-    let residual: Vec<Vector<D>> = site_of_point
-        .iter()
-        .map(|s| {
-            s.map_or(Vector::zeros(), |s| {
-                Vector::from_column_slice(&solved.residual[s * D..][..D])
-            })
-        })
-        .collect();
+    let on_site = |s: usize, values: &[f64]| Vector::<D>::from_column_slice(&values[s * D..][..D]);
     snapshot.point_fields = vec![
         Field::vector("displacement", &displacement),
         Field::scalar("beta", of_site(&|s| solved.operator.beta(s))),
         Field::scalar("horizon", of_site(&horizon)),
-        Field::vector("residual", &residual),
     ];
+    if !solved.residual.is_empty() {
+        let residual: Vec<Vector<D>> = site_of_point
+            .iter()
+            .map(|s| s.map_or(Vector::zeros(), |s| on_site(s, solved.residual)))
+            .collect();
+        snapshot
+            .point_fields
+            .push(Field::vector("residual", &residual));
+    }
+    for field in more {
+        snapshot.point_fields.push(match field {
+            OverSites::Scalar(name, values) => Field::scalar(name, of_site(&|s| values[s])),
+            OverSites::Vector(name, values) => {
+                let at = |(site, node): (&Option<usize>, &Option<usize>)| match (site, node) {
+                    (_, Some(n)) => model.node_transfer.displacement(*n, values),
+                    (Some(s), None) => on_site(*s, values),
+                    (None, None) => Vector::zeros(),
+                };
+                let vectors: Vec<Vector<D>> =
+                    site_of_point.iter().zip(&node_of_point).map(at).collect();
+                Field::vector(name, &vectors)
+            }
+        });
+    }
     snapshot.cell_fields = vec![
         Field::labels("model", zones),
         Field::tensor("strain", &strains),

@@ -13,6 +13,8 @@ use crate::scene::value::Text;
 pub enum ConditionSpec {
     /// Displacement, component by component; components left out stay free.
     Displacement(DisplacementSpec),
+    /// Velocity, component by component, in a scene that moves; components left out stay free.
+    Velocity(VelocitySpec),
     /// Force per area (per length of thickness 1 in 2D; a force in 1D) on a set of facets.
     Traction(TractionSpec),
     /// Force per volume.
@@ -36,6 +38,27 @@ pub struct DisplacementSpec {
     #[serde(default)]
     pub y: Option<Expression>,
     /// Displacement along z.
+    #[serde(default)]
+    pub z: Option<Expression>,
+}
+
+/// Prescribed velocity: exactly one of `on` and `inside`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct VelocitySpec {
+    /// A named set of the mesh. Where peridynamics meets the set, points in a layer one horizon deep follow it.
+    #[serde(default)]
+    pub on: Option<Text>,
+    /// All sites inside a shape.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// Velocity along x.
+    #[serde(default)]
+    pub x: Option<Expression>,
+    /// Velocity along y.
+    #[serde(default)]
+    pub y: Option<Expression>,
+    /// Velocity along z.
     #[serde(default)]
     pub z: Option<Expression>,
 }

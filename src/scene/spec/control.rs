@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::motion::TipSpec;
 use crate::scene::value::{Coordinates, Count, Number, Text};
 use crate::solve::ordering::Ordering;
 use crate::solve::statics::Method;
@@ -43,9 +44,12 @@ pub struct OutputSpec {
     /// Straight lines along which a CSV file samples the solution, by name.
     #[serde(default)]
     pub lines: BTreeMap<Text, LineSpec>,
-    /// Points at which a CSV file gives the solution, by name.
+    /// Points at which a CSV file gives the solution, by name; in a scene that moves, columns of the history.
     #[serde(default)]
     pub probes: BTreeMap<Text, ProbeSpec>,
+    /// Tips of cracks to follow, by name, in a scene in which bonds break.
+    #[serde(default)]
+    pub tips: BTreeMap<Text, TipSpec>,
 }
 
 /// A line of samples.

@@ -34,6 +34,12 @@ pub struct BondBasedSpec {
     /// How the stiffness of a bond depends on its length.
     #[serde(default)]
     pub micromodulus: MicromodulusSpec,
+    /// Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.
+    #[serde(default)]
+    pub fracture_energy: Option<Number>,
+    /// Stretch at which a bond breaks, instead of `fracture-energy`.
+    #[serde(default)]
+    pub critical_stretch: Option<Number>,
     /// The set of cells that this material fills.
     #[serde(default)]
     pub cells: Option<Text>,
@@ -50,6 +56,12 @@ pub struct StateBasedSpec {
     /// Density.
     #[serde(default)]
     pub density: Option<Number>,
+    /// Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.
+    #[serde(default)]
+    pub fracture_energy: Option<Number>,
+    /// Stretch at which a bond breaks, instead of `fracture-energy`.
+    #[serde(default)]
+    pub critical_stretch: Option<Number>,
     /// The set of cells that this material fills.
     #[serde(default)]
     pub cells: Option<Text>,
@@ -166,6 +178,10 @@ pub struct PeridynamicsSpec {
     /// Where the points are.
     #[serde(default)]
     pub points: PointsSpec,
+    /// How the force of a bond depends on the displacement; "linear" without damage and "exact" with it if left out.
+    #[serde(default)]
+    #[schemars(with = "Option<super::motion::BondsSpec>")]
+    pub bonds: Option<toml::Spanned<super::motion::BondsSpec>>,
     /// Whether the mesh's own boundary (a hole, a notch) cuts bonds.
     #[serde(default)]
     pub surfaces: SurfacesSpec,

@@ -7,9 +7,12 @@ mod control;
 mod coupling;
 mod material;
 mod mesh;
+mod motion;
 mod region;
 
-pub use condition::{BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VoidSpec};
+pub use condition::{
+    BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VelocitySpec, VoidSpec,
+};
 pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec};
 pub use coupling::{
     BetaSpec, BlendingSpec, CouplingSpec, FormSpec, InterfaceSpec, Joining, LatticeStart,
@@ -23,6 +26,10 @@ pub use mesh::{
     AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
+pub use motion::{
+    BeyondLimitSpec, BondsSpec, ContactSpec, EdgeSpec, ExplicitSpec, InitialFieldSpec, InitialSpec,
+    LoadStepSpec, QuasiStaticSpec, SolveSpec, TipSpec,
+};
 pub use region::{
     BallSpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
@@ -35,7 +42,7 @@ use toml::Spanned;
 
 use super::value::Text;
 
-/// A scene of bondline: one static problem of a body that is finite elements here and peridynamics there.
+/// A scene of bondline: a body that is finite elements here and peridynamics there, at rest or in motion.
 ///
 /// Units are the user's own, consistent throughout (m, N, Pa; or mm, N, MPa). Every number may also be a constant
 /// expression in quotes, "1/120".
@@ -62,21 +69,43 @@ pub struct SceneSpec {
     /// How the two models are joined; also as text where no option is set, `coupling = "splice"`.
     #[schemars(schema_with = "coupling::coupling_schema")]
     pub coupling: Spanned<CouplingSpec>,
-    /// Displacements, tractions and body forces by name.
+    /// What is computed: one state of equilibrium (default), motion in time, or a load that grows; as text where no option is set, `solve = "static"`.
+    #[serde(default)]
+    #[schemars(schema_with = "solve_schema")]
+    pub solve: Option<Spanned<SolveSpec>>,
+    /// Displacements, velocities, tractions and body forces by name.
     #[serde(default)]
     pub conditions: BTreeMap<Text, ConditionSpec>,
+    /// Displacements and velocities at time zero by name; at rest where none says otherwise.
+    #[serde(default)]
+    pub initial: BTreeMap<Text, InitialSpec>,
     /// Empty regions by name: points inside are removed, and bonds across are cut.
     #[serde(default)]
     pub voids: BTreeMap<Text, VoidSpec>,
     /// Cracks by name: surfaces without thickness that cut the bonds across them.
     #[serde(default)]
     pub cracks: BTreeMap<Text, ShapeSpec>,
+    /// Regions by name in which no bond breaks: where a load or a grip holds the points.
+    #[serde(default)]
+    pub no_fail: BTreeMap<Text, ShapeSpec>,
+    /// Short-range contact; none if left out.
+    #[serde(default)]
+    pub contact: Option<ContactSpec>,
     /// The linear solver.
     #[serde(default)]
     pub solver: SolverSpec,
     /// What is written, and where.
     #[serde(default)]
     pub output: OutputSpec,
+}
+
+/// A table with options, or the name alone.
+fn solve_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    let table = generator.subschema_for::<SolveSpec>();
+    schemars::json_schema!({
+        "description": "What is computed: a table, [solve.explicit], or a name where no option is set, \"static\" (default).",
+        "anyOf": [table, { "enum": ["static"] }]
+    })
 }
 
 /// How a body of one, two or three dimensions stands for a solid.

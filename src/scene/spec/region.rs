@@ -18,6 +18,10 @@ pub struct ZonesSpec {
     #[serde(default)]
     #[schemars(with = "Option<TransitionSpec>")]
     pub transition: Option<Spanned<TransitionSpec>>,
+    /// What is done when damage reaches the edge of the nonlocal zone; "stop" if left out.
+    #[serde(default)]
+    #[schemars(with = "Option<super::motion::EdgeSpec>")]
+    pub damage_at_edge: Option<Spanned<super::motion::EdgeSpec>>,
 }
 
 /// A region of space or a named set of cells.

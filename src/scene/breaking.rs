@@ -1,0 +1,126 @@
+//! How the bonds of a validated scene deform, where they may break, and what points do that touch.
+
+use super::check;
+use super::error::{SceneError, SceneErrorKind};
+use super::materials::{Fracture, Law, Material};
+use super::region::{Region, region};
+use super::spec::{BondsSpec, ContactSpec, EdgeSpec, SceneSpec};
+use crate::mesh::Mesh;
+
+/// How bonds deform and break. A scene that names neither fracture nor contact has none, and pays for none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Breaking<const D: usize> {
+    /// How the force of a bond depends on the displacement.
+    pub bonds: BondsSpec,
+    /// When bonds of the peridynamic material break; never if there is none.
+    pub fracture: Option<Fracture>,
+    /// Regions in which no bond breaks.
+    pub no_fail: Vec<Region<D>>,
+    /// What is done when damage reaches the edge of the nonlocal zone.
+    pub at_edge: EdgeSpec,
+    /// Short-range contact.
+    pub contact: Option<Contact>,
+}
+
+/// Short-range contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Distance below which points repel each other, over the spacing.
+    pub radius_factor: f64,
+    /// Stiffness of the repulsion over that of a bond.
+    pub stiffness_factor: f64,
+}
+
+/// How bonds of the peridynamic material `material` deform and break.
+pub(crate) fn breaking<const D: usize>(
+    spec: &SceneSpec,
+    material: &Material<D>,
+    mesh: &Mesh<D>,
+) -> Result<Breaking<D>, SceneError> {
+    let fracture = material.fracture;
+    if fracture.is_none() {
+        let needless = |span, what: &str| {
+            SceneError::new(
+                SceneErrorKind::Conflict,
+                format!(
+                    "{what}, but no bond of the material `{}` breaks",
+                    material.name
+                ),
+            )
+            .label(span, "needs a material that breaks")
+            .help(format!(
+                "add fracture-energy or critical-stretch to [materials.{}.…], or remove this",
+                material.name
+            ))
+        };
+        if let Some(name) = spec.no_fail.keys().next() {
+            return Err(needless(
+                name.span.clone(),
+                &format!("`no-fail.{name}` names a region"),
+            ));
+        }
+        if let Some(name) = spec.output.tips.keys().next() {
+            return Err(needless(
+                name.span.clone(),
+                &format!("`output.tips.{name}` follows a crack"),
+            ));
+        }
+        if let Some(edge) = &spec.zones.damage_at_edge {
+            return Err(needless(edge.span(), "`zones.damage-at-edge` is set"));
+        }
+    }
+    let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
+    let bonds = match typed {
+        Some(bonds) => {
+            if *bonds.get_ref() == BondsSpec::Exact
+                && matches!(material.law, Law::Correspondence(..))
+            {
+                return Err(SceneError::new(
+                    SceneErrorKind::Conflict,
+                    format!("`peridynamics.bonds` is \"exact\", and the material `{}` is a correspondence law", material.name),
+                )
+                .label(bonds.span(), "its force does not follow the stretch of a bond")
+                .help("use bonds = \"linear\", or a bond-based or lps material"));
+            }
+            *bonds.get_ref()
+        }
+        None if fracture.is_some() || spec.contact.is_some() => BondsSpec::Exact,
+        None => BondsSpec::Linear,
+    };
+    let mut no_fail = Vec::with_capacity(spec.no_fail.len());
+    for (name, shape) in &spec.no_fail {
+        no_fail.push(region(&format!("no-fail.{name}"), shape, mesh)?);
+    }
+    Ok(Breaking {
+        bonds,
+        fracture,
+        no_fail,
+        at_edge: spec
+            .zones
+            .damage_at_edge
+            .as_ref()
+            .map_or(EdgeSpec::Stop, |e| *e.get_ref()),
+        contact: spec.contact.as_ref().map(contact).transpose()?,
+    })
+}
+
+fn contact(spec: &ContactSpec) -> Result<Contact, SceneError> {
+    let radius_factor = match &spec.radius_factor {
+        Some(r) => check::within(
+            "contact.radius-factor",
+            r,
+            r.value > 0.0 && r.value <= 1.0,
+            "must be positive and at most 1",
+            "0.9 suits most scenes; beyond 1 neighbours at rest would repel each other",
+        )?,
+        None => 0.9,
+    };
+    let stiffness_factor = match &spec.stiffness_factor {
+        Some(s) => check::positive("contact.stiffness-factor", s)?,
+        None => 15.0,
+    };
+    Ok(Contact {
+        radius_factor,
+        stiffness_factor,
+    })
+}

@@ -1,0 +1,83 @@
+//! What a validated scene starts from.
+
+use std::collections::BTreeMap;
+
+use super::conditions::{Components, components, finite, inside};
+use super::error::{SceneError, SceneErrorKind};
+use super::region::Region;
+use super::solve::{Clock, Pacing, still};
+use super::spec::{InitialFieldSpec, InitialSpec};
+use super::validate::Scene;
+use super::value::Text;
+use crate::mesh::Mesh;
+
+/// Which field is given at time zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InitialKind {
+    /// Displacement.
+    Displacement,
+    /// Velocity.
+    Velocity,
+}
+
+/// A field at time zero; where two meet, the later name in the alphabet holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Initial<const D: usize> {
+    /// Its name.
+    pub name: String,
+    /// Which field.
+    pub kind: InitialKind,
+    /// Where.
+    pub region: Region<D>,
+    /// How much; components left out stay as they are.
+    pub components: Components<D>,
+}
+
+/// All initial fields.
+pub(crate) fn initial<const D: usize>(
+    spec: &BTreeMap<Text, InitialSpec>,
+    mesh: &Mesh<D>,
+    clock: Clock,
+) -> Result<Vec<Initial<D>>, SceneError> {
+    let mut found = Vec::with_capacity(spec.len());
+    for (name, initial) in spec {
+        let (kind, word, field) = match initial {
+            InitialSpec::Displacement(f) => (InitialKind::Displacement, "displacement", f),
+            InitialSpec::Velocity(f) => (InitialKind::Velocity, "velocity", f),
+        };
+        let place = format!("initial.{name}.{word}");
+        if clock.pacing != Pacing::Moving {
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                format!("`{place}` in a scene that does not move"),
+            )
+            .label(name.span.clone(), "there is no time zero")
+            .help("add [solve.explicit] with duration = ..., or remove it"));
+        }
+        let InitialFieldSpec {
+            inside: shape,
+            x,
+            y,
+            z,
+        } = field;
+        let components = components::<D>(&place, name, [x, y, z])?;
+        for (axis, e) in ["x", "y", "z"].iter().zip(&components.0) {
+            if let Some(e) = e {
+                still(&format!("{place}.{axis}"), e)?;
+            }
+        }
+        let region = match shape {
+            Some(shape) => inside(&place, name, shape, mesh)?,
+            None => Scene::everywhere(),
+        };
+        let within = mesh.nodes.iter().filter(|x| region.contains(x, 0.0));
+        finite(&place, name, &components, clock, within.copied())?;
+        found.push(Initial {
+            name: name.value.clone(),
+            kind,
+            region,
+            components,
+        });
+    }
+    Ok(found)
+}

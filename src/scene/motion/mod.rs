@@ -1,0 +1,75 @@
+//! Scenes in time and under a load that grows: what moves, what drives it, what is written meanwhile.
+//!
+//! | file | what |
+//! |---|---|
+//! | `system.rs` | what moves, its masses, its start |
+//! | `drive.rs` | loads and prescribed motion as functions of time |
+//! | `explicit.rs` | the run in time |
+//! | `predict.rs` | what a run in time will need |
+//! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
+
+mod drive;
+mod explicit;
+mod predict;
+mod record;
+mod system;
+
+use std::sync::atomic::AtomicBool;
+
+use super::predict::Prediction;
+use super::run::RunError;
+use super::solve::Solve;
+use super::validate::Scene;
+use crate::observe::checkpoint::Pace;
+use crate::observe::summary::RunSummary;
+use crate::progress::Progress;
+
+/// Where a run starts from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartFrom {
+    /// The beginning; files of an earlier run go.
+    #[default]
+    Beginning,
+    /// The last checkpoint in the output folder; the beginning if there is none yet.
+    Checkpoint,
+}
+
+/// What the caller of a run decides, beside the scene. None of it changes a result.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RunOptions<'a> {
+    /// Where the run starts from.
+    pub start: StartFrom,
+    /// How often a checkpoint is written, instead of what the scene says.
+    pub checkpoint_every: Option<Pace>,
+    /// Set by another thread to end the run after the step at hand, with a checkpoint.
+    pub interrupt: Option<&'a AtomicBool>,
+}
+
+/// Predicts a run in time or under a load that grows.
+pub(super) fn predict<const D: usize>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    match scene.solve.clone() {
+        Solve::Explicit(solve) => predict::predict(scene, &solve, progress),
+        Solve::QuasiStatic(solve) => predict::load_steps(scene, &solve, progress),
+        Solve::Static => Err(LATER),
+    }
+}
+
+const LATER: RunError = RunError::Later {
+    what: "[solve.quasi-static] comes with its driver",
+    remedy: "use [solve.explicit], or a static scene",
+};
+
+/// Runs a scene in time or under a load that grows.
+pub(super) fn run<const D: usize>(
+    scene: Scene<D>,
+    options: &RunOptions<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, RunError> {
+    match scene.solve.clone() {
+        Solve::Explicit(solve) => explicit::run(scene, &solve, options, progress),
+        Solve::QuasiStatic(_) | Solve::Static => Err(LATER),
+    }
+}

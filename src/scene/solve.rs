@@ -1,0 +1,269 @@
+//! How a validated scene is carried through time or load.
+
+use toml::Spanned;
+
+use super::check;
+use super::error::{SceneError, SceneErrorKind};
+use super::expression::Expression;
+use super::spec::{BeyondLimitSpec, ExplicitSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec};
+use super::value::{Count, Every};
+use crate::observe::checkpoint::Pace;
+
+/// What a scene computes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Solve {
+    /// One state of equilibrium.
+    #[default]
+    Static,
+    /// Motion in time.
+    Explicit(Explicit),
+    /// States of equilibrium under a load that grows.
+    QuasiStatic(QuasiStatic),
+}
+
+/// Motion in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explicit {
+    /// Time at the end.
+    pub duration: f64,
+    /// The time step asked for; none for the stable one.
+    pub step: Option<f64>,
+    /// The fraction of the stable step that is taken.
+    pub fraction: f64,
+    /// What becomes of a step beyond the stable one.
+    pub beyond_limit: BeyondLimitSpec,
+    /// Time between VTU files.
+    pub output_interval: f64,
+    /// Time between rows of the history.
+    pub history_interval: f64,
+    /// How often a checkpoint is written.
+    pub checkpoint_every: Option<Pace>,
+}
+
+/// States of equilibrium under a load that grows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QuasiStatic {
+    /// Number of load steps.
+    pub steps: usize,
+    /// What t reaches at the last step.
+    pub duration: f64,
+    /// How each step is solved.
+    pub method: LoadStepSpec,
+    /// Relative out-of-balance force of a solved step.
+    pub tolerance: f64,
+    /// Most iterations of a step.
+    pub max_iterations: usize,
+    /// Load steps between VTU files.
+    pub output_every: usize,
+    /// How often a checkpoint is written.
+    pub checkpoint_every: Option<Pace>,
+}
+
+/// What `t` means in a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Pacing {
+    /// Nothing.
+    Still,
+    /// The load.
+    Loading,
+    /// Time.
+    Moving,
+}
+
+/// What `t` means, and instants at which conditions are looked at before a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Clock {
+    pub pacing: Pacing,
+    instants: [f64; 9],
+}
+
+impl Clock {
+    /// Instants at which a condition is looked at: the first if it does not change.
+    pub fn instants(&self, moving: bool) -> &[f64] {
+        if moving { &self.instants } else { &[0.0] }
+    }
+
+    /// Refuses `t` where nothing moves.
+    pub fn admits(&self, place: &str, expression: &Expression) -> Result<(), SceneError> {
+        if self.pacing != Pacing::Still || !expression.depends_on_time() {
+            return Ok(());
+        }
+        Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`{place}` depends on the time t in a static scene"),
+        )
+        .label(expression.span.clone(), "t means nothing here")
+        .help("add [solve.explicit] with duration = ..., or [solve.quasi-static] with steps = ...; or use x, y, z only"))
+    }
+}
+
+impl Solve {
+    /// What `t` means.
+    pub(crate) fn clock(&self) -> Clock {
+        let (pacing, end) = match self {
+            Self::Static => (Pacing::Still, 0.0),
+            Self::Explicit(e) => (Pacing::Moving, e.duration),
+            Self::QuasiStatic(q) => (Pacing::Loading, q.duration),
+        };
+        Clock {
+            pacing,
+            // both ends, and between them nothing that falls on a period
+            instants: [0.0, 0.013, 0.097, 0.23, 0.41, 0.59, 0.73, 0.91, 1.0].map(|s| s * end),
+        }
+    }
+}
+
+/// Refuses `t` in a field that does not change.
+pub(crate) fn still(place: &str, expression: &Expression) -> Result<(), SceneError> {
+    if !expression.depends_on_time() {
+        return Ok(());
+    }
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!("`{place}` depends on the time t"),
+    )
+    .label(expression.span.clone(), "does not change with time")
+    .help("use x, y, z only; t belongs into conditions"))
+}
+
+/// What a scene computes.
+pub(crate) fn solve(spec: Option<&Spanned<SolveSpec>>) -> Result<Solve, SceneError> {
+    Ok(match spec.map(Spanned::get_ref) {
+        None | Some(SolveSpec::Static(_)) => Solve::Static,
+        Some(SolveSpec::Explicit(e)) => Solve::Explicit(explicit(e)?),
+        Some(SolveSpec::QuasiStatic(q)) => Solve::QuasiStatic(quasi_static(q)?),
+    })
+}
+
+fn pace(every: Option<&Every>) -> Option<Pace> {
+    every.map(|e| e.pace)
+}
+
+fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
+    let place = |key: &str| format!("solve.explicit.{key}");
+    let duration = check::positive(&place("duration"), &spec.duration)?;
+    let step = match spec.step.value {
+        Some(value) if !(value > 0.0 && value <= duration) => {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("`{}` is {value}", place("step")),
+            )
+            .label(
+                spec.step.span.clone(),
+                format!("must be positive and at most the duration {duration}"),
+            )
+            .help("use step = \"auto\" for a fraction of the stable step"));
+        }
+        step => step,
+    };
+    let fraction = match &spec.step_fraction {
+        Some(f) => check::within(
+            &place("step-fraction"),
+            f,
+            f.value > 0.0 && f.value <= 1.0,
+            "must be positive and at most 1",
+            "0.95 suits most scenes; beyond 1 no step is stable",
+        )?,
+        None => 0.95,
+    };
+    let interval = |key: &str, number: &Option<super::value::Number>, default: f64| match number {
+        None => Ok(default),
+        Some(n) => check::within(
+            &place(key),
+            n,
+            n.value > 0.0 && n.value <= duration,
+            "must be positive and at most the duration",
+            "make it a fraction of the duration",
+        ),
+    };
+    let output_interval = match (&spec.outputs, &spec.output_interval) {
+        (Some(count), Some(interval)) => {
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                "`solve.explicit` has both `outputs` and `output-interval`",
+            )
+            .label(count.span.clone(), "a number of files")
+            .label(interval.span.clone(), "a time between files")
+            .help("keep one of them"));
+        }
+        (Some(count), None) => duration / count.value.max(1) as f64,
+        (None, given) => interval("output-interval", given, duration / 20.0)?,
+    };
+    if duration / output_interval > MOST_FILES {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!(
+                "`solve.explicit` asks for {:.1e} VTU files",
+                duration / output_interval
+            ),
+        )
+        .label(spec.duration.span.clone(), "over this time")
+        .help(format!(
+            "the limit is {MOST_FILES:.0e}; the history has a row for each of many more instants"
+        )));
+    }
+    Ok(Explicit {
+        duration,
+        step,
+        fraction,
+        beyond_limit: spec.beyond_limit,
+        output_interval,
+        history_interval: interval(
+            "history-interval",
+            &spec.history_interval,
+            duration / 1000.0,
+        )?,
+        checkpoint_every: pace(spec.checkpoint_every.as_ref()),
+    })
+}
+
+/// The most VTU files of a run: beyond it a typing error is likelier than a wish.
+const MOST_FILES: f64 = 1e5;
+
+fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
+    let place = |key: &str| format!("solve.quasi-static.{key}");
+    let count = |key: &str, number: &Count| {
+        if number.value > 0 {
+            return Ok(number.value);
+        }
+        Err(
+            SceneError::new(SceneErrorKind::WrongValue, format!("`{}` is 0", place(key)))
+                .label(number.span.clone(), "nothing is computed")
+                .help("ask for at least 1"),
+        )
+    };
+    let steps = count("steps", &spec.steps)?;
+    let duration = match &spec.duration {
+        Some(d) => check::positive(&place("duration"), d)?,
+        None => 1.0,
+    };
+    let tolerance = match &spec.tolerance {
+        Some(t) => check::within(
+            &place("tolerance"),
+            t,
+            t.value > 0.0 && t.value < 1.0,
+            "must lie between 0 and 1",
+            "1e-8 suits most scenes",
+        )?,
+        None => 1e-8,
+    };
+    let max_iterations = match &spec.max_iterations {
+        Some(n) => count("max-iterations", n)?,
+        None => match spec.method {
+            LoadStepSpec::Implicit => 100,
+            LoadStepSpec::Relaxation => 100_000,
+        },
+    };
+    Ok(QuasiStatic {
+        steps,
+        duration,
+        method: spec.method,
+        tolerance,
+        max_iterations,
+        output_every: match &spec.outputs {
+            Some(n) => steps.div_ceil(n.value.max(1)),
+            None => 1,
+        },
+        checkpoint_every: pace(spec.checkpoint_every.as_ref()),
+    })
+}

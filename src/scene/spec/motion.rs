@@ -1,0 +1,172 @@
+//! How a scene is carried through time or load, what it starts from, and what may break in it.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::coupling::NoOptionsSpec;
+use super::region::ShapeSpec;
+use crate::scene::expression::Expression;
+use crate::scene::value::{Automatic, Coordinates, Count, Every, Number};
+
+/// What is computed.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolveSpec {
+    /// One state of equilibrium.
+    Static(NoOptionsSpec),
+    /// Motion in time by velocity Verlet.
+    Explicit(ExplicitSpec),
+    /// States of equilibrium under a load that grows step by step.
+    QuasiStatic(QuasiStaticSpec),
+}
+
+/// Motion in time by velocity Verlet.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ExplicitSpec {
+    /// Time at the end; it begins at zero.
+    pub duration: Number,
+    /// Time step: a number, or "auto" (default) for a fraction of the measured stable step.
+    #[serde(default)]
+    pub step: Automatic,
+    /// Fraction of the measured stable step that "auto" takes; 0.95 if left out.
+    #[serde(default)]
+    pub step_fraction: Option<Number>,
+    /// What becomes of a step beyond the stable one; "refuse" if left out.
+    #[serde(default)]
+    pub beyond_limit: BeyondLimitSpec,
+    /// Number of VTU files after the first; 20 if left out, 0 for none but first and last.
+    #[serde(default)]
+    pub outputs: Option<Count>,
+    /// Time between VTU files, instead of `outputs`.
+    #[serde(default)]
+    pub output_interval: Option<Number>,
+    /// Time between rows of the history; a thousandth of the duration if left out.
+    #[serde(default)]
+    pub history_interval: Option<Number>,
+    /// Checkpoint after this many steps, or after this time of the clock: 1000, "10 min".
+    #[serde(default)]
+    pub checkpoint_every: Option<Every>,
+}
+
+/// What becomes of a time step beyond the stable one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BeyondLimitSpec {
+    /// The run does not begin.
+    #[default]
+    Refuse,
+    /// The step is shortened to the fraction of the stable one.
+    Shorten,
+}
+
+/// States of equilibrium under a load that grows step by step.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct QuasiStaticSpec {
+    /// Number of load steps.
+    pub steps: Count,
+    /// What t reaches at the last step; 1 if left out.
+    #[serde(default)]
+    pub duration: Option<Number>,
+    /// How each step is solved.
+    #[serde(default)]
+    pub method: LoadStepSpec,
+    /// Out-of-balance force at which a step is solved, relative to the applied force; 1e-8 if left out.
+    #[serde(default)]
+    pub tolerance: Option<Number>,
+    /// Most iterations of a step; if left out 100 (implicit) or 100000 (relaxation).
+    #[serde(default)]
+    pub max_iterations: Option<Count>,
+    /// Number of VTU files after the first; one per step if left out.
+    #[serde(default)]
+    pub outputs: Option<Count>,
+    /// Checkpoint after this many steps, or after this time of the clock: 10, "10 min".
+    #[serde(default)]
+    pub checkpoint_every: Option<Every>,
+}
+
+/// How a load step is solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LoadStepSpec {
+    /// Newton's method with the tangent.
+    #[default]
+    Implicit,
+    /// Adaptive dynamic relaxation: no matrix.
+    Relaxation,
+}
+
+/// What the body starts from, where it does not start at rest.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum InitialSpec {
+    /// Displacement at time zero.
+    Displacement(InitialFieldSpec),
+    /// Velocity at time zero.
+    Velocity(InitialFieldSpec),
+}
+
+/// A field at time zero; components left out are zero.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct InitialFieldSpec {
+    /// Where; everywhere if left out.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// Component along x.
+    #[serde(default)]
+    pub x: Option<Expression>,
+    /// Component along y.
+    #[serde(default)]
+    pub y: Option<Expression>,
+    /// Component along z.
+    #[serde(default)]
+    pub z: Option<Expression>,
+}
+
+/// How the force of a bond depends on the displacement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BondsSpec {
+    /// Along the deformed bond, by its stretch.
+    Exact,
+    /// Along the undeformed bond, to first order of the displacement.
+    Linear,
+}
+
+/// What is done when damage reaches the edge of the nonlocal zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeSpec {
+    /// The run ends there, its outputs written.
+    Stop,
+    /// The run goes on; the summary says when it happened.
+    Warn,
+}
+
+/// Short-range repulsion of points that share no bond: of two bodies, or of the faces of a crack.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ContactSpec {
+    /// Distance below which points repel each other, over the spacing; 0.9 if left out.
+    #[serde(default)]
+    pub radius_factor: Option<Number>,
+    /// Stiffness of the repulsion over that of a bond; 15 if left out.
+    #[serde(default)]
+    pub stiffness_factor: Option<Number>,
+}
+
+/// The tip of a crack: the farthest damaged point along a direction.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct TipSpec {
+    /// The direction in which the crack runs.
+    pub direction: Coordinates,
+    /// Where to look; everywhere if left out.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// Damage from which a point counts; 0.35 if left out.
+    #[serde(default)]
+    pub threshold: Option<Number>,
+}
