@@ -185,10 +185,10 @@ impl Line {
         matrix
     }
 
-    /// Displacement in equilibrium with a force density, with `u = 0` at node `fixed`.
+    /// Displacement in equilibrium with a force density; where `prescribed` gives a displacement, that is it.
     ///
-    /// Gauss elimination in a band, without exchanges: every row is that of an M-matrix.
-    pub fn equilibrium(&self, load: &[f64], fixed: usize) -> Vec<f64> {
+    /// Gauss elimination in a band, without exchanges: every row is that of an M-matrix. At least one node must be prescribed.
+    pub fn equilibrium(&self, load: &[f64], prescribed: impl Fn(usize) -> Option<f64>) -> Vec<f64> {
         let n = self.len();
         let half = (0..n)
             .flat_map(|i| self.bonds(i).map(move |(j, _)| i.abs_diff(j)))
@@ -198,9 +198,9 @@ impl Line {
         let mut band = vec![0.0; n * width];
         let mut u = load.to_vec();
         for i in 0..n {
-            if i == fixed {
+            if let Some(value) = prescribed(i) {
                 band[i * width + half] = 1.0;
-                u[i] = 0.0;
+                u[i] = value;
                 continue;
             }
             for (j, k) in self.bonds(i) {
