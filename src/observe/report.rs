@@ -162,6 +162,11 @@ impl Row {
         self.because(reason)
     }
 
+    /// Value over reference, where there is one.
+    fn ratio(&self) -> Option<f64> {
+        self.reference.filter(|&r| r != 0.0).map(|r| self.value / r)
+    }
+
     fn limit_text(&self) -> String {
         match (self.bound, self.limit) {
             (Bound::AtMost, Some(l)) => format!("<= {}", number(l)),
@@ -241,9 +246,17 @@ impl Table {
 
     fn full(&self) -> (Vec<Vec<String>>, Vec<String>) {
         let mut grid = vec![
-            ["case", "quantity", "value", "reference", "limit", "verdict"]
-                .map(str::to_owned)
-                .to_vec(),
+            [
+                "case",
+                "quantity",
+                "value",
+                "reference",
+                "ratio",
+                "limit",
+                "verdict",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
         ];
         let mut reasons: Vec<&str> = Vec::new();
         for row in &self.rows {
@@ -261,12 +274,13 @@ impl Table {
                 row.quantity.clone(),
                 number(row.value),
                 row.reference.map(number).unwrap_or_default(),
+                row.ratio().map(number).unwrap_or_default(),
                 row.limit_text(),
                 verdict,
             ]);
         }
         // a column that says nothing is left out
-        for column in [4, 3] {
+        for column in [5, 4, 3] {
             if grid[1..].iter().all(|line| line[column].is_empty()) {
                 for line in &mut grid {
                     line.remove(column);

@@ -11,6 +11,7 @@
 //! | `convergence` | the studies of [SAND2015-7998] chapter 5 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
+//! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
 //!
@@ -22,6 +23,7 @@ pub mod bobaru;
 pub mod convergence;
 pub mod emmrich_weckner;
 pub mod enclosed;
+pub mod estimates;
 pub mod fields;
 pub mod partial_volumes;
 pub mod patch;
@@ -114,6 +116,11 @@ pub const SUITES: &[Suite] = &[
         name: "emmrich-weckner",
         about: "the nonlocal bar of Emmrich and Weckner 2007: exact solution, three discretisations, energies",
         run: emmrich_weckner::run,
+    },
+    Suite {
+        name: "estimates",
+        about: "estimates of SAND2015-7998 (2.18), (2.23) to (2.28), (3.15) and the ghost strain of figure 2.1",
+        run: estimates::run,
     },
 ];
 

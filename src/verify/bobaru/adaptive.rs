@@ -279,3 +279,74 @@ fn grid(plan: &Plan, divided: &[bool]) -> Line {
     }
     Line::new(x, &horizon, plan.rule)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        peridynamics::Micromodulus,
+        verify::bobaru::line::{Sharing, Weights},
+    };
+
+    fn plan(interpolation: Interpolation) -> Plan {
+        Plan {
+            length: 60.0,
+            nodes: 61,
+            horizon: 3.0,
+            ratio: 4,
+            rule: Rule {
+                micromodulus: Micromodulus::Triangular,
+                weights: Weights::Normalised,
+                sharing: Sharing::Mean,
+            },
+            threshold: 0.25,
+            padding: 4.0,
+            horizons: Horizons::Zone,
+            interpolation,
+            every: 8,
+            integrator: Integrator::Verlet,
+            step: 0.1,
+        }
+    }
+
+    #[test]
+    fn transfer_keeps_polynomials_of_its_degree_and_old_nodes() {
+        for (how, degree) in [(Interpolation::Linear, 1), (Interpolation::Cubic, 3)] {
+            let bar = Adaptive::new(plan(how), |x| (-0.05 * (x - 30.0).powi(2)).exp());
+            assert!(bar.divided.iter().any(|&d| d) && !bar.divided.iter().all(|&d| d));
+            let field = |x: f64| (0..=degree).map(|k| (0.1 * x - 2.0).powi(k)).sum::<f64>();
+            let old: Vec<f64> = bar.line.x.iter().map(|&x| field(x)).collect();
+            // the other intervals are divided, and those that are now are joined
+            let wanted: Vec<bool> = bar.divided.iter().map(|d| !d).collect();
+            let new = grid(&bar.plan, &wanted);
+            let moved = bar.transferred(&wanted, &old);
+            assert_eq!(moved.len(), new.len());
+            for (x, f) in new.x.iter().zip(&moved) {
+                assert!(
+                    (f - field(*x)).abs() < 1e-12 * field(*x).abs().max(1.0),
+                    "{how:?} at {x}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_refined_zone_follows_the_wave_and_keeps_its_energy() {
+        let mut bar = Adaptive::new(plan(Interpolation::Linear), |x| {
+            (-0.05 * (x - 30.0).powi(2)).exp()
+        });
+        let first = bar.motion().energy(bar.line());
+        let begin = bar.divided.clone();
+        while bar.time() < 20.0 {
+            bar.advance();
+        }
+        // two waves, 20 to either side of where they began, and nothing refined in between
+        assert!(begin[30] && !bar.divided[30]);
+        assert!(bar.divided[10] && bar.divided[49]);
+        let drift = (bar.motion().energy(bar.line()) / first - 1.0).abs();
+        assert!(drift < 0.01, "{drift}");
+        // two equal waves, apart from what changes of the grid leave
+        assert!(bar.motion().momentum(bar.line()).abs() < 1e-3);
+        assert!(!bar.changes.is_empty());
+    }
+}

@@ -196,3 +196,41 @@ pub fn statics() -> Table {
     }
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn watched_points_are_seen_only_by_the_finest_nodes() {
+        let rule = Rule {
+            micromodulus: Micromodulus::Triangular,
+            weights: Weights::Normalised,
+            sharing: Sharing::Source,
+        };
+        let goal = Goal {
+            half: 10.0,
+            intervals: 80,
+            m: 4.0,
+            target: 0.5,
+            loads: vec![(1.0, 1.0), (-1.0, -1.0)],
+            tolerance: 0.0,
+            levels: 3,
+            watch: Watch::TargetAndLoads,
+        };
+        let stages = refine(&goal, rule);
+        assert_eq!(stages.len(), 3);
+        // first grid: spacing 1/4, horizon 1, so that |x| ≤ 2 sees a load; 16 intervals and the two beside them are divided
+        assert_eq!(stages[0].nodes, 81);
+        assert_eq!(stages[1].nodes, 81 + 18);
+        // and it ends where it settles
+        let early = refine(
+            &Goal {
+                tolerance: 0.1,
+                ..goal
+            },
+            rule,
+        );
+        assert_eq!(early.len(), 2);
+    }
+}
