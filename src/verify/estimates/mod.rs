@@ -213,7 +213,7 @@ fn ghost_force(progress: &dyn Progress) -> Table {
                 let largest = bar.linear.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
                 let value = largest / linear_scale();
                 match model {
-                    BarModel::PartialStress => Row::at_most(case, what, value, 1e-10),
+                    BarModel::PartialStress => Row::at_most(case, what, value, 1e-8),
                     BarModel::Standard => Row::info(case, what, value),
                 }
             }
