@@ -73,6 +73,19 @@ impl<const D: usize> Mesh<D> {
         self.boundary_facets(0..self.cell_count() as u32)
     }
 
+    /// For each cell whether it touches the boundary of the mesh, with a facet, an edge or a corner.
+    pub fn cells_at_boundary(&self) -> Vec<bool> {
+        let mut outer = vec![false; self.nodes.len()];
+        for facet in self.outer_facets() {
+            for n in facet.nodes {
+                outer[n as usize] = true;
+            }
+        }
+        (0..self.cell_count())
+            .map(|c| self.cell(c).iter().any(|&n| outer[n as usize]))
+            .collect()
+    }
+
     /// The facets between a cell of class `first` and one of class `second`; `class` gives each cell's class.
     ///
     /// Shapes: `class` has one entry per cell.

@@ -7,7 +7,7 @@ use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{Joining, SceneSpec, ShapeSpec, TransitionSpec, ZonesNeeded};
+use super::spec::{Joining, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 
@@ -43,6 +43,21 @@ pub(crate) fn zones<const D: usize>(
         .iter()
         .map(|n| if *n { Zone::Nonlocal } else { Zone::Local })
         .collect();
+    if let Some(SkinSpec::FreeSurfaces) = spec.zones.skin {
+        for (zone, outer) in zones.iter_mut().zip(mesh.cells_at_boundary()) {
+            if outer {
+                *zone = Zone::Local;
+            }
+        }
+        if !zones.contains(&Zone::Nonlocal) {
+            return Err(SceneError::new(
+                SceneErrorKind::Empty,
+                "`zones.skin` takes every cell of `zones.nonlocal`",
+            )
+            .label(span, "is nowhere thicker than two cells")
+            .help("refine the mesh, enlarge the zone or leave the skin out"));
+        }
+    }
     if let Some(transition) = &spec.zones.transition {
         let span = transition.span();
         let selected = transition_cells(transition.get_ref(), &region, &inner, mesh)?;

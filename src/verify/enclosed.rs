@@ -157,6 +157,8 @@ pub enum Cells {
     Coarse,
     /// Two times coarser, inner nodes moved by up to a fifth of a cell, those between zones too.
     Jittered,
+    /// So many times coarser, aligned.
+    Aligned(u32),
     /// Triangles or tetrahedra, two times coarser, inner nodes moved by up to a tenth of a cell.
     Simplices,
 }
@@ -174,7 +176,11 @@ impl Cells {
     pub fn name(self) -> &'static str {
         match self {
             Self::Matching => "matching",
-            Self::Coarse => "coarse x3",
+            Self::Coarse | Self::Aligned(3) => "coarse x3",
+            Self::Aligned(1) => "matching",
+            Self::Aligned(2) => "coarse x2",
+            Self::Aligned(4) => "coarse x4",
+            Self::Aligned(_) => "coarse",
             Self::Jittered => "jittered x2",
             Self::Simplices => "simplices x2",
         }
@@ -182,7 +188,7 @@ impl Cells {
 
     /// Whether the elements are aligned to the lattice.
     pub fn is_aligned(self) -> bool {
-        matches!(self, Self::Matching | Self::Coarse)
+        matches!(self, Self::Matching | Self::Coarse | Self::Aligned(_))
     }
 
     /// Size of a cell in spacings.
@@ -190,6 +196,7 @@ impl Cells {
         match self {
             Self::Matching => 1,
             Self::Coarse => 3,
+            Self::Aligned(times) => times,
             Self::Jittered | Self::Simplices => 2,
         }
     }
@@ -257,7 +264,7 @@ impl<const D: usize> Enclosed<D> {
     /// # Errors
     /// [`EnclosedError`] of the mesh or the model.
     pub fn new(case: &Case) -> Result<Self, EnclosedError> {
-        Self::with_coupling(case, case.method.coupling())
+        Self::with(case, case.method.coupling(), case.law.law::<D>())
     }
 
     /// The same block with finite elements everywhere.
@@ -265,12 +272,19 @@ impl<const D: usize> Enclosed<D> {
     /// # Errors
     /// As [`Enclosed::new`].
     pub fn local(case: &Case) -> Result<Self, EnclosedError> {
-        Self::with_coupling(case, Box::new(Local))
+        Self::with(case, Box::new(Local), case.law.law::<D>())
     }
 
-    fn with_coupling(case: &Case, coupling: Box<dyn Coupling<D>>) -> Result<Self, EnclosedError> {
+    /// The block with another coupling or law than the case names.
+    ///
+    /// # Errors
+    /// As [`Enclosed::new`].
+    pub fn with(
+        case: &Case,
+        coupling: Box<dyn Coupling<D>>,
+        law: Box<dyn BondLaw<D>>,
+    ) -> Result<Self, EnclosedError> {
         let (mesh, zones) = blocks::<D>(case.cells, case.widths)?;
-        let law = case.law.law::<D>();
         let tensor = *law.tensor();
         let horizon = f64::from(case.ratio) * SPACING;
         // truncated bonds want the seam halfway between points
@@ -345,7 +359,7 @@ fn blocks<const D: usize>(cells: Cells, widths: Widths) -> Result<(Mesh<D>, Vec<
         })
         .collect();
     let mesh = match cells {
-        Cells::Matching | Cells::Coarse => regular,
+        Cells::Matching | Cells::Coarse | Cells::Aligned(_) => regular,
         Cells::Jittered => grid.jitter(0.2, 7).mesh()?,
         Cells::Simplices => grid.jitter(0.1, 7).mesh()?,
     };

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `patch` | affine fields through the seam: residual, solution, out-of-balance force |
 //! | `balance` | the out-of-balance force of a seam against its leading term |
+//! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, what symmetry saves |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
 //! | `bar` | the coupled bar of [SAND2015-7998] section 7.3 |
@@ -27,9 +28,11 @@ pub mod estimates;
 pub mod fields;
 pub mod partial_volumes;
 pub mod patch;
+pub mod skin;
 pub mod spectrum;
 pub mod strip;
 pub mod tangents;
+pub mod truncated;
 pub mod variable_horizon;
 pub mod weights;
 
@@ -71,6 +74,11 @@ pub const SUITES: &[Suite] = &[
         name: "balance",
         about: "out-of-balance force of a seam against its leading term, spurious force of a single site",
         run: balance,
+    },
+    Suite {
+        name: "truncated",
+        about: "truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in the horizon, what symmetry saves",
+        run: truncated::run,
     },
     Suite {
         name: "weights",

@@ -264,7 +264,8 @@ fn rigid_force<const D: usize>(k: &BlockCsr, places: &[Vector<D>]) -> f64 {
 }
 
 /// Sum of all internal forces, and of their moments about the origin, under a random displacement, over the sum of their magnitudes.
-fn momentum<const D: usize>(k: &BlockCsr, places: &[Vector<D>]) -> (f64, f64) {
+/// Sum of the forces and of the moments under a random displacement, over the sums of their sizes.
+pub fn momentum<const D: usize>(k: &BlockCsr, places: &[Vector<D>]) -> (f64, f64) {
     let mut numbers = Numbers(5);
     let u: Vec<f64> = (0..k.dofs()).map(|_| numbers.draw()).collect();
     let force = k.multiply(&u);

@@ -31,7 +31,8 @@ pub use motion::{
     LoadStepSpec, QuasiStaticSpec, SolveSpec, TipSpec,
 };
 pub use region::{
-    BallSpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, TransitionSpec, WithoutSpec, ZonesSpec,
+    BallSpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec,
+    ZonesSpec,
 };
 
 use std::collections::BTreeMap;

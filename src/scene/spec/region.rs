@@ -22,6 +22,17 @@ pub struct ZonesSpec {
     #[serde(default)]
     #[schemars(with = "Option<super::motion::EdgeSpec>")]
     pub damage_at_edge: Option<Spanned<super::motion::EdgeSpec>>,
+    /// Cells of the nonlocal zone that are elements all the same, so that no bond is missing there.
+    #[serde(default)]
+    pub skin: Option<SkinSpec>,
+}
+
+/// Where elements cover the nonlocal zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SkinSpec {
+    /// One cell thick on the boundary of the mesh; meant for the coupling `truncated`.
+    FreeSurfaces,
 }
 
 /// A region of space or a named set of cells.
