@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::{
-    system::BlockCsr,
+    system::{BlockCsr, RowBatch, SharedRows},
     tensor::{Tensor, Vector},
 };
 
@@ -191,43 +191,32 @@ pub fn assemble_rows<const D: usize>(
     advance: impl Fn(u64) + Sync,
     add_row: impl Fn(usize, &mut Row<D>) + Sync,
 ) -> BlockCsr {
-    let mut matrix = BlockCsr {
-        block: D,
-        row_offsets: Vec::with_capacity(rows + 1),
-        columns: Vec::new(),
-        values: Vec::new(),
-    };
-    matrix.row_offsets.push(0);
+    let mut gathered = SharedRows::gather(D, rows);
     let chunks = rows.div_ceil(CHUNK);
     for wave in (0..chunks).step_by(WAVE) {
-        let parts: Vec<(Vec<usize>, Vec<u32>, Vec<f64>)> = (wave..(wave + WAVE).min(chunks))
+        let parts: Vec<RowBatch> = (wave..(wave + WAVE).min(chunks))
             .into_par_iter()
             .map_init(
-                || Row::<D>::new(sites),
-                |row, chunk| {
+                || (Row::<D>::new(sites), Vec::new(), Vec::new()),
+                |(row, columns, values), chunk| {
                     let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(rows);
-                    let (mut ends, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+                    let mut batch = RowBatch::new(D);
                     let count = range.len() as u64;
                     for site in range {
                         add_row(site, row);
-                        row.drain_into(&mut columns, &mut values);
-                        ends.push(columns.len());
+                        row.drain_into(columns, values);
+                        batch.push(columns, values);
+                        columns.clear();
+                        values.clear();
                     }
                     advance(count);
-                    (ends, columns, values)
+                    batch
                 },
             )
             .collect();
-        for (ends, columns, values) in parts {
-            let before = matrix.columns.len();
-            matrix.row_offsets.extend(ends.iter().map(|e| before + e));
-            matrix.columns.extend(columns);
-            matrix.values.extend(values);
-        }
+        parts.into_iter().for_each(|batch| gathered.append(batch));
     }
-    matrix.columns.shrink_to_fit();
-    matrix.values.shrink_to_fit();
-    matrix
+    gathered.finish()
 }
 
 /// What remains of a block matrix whose values were dropped row by row.

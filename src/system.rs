@@ -5,6 +5,11 @@
 
 use rayon::prelude::*;
 
+mod product;
+mod sharing;
+
+pub use sharing::{GatheredRows, RowBatch, SharedRows};
+
 /// Whether the tangent of a system is symmetric; solvers choose by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -126,8 +131,8 @@ impl Dynamic for LinearMotion {
 
 /// A square block-sparse matrix by rows; each entry is a dense `block × block` matrix, row-major.
 ///
-/// Shapes: `row_offsets` has one entry more than block rows; `columns[e]` and
-/// `values[e · block² ..][..block²]` are entry `e`. Columns are sorted within a row.
+/// Shapes: `row_offsets` has one entry more than block rows; the columns of row `i` are `columns[row_offsets[i]..row_offsets[i + 1]]`, ascending; its blocks
+/// follow one another in `values` from [`BlockCsr::start`] on. Rows of equal blocks, those of a lattice say, may share them: see [`SharedRows`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlockCsr {
     /// Unknowns per site (the dimension).
@@ -138,6 +143,8 @@ pub struct BlockCsr {
     pub columns: Vec<u32>,
     /// Dense blocks, row-major, one after another.
     pub values: Vec<f64>,
+    /// Which rows share their blocks; none if each row has its own.
+    pub shared: Option<SharedRows>,
 }
 
 impl BlockCsr {
@@ -151,57 +158,32 @@ impl BlockCsr {
         self.rows() * self.block
     }
 
-    /// Number of stored scalars.
+    /// Number of scalars in all rows, shared ones counted in every row.
     pub fn nonzeros(&self) -> usize {
-        self.values.len()
+        self.columns.len() * self.block * self.block
+    }
+
+    /// The first block of row `i`, counted in blocks from the start of `values`.
+    pub fn start(&self, i: usize) -> usize {
+        match &self.shared {
+            Some(shared) => shared.starts[i],
+            None => self.row_offsets[i],
+        }
     }
 
     /// The block columns and the blocks of row `i`.
     pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
         let (a, b) = (self.row_offsets[i], self.row_offsets[i + 1]);
-        let s = self.block * self.block;
-        (&self.columns[a..b], &self.values[a * s..b * s])
+        let (s, first) = (self.block * self.block, self.start(i));
+        (
+            &self.columns[a..b],
+            &self.values[first * s..(first + b - a) * s],
+        )
     }
 
-    /// `y = K x`, threaded over rows; the same bits for any number of threads.
+    /// `y = K x`, threaded over rows; the same bits for any number of threads, and whether or not rows share their blocks.
     pub fn multiply_into(&self, x: &[f64], y: &mut [f64]) {
-        match self.block {
-            1 => self.multiply_blocks::<1>(x, y),
-            2 => self.multiply_blocks::<2>(x, y),
-            3 => self.multiply_blocks::<3>(x, y),
-            6 => self.multiply_blocks::<6>(x, y),
-            d => y.par_chunks_mut(d.max(1)).enumerate().for_each(|(i, yi)| {
-                yi.fill(0.0);
-                let (columns, blocks) = self.row(i);
-                for (&c, k) in columns.iter().zip(blocks.chunks_exact(d * d)) {
-                    let xj = &x[c as usize * d..][..d];
-                    for (y, row) in yi.iter_mut().zip(k.chunks_exact(d)) {
-                        *y += row.iter().zip(xj).map(|(k, x)| k * x).sum::<f64>();
-                    }
-                }
-            }),
-        }
-    }
-
-    /// The product with blocks of a size known to the compiler, which unrolls them.
-    fn multiply_blocks<const D: usize>(&self, x: &[f64], y: &mut [f64]) {
-        // short rows (a 2D mesh has 9 blocks each) are dealt out in bundles
-        y.par_chunks_exact_mut(D)
-            .enumerate()
-            .with_min_len(128)
-            .for_each(|(i, yi)| {
-                let (columns, blocks) = self.row(i);
-                let mut sum = [0.0; D];
-                for (&c, k) in columns.iter().zip(blocks.chunks_exact(D * D)) {
-                    let xj = &x[c as usize * D..][..D];
-                    for a in 0..D {
-                        for b in 0..D {
-                            sum[a] += k[a * D + b] * xj[b];
-                        }
-                    }
-                }
-                yi.copy_from_slice(&sum);
-            });
+        product::multiply_into(self, x, y);
     }
 
     /// `K x`.
@@ -249,8 +231,8 @@ impl BlockCsr {
     /// `‖K − Kᵀ‖_F / ‖K‖_F`.
     pub fn asymmetry(&self) -> f64 {
         let d = self.block;
-        let (mut diff, mut norm) = (0.0, 0.0);
-        for i in 0..self.rows() {
+        let of_row = |i: usize| {
+            let (mut diff, mut norm) = (0.0, 0.0);
             let (columns, blocks) = self.row(i);
             for (e, &c) in columns.iter().enumerate() {
                 let (other, other_blocks) = self.row(c as usize);
@@ -265,7 +247,20 @@ impl BlockCsr {
                     }
                 }
             }
-        }
+            (diff, norm)
+        };
+        // by fixed chunks, so that the sum has the same bits on any number of threads
+        let parts: Vec<(f64, f64)> = (0..self.rows().div_ceil(1024))
+            .into_par_iter()
+            .map(|chunk| {
+                (chunk * 1024..((chunk + 1) * 1024).min(self.rows()))
+                    .map(of_row)
+                    .fold((0.0, 0.0), |s, r| (s.0 + r.0, s.1 + r.1))
+            })
+            .collect();
+        let (diff, norm) = parts
+            .into_iter()
+            .fold((0.0, 0.0), |s, r| (s.0 + r.0, s.1 + r.1));
         if norm == 0.0 {
             0.0
         } else {
@@ -285,6 +280,7 @@ mod tests {
             row_offsets: vec![0, 2, 3, 5],
             columns: vec![0, 2, 1, 0, 2],
             values: (0..20).map(|k| f64::from(k * k % 7) - 2.5).collect(),
+            shared: None,
         };
         let scalar = matrix.to_csr();
         let x: Vec<f64> = (0..6).map(|k| 1.0 / (1.0 + f64::from(k))).collect();

@@ -1,5 +1,7 @@
 //! What all couplings share: sites, peridynamic points, their families, and the places at the seam that follow sites.
 
+use std::collections::HashMap;
+
 use rayon::prelude::*;
 
 use crate::{
@@ -74,6 +76,46 @@ pub struct Model<const D: usize> {
     passing: Option<Passing<D>>,
     spacing: f64,
     volumes: Volumes,
+}
+
+/// Positions sorted into bins, to find those near a node without looking at all of them.
+struct Bins<const D: usize> {
+    size: f64,
+    bins: HashMap<[i64; D], Vec<u32>>,
+}
+
+impl<const D: usize> Bins<D> {
+    fn new(positions: &[Vector<D>], size: f64) -> Self {
+        let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
+        for (k, x) in positions.iter().enumerate() {
+            bins.entry(Self::bin(x, size)).or_default().push(k as u32);
+        }
+        Self { size, bins }
+    }
+
+    fn bin(x: &Vector<D>, size: f64) -> [i64; D] {
+        std::array::from_fn(|i| (x[i] / size).floor() as i64)
+    }
+
+    /// The numbers of all positions in bins that a ball meets, and of no others.
+    fn around(&self, x: &Vector<D>, radius: f64) -> impl Iterator<Item = usize> + '_ {
+        let reach = radius * (1.0 + 1e-9);
+        let low = Self::bin(&x.add_scalar(-reach), self.size);
+        let high = Self::bin(&x.add_scalar(reach), self.size);
+        let counts: [usize; D] = std::array::from_fn(|i| (high[i] - low[i] + 1) as usize);
+        (0..counts.iter().product::<usize>())
+            .map(move |index| {
+                let mut rest = index;
+                std::array::from_fn(|i| {
+                    let k = rest % counts[i];
+                    rest /= counts[i];
+                    low[i] + k as i64
+                })
+            })
+            .filter_map(|bin| self.bins.get(&bin))
+            .flatten()
+            .map(|&k| k as usize)
+    }
 }
 
 impl<const D: usize> Model<D> {
@@ -389,6 +431,7 @@ impl<const D: usize> Model<D> {
             })
             .collect();
         let positions: Vec<Vector<D>> = data.iter().map(|d| d.1).collect();
+        let bins = Bins::new(&positions, 2.0 * cloud.spacing);
         let rows = (0..self.mesh.nodes.len())
             .into_par_iter()
             .map(|n| {
@@ -401,10 +444,15 @@ impl<const D: usize> Model<D> {
                 let x = self.mesh.nodes[n];
                 let distance = |k: &usize| (positions[*k] - x).norm();
                 let widest = (6.0 * cloud.spacing).max(3.0 * largest);
-                let near: Vec<usize> = (0..positions.len())
-                    .filter(|k| distance(k) <= widest)
-                    .collect();
-                if let Some(&k) = near.iter().find(|k| distance(k) <= 1e-9 * cloud.spacing) {
+                let within = |radius: f64| -> Vec<usize> {
+                    let mut found: Vec<usize> = bins
+                        .around(&x, radius)
+                        .filter(|k| distance(k) <= radius)
+                        .collect();
+                    found.sort_unstable();
+                    found
+                };
+                if let Some(&k) = within(1e-9 * cloud.spacing).first() {
                     return Ok(vec![(data[k].0, 1.0)]);
                 }
                 let start = if with_nodes {
@@ -415,11 +463,7 @@ impl<const D: usize> Model<D> {
                 for degree in [degree, FitDegree::Affine] {
                     for factor in [1.0, 1.3, 1.7, 2.2, 3.0] {
                         let radius = start * factor * (1.0 + 1e-9);
-                        let chosen: Vec<usize> = near
-                            .iter()
-                            .copied()
-                            .filter(|k| distance(k) <= radius)
-                            .collect();
+                        let chosen = within(radius.min(widest));
                         let at: Vec<Vector<D>> = chosen.iter().map(|&k| positions[k]).collect();
                         if let Some(weights) = derivative::fit(&x, &at, degree) {
                             return Ok(chosen
@@ -433,7 +477,7 @@ impl<const D: usize> Model<D> {
                 Err(ModelError::Fit {
                     node: n as u32,
                     position: x.iter().copied().collect(),
-                    found: near.len(),
+                    found: within(widest).len(),
                 })
             })
             .collect::<Result<Vec<_>, _>>()?;

@@ -196,6 +196,7 @@ pub fn assemble<'a, const D: usize>(
         row_offsets,
         columns,
         values,
+        shared: None,
     })
 }
 

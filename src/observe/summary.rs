@@ -171,6 +171,8 @@ pub struct RunSummary {
     pub total_seconds: f64,
     /// Most memory held, in bytes; `null` where the system does not tell.
     pub peak_memory_bytes: Option<u64>,
+    /// Krylov iterations, or refinement steps after a factorisation.
+    pub iterations: usize,
     /// Norm of the residual on free unknowns over that of the applied (or reaction) forces.
     pub residual: f64,
     /// Sum of all internal forces, one component per dimension; zero in a model without ghost forces at rest.
@@ -362,7 +364,12 @@ impl fmt::Display for RunSummary {
         match &self.motion {
             Some(motion) => motion.write(f)?,
             None => {
-                writeln!(f, "relative residual      {}", number(self.residual))?;
+                writeln!(
+                    f,
+                    "relative residual      {} after {} iteration(s)",
+                    number(self.residual),
+                    self.iterations
+                )?;
                 writeln!(
                     f,
                     "out-of-balance force   {} relative to the applied force ({})",

@@ -203,6 +203,7 @@ pub fn solve_with<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
+        iterations: info.iterations,
         residual: info.relative_residual,
         out_of_balance_force: balance.iter().copied().collect(),
         out_of_balance_relative: if scale > 0.0 {

@@ -81,8 +81,9 @@ impl SiteGraph {
     /// Blocks that are exactly zero (bonds that were cut) join nothing.
     pub fn new(matrix: &BlockCsr, free: &FreeDofs) -> SiteGraph {
         let size = matrix.block * matrix.block;
-        SiteGraph::joined(&matrix.row_offsets, &matrix.columns, free, |e| {
-            matrix.values[e * size..(e + 1) * size]
+        SiteGraph::joined(&matrix.row_offsets, &matrix.columns, free, |i, e| {
+            let block = matrix.start(i) + e - matrix.row_offsets[i];
+            matrix.values[block * size..(block + 1) * size]
                 .iter()
                 .any(|&k| k != 0.0)
         })
@@ -92,15 +93,15 @@ impl SiteGraph {
     ///
     /// Shapes: `row_offsets` and `columns` as in [`BlockCsr`], columns ascending within a row.
     pub fn from_pattern(row_offsets: &[usize], columns: &[u32], free: &FreeDofs) -> SiteGraph {
-        SiteGraph::joined(row_offsets, columns, free, |_| true)
+        SiteGraph::joined(row_offsets, columns, free, |_, _| true)
     }
 
-    /// `joins` says whether an entry of the pattern connects its sites.
+    /// `joins` says whether an entry of the pattern, given by its site and its place, connects its sites.
     fn joined(
         row_offsets: &[usize],
         columns: &[u32],
         free: &FreeDofs,
-        joins: impl Fn(usize) -> bool + Sync,
+        joins: impl Fn(usize, usize) -> bool + Sync,
     ) -> SiteGraph {
         let n_sites = free.sites();
         let sites: Vec<u32> = (0..n_sites as u32)
@@ -115,7 +116,9 @@ impl SiteGraph {
             .map(|&i| {
                 (row_offsets[i as usize]..row_offsets[i as usize + 1])
                     .filter(|&e| {
-                        columns[e] != i && vertex[columns[e] as usize] != u32::MAX && joins(e)
+                        columns[e] != i
+                            && vertex[columns[e] as usize] != u32::MAX
+                            && joins(i as usize, e)
                     })
                     .map(|e| vertex[columns[e] as usize])
                     .collect()

@@ -308,7 +308,7 @@ fn null_vector(
     ordering: Ordering,
 ) -> Option<Vec<f64>> {
     let d = matrix.block;
-    let mut shifted = matrix.clone();
+    let mut shifted = matrix.unshare();
     let mut shift = vec![0.0; matrix.dofs()];
     for i in 0..matrix.rows() {
         let (columns, _) = matrix.row(i);

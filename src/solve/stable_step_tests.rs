@@ -10,6 +10,7 @@ fn system(n: usize, symmetry: Symmetry, entry: impl Fn(usize, usize) -> f64) -> 
             row_offsets: (0..=n).map(|i| i * n).collect(),
             columns: (0..n * n).map(|k| (k % n) as u32).collect(),
             values,
+            shared: None,
         },
         mass: (0..n).map(|i| 1.0 + (i % 5) as f64).collect(),
         symmetry,

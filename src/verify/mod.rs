@@ -11,6 +11,7 @@
 //! | `partial-volumes` | weights of full families, other cells, cost of the closed forms |
 //! | `convergence` | the studies of [SAND2015-7998] chapter 5 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
+//! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
@@ -28,6 +29,7 @@ pub mod estimates;
 pub mod fields;
 pub mod partial_volumes;
 pub mod patch;
+pub mod scale;
 pub mod skin;
 pub mod spectrum;
 pub mod strip;
@@ -132,12 +134,19 @@ pub const SUITES: &[Suite] = &[
     },
 ];
 
-/// Suites that take an hour: `verify` runs them only by name.
-pub const LONG_SUITES: &[Suite] = &[Suite {
-    name: "convergence-3d",
-    about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about an hour on two cores, only if named",
-    run: convergence::run_solid,
-}];
+/// Suites that take minutes to an hour, or gigabytes: `verify` runs them only by name.
+pub const LONG_SUITES: &[Suite] = &[
+    Suite {
+        name: "convergence-3d",
+        about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about an hour on two cores, only if named",
+        run: convergence::run_solid,
+    },
+    Suite {
+        name: "scale",
+        about: "static solves of up to a million unknowns: iterations, time, memory; minutes and 9 GB, only if named",
+        run: scale::run,
+    },
+];
 
 /// The suite of that name.
 pub fn suite(name: &str) -> Option<&'static Suite> {
