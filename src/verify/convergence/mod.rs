@@ -31,6 +31,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     let mut tables = of_dimension::<1>(&grid_sizes(1), progress);
     let planes = grid_sizes(if effort == Effort::Quick { 15 } else { 1 });
     tables.extend(of_dimension::<2>(&planes, progress));
+    tables.push(statements::residuals::<3>());
     if effort == Effort::Full {
         tables.extend(of_dimension::<3>(&[75, 90], progress));
     }

@@ -111,6 +111,33 @@ pub fn layer<const D: usize>(points: usize) -> usize {
     (width * points as f64 + 0.5 + 1e-9).floor() as usize
 }
 
+/// `b − A u` of the exact solution at an inner point, over `|b|`: what the quadrature alone gets wrong, without a solution.
+///
+/// # Errors
+/// [`ProblemError::Family`].
+pub fn residual<const D: usize>(d: &Discretisation) -> Result<f64, ProblemError> {
+    let (_, _, residual) = discrete::<D>(d)?;
+    Ok(residual / body_force::<D>().abs())
+}
+
+/// The stencil, the operator's constants and `b − A u` of the exact solution.
+fn discrete<const D: usize>(
+    d: &Discretisation,
+) -> Result<(Stencil<D>, Constants, f64), ProblemError> {
+    let h = 1.0 / d.points as f64;
+    let stencil = Stencil::<D>::new(d.algorithm, d.influence, HORIZON, h)?;
+    let square = |xi: &[f64; D]| xi.iter().map(|c| c * c).sum::<f64>();
+    let m = match d.weighted_volume {
+        WeightedVolume::Integral => d.influence.weighted_volume::<D>(HORIZON),
+        WeightedVolume::Sum => stencil.sum(|xi| square(&xi)),
+    };
+    let constants = constants::<D>(m);
+    let fourth = stencil.sum(|xi| xi[0].powi(4) / square(&xi));
+    let second = stencil.sum(|xi| xi[0] * xi[0]);
+    let force = constants.bond * fourth + 2.0 * constants.dilatation * second * second;
+    Ok((stencil, constants, body_force::<D>() + force))
+}
+
 /// Solves the problem of dimension `D`.
 ///
 /// The exact solution is quadratic, so that the discrete operator's residual on it is the same constant at every inner point (families are whole). The
@@ -124,21 +151,13 @@ pub fn layer<const D: usize>(points: usize) -> usize {
 pub fn solve<const D: usize>(d: &Discretisation) -> Result<Outcome, ProblemError> {
     let start = Instant::now();
     let h = 1.0 / d.points as f64;
-    let stencil = Stencil::<D>::new(d.algorithm, d.influence, HORIZON, h)?;
-    let m = match d.weighted_volume {
-        WeightedVolume::Integral => d.influence.weighted_volume::<D>(HORIZON),
-        WeightedVolume::Sum => stencil.sum(|xi| xi.iter().map(|c| c * c).sum()),
-    };
-    let constants = constants::<D>(m);
+    let (stencil, constants, residual) = discrete::<D>(d)?;
     let first = layer::<D>(d.points);
     let inner = d.points.saturating_sub(2 * first);
     if inner == 0 {
         return Err(ProblemError::NoInside { points: d.points });
     }
-    let fourth = stencil.sum(|xi| xi[0].powi(4) / xi.iter().map(|c| c * c).sum::<f64>());
-    let second = stencil.sum(|xi| xi[0] * xi[0]);
     let b = body_force::<D>();
-    let residual = b + constants.bond * fourth + 2.0 * constants.dilatation * second * second;
     let operator = StencilOperator::new(&stencil, constants, inner);
     let points = inner.pow(D as u32);
     let mut rhs = vec![0.0; operator.unknowns()];

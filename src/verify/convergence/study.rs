@@ -26,6 +26,36 @@ pub struct Kernel {
     pub degree: Degree,
 }
 
+impl Kernel {
+    /// Its name in the report's letters: FL, FA or FV, PDLAMMPS, HHB, AC.
+    pub fn name<const D: usize>(&self, alpha: Alpha) -> String {
+        let algorithm = match self.algorithm {
+            PartialVolume::Full => ["FL", "FA", "FV"][D - 1],
+            PartialVolume::PdLammps => ["PL-PDLAMMPS", "PA-PDLAMMPS", "PV-PDLAMMPS"][D - 1],
+            PartialVolume::Hhb => ["PL-HHB", "PA-HHB", "PV-HHB"][D - 1],
+            PartialVolume::Exact => ["exact lengths", "exact areas", "exact volumes"][D - 1],
+        };
+        format!(
+            "alpha = {}, {algorithm}, P{}",
+            alpha.exponent(),
+            self.degree.order()
+        )
+    }
+
+    /// The discretisation with so many points along an edge.
+    pub fn discretisation(&self, points: usize, alpha: Alpha) -> Discretisation {
+        Discretisation {
+            points,
+            algorithm: self.algorithm,
+            influence: Influence::Polynomial {
+                degree: self.degree,
+                alpha,
+            },
+            weighted_volume: WeightedVolume::Integral,
+        }
+    }
+}
+
 /// What the report's figures compare: full volumes with P0, P1 (its PWL), P3 (PWC), P5 (PWQ), P7 (PWS), the other algorithms with P0.
 pub const KERNELS: [Kernel; 8] = {
     use PartialVolume::{Exact, Full, Hhb, PdLammps};
@@ -92,19 +122,9 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Its name in the report's letters: FL, FA or FV, PDLAMMPS, HHB, AC.
+    /// Its name in the report's letters.
     pub fn name<const D: usize>(&self) -> String {
-        let algorithm = match self.kernel.algorithm {
-            PartialVolume::Full => ["FL", "FA", "FV"][D - 1],
-            PartialVolume::PdLammps => ["PL-PDLAMMPS", "PA-PDLAMMPS", "PV-PDLAMMPS"][D - 1],
-            PartialVolume::Hhb => ["PL-HHB", "PA-HHB", "PV-HHB"][D - 1],
-            PartialVolume::Exact => ["exact lengths", "exact areas", "exact volumes"][D - 1],
-        };
-        format!(
-            "alpha = {}, {algorithm}, P{}",
-            self.alpha.exponent(),
-            self.kernel.degree.order()
-        )
+        self.kernel.name::<D>(self.alpha)
     }
 
     /// N and error, from that N on.
@@ -154,15 +174,7 @@ impl Study {
     pub fn run<const D: usize>(sizes: &[usize], progress: &dyn Progress) -> Self {
         let curve = |alpha: Alpha, kernel: Kernel| {
             let one = |&points: &usize| {
-                let outcome = solve::<D>(&Discretisation {
-                    points,
-                    algorithm: kernel.algorithm,
-                    influence: Influence::Polynomial {
-                        degree: kernel.degree,
-                        alpha,
-                    },
-                    weighted_volume: WeightedVolume::Integral,
-                });
+                let outcome = solve::<D>(&kernel.discretisation(points, alpha));
                 progress.advance(1);
                 (points, outcome)
             };
