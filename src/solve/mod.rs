@@ -1,10 +1,11 @@
 //! Solvers of `K u = f`: elimination orders, a multifrontal direct solver, Krylov methods with multigrid, and the
-//! static problem that chooses among them; explicit dynamics.
+//! static problem that chooses among them; explicit dynamics with its stable step.
 
 mod aggregate;
 pub mod direct;
 pub mod explicit;
 mod front;
+pub mod growth;
 pub mod krylov;
 mod multifrontal;
 pub mod multigrid;

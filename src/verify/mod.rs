@@ -15,6 +15,8 @@
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
+//! | `wave` | energy and momentum over 100 000 steps |
+//! | `reflection` | what a seam sends back of a pulse |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
 //!
 //! A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
@@ -29,6 +31,7 @@ pub mod estimates;
 pub mod fields;
 pub mod partial_volumes;
 pub mod patch;
+pub mod reflection;
 pub mod scale;
 pub mod skin;
 pub mod spectrum;
@@ -36,6 +39,7 @@ pub mod strip;
 pub mod tangents;
 pub mod truncated;
 pub mod variable_horizon;
+pub mod wave;
 pub mod weights;
 
 pub use balance::balance;
@@ -116,6 +120,16 @@ pub const SUITES: &[Suite] = &[
         name: "spectrum",
         about: "eigenvalues of coupled strips: whether their motion is bounded, and the stable step against its limit",
         run: spectrum::run,
+    },
+    Suite {
+        name: "wave",
+        about: "100 000 steps at 0.95 of the stable step: discrete energy, momentum, the bodies' own energy beside a seam",
+        run: wave::run,
+    },
+    Suite {
+        name: "reflection",
+        about: "what a seam sends back of a pulse, by its width, method, m and side",
+        run: reflection::run,
     },
     Suite {
         name: "bobaru",

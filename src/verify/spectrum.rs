@@ -13,7 +13,10 @@ use crate::{
         influence::{Alpha, Degree},
     },
     progress::Progress,
-    solve::stable_step::{self, LARGEST_GAIN},
+    solve::{
+        growth::{self, LARGEST_GAIN},
+        stable_step,
+    },
     verify::{
         Effort,
         enclosed::{INFLUENCE, Method},
@@ -28,10 +31,11 @@ pub const ROUND_OFF: f64 = 1e-4;
 pub const CROSSINGS: f64 = 100.0;
 
 /// What to do about an unstable partial stress.
-pub const REMEDY: &str = "give the material and the divergence an influence function P_n/|xi| with n >= 1 (bond-based: micromodulus triangular), keep the horizon constant in the transition zone, or use coupling.splice";
+pub const REMEDY: &str = "give the material and the divergence an influence function P_n/|xi| with n >= 1 (bond-based: micromodulus triangular), keep the horizon constant in the transition zone, or use coupling.truncated";
 
 /// What to do about a splice or a blending whose motion grows.
-pub const REMEDY_SEAM: &str = "make the run shorter, the seam longer than a few horizons away from free sides, or use one model";
+pub const REMEDY_SEAM: &str =
+    "make the run shorter, or use coupling.truncated, whose stiffness is symmetric";
 
 /// How the horizon runs through the transition zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,7 +130,12 @@ fn laws(effort: Effort) -> Vec<StripLaw> {
 }
 
 fn kinds() -> Vec<Kind> {
-    let mut kinds = vec![Kind::Local, Kind::Nonlocal, Kind::Coupled(Method::Splice)];
+    let mut kinds = vec![
+        Kind::Local,
+        Kind::Nonlocal,
+        Kind::Coupled(Method::Truncated),
+        Kind::Coupled(Method::Splice),
+    ];
     kinds.extend(
         [
             BlendingFunction::Constant,
@@ -153,7 +162,7 @@ fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row 
         .map_err(|e| e.to_string())
         .and_then(|strip| {
             let length: f64 = case.lengths.iter().map(|l| f64::from(*l)).sum();
-            stable_step::growth(&strip.motion, &[], 0.5, 0)
+            growth::growth(&strip.motion, &[], 0.5, 0)
                 .map(|g| g.rate * length)
                 .map_err(|e| e.to_string())
         });
@@ -364,7 +373,7 @@ fn steps(effort: Effort) -> Table {
 fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
     let measured = || -> Result<Vec<Row>, String> {
         let strip = Strip::new::<1>(case).map_err(|e| e.to_string())?;
-        let values = stable_step::eigenvalues(&strip.motion, &[]).map_err(|e| e.to_string())?;
+        let values = growth::eigenvalues(&strip.motion, &[]).map_err(|e| e.to_string())?;
         let largest = values
             .iter()
             .fold(0.0_f64, |m, [re, im]| m.max(re.hypot(*im)));
@@ -386,7 +395,7 @@ fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
             },
         ];
         // a mode that grows at any step leaves no limit to bisect
-        let grows = stable_step::growth(&strip.motion, &[], found.stable, 0)
+        let grows = growth::growth(&strip.motion, &[], found.stable, 0)
             .map_err(|e| e.to_string())?
             .rate
             * 4000.0

@@ -1,0 +1,269 @@
+//! What an explicit motion is driven by, what it carries from step to step, and why it stops.
+
+use crate::system::Dynamic;
+
+/// What drives a motion: external forces and prescribed displacements, as functions of time.
+///
+/// Nothing here may depend on what was called before, or a resumed run would differ from one that never stopped.
+pub trait Drive: Sync {
+    /// Overwrites `load` with the external force on every dof \[N\] at `time` \[s\].
+    fn load_into(&self, time: f64, load: &mut [f64]);
+
+    /// Whether the load is the same at all times; it is then evaluated once.
+    fn is_steady(&self) -> bool {
+        false
+    }
+
+    /// The dofs whose displacement is prescribed, ascending.
+    fn prescribed(&self) -> &[u32] {
+        &[]
+    }
+
+    /// Overwrites `values` with the displacements \[m\] of [`Drive::prescribed`] at `time`.
+    fn displacement_into(&self, _time: f64, _values: &mut [f64]) {}
+
+    /// Overwrites `values` with the velocities \[m/s\] of [`Drive::prescribed`] at `time`; asked for at the start only.
+    fn velocity_into(&self, _time: f64, values: &mut [f64]) {
+        values.fill(0.0);
+    }
+}
+
+/// No load and nothing prescribed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Undriven;
+
+impl Drive for Undriven {
+    fn load_into(&self, _time: f64, load: &mut [f64]) {
+        load.fill(0.0);
+    }
+
+    fn is_steady(&self) -> bool {
+        true
+    }
+}
+
+/// All that changes in a motion, but for the damage, which the system keeps ([`Dynamic::damage_state`]): both together resume a run bit for bit.
+///
+/// Shapes: one entry per dof. Units: \[s\], \[m\], \[m/s\], \[m/s²\], \[J\].
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct State {
+    /// Time.
+    pub time: f64,
+    /// Steps taken.
+    pub step: u64,
+    /// Displacement.
+    pub u: Vec<f64>,
+    /// Velocity.
+    pub v: Vec<f64>,
+    /// Acceleration; empty before the driver has seen the state for the first time.
+    pub a: Vec<f64>,
+    /// Work done by loads and supports since the start.
+    pub work: f64,
+    /// Energy at the start plus the work in absolute values: what the motion can have, to tell a runaway by.
+    pub supplied: f64,
+    /// Bonds broken since the start.
+    pub broken: u64,
+}
+
+impl State {
+    /// The start of a motion at time zero, with given fields.
+    pub fn start(u: Vec<f64>, v: Vec<f64>) -> State {
+        State {
+            u,
+            v,
+            ..State::default()
+        }
+    }
+
+    /// The start from rest, undeformed.
+    pub fn at_rest(dofs: usize) -> State {
+        State::start(vec![0.0; dofs], vec![0.0; dofs])
+    }
+}
+
+/// How a motion is stepped.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ExplicitParams {
+    /// Time step Δt \[s\]; [`crate::solve::stable_step`] finds one and refuses those that are too large.
+    pub step: f64,
+    /// The run stops once the kinetic energy exceeds this many times what was supplied.
+    pub runaway: f64,
+}
+
+impl ExplicitParams {
+    /// Steps of a given size.
+    pub fn with_step(step: f64) -> ExplicitParams {
+        // couplings that are not symmetric exchange some per cent of energy with a pulse at the seam; an instability passes any factor within a few hundred steps
+        ExplicitParams {
+            step,
+            runaway: 100.0,
+        }
+    }
+}
+
+/// Energies after a step `n → n+1` \[J\]; at the start those of the start, with no half step between.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Energies {
+    /// `½ vᵀ M v` at `n+1`.
+    pub kinetic: f64,
+    /// `½ vᵀ M v` at `n+½`.
+    pub kinetic_half: f64,
+    /// `½ v_{n+½}ᵀ M v_{n+½} + ½ u_nᵀ F(u_{n+1})`: of a linear symmetric system it differs from its start by `work_half` only.
+    pub discrete: f64,
+    /// Work of loads and supports up to `n+1`.
+    pub work: f64,
+    /// Work of loads and supports up to `n+½`.
+    pub work_half: f64,
+}
+
+/// What a run did.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ExplicitInfo {
+    /// Steps taken by this call.
+    pub steps: u64,
+    /// Time reached \[s\].
+    pub time: f64,
+    /// Bonds broken by this call.
+    pub broken: u64,
+    /// Why it ended.
+    pub end: End,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum End {
+    /// The last step was taken.
+    Finished,
+    /// The observer asked for it.
+    Stopped,
+}
+
+/// Why a motion cannot start or go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExplicitError {
+    /// An input has the wrong length.
+    #[error("{what} has {found} entries, the model has {expected}: it belongs to another model")]
+    Shape {
+        /// Name of the input.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length needed.
+        expected: usize,
+    },
+    /// The step is no step.
+    #[error(
+        "the time step is {step}: it must be positive and finite; leave it out to get the stable one"
+    )]
+    Step {
+        /// Its value \[s\].
+        step: f64,
+    },
+    /// A site without mass.
+    #[error(
+        "site {site} has the mass {mass}: explicit dynamics needs a positive density of every material"
+    )]
+    Mass {
+        /// The site.
+        site: usize,
+        /// Its mass \[kg\].
+        mass: f64,
+    },
+    /// A field at the start is not finite.
+    #[error("the {what} of site {site} is {value} at the start; check its expression")]
+    Start {
+        /// Displacement or velocity.
+        what: &'static str,
+        /// The site.
+        site: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A number is no longer finite.
+    #[error(
+        "the motion is no longer finite at step {step}, t = {time:e} s, site {site}: the load or the prescribed motion there is not a number, or the time step is too large; check the expressions, or take the stable step"
+    )]
+    NotFinite {
+        /// Step at which it was found.
+        step: u64,
+        /// Time \[s\].
+        time: f64,
+        /// The first such site.
+        site: usize,
+    },
+    /// The energy grew beyond everything that was put in.
+    #[error(
+        "the motion ran away at step {step}, t = {time:e} s: its kinetic energy {energy:e} J is more than {factor} times the {supplied:e} J put in, fastest at site {site}; the time step is too large or the coupling unstable: take the stable step, or coupling.splice"
+    )]
+    Runaway {
+        /// Step at which it was found.
+        step: u64,
+        /// Time \[s\].
+        time: f64,
+        /// The fastest site.
+        site: usize,
+        /// Kinetic energy \[J\].
+        energy: f64,
+        /// Energy at the start plus work in absolute values \[J\].
+        supplied: f64,
+        /// [`ExplicitParams::runaway`].
+        factor: f64,
+    },
+}
+
+/// Whether state, step, masses and prescribed dofs are those of a motion of this system.
+pub(super) fn check(
+    system: &dyn Dynamic,
+    params: &ExplicitParams,
+    state: &State,
+    prescribed: &[u32],
+) -> Result<(), ExplicitError> {
+    let block = system.block().max(1);
+    let dofs = system.mass().len() * block;
+    if !(params.step > 0.0 && params.step.is_finite()) {
+        return Err(ExplicitError::Step { step: params.step });
+    }
+    if let Some((site, &mass)) = system
+        .mass()
+        .iter()
+        .enumerate()
+        .find(|(_, m)| !(**m > 0.0 && m.is_finite()))
+    {
+        return Err(ExplicitError::Mass { site, mass });
+    }
+    let shapes = [
+        ("the displacement", state.u.len()),
+        ("the velocity", state.v.len()),
+        (
+            "the acceleration",
+            state.a.len().max(if state.a.is_empty() { dofs } else { 0 }),
+        ),
+    ];
+    for (what, found) in shapes {
+        if found != dofs {
+            return Err(ExplicitError::Shape {
+                what,
+                found,
+                expected: dofs,
+            });
+        }
+    }
+    for (what, field) in [("displacement", &state.u), ("velocity", &state.v)] {
+        if let Some((k, &value)) = field.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            return Err(ExplicitError::Start {
+                what,
+                site: k / block,
+                value,
+            });
+        }
+    }
+    match prescribed.iter().find(|&&k| k as usize >= dofs) {
+        Some(&k) => Err(ExplicitError::Shape {
+            what: "the list of prescribed dofs",
+            found: k as usize + 1,
+            expected: dofs,
+        }),
+        None => Ok(()),
+    }
+}
