@@ -222,8 +222,10 @@ pub fn assemble_rows<const D: usize>(
 /// What remains of a block matrix whose values were dropped row by row.
 #[derive(Clone, Debug, Default)]
 pub struct Pattern {
-    /// Blocks that [`assemble`] would store, zero blocks included.
+    /// Blocks of all rows, zero blocks included.
     pub stored: usize,
+    /// Blocks that [`assemble`] would hold, about: equal rows are stored once.
+    pub distinct: usize,
     /// An estimate of `‖K − Kᵀ‖_F / ‖K‖_F`, from `xᵀ K y − yᵀ K x` with random `x` and `y`.
     pub asymmetry: f64,
     /// Start of each block row among the blocks that are not zero.
@@ -233,8 +235,10 @@ pub struct Pattern {
 }
 
 /// Sums over the values of rows that are dropped.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Dropped {
+    /// What tells equal rows, and their numbers of blocks.
+    marks: Vec<(u64, usize)>,
     stored: usize,
     skew: f64,
     squares: f64,
@@ -252,8 +256,11 @@ fn noise(site: u32, component: usize, which: u64) -> f64 {
 
 impl<const D: usize> Row<D> {
     /// Empties the row of `site` into the columns of its non-zero blocks.
-    fn drain_pattern(&mut self, site: u32, columns: &mut Vec<u32>, sums: &mut Dropped) {
+    fn drain_pattern(&mut self, site: u32, columns: &mut Vec<u32>, sums: &mut Dropped) -> u64 {
         let start = columns.len();
+        let largest = self.blocks.iter().map(|b| b.amax()).fold(0.0, f64::max);
+        // a sum over the blocks, so that their order does not matter; nine digits, so that round-off does not
+        let mut mark = 0u64;
         for (&other, block) in self.columns.iter().zip(&self.blocks) {
             self.slot[other as usize] = EMPTY;
             sums.stored += 1;
@@ -264,6 +271,11 @@ impl<const D: usize> Row<D> {
             for a in 0..D {
                 for b in 0..D {
                     let k = block[(a, b)];
+                    let digits = (k / largest * 1e9).round() as i64 as u64;
+                    mark = mark.wrapping_add(
+                        (digits ^ ((a * D + b) as u64) << 40).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+                            ^ digits.rotate_left(31),
+                    );
                     sums.skew += k
                         * (noise(site, a, 0) * noise(other, b, 1)
                             - noise(site, a, 1) * noise(other, b, 0));
@@ -274,6 +286,7 @@ impl<const D: usize> Row<D> {
         columns[start..].sort_unstable();
         self.columns.clear();
         self.blocks.clear();
+        mark.wrapping_add(largest.to_bits() >> 12)
     }
 }
 
@@ -294,7 +307,9 @@ pub fn pattern<const D: usize>(
                 let count = range.len() as u64;
                 for site in range {
                     add_row(site, row);
-                    row.drain_pattern(site as u32, &mut columns, &mut sums);
+                    let before = sums.stored;
+                    let mark = row.drain_pattern(site as u32, &mut columns, &mut sums);
+                    sums.marks.push((mark, sums.stored - before));
                     ends.push(columns.len());
                 }
                 advance(count);
@@ -307,7 +322,13 @@ pub fn pattern<const D: usize>(
         ..Pattern::default()
     };
     let mut sums = Dropped::default();
+    let mut seen = std::collections::HashSet::new();
     for (ends, columns, part) in parts {
+        for (mark, blocks) in part.marks {
+            if seen.insert((mark, blocks)) {
+                pattern.distinct += blocks;
+            }
+        }
         let before = pattern.columns.len();
         pattern.row_offsets.extend(ends.iter().map(|e| before + e));
         pattern.columns.extend(columns);

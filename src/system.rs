@@ -65,6 +65,11 @@ pub trait Dynamic: Send + Sync {
     /// Energy stored in the bodies \[J\]; of a coupled system the sum of the bodies' own energies, which the motion conserves only as far as the seam does.
     fn stored_energy(&self, u: &[f64]) -> f64;
 
+    /// What breaking bonds has cost so far \[J\]; none if nothing can break.
+    fn dissipated_energy(&self) -> Option<f64> {
+        None
+    }
+
     /// Damage of each site, `1 − Σ V of intact bonds / Σ V of all`; none if nothing can break.
     fn damage(&self) -> Option<Vec<f64>> {
         None

@@ -3,6 +3,8 @@
 //! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`]) take their force from a pass over the bonds, which may be geometrically exact
 //! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
 
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 
 use crate::{
@@ -10,7 +12,8 @@ use crate::{
     coupling::{CellRole, Model, Operator, SiteKind},
     fem,
     peridynamics::{
-        BondEnergy,
+        BondEnergy, PdBody,
+        contact::{Contact, ContactError, ContactSetup, contact_stiffness},
         kernel::{
             BondForce, BondPass, BondSetup, CriticalStretch, Failure, KernelError, Kinematics,
             Layout, Storage, bond_pass,
@@ -37,6 +40,17 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub critical_stretch: Option<f64>,
     /// Where bonds never break.
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
+    /// Contact of points that no bond joins; none if they may pass through each other.
+    pub contact: Option<ContactBehaviour>,
+}
+
+/// How points that no bond joins keep their distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactBehaviour {
+    /// Part of their distance at rest to which two points may approach each other.
+    pub approach: f64,
+    /// Stiffness of the repulsion relative to a bond as long as the horizon; 15 in EMU.
+    pub stiffness: f64,
 }
 
 /// Why a model cannot move bond by bond.
@@ -53,6 +67,9 @@ pub enum MotionError {
     /// The bonds cannot be passed over.
     #[error(transparent)]
     Kernel(#[from] KernelError),
+    /// The contact cannot be set up.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
 }
 
 /// A coupled model as a system that moves.
@@ -69,6 +86,9 @@ pub struct Motion<'a, const D: usize> {
 /// The points and their bonds.
 struct MovingBody<const D: usize> {
     pass: Box<dyn BondPass<D>>,
+    critical_stretch: Option<f64>,
+    /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
+    contact: Option<Mutex<Contact<D>>>,
     /// The site of each point; `NONE` for a point that follows sites.
     site_of_point: Vec<u32>,
     /// All points follow this many sites later, if they do.
@@ -221,6 +241,19 @@ impl<const D: usize> MovingBody<D> {
             layout: Layout::Automatic,
             storage: Storage::Double,
         })?;
+        let contact = match behaviour.contact {
+            Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {
+                position: &body.cloud.position,
+                volume: &body.cloud.volume,
+                rows: &own_row,
+                spacing: model.spacing(),
+                approach: c.approach,
+                stiffness: c.stiffness / 15.0
+                    * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),
+                skin: 0.25 * model.spacing(),
+            })?)),
+            None => None,
+        };
         let first = site_of_point.first().copied().unwrap_or(0);
         let shift = site_of_point
             .iter()
@@ -229,6 +262,8 @@ impl<const D: usize> MovingBody<D> {
             .then_some(first as usize);
         Ok(Some(Self {
             pass,
+            critical_stretch: behaviour.critical_stretch,
+            contact,
             site_of_point,
             shift,
             transfer: body.cloud.transfer.clone(),
@@ -270,6 +305,17 @@ impl<const D: usize> MovingBody<D> {
     }
 }
 
+/// `c` of `f = c s`, the largest of the bonds of the point with the most of them.
+fn bond_constant<const D: usize>(body: &PdBody<D>) -> f64 {
+    let fullest = (0..body.families.len()).max_by_key(|&i| body.families.of(i).len());
+    fullest.map_or(0.0, |i| {
+        let family = body.families.of(i).iter().zip(body.kernel(i).0);
+        family
+            .map(|(&j, p)| 2.0 * p * body.bond(i, j as usize).norm().powi(3))
+            .fold(0.0, f64::max)
+    })
+}
+
 impl<const D: usize> Dynamic for Motion<'_, D> {
     fn block(&self) -> usize {
         D
@@ -285,6 +331,13 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let mut points = std::mem::take(&mut body.displacement);
         body.spread(u, &mut points);
         let broken = body.pass.force_into(&points, &mut body.force, breakage);
+        if let Some(contact) = &body.contact {
+            let pass = &body.pass;
+            contact
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .add_force(&points, &|i, j| pass.bonded(i, j), &mut body.force);
+        }
         body.displacement = points;
         body.gather(&body.force, force);
         broken
@@ -308,9 +361,14 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let spread = (0..body.site_of_point.len())
             .map(|p| body.transfer.row(p).map(|(_, w)| w.abs()).sum::<f64>())
             .fold(1.0, f64::max);
+        let contact = body
+            .contact
+            .as_ref()
+            .map(|c| c.lock().unwrap_or_else(PoisonError::into_inner));
         for &(site, point) in &body.rows {
+            let touching = contact.as_ref().map_or(0.0, |c| c.row_sum(point as usize));
             for k in 0..D {
-                sums[site as usize * D + k] = points[point as usize * D + k] * spread;
+                sums[site as usize * D + k] = points[point as usize * D + k] * spread + touching;
             }
         }
         sums
@@ -321,15 +379,68 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     }
 
     fn stored_energy(&self, u: &[f64]) -> f64 {
+        let is_body_alone = self
+            .body
+            .as_ref()
+            .is_some_and(|b| b.rows.len() == self.mass.len());
+        if self.symmetry == Symmetry::Symmetric && !is_body_alone {
+            // a seam that has an energy: that of the whole, to first order in the stretch of exact bonds
+            let mut force = vec![0.0; u.len()];
+            self.tangent_into(u, &mut force);
+            let products: Vec<f64> = u
+                .par_chunks(CHUNK)
+                .zip(force.par_chunks(CHUNK))
+                .map(|(u, f)| u.iter().zip(f).map(|(u, f)| u * f).sum())
+                .collect();
+            return 0.5 * products.iter().sum::<f64>();
+        }
         let elements = self
             .energy
             .of::<D>(&self.linear, &self.model.node_transfer, u);
         let bonds = self.body.as_ref().map_or(0.0, |body| {
             let mut points = vec![0.0; body.displacement.len()];
             body.spread(u, &mut points);
-            body.pass.stored_energy(&points)
+            let contact = body.contact.as_ref().map_or(0.0, |contact| {
+                contact
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .energy(&points, &|i, j| body.pass.bonded(i, j))
+            });
+            body.pass.stored_energy(&points) + contact
         });
         elements + bonds
+    }
+
+    fn dissipated_energy(&self) -> Option<f64> {
+        let moving = self.body.as_ref()?;
+        let s = moving.critical_stretch?;
+        let body = self.model.body()?;
+        if moving.pass.broken() == 0 {
+            return Some(0.0);
+        }
+        let cloud = &body.cloud;
+        let mut damage = vec![0.0; cloud.position.len()];
+        moving.pass.damage_into(&mut damage);
+        // each end of a bond has half of p r² (r s_c)² V_i V_j; of an LPS the pairwise part, its dilatation has no energy of single bonds
+        let energies: Vec<f64> = (0..damage.len())
+            .into_par_iter()
+            .with_min_len(256)
+            .map(|i| {
+                if damage[i] == 0.0 || moving.site_of_point[i] == NONE {
+                    return 0.0;
+                }
+                let pair = body.kernel(i).0;
+                let family = body.families.of(i).iter().zip(pair);
+                family
+                    .filter(|&(&j, _)| !moving.pass.bonded(i, j as usize))
+                    .map(|(&j, p)| {
+                        let r2 = body.bond(i, j as usize).norm_squared();
+                        0.5 * p * r2 * r2 * s * s * cloud.volume[i] * cloud.volume[j as usize]
+                    })
+                    .sum()
+            })
+            .collect();
+        Some(energies.iter().sum())
     }
 
     fn damage(&self) -> Option<Vec<f64>> {

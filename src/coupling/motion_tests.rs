@@ -22,6 +22,7 @@ fn behaviour<const D: usize>(
         kinematics,
         critical_stretch,
         no_fail: &|_| false,
+        contact: None,
     }
 }
 

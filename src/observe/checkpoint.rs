@@ -298,10 +298,17 @@ impl CheckpointFile {
         if u64::from_le_bytes(identity) != self.identity {
             return Err(CheckpointError::OtherScene { path: path_buf() });
         }
-        postcard::from_bytes(&bytes[HEAD..end]).map_err(|e| CheckpointError::Content {
+        let content = |message: String| CheckpointError::Content {
             path: path_buf(),
-            message: e.to_string(),
-        })
+            message,
+        };
+        let (value, rest) =
+            postcard::take_from_bytes(&bytes[HEAD..end]).map_err(|e| content(e.to_string()))?;
+        if rest.is_empty() {
+            Ok(value)
+        } else {
+            Err(content(format!("{} bytes are left over", rest.len())))
+        }
     }
 }
 

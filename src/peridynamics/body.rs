@@ -360,7 +360,8 @@ fn split_rows<'a>(mut values: &'a mut [f64], offsets: &[usize]) -> Vec<&'a mut [
 }
 
 impl Families {
-    /// The same families with points renumbered (`u32::MAX` for a point that is dropped); only `active` points, by old number, keep theirs.
+    /// The same families with points renumbered (`u32::MAX` for a point that is dropped); only `active` points, by old number, keep theirs,
+    /// without the neighbours that are dropped.
     pub fn restrict(&self, renumbered: &[u32], active: &[bool]) -> Self {
         let mut result = Self {
             offsets: vec![0],
@@ -371,9 +372,12 @@ impl Families {
                 continue;
             }
             if active[i] {
-                result
-                    .neighbours
-                    .extend(self.of(i).iter().map(|&j| renumbered[j as usize]));
+                result.neighbours.extend(
+                    self.of(i)
+                        .iter()
+                        .map(|&j| renumbered[j as usize])
+                        .filter(|&j| j != u32::MAX),
+                );
             }
             result.offsets.push(result.neighbours.len());
         }

@@ -11,10 +11,12 @@
 //! | `fracture.rs` | critical stretch from the fracture energy | [Silling2005] |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
+//! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |
 //! | `kernel/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
 
 pub mod body;
 pub mod bond_based;
+pub mod contact;
 pub mod correspondence;
 pub mod families;
 pub mod fracture;

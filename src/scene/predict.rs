@@ -196,11 +196,15 @@ pub(crate) fn predict<const D: usize>(
         });
     }
 
-    let stiffness = (nonzeros * 8 + pattern.stored * 4 + model.sites.len() * 8) as u64;
+    let stiffness =
+        (pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8) as u64;
     let solver = match method {
         MethodUsed::Cholesky => analysis.bytes() + (cost.bytes as f64 * CHOLESKY) as u64,
         MethodUsed::Lu => analysis.bytes() + (cost.bytes as f64 * LU) as u64,
-        _ => analysis.bytes().max((HIERARCHY * stiffness as f64) as u64),
+        // coarse levels share no rows
+        _ => analysis
+            .bytes()
+            .max((HIERARCHY * (nonzeros * 8 + pattern.stored * 4) as f64) as u64),
     };
     let output = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
     let memory = vec![

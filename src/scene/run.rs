@@ -27,6 +27,7 @@ use crate::peridynamics::{
 };
 use crate::progress::Progress;
 use crate::solve::explicit::ExplicitError;
+use crate::solve::quasi_static::QuasiStaticError;
 use crate::solve::stable_step::StepError;
 use crate::solve::statics::{self, StaticError, StaticParams, StaticProblem};
 use crate::system::Symmetry;
@@ -50,6 +51,9 @@ pub enum RunError {
     /// The run cannot go on from a checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// A load step has no solution.
+    #[error(transparent)]
+    QuasiStatic(#[from] QuasiStaticError),
     /// The time step, or the model at any step, is not stable.
     #[error(transparent)]
     Step(#[from] StepError),

@@ -249,10 +249,7 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
     };
     let max_iterations = match &spec.max_iterations {
         Some(n) => count("max-iterations", n)?,
-        None => match spec.method {
-            LoadStepSpec::Implicit => 100,
-            LoadStepSpec::Relaxation => 100_000,
-        },
+        None => 50_000,
     };
     Ok(QuasiStatic {
         steps,

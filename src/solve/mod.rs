@@ -1,5 +1,5 @@
 //! Solvers of `K u = f`: elimination orders, a multifrontal direct solver, Krylov methods with multigrid, and the
-//! static problem that chooses among them; explicit dynamics with its stable step.
+//! static problem that chooses among them; explicit dynamics with its stable step; quasi-static load steps.
 
 mod aggregate;
 pub mod direct;
@@ -10,6 +10,7 @@ pub mod krylov;
 mod multifrontal;
 pub mod multigrid;
 pub mod ordering;
+pub mod quasi_static;
 mod singular;
 pub mod smoother;
 pub mod stable_step;

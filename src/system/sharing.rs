@@ -58,6 +58,9 @@ impl Known {
     }
 }
 
+/// In place of the number of a distinct row: a row without blocks.
+const EMPTY: u32 = u32::MAX;
+
 /// Consecutive rows with the distinct ones among them, gathered by one task.
 #[derive(Clone, Debug)]
 pub struct RowBatch {
@@ -90,6 +93,13 @@ impl RowBatch {
 
     /// Appends a row: its columns, ascending, and their blocks.
     pub fn push(&mut self, columns: &[u32], values: &[f64]) {
+        if columns.is_empty() {
+            // nothing to share; a start of its own would be that of the next distinct row
+            self.distinct.push(EMPTY);
+            self.follows.push(false);
+            self.ends.push(self.columns.len());
+            return;
+        }
         let next = self.values.len() / self.size;
         let found = self.known.find(&self.values, values, self.size, next);
         let number = match found {
@@ -165,7 +175,10 @@ impl GatheredRows {
         self.matrix.columns.extend(batch.columns);
         self.shared
             .starts
-            .extend(batch.distinct.iter().map(|&n| starts[n as usize]));
+            .extend(batch.distinct.iter().map(|&n| match n {
+                EMPTY => 0,
+                n => starts[n as usize],
+            }));
         self.shared.follows.extend(batch.follows);
     }
 
@@ -212,6 +225,32 @@ impl BlockCsr {
 #[cfg(test)]
 mod tests {
     use crate::solve::stencils::Lattice;
+
+    #[test]
+    fn rows_without_blocks_stay_empty() {
+        let mut matrix = Lattice::rectangle(9, 7).bonds(2).unshare();
+        // every third row loses its blocks, the first and the last among them
+        let mut emptied = crate::system::BlockCsr {
+            block: matrix.block,
+            row_offsets: vec![0],
+            ..Default::default()
+        };
+        for i in 0..matrix.rows() {
+            let (columns, blocks) = matrix.row(i);
+            if i % 3 != 0 {
+                emptied.columns.extend(columns);
+                emptied.values.extend(blocks);
+            }
+            emptied.row_offsets.push(emptied.columns.len());
+        }
+        matrix = emptied.share();
+        let x: Vec<f64> = (0..matrix.dofs()).map(|k| (k as f64).sin()).collect();
+        let (a, b) = (emptied.multiply(&x), matrix.multiply(&x));
+        for (i, (a, b)) in a.iter().zip(&b).enumerate() {
+            assert!((a - b).abs() <= 1e-12 * (1.0 + a.abs()), "{i}");
+            assert!(!(i / matrix.block).is_multiple_of(3) || *b == 0.0, "{i}");
+        }
+    }
 
     #[test]
     fn shared_rows_are_those_of_the_matrix_and_have_its_products() {

@@ -281,7 +281,7 @@ fn expression_in_t() {
         &[],
         &[
             "`conditions.pulled.traction.x`",
-            "time-dependent",
+            "in a static scene",
             "use x, y, z",
         ],
     );

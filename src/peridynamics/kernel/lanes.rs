@@ -386,3 +386,56 @@ mod x86 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every operation once, over numbers with signs, zeros and a mask.
+    fn all<L: Lanes>(l: L) -> Vec<u64> {
+        let x: [f64; LANES] = std::array::from_fn(|k| (k as f64 - 3.0) / 7.0);
+        let y: [f64; LANES] = std::array::from_fn(|k| 1.0 / (3.0 + k as f64));
+        let (a, b) = (l.load(&x), l.load(&y));
+        let above = l.above(a, b);
+        let results = [
+            l.splat(0.1),
+            l.add(a, b),
+            l.sub(a, b),
+            l.mul(a, b),
+            l.div(a, b),
+            l.sqrt(b),
+            l.max(a, b),
+            l.min(a, b),
+            l.fma(a, b, a),
+            l.fnma(a, b, b),
+            l.keep(a, 0b1010_0110),
+            l.select(above, a, b),
+        ];
+        let mut bits = vec![u64::from(above)];
+        for r in results {
+            let mut to = [0.0; LANES];
+            l.store(r, &mut to);
+            bits.extend(to.map(f64::to_bits));
+        }
+        bits
+    }
+
+    #[test]
+    fn instruction_sets_agree_bit_for_bit() {
+        struct All;
+        impl Work for All {
+            type Output = Vec<u64>;
+            fn run<L: Lanes>(self, l: L) -> Vec<u64> {
+                all(l)
+            }
+        }
+        let plain = All.run(Plain);
+        assert_eq!(dispatch(All), plain);
+        assert_eq!(plain[0], 0b1111_0000 & plain[0]);
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the features were detected
+            assert_eq!(unsafe { x86::with_avx2(All) }, plain);
+        }
+    }
+}

@@ -261,6 +261,15 @@ impl<const D: usize> Lattice<D> {
         energy
     }
 
+    /// The cell of a point in a group.
+    fn cell(&self, p: usize) -> Option<usize> {
+        let place = self.place[p];
+        (place != NONE).then(|| {
+            let place = place as usize;
+            self.stencil.groups[place / LANES] as usize + place % LANES
+        })
+    }
+
     /// Calls `f(offset, neighbour's cell)` for the standing bonds of lane `lane` of group `g`.
     #[inline(always)]
     fn each(&self, bits: &[u8], g: usize, lane: usize, mut f: impl FnMut(usize, usize)) {
@@ -440,6 +449,20 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
 
     fn broken(&self) -> u64 {
         self.reference - ones(&self.stencil.intact)
+    }
+
+    fn bonded(&self, i: usize, j: usize) -> bool {
+        let (Some(here), Some(there)) = (self.cell(i), self.cell(j)) else {
+            return false;
+        };
+        let delta = there as isize - here as isize;
+        let offsets = &self.stencil.offsets;
+        let g = self.place[i] as usize / LANES;
+        // a flat distance is that of one step only: rows are padded by the reach of the stencil
+        offsets
+            .iter()
+            .position(|o| o.delta == delta)
+            .is_some_and(|o| self.stencil.intact[g * offsets.len() + o] >> (here % LANES) & 1 == 1)
     }
 
     fn damage_state(&self) -> Vec<u64> {

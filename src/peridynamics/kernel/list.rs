@@ -72,11 +72,20 @@ pub(super) struct List<const D: usize> {
     reference: u64,
 }
 
-/// What one bond gives: `t`, and what multiplies `w V` times the direction.
+/// What one bond gives.
 struct Stretched<const D: usize> {
-    t: f64,
+    /// `t r²` and `r²`: a bond beyond its limit is found without dividing.
+    excess: f64,
+    length: f64,
     /// `ξ + η`, or ξ of a linear bond.
     direction: [f64; D],
+}
+
+impl<const D: usize> Stretched<D> {
+    #[inline(always)]
+    fn t(&self) -> f64 {
+        self.excess / self.length
+    }
 }
 
 #[inline(always)]
@@ -97,7 +106,8 @@ fn stretched<const D: usize, const EXACT: bool>(
         }
     }
     Stretched {
-        t: (2.0 * cross + square) / length,
+        excess: 2.0 * cross + square,
+        length,
         direction,
     }
 }
@@ -124,6 +134,32 @@ fn ratio<const EXACT: bool>(t: f64) -> f64 {
     if EXACT { 1.0 - t * psi(t) } else { 1.0 }
 }
 
+/// A number per bond, made block by block in place.
+fn fill<T: Copy + Default + Send>(
+    offsets: &[usize],
+    f: impl Fn(usize, usize) -> T + Sync,
+) -> Vec<T> {
+    let points = offsets.len().saturating_sub(1);
+    let mut numbers = vec![T::default(); offsets.last().copied().unwrap_or(0)];
+    let mut blocks = Vec::new();
+    let mut rest = numbers.as_mut_slice();
+    for start in (0..points).step_by(BLOCK) {
+        let end = (start + BLOCK).min(points);
+        let (head, tail) = rest.split_at_mut(offsets[end] - offsets[start]);
+        blocks.push((start..end, head));
+        rest = tail;
+    }
+    blocks.into_par_iter().for_each(|(range, numbers)| {
+        let first = offsets[range.start];
+        for i in range {
+            for bond in offsets[i]..offsets[i + 1] {
+                numbers[bond - first] = f(i, bond - offsets[i]);
+            }
+        }
+    });
+    numbers
+}
+
 #[inline(always)]
 fn vector<const D: usize>(u: &[f64], i: usize) -> [f64; D] {
     std::array::from_fn(|a| u[i * D + a])
@@ -133,16 +169,15 @@ impl<const D: usize> List<D> {
     pub(super) fn new(setup: &BondSetup<'_, D>) -> Self {
         let points = setup.position.len();
         let families = setup.families;
-        let per_bond = |f: &(dyn Fn(usize, usize) -> f64 + Sync)| -> Vec<f64> {
-            let rows: Vec<Vec<f64>> = (0..points)
-                .into_par_iter()
-                .with_min_len(BLOCK)
-                .map(|i| (0..families.of(i).len()).map(|k| f(i, k)).collect())
-                .collect();
-            rows.concat()
-        };
+        let per_bond =
+            |f: &(dyn Fn(usize, usize) -> f64 + Sync)| -> Vec<f64> { fill(&families.offsets, f) };
         let xi = |i: usize, k: usize| setup.bond(i, families.of(i)[k] as usize);
-        let weights = per_bond(&|i, k| setup.weight(i, k, &xi(i, k)));
+        let weights = match setup.storage {
+            Storage::Double => Weights::Double(per_bond(&|i, k| setup.weight(i, k, &xi(i, k)))),
+            Storage::Single => Weights::Single(fill(&families.offsets, |i, k| {
+                setup.weight(i, k, &xi(i, k)) as f32
+            })),
+        };
         let limit = match setup.failure.map(|f| f.critical) {
             None => Limit::Never,
             Some(super::CriticalStretch::Uniform(_)) => {
@@ -193,10 +228,7 @@ impl<const D: usize> List<D> {
             no_fail: (0..points).map(|i| setup.no_fail(i)).collect(),
             offsets: families.offsets.clone(),
             neighbours: families.neighbours.clone(),
-            weights: match setup.storage {
-                Storage::Double => Weights::Double(weights),
-                Storage::Single => Weights::Single(weights.iter().map(|&w| w as f32).collect()),
-            },
+            weights,
             limit,
             kinematics: setup.kinematics,
             solid,
@@ -247,7 +279,7 @@ impl<const D: usize> List<D> {
                         }
                         let xi = self.xi(i, j);
                         let s = stretched::<D, EXACT>(&xi, &here, &u[j * D..][..D]);
-                        if s.t > self.limit.get(bond) {
+                        if s.excess > self.limit.get(bond) * s.length {
                             *byte &= !(1 << (k % 8));
                             broken += 1;
                         }
@@ -281,9 +313,8 @@ impl<const D: usize> List<D> {
     fn dilatation<const EXACT: bool>(&self, solid: &Solid, i: usize, u: &[f64]) -> f64 {
         let mut sum = 0.0;
         self.each::<EXACT>(i, u, |bond, j, s| {
-            let xi = self.xi(i, j);
-            let length: f64 = xi.iter().map(|x| x * x).sum();
-            sum += self.weights.get(bond) * length * self.volume[j] * extension::<EXACT>(s.t);
+            let e = extension::<EXACT>(s.t());
+            sum += self.weights.get(bond) * s.length * self.volume[j] * e;
         });
         sum * solid.dilatation[i]
     }
@@ -308,13 +339,13 @@ impl<const D: usize> List<D> {
                         let f = self.weights.get(bond)
                             * self.volume[j]
                             * match &self.solid {
-                                None => shortening::<EXACT>(s.t),
+                                None => shortening::<EXACT>(s.t()),
                                 Some(c) => {
                                     (c.volumetric[i] * theta[i]
                                         + c.volumetric[j] * theta[j]
                                         + (c.deviatoric[i] + c.deviatoric[j])
-                                            * extension::<EXACT>(s.t))
-                                        * ratio::<EXACT>(s.t)
+                                            * extension::<EXACT>(s.t()))
+                                        * ratio::<EXACT>(s.t())
                                 }
                             };
                         for a in 0..D {
@@ -357,12 +388,8 @@ impl<const D: usize> List<D> {
                 }
                 let mut sum = 0.0;
                 self.each::<EXACT>(i, u, |bond, j, s| {
-                    let e = extension::<EXACT>(s.t);
-                    let mut w = self.weights.get(bond) * self.volume[j] * e * e;
-                    let xi = self.xi(i, j);
-                    let length: f64 = xi.iter().map(|x| x * x).sum();
-                    w *= length;
-                    sum += w;
+                    let e = extension::<EXACT>(s.t());
+                    sum += self.weights.get(bond) * self.volume[j] * e * e * s.length;
                 });
                 // pairwise: 2 p r² e² r² / 4; state-based: B ω e² r² / 2
                 self.volume[i]
@@ -512,6 +539,12 @@ impl<const D: usize> BondPass<D> for List<D> {
             .map(|b| u64::from(b.count_ones()))
             .sum();
         self.reference - standing
+    }
+
+    fn bonded(&self, i: usize, j: usize) -> bool {
+        self.neighbours[self.offsets[i]..self.offsets[i + 1]]
+            .binary_search(&(j as u32))
+            .is_ok_and(|k| self.stands(i, k))
     }
 
     fn damage_state(&self) -> Vec<u64> {

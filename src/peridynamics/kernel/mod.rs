@@ -71,6 +71,9 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Directed bonds of the reference families that are broken.
     fn broken(&self) -> u64;
 
+    /// Whether a bond of the reference families joins points `i` and `j`, both with a family, and stands; contact leaves such pairs to their bond.
+    fn bonded(&self, i: usize, j: usize) -> bool;
+
     /// The bits that say which bonds stand.
     fn damage_state(&self) -> Vec<u64>;
 

@@ -242,6 +242,12 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
                         .filter(|&(i, j)| !stands(i, j))
                         .count() as u64;
                     assert_eq!((lost, pass.broken()), (count, count), "{name}");
+                    for i in (0..points).step_by(5) {
+                        for j in 0..points {
+                            let bond = case.families.of(i).binary_search(&(j as u32)).is_ok();
+                            assert_eq!(pass.bonded(i, j), bond && stands(i, j), "{name} {i} {j}");
+                        }
+                    }
                     let mut damage = vec![0.0; points];
                     pass.damage_into(&mut damage);
                     for i in 0..points {

@@ -5,12 +5,14 @@
 //! | `system.rs` | what moves, its masses, its start |
 //! | `drive.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
+//! | `quasi_static.rs` | the run under a load that grows |
 //! | `predict.rs` | what a run in time will need |
 //! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
 
 mod drive;
 mod explicit;
 mod predict;
+mod quasi_static;
 mod record;
 mod system;
 
@@ -53,13 +55,13 @@ pub(super) fn predict<const D: usize>(
     match scene.solve.clone() {
         Solve::Explicit(solve) => predict::predict(scene, &solve, progress),
         Solve::QuasiStatic(solve) => predict::load_steps(scene, &solve, progress),
-        Solve::Static => Err(LATER),
+        Solve::Static => Err(STILL),
     }
 }
 
-const LATER: RunError = RunError::Later {
-    what: "[solve.quasi-static] comes with its driver",
-    remedy: "use [solve.explicit], or a static scene",
+const STILL: RunError = RunError::Later {
+    what: "a static scene does not move",
+    remedy: "use AnyScene::run, which solves it",
 };
 
 /// Runs a scene in time or under a load that grows.
@@ -70,6 +72,7 @@ pub(super) fn run<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     match scene.solve.clone() {
         Solve::Explicit(solve) => explicit::run(scene, &solve, options, progress),
-        Solve::QuasiStatic(_) | Solve::Static => Err(LATER),
+        Solve::QuasiStatic(solve) => quasi_static::run(scene, &solve, options, progress),
+        Solve::Static => Err(STILL),
     }
 }

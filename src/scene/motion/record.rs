@@ -94,6 +94,18 @@ pub(super) struct Moment<'a> {
     pub discrete: Option<f64>,
 }
 
+impl<'a> Moment<'a> {
+    /// A state of equilibrium.
+    pub fn at_rest(state: &'a State, system: &'a dyn Dynamic) -> Self {
+        Self {
+            state,
+            system,
+            kinetic: 0.0,
+            discrete: None,
+        }
+    }
+}
+
 /// The energies of a row of the history.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Row {
@@ -222,6 +234,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         ];
         row.extend(moment.discrete.map(Entry::from));
         if self.breaks == Breaks::Possibly {
+            row.push(moment.system.dissipated_energy().unwrap_or(0.0).into());
             row.push(self.last.missing.into());
             row.push((state.broken as i64).into());
         }
@@ -375,7 +388,7 @@ fn history_header<const D: usize>(
         header.push("discrete_energy");
     }
     if breaks == Breaks::Possibly {
-        header.extend(["dissipated_energy", "broken_bonds"]);
+        header.extend(["dissipated_energy", "missing_energy", "broken_bonds"]);
     }
     let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();
     header.extend(AXES[..D].iter().map(|a| format!("momentum_{a}")));

@@ -1,6 +1,6 @@
 //! The moving system of a scene: what moves, with what mass, from where.
 
-use crate::coupling::motion::{BondBehaviour, Motion, MotionError, masses};
+use crate::coupling::motion::{BondBehaviour, ContactBehaviour, Motion, MotionError, masses};
 use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::summary::Choice;
 use crate::peridynamics::kernel::Kinematics;
@@ -25,7 +25,7 @@ pub(super) struct Moving<'a> {
 /// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks.
 ///
 /// # Errors
-/// [`RunError::Motion`] for bonds that cannot stretch or break, [`RunError::Fracture`], [`RunError::Later`] for contact.
+/// [`RunError::Motion`] for bonds that cannot stretch or break, [`RunError::Fracture`].
 pub(super) fn dynamic<'a, const D: usize>(
     model: &'a Model<D>,
     coupling: &dyn Coupling<D>,
@@ -35,12 +35,6 @@ pub(super) fn dynamic<'a, const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Moving<'a>, RunError> {
     let breaking = &rest.breaking;
-    if breaking.contact.is_some() {
-        return Err(RunError::Later {
-            what: "contact comes with its kernel",
-            remedy: "remove [contact]",
-        });
-    }
     let critical_stretch = critical_stretch(model, rest)?;
     let (bonds, kinematics) = match breaking.bonds {
         BondsSpec::Exact => ("geometrically exact bonds", Kinematics::Exact),
@@ -55,7 +49,9 @@ pub(super) fn dynamic<'a, const D: usize>(
     };
     let density = |material: u16| rest.density[material as usize];
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
-    let is_linear = critical_stretch.is_none() && breaking.bonds == BondsSpec::Linear;
+    let is_linear = critical_stretch.is_none()
+        && breaking.contact.is_none()
+        && breaking.bonds == BondsSpec::Linear;
     let moving = Motion::new(
         model,
         operator,
@@ -65,6 +61,10 @@ pub(super) fn dynamic<'a, const D: usize>(
             kinematics,
             critical_stretch,
             no_fail: &can_fail_nowhere,
+            contact: breaking.contact.map(|c| ContactBehaviour {
+                approach: c.radius_factor,
+                stiffness: c.stiffness_factor,
+            }),
         },
     );
     match moving {

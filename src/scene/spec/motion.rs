@@ -75,7 +75,7 @@ pub struct QuasiStaticSpec {
     /// Out-of-balance force at which a step is solved, relative to the applied force; 1e-8 if left out.
     #[serde(default)]
     pub tolerance: Option<Number>,
-    /// Most iterations of a step; if left out 100 (implicit) or 100000 (relaxation).
+    /// Most products with the tangent (implicit) or passes over the bonds (relaxation) of one equilibrium; 50000 if left out.
     #[serde(default)]
     pub max_iterations: Option<Count>,
     /// Number of VTU files after the first; one per step if left out.
@@ -90,7 +90,7 @@ pub struct QuasiStaticSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoadStepSpec {
-    /// Newton's method with the tangent.
+    /// By the tangent at rest, broken bonds left out.
     #[default]
     Implicit,
     /// Adaptive dynamic relaxation: no matrix.
@@ -149,10 +149,10 @@ pub enum EdgeSpec {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactSpec {
-    /// Distance below which points repel each other, over the spacing; 0.9 if left out.
+    /// Part of their distance at rest below which two points without a bond repel each other, never more than 1.35 spacings; 0.9 if left out.
     #[serde(default)]
     pub radius_factor: Option<Number>,
-    /// Stiffness of the repulsion over that of a bond; 15 if left out.
+    /// Stiffness of the repulsion over that of a bond as long as the horizon; 15 if left out.
     #[serde(default)]
     pub stiffness_factor: Option<Number>,
 }

@@ -1,0 +1,175 @@
+//! A crack that branches in glass: coupled against full peridynamics, by branch point, branch time, energy, and total time.
+//!
+//!     cargo run --release --example branching
+//!     cargo run --release --example branching -- --figures docs/figures
+//!     cargo run --release --example branching -- --output out/branching --json
+
+use std::{path::PathBuf, process::ExitCode};
+
+use bondline::observe::{
+    figure::{LinePlot, Series, Stroke},
+    report::{self, Format, Row, Table, exit_code, render},
+};
+use shared::{Columns, Failure, argument, run};
+
+mod shared;
+
+/// What a run tells.
+struct Crack {
+    time: f64,
+    point: f64,
+    tips: [(f64, f64); 2],
+    thickness: f64,
+    dissipated: f64,
+    broken: f64,
+    seconds: f64,
+    points: usize,
+    sites: usize,
+    paths: [Vec<(f64, f64)>; 2],
+}
+
+fn main() -> ExitCode {
+    match tables() {
+        Ok(tables) => {
+            let format = if std::env::args().any(|a| a == "--json") {
+                Format::Json
+            } else {
+                Format::Text
+            };
+            println!("{}", render(&tables, format).trim_end());
+            ExitCode::from(exit_code(&tables))
+        }
+        Err(e) => {
+            eprintln!("{e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn crack(name: &str, overrides: &[&str], output: &std::path::Path) -> Result<Crack, Failure> {
+    let mut all: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
+    // pictures cost more than the motion, and alike for both
+    all.push("solve.explicit.outputs=1".into());
+    // where the branches begin, and how thick one of them is further on
+    for (tip, direction, low, high) in [
+        ("root", "[-1, 0]", "[0, 0.021]", "[0.1, 0.04]"),
+        ("over", "[0, 1]", "[0.085, 0.021]", "[0.086, 0.04]"),
+        ("under", "[0, -1]", "[0.085, 0.021]", "[0.086, 0.04]"),
+    ] {
+        all.push(format!(
+            "output.tips.{tip}={{direction={direction},inside={{box={{min={low},max={high}}}}}}}"
+        ));
+    }
+    let summary = run("branching.toml", &all, output, name)?;
+    let read = |end: &str| Columns::read(&output.join(name).join(format!("branching_{end}.csv")));
+    let history = read("history")?;
+    let last = |values: Vec<f64>| values.last().copied().unwrap_or(f64::NAN);
+    let (upper, lower, root) = (read("tip_upper")?, read("tip_lower")?, read("tip_root")?);
+    let path = |tip: &Columns| -> Result<Vec<(f64, f64)>, Failure> {
+        Ok(tip.column("x")?.into_iter().zip(tip.column("y")?).collect())
+    };
+    let paths = [path(&upper)?, path(&lower)?];
+    let end = |k: usize| paths[k].last().copied().unwrap_or((f64::NAN, f64::NAN));
+    let tips = [end(0), end(1)];
+    Ok(Crack {
+        time: root.column("time")?[0],
+        point: last(root.column("x")?),
+        tips,
+        thickness: last(read("tip_over")?.column("y")?) - last(read("tip_under")?.column("y")?),
+        dissipated: last(history.column("dissipated_energy")?),
+        broken: last(history.column("broken_bonds")?),
+        seconds: summary.total_seconds,
+        points: summary.sizes.points,
+        sites: summary.sizes.sites,
+        paths,
+    })
+}
+
+fn tables() -> Result<Vec<Table>, Failure> {
+    let output = PathBuf::from(argument("--output").unwrap_or("out/branching".into()));
+    let full = crack("full", &["coupling=nonlocal"], &output)?;
+    let mut table = Table::new(
+        "branching, coupled against full PD",
+        report::Columns::default(),
+    );
+    let mut series = vec![];
+    let name = "full PD";
+    table.push(Row::info(name, "branch point, mm", full.point * 1e3));
+    table.push(Row::info(name, "branch time, us", full.time * 1e6));
+    table.push(Row::info(name, "dissipated energy, J/m", full.dissipated));
+    let mut paths = |name: &str, crack: &Crack, stroke| {
+        for (half, path) in ["upper", "lower"].iter().zip(&crack.paths) {
+            let path = path.iter().map(|p| (p.0 * 1e3, p.1 * 1e3)).collect();
+            series.push(Series::new(format!("{name}, {half}"), stroke, path));
+        }
+    };
+    paths("full PD", &full, Stroke::Dashed);
+    let name = "truncated";
+    let coupled = crack(name, &[], &output)?;
+    paths(name, &coupled, Stroke::Line);
+    let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0).abs();
+    table.push(Row::at_most(
+        name,
+        "branch point against full PD, mm",
+        1e3 * (coupled.point - full.point).abs(),
+        2.0,
+    ));
+    table.push(Row::at_most(
+        name,
+        "branch time against full PD, us",
+        1e6 * (coupled.time - full.time).abs(),
+        2.0,
+    ));
+    table.push(Row::at_most(
+        name,
+        "dissipated energy against full PD, %",
+        percent(coupled.dissipated, full.dissipated),
+        5.0,
+    ));
+    table.push(Row::info(
+        name,
+        "broken bonds against full PD, %",
+        percent(coupled.broken, full.broken),
+    ));
+    let [upper, lower] = coupled.tips;
+    table.push(Row::at_most(
+        name,
+        "asymmetry of the two tips at the end, mm",
+        1e3 * (upper.0 - lower.0)
+            .abs()
+            .max((upper.1 + lower.1 - 0.04).abs()),
+        1.0,
+    ));
+    table.push(Row::at_most(
+        name,
+        "extent of the upper branch across at x = 85 mm: one branch, mm",
+        1e3 * coupled.thickness,
+        2.0,
+    ));
+    table.push(Row::info(
+        name,
+        "total time of full PD over coupled (1.8 wanted)",
+        full.seconds / coupled.seconds,
+    ));
+    table.push(Row::info(
+        name,
+        "points over those of full PD",
+        coupled.points as f64 / full.points as f64,
+    ));
+    table.push(Row::info(
+        name,
+        "sites over those of full PD",
+        coupled.sites as f64 / full.sites as f64,
+    ));
+    if let Some(folder) = argument("--figures") {
+        LinePlot {
+            title: "Paths of the tips".into(),
+            x_label: "x (mm)".into(),
+            y_label: "y (mm)".into(),
+            series,
+            ..LinePlot::default()
+        }
+        .write(&PathBuf::from(folder).join("branching_paths.svg"))?;
+    }
+    Ok(vec![table])
+}

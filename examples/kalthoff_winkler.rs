@@ -1,0 +1,99 @@
+//! Kalthoff and Winkler's plate: the angle at which cracks leave the notches, coupled against full peridynamics.
+//!
+//!     cargo run --release --example kalthoff_winkler
+//!     cargo run --release --example kalthoff_winkler -- --output out/kalthoff --json
+
+use std::{path::PathBuf, process::ExitCode};
+
+use bondline::observe::report::{self, Format, Row, Table, exit_code, render};
+use shared::{Columns, Failure, argument, between, run};
+
+mod shared;
+
+/// How far a crack has run when its angle is taken \[m\].
+const RUN: f64 = 0.03;
+
+fn main() -> ExitCode {
+    match tables() {
+        Ok(tables) => {
+            let format = if std::env::args().any(|a| a == "--json") {
+                Format::Json
+            } else {
+                Format::Text
+            };
+            println!("{}", render(&tables, format).trim_end());
+            ExitCode::from(exit_code(&tables))
+        }
+        Err(e) => {
+            eprintln!("{e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Angle in degrees between the notch and the way from its tip to that of the crack, when this is `RUN` away; and the time.
+fn angle(tip: &Columns, notch: [f64; 2]) -> Result<(f64, f64), Failure> {
+    let (time, x, y) = (tip.column("time")?, tip.column("x")?, tip.column("y")?);
+    (0..time.len())
+        .map(|k| (time[k], x[k] - notch[0], (y[k] - notch[1]).abs()))
+        .find(|(_, dx, dy)| dx.hypot(*dy) >= RUN)
+        .map(|(time, dx, dy)| (dy.atan2(dx).to_degrees(), time))
+        .ok_or_else(|| "the crack has not run 30 mm".into())
+}
+
+fn tables() -> Result<Vec<Table>, Failure> {
+    let output = PathBuf::from(argument("--output").unwrap_or("out/kalthoff_winkler".into()));
+    let mut table = Table::new(
+        "Kalthoff-Winkler, secant angle after 30 mm",
+        report::Columns::default(),
+    );
+    let mut reference: Option<([f64; 2], f64)> = None;
+    for (name, overrides) in [("full PD", &["coupling=nonlocal"][..]), ("truncated", &[])] {
+        let mut all: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
+        // pictures cost more than the motion, and alike for both
+        all.push("solve.explicit.outputs=1".into());
+        let folder = name.replace(' ', "_");
+        let summary = run("kalthoff_winkler.toml", &all, &output, &folder)?;
+        let read = |end: &str| {
+            Columns::read(
+                &output
+                    .join(&folder)
+                    .join(format!("kalthoff_winkler_{end}.csv")),
+            )
+        };
+        let (lower, time) = angle(&read("tip_lower")?, [0.05, 0.075])?;
+        let (upper, _) = angle(&read("tip_upper")?, [0.05, 0.125])?;
+        for (which, angle) in [("lower", lower), ("upper", upper)] {
+            table.push(between(
+                name,
+                format!("angle of the {which} crack, degrees"),
+                angle,
+                63.0,
+                73.0,
+            ));
+        }
+        table.push(Row::info(
+            name,
+            "time at which it has run 30 mm, us",
+            time * 1e6,
+        ));
+        match reference {
+            None => reference = Some(([lower, upper], summary.total_seconds)),
+            Some((angles, seconds)) => {
+                let off = (lower - angles[0]).abs().max((upper - angles[1]).abs());
+                table.push(Row::at_most(
+                    name,
+                    "angle against full PD, degrees",
+                    off,
+                    4.0,
+                ));
+                table.push(Row::info(
+                    name,
+                    "total time of full PD over coupled",
+                    seconds / summary.total_seconds,
+                ));
+            }
+        }
+    }
+    Ok(vec![table])
+}

@@ -1,0 +1,266 @@
+//! A scene under a load that grows: one equilibrium after another, each broken through until no bond breaks.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use super::drive::SceneDrive;
+use super::explicit::{read, sizes};
+use super::record::{Breaks, EdgeReached, Moment, Recorder, StepChoice};
+use super::system::{dynamic, start};
+use super::{RunOptions, StartFrom};
+use crate::coupling::{Model, Sampler};
+use crate::observe::ObserveError;
+use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
+use crate::observe::report::number;
+use crate::observe::summary::{
+    Choice, Ended, MotionSummary, RunSummary, Stopwatch, Timings, peak_memory_bytes,
+};
+use crate::progress::Progress;
+use crate::scene::run::{self, RunError, Solved};
+use crate::scene::solve::QuasiStatic as Spec;
+use crate::scene::spec::{EdgeSpec, LoadStepSpec};
+use crate::scene::validate::Scene;
+use crate::solve::explicit::Drive;
+use crate::solve::quasi_static::{self, Equilibrium, LoadState, LoadStep, QuasiStaticParams};
+use crate::system::Breakage;
+
+/// Runs a scene under a load that grows.
+pub(super) fn run<const D: usize>(
+    scene: Scene<D>,
+    spec: &Spec,
+    options: &RunOptions<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, RunError> {
+    let mut timings = Timings::default();
+    let mut watch = Stopwatch::start();
+    let title = scene.title.clone();
+    let joining = scene.coupling.joining();
+    let (problem, rest) = run::problem(scene);
+    let path = rest
+        .output
+        .directory
+        .join(format!("{}.checkpoint", rest.output.name));
+    let file = CheckpointFile::new(path.clone(), rest.fingerprint.value());
+    let mut choices = Vec::new();
+    let saved = match options.start {
+        StartFrom::Beginning => None,
+        StartFrom::Checkpoint => read(&file, &mut choices)?,
+    };
+    let (model, coupling) = Model::new(problem, progress)?;
+    watch.lap(&mut timings, "sites and bonds");
+    let operator = coupling.operator(&model)?;
+    let mut moving = dynamic(
+        &model,
+        coupling.as_ref(),
+        operator.as_ref(),
+        &rest,
+        &mut choices,
+        progress,
+    )?;
+    watch.lap(&mut timings, "rows and bonds");
+    let step = spec.duration / spec.steps as f64;
+    let pace = StepChoice {
+        step,
+        steps: spec.steps as u64,
+        stable: 0.0,
+        certified: 0.0,
+        site: 0,
+    };
+    let params = QuasiStaticParams {
+        equilibrium: match spec.method {
+            LoadStepSpec::Implicit => Equilibrium::Secant,
+            LoadStepSpec::Relaxation => Equilibrium::Relaxation,
+        },
+        tolerance: spec.tolerance,
+        max_iterations: spec.max_iterations,
+        ..QuasiStaticParams::default()
+    };
+    choices.push(Choice {
+        choice: match params.equilibrium {
+            Equilibrium::Secant => "the tangent at rest, without a matrix",
+            Equilibrium::Relaxation => "adaptive dynamic relaxation",
+        }
+        .to_owned(),
+        why: format!("{} load steps to t = {}", spec.steps, number(spec.duration)),
+    });
+    let begin = start(&model, &rest.initial);
+    let drive = SceneDrive::new(&model, &rest.conditions, &begin.u, step, pace.steps)?;
+    if let Some(saved) = &saved
+        && !moving.system.restore_damage(&saved.damage)
+    {
+        let message = "its bonds are not those of this model".to_owned();
+        return Err(CheckpointError::Content { path, message }.into());
+    }
+    let breaks = match moving.system.damage() {
+        Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
+        _ => Breaks::Never,
+    };
+    let mut recorder = Recorder::new(
+        &rest.output,
+        &Sampler::new(&model),
+        breaks,
+        false,
+        file,
+        options.checkpoint_every.or(spec.checkpoint_every),
+        saved.as_ref().map(|s| &s.written),
+    )?;
+    let zones = run::zone_of_site(&model);
+    let solved = |u: &[f64], visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
+        visit(&Solved {
+            model: &model,
+            operator: operator.as_ref(),
+            displacement: u,
+            residual: &[],
+            zone_of_site: &zones,
+        })
+    };
+    let place = |site: usize| model.sites[site].position;
+    let mut edge = saved.as_ref().and_then(|s| s.edge);
+    let dofs = begin.u.len();
+    let mut loaded = LoadState::at_rest(dofs);
+    // fields, time, step, work, broken bonds: what a checkpoint keeps
+    let mut state = begin;
+    let mut load = vec![0.0; dofs];
+    // the forces whose work a load step does: loads on free dofs, internal forces where supports hold
+    let mut forces = vec![0.0; dofs];
+    if let Some(saved) = saved {
+        state = saved.state;
+        // the state at t = 0 counts as one of the driver's steps
+        loaded.step = state.step + 1;
+        loaded.u.clone_from(&state.u);
+        loaded.broken = state.broken;
+        let system = moving.system.as_mut();
+        system.internal_force_into(&state.u, &mut forces, Breakage::Held);
+        drive.load_into(state.time, &mut load);
+        mix(&drive, &load, &mut forces);
+    } else {
+        loaded.u.clone_from(&state.u);
+    }
+    let first = state.step;
+    let times: Vec<f64> = (0..=spec.steps).map(|k| k as f64 * step).collect();
+    watch.lap(&mut timings, "start");
+    let written = recorder.seconds;
+    progress.stage("load steps", Some(pace.steps));
+    progress.advance(first);
+    let clock = Instant::now();
+    let mut ended = Ended::Finished;
+    let mut failed = None;
+    let mut observe = |seen: &LoadStep<'_>| -> ControlFlow<()> {
+        drive.load_into(seen.time, &mut load);
+        let mut now = seen.force.to_vec();
+        mix(&drive, &load, &mut now);
+        let begins = seen.state.step == 1;
+        if !begins {
+            state.work += (0..dofs)
+                .map(|k| 0.5 * (forces[k] + now[k]) * (seen.state.u[k] - state.u[k]))
+                .sum::<f64>();
+        }
+        forces = now;
+        state.step = seen.state.step - 1;
+        state.time = seen.time;
+        state.u.copy_from_slice(&seen.state.u);
+        state.broken = seen.state.broken;
+        if breaks == Breaks::Possibly && edge.is_none() {
+            edge = seen.system.damage_at_edge().map(|site| EdgeReached {
+                step: state.step,
+                time: state.time,
+                site: site as u64,
+            });
+        }
+        let last = state.step == pace.steps;
+        if edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
+            ended = Ended::DamageAtEdge;
+        } else if options.interrupt.is_some_and(|i| i.load(Ordering::Relaxed)) && !last {
+            ended = Ended::Interrupted;
+        }
+        let moment = Moment::at_rest(&state, seen.system);
+        let shown = begins
+            || last
+            || ended == Ended::DamageAtEdge
+            || state.step.is_multiple_of(spec.output_every as u64);
+        let leave = ended != Ended::Finished || (last && recorder.keeps_state());
+        let mut write = || -> Result<(), ObserveError> {
+            if begins {
+                recorder.begin(&moment);
+            }
+            recorder.row(&moment, place)?;
+            if shown {
+                solved(&state.u, &mut |s| recorder.output(&moment, s))?;
+            }
+            if leave || (!begins && recorder.is_checkpoint_due(state.step)) {
+                recorder.checkpoint(&moment, pace, edge)?;
+            }
+            Ok(())
+        };
+        if let Err(error) = write() {
+            failed = Some(error);
+            return ControlFlow::Break(());
+        }
+        progress.advance(u64::from(!begins));
+        progress.tell(&format!(
+            "t = {:.3e}, {} iterations, {} bonds broken",
+            state.time, seen.iterations, state.broken
+        ));
+        match ended {
+            Ended::Finished => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        }
+    };
+    let info = quasi_static::run(
+        moving.system.as_mut(),
+        &drive,
+        params,
+        &times,
+        &mut loaded,
+        &mut observe,
+    )?;
+    if let Some(error) = failed {
+        return Err(error.into());
+    }
+    progress.finish();
+    let seconds = clock.elapsed().as_secs_f64();
+    timings.add("load steps", seconds - (recorder.seconds - written));
+    timings.add("output", recorder.seconds - written);
+    let stored = moving.system.stored_energy(&state.u);
+    choices.push(Choice {
+        choice: format!("{} products or passes", info.iterations),
+        why: "of all load steps of this run".to_owned(),
+    });
+    Ok(RunSummary {
+        scene: title,
+        dimension: D,
+        coupling: joining.name.to_owned(),
+        sizes: sizes(&model, operator.as_ref()),
+        choices,
+        total_seconds: timings.total(),
+        timings,
+        peak_memory_bytes: peak_memory_bytes(),
+        motion: Some(MotionSummary {
+            ended,
+            steps: state.step,
+            of_steps: pace.steps,
+            time: state.time,
+            step,
+            stable_step: None,
+            kinetic_energy: 0.0,
+            stored_energy: stored,
+            external_work: state.work,
+            missing_energy: recorder.energy_at_start + state.work - stored,
+            broken_bonds: state.broken,
+            edge_reached: edge.map(|e| (e.time, place(e.site as usize).iter().copied().collect())),
+            steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),
+        }),
+        files: recorder.files(),
+        ..RunSummary::default()
+    })
+}
+
+/// Takes the loads on free dofs and leaves the internal forces where supports hold.
+fn mix<const D: usize>(drive: &SceneDrive<'_, D>, load: &[f64], forces: &mut [f64]) {
+    let mut mixed = load.to_vec();
+    for &dof in drive.prescribed() {
+        mixed[dof as usize] = forces[dof as usize];
+    }
+    forces.copy_from_slice(&mixed);
+}

@@ -1,0 +1,408 @@
+use super::*;
+use crate::{
+    solve::statics::{self, StaticParams, StaticProblem},
+    system::{BlockCsr, LinearMotion},
+};
+
+/// A chain of springs of uneven stiffness; `skew` makes its rows differ from its columns.
+fn chain(n: usize, skew: f64) -> LinearMotion {
+    let spring = |i: usize| 1.0 + (i % 4) as f64;
+    let mut k = BlockCsr {
+        block: 1,
+        row_offsets: vec![0],
+        ..BlockCsr::default()
+    };
+    for i in 0..n {
+        let left = if i > 0 {
+            spring(i - 1) * (1.0 + skew)
+        } else {
+            0.0
+        };
+        let right = if i + 1 < n {
+            spring(i) * (1.0 - skew)
+        } else {
+            0.0
+        };
+        if i > 0 {
+            k.columns.push(i as u32 - 1);
+            k.values.push(-left);
+        }
+        k.columns.push(i as u32);
+        k.values.push(left + right);
+        if i + 1 < n {
+            k.columns.push(i as u32 + 1);
+            k.values.push(-right);
+        }
+        k.row_offsets.push(k.columns.len());
+    }
+    LinearMotion {
+        stiffness: k,
+        mass: vec![1.0; n],
+        symmetry: if skew == 0.0 {
+            Symmetry::Symmetric
+        } else {
+            Symmetry::Unsymmetric
+        },
+    }
+}
+
+/// One end held, the other pulled, a load in the middle.
+struct Pulled {
+    ends: [u32; 2],
+    middle: usize,
+}
+
+impl Drive for Pulled {
+    fn load_into(&self, time: f64, load: &mut [f64]) {
+        load.fill(0.0);
+        load[self.middle] = 0.3 * time;
+    }
+
+    fn prescribed(&self) -> &[u32] {
+        &self.ends
+    }
+
+    fn displacement_into(&self, time: f64, values: &mut [f64]) {
+        values.copy_from_slice(&[0.0, time]);
+    }
+}
+
+fn go(
+    system: &mut dyn Dynamic,
+    drive: &dyn Drive,
+    equilibrium: Equilibrium,
+    times: &[f64],
+    observe: &mut dyn FnMut(&LoadStep<'_>),
+) -> Result<QuasiStaticInfo, QuasiStaticError> {
+    let params = QuasiStaticParams {
+        equilibrium,
+        tolerance: 1e-11,
+        ..QuasiStaticParams::default()
+    };
+    let mut state = LoadState::at_rest(system.mass().len() * system.block());
+    run(system, drive, params, times, &mut state, &mut |s| {
+        observe(s);
+        ControlFlow::Continue(())
+    })
+}
+
+#[test]
+fn without_breaking_it_is_the_static_solve() {
+    let n = 40;
+    let drive = Pulled {
+        ends: [0, n as u32 - 1],
+        middle: 13,
+    };
+    for (skew, equilibrium) in [
+        (0.0, Equilibrium::Secant),
+        (0.1, Equilibrium::Secant),
+        (0.0, Equilibrium::Relaxation),
+        (0.1, Equilibrium::Relaxation),
+    ] {
+        let mut system = chain(n, skew);
+        let mut load = vec![0.0; n];
+        drive.load_into(2.0, &mut load);
+        let mut prescribed = vec![None; n];
+        (prescribed[0], prescribed[n - 1]) = (Some(0.0), Some(2.0));
+        let positions: Vec<[f64; 3]> = (0..n).map(|i| [i as f64, 0.0, 0.0]).collect();
+        let exact = statics::solve(
+            &StaticProblem {
+                stiffness: &system.stiffness,
+                symmetry: system.symmetry,
+                positions: &positions,
+                load: &load,
+                prescribed: &prescribed,
+            },
+            &StaticParams::default(),
+            &Silent,
+        )
+        .expect("solved");
+        let mut worst = f64::NAN;
+        let info = go(&mut system, &drive, equilibrium, &[1.0, 2.0], &mut |s| {
+            worst = s
+                .state
+                .u
+                .iter()
+                .zip(&exact.displacement)
+                .fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+            let pull = s.force[n - 1];
+            if s.state.step == 2 {
+                assert!((pull - exact.reactions[n - 1]).abs() < 1e-8, "{pull}");
+            }
+        })
+        .expect("equilibrium");
+        assert!(
+            info.steps == 2 && info.broken == 0 && worst < 1e-8,
+            "{skew} {equilibrium:?}: {worst} {info:?}"
+        );
+    }
+}
+
+/// Site 0 is held; fibres of stiffness 1 join it to site 1 and break beyond their own elongation; a spring of stiffness `spring` joins site 1 to site 2.
+struct Bundle {
+    limits: Vec<f64>,
+    intact: Vec<bool>,
+    spring: f64,
+    mass: [f64; 3],
+}
+
+impl Bundle {
+    fn new(count: usize, spring: f64) -> Bundle {
+        Bundle {
+            limits: (1..=count).map(|i| i as f64 / count as f64).collect(),
+            intact: vec![true; count],
+            spring,
+            mass: [1.0; 3],
+        }
+    }
+
+    fn alive(&self) -> f64 {
+        self.intact.iter().filter(|i| **i).count() as f64
+    }
+}
+
+impl Dynamic for Bundle {
+    fn block(&self) -> usize {
+        1
+    }
+
+    fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+        let mut broken = 0;
+        if breakage == Breakage::Allowed {
+            for (intact, limit) in self.intact.iter_mut().zip(&self.limits) {
+                if *intact && u[1] - u[0] > *limit {
+                    *intact = false;
+                    broken += 1;
+                }
+            }
+        }
+        self.tangent_into(u, force);
+        broken
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        let (fibres, spring) = (self.alive() * (x[1] - x[0]), self.spring * (x[2] - x[1]));
+        y.copy_from_slice(&[-fibres, fibres - spring, spring]);
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        let (n, s) = (self.alive(), self.spring);
+        vec![2.0 * n, 2.0 * (n + s), 2.0 * s]
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Symmetric
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        0.5 * (self.alive() * (u[1] - u[0]).powi(2) + self.spring * (u[2] - u[1]).powi(2))
+    }
+}
+
+/// Pulls site 2 by a displacement, or site 1 by a force.
+enum Grip {
+    Displacement,
+    Force,
+}
+
+impl Drive for Grip {
+    fn load_into(&self, time: f64, load: &mut [f64]) {
+        load.fill(0.0);
+        if matches!(self, Self::Force) {
+            load[1] = time;
+        }
+    }
+
+    fn prescribed(&self) -> &[u32] {
+        match self {
+            Self::Displacement => &[0, 2],
+            Self::Force => &[0],
+        }
+    }
+
+    fn displacement_into(&self, time: f64, values: &mut [f64]) {
+        values.fill(0.0);
+        if matches!(self, Self::Displacement) {
+            values[1] = time;
+        }
+    }
+}
+
+#[test]
+fn a_bundle_of_fibres_follows_its_curve() {
+    // elongation x of n fibres with limits i/n: the force is n (1 − x) x up to the fibres' steps, largest n/4 at x = 1/2 (Daniels)
+    for equilibrium in [Equilibrium::Secant, Equilibrium::Relaxation] {
+        let count = 50;
+        let mut bundle = Bundle::new(count, 1e4);
+        let times: Vec<f64> = (1..=90).map(|k| (k as f64 + 0.5) / 100.0).collect();
+        let mut largest: f64 = 0.0;
+        go(
+            &mut bundle,
+            &Grip::Displacement,
+            equilibrium,
+            &times,
+            &mut |s| {
+                let x = s.state.u[1];
+                let alive = (0..count)
+                    .filter(|i| (*i as f64 + 1.0) / count as f64 >= x)
+                    .count();
+                assert_eq!(s.state.broken as usize, count - alive, "x = {x}");
+                assert!(
+                    (s.force[2] - alive as f64 * x).abs() < 1e-6,
+                    "{} {x}",
+                    s.force[2]
+                );
+                largest = largest.max(s.force[2]);
+            },
+        )
+        .expect("equilibrium");
+        assert!(
+            (largest / (count as f64 / 4.0) - 1.0).abs() < 0.05,
+            "{largest}"
+        );
+    }
+}
+
+#[test]
+fn a_bundle_under_dead_load_breaks_at_its_strength() {
+    // the largest force of i/n times the n − i + 1 fibres that are left as fibre i is about to break
+    let count = 20;
+    let strength = (1..=count)
+        .map(|i| (i * (count - i + 1)) as f64 / count as f64)
+        .fold(0.0, f64::max);
+    for (load, holds) in [(0.999 * strength, true), (1.001 * strength, false)] {
+        let mut bundle = Bundle::new(count, 1.0);
+        let times: Vec<f64> = (1..=50).map(|k| load * f64::from(k) / 50.0).collect();
+        let mut broken = 0;
+        let end = go(
+            &mut bundle,
+            &Grip::Force,
+            Equilibrium::Secant,
+            &times,
+            &mut |s| {
+                broken = s.state.broken;
+            },
+        );
+        assert_eq!(end.is_ok(), holds, "{end:?}");
+        if holds {
+            assert!(broken < count as u64);
+        } else {
+            // nothing is left to bear the load
+            assert!(
+                matches!(
+                    end,
+                    Err(QuasiStaticError::Linear { .. } | QuasiStaticError::NoEquilibrium { .. })
+                ),
+                "{end:?}"
+            );
+            assert_eq!(bundle.alive(), 0.0);
+        }
+    }
+}
+
+#[test]
+fn runs_resume_and_trouble_is_named() {
+    let times: Vec<f64> = (1..=60).map(|k| f64::from(k) / 80.0).collect();
+    let whole = {
+        let (mut bundle, mut state) = (Bundle::new(30, 10.0), LoadState::at_rest(3));
+        let params = QuasiStaticParams::default();
+        run(
+            &mut bundle,
+            &Grip::Displacement,
+            params,
+            &times,
+            &mut state,
+            &mut |_| ControlFlow::Continue(()),
+        )
+        .expect("equilibrium");
+        (state, bundle.intact)
+    };
+    let (mut bundle, mut state) = (Bundle::new(30, 10.0), LoadState::at_rest(3));
+    for stop in [23, 60] {
+        let params = QuasiStaticParams::default();
+        run(
+            &mut bundle,
+            &Grip::Displacement,
+            params,
+            &times,
+            &mut state,
+            &mut |s| {
+                if s.state.step == stop {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        )
+        .expect("equilibrium");
+    }
+    assert_eq!(whole, (state, bundle.intact));
+
+    let mut bundle = Bundle::new(4, 1.0);
+    let mut short = LoadState::at_rest(2);
+    let params = QuasiStaticParams {
+        max_rounds: 1,
+        ..QuasiStaticParams::default()
+    };
+    let mut none = |_: &LoadStep<'_>| ControlFlow::Continue(());
+    let error = run(
+        &mut bundle,
+        &Grip::Displacement,
+        params,
+        &[1.0],
+        &mut short,
+        &mut none,
+    );
+    assert!(
+        matches!(error, Err(QuasiStaticError::Shape { .. })),
+        "{error:?}"
+    );
+    let mut state = LoadState::at_rest(3);
+    let error = run(
+        &mut bundle,
+        &Grip::Displacement,
+        params,
+        &[3.0],
+        &mut state,
+        &mut none,
+    );
+    assert!(
+        matches!(error, Err(QuasiStaticError::NeverHolds { step: 0, .. })),
+        "{error:?}"
+    );
+    let few = QuasiStaticParams {
+        equilibrium: Equilibrium::Relaxation,
+        max_iterations: 3,
+        ..params
+    };
+    let mut system = chain(40, 0.0);
+    let drive = Pulled {
+        ends: [0, 39],
+        middle: 13,
+    };
+    let mut state = LoadState::at_rest(40);
+    let error = run(&mut system, &drive, few, &[1.0], &mut state, &mut none);
+    assert!(
+        matches!(
+            error,
+            Err(QuasiStaticError::NoEquilibrium { iterations: 3, .. })
+        ),
+        "{error:?}"
+    );
+    let error = run(
+        &mut system,
+        &drive,
+        few,
+        &[f64::NAN],
+        &mut LoadState::at_rest(40),
+        &mut none,
+    );
+    assert!(
+        matches!(error, Err(QuasiStaticError::NotFinite { .. })),
+        "{error:?}"
+    );
+}
