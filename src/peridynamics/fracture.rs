@@ -56,7 +56,7 @@ impl BondEnergy {
     ///    = s² { ½ ∫ λ r⁵ dr (1D),  ∫ λ r⁶ dr (2D),  π/2 ∫ λ r⁷ dr (3D) } ,
     /// ```
     ///
-    /// which for `λ = c/r³` is the prototype microelastic brittle `s_c² = 10 G0/(π c δ⁵)` in 3D and `4 G0/(c δ⁴)` in 2D [Silling2005]. An LPS adds
+    /// which for `λ = c/r³` is the prototype microelastic brittle `s_c² = 10 G0/(π c δ⁵)` in 3D and `4 G0/(c δ⁴)` in 2D \[Silling2005\]. An LPS adds
     /// `2 ∫ ½ K′ θ(z)² dz` with the dilatation `θ(z) = D/m s ∫ ω r² A dr` of a point at distance `z` from the plane and `K′ = k − (D + 2) μ/D`.
     ///
     /// Units: `energy` \[J/m²\] (J/m of crack and unit thickness in 2D, J per unit section in 1D), `horizon` \[m\].

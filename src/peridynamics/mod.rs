@@ -8,7 +8,7 @@
 //! | `weights.rs` | moment-fitted weights of one irregular family | |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is; `bond_based.rs`, `lps.rs`, `correspondence.rs` | eq. (3.1), (5.16), section 7.2 |
-//! | `fracture.rs` | critical stretch from the fracture energy | [Silling2005] |
+//! | `fracture.rs` | critical stretch from the fracture energy | \[Silling2005\] |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
 //! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |

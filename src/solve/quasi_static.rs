@@ -6,7 +6,7 @@
 //! * **Secant**: `u ← u + K⁻¹ (f − F(u))` with the tangent at rest, broken bonds left out; conjugate gradients or GMRES by its symmetry,
 //!   preconditioned by the row sums. One iteration where `F` is linear.
 //! * **Relaxation**: the motion `M̃ ü + c M̃ u̇ = f − F(u)` in steps of one, with fictitious masses `m̃_a = ¼ Σ_b |K_ab|` that make the step stable, and
-//!   the damping that is critical for the mode in motion, `c = 2 √(v·ΔF / v·M̃ v)` ([Underwood1983], with the increment in place of the displacement). It needs
+//!   the damping that is critical for the mode in motion, `c = 2 √(v·ΔF / v·M̃ v)` (\[Underwood1983\], with the increment in place of the displacement). It needs
 //!   no solve, and pieces that are torn off do not trouble it.
 
 use std::ops::ControlFlow;

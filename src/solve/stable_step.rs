@@ -6,7 +6,7 @@
 //!
 //! * **Certified**: `λ ≤ max_a Σ_b |K_ab| / m_a` (Gershgorin), valid for any `K`.
 //! * **Sharp**: the largest Ritz value θ of Lanczos (symmetric) or Arnoldi in the inner product of the masses, from a random start. With
-//!   `k` products on `n` unknowns `λ ≤ θ/(1 − ε)` fails with a probability of at most `1.648 √n exp(−√ε (2k − 1))` ([Kuczynski1992], theorem 3, symmetric);
+//!   `k` products on `n` unknowns `λ ≤ θ/(1 − ε)` fails with a probability of at most `1.648 √n exp(−√ε (2k − 1))` (\[Kuczynski1992\], theorem 3, symmetric);
 //!   `ε` is [`MARGIN`], and `k` is chosen for one in 10⁹. Without symmetry there is no such theorem and the same margin is kept.
 //!
 //! The second question is that of [`crate::solve::growth`].

@@ -45,7 +45,7 @@ impl Hexahedron {
         }
     }
 
-    /// Its volume, that of the trilinear cell. Units: [m³].
+    /// Its volume, that of the trilinear cell. Units: \[m³\].
     pub fn volume(&self) -> f64 {
         // about a corner, or digits are lost far from the origin
         let origin = self.corners[0];
@@ -54,7 +54,7 @@ impl Hexahedron {
             .sum()
     }
 
-    /// Volume of its intersection with a ball. Units: \[m\] → [m³].
+    /// Volume of its intersection with a ball. Units: \[m\] → \[m³\].
     pub fn ball_volume(&self, centre: &Vector<3>, radius: f64) -> f64 {
         if radius <= 0.0 {
             return 0.0;
