@@ -146,11 +146,14 @@ fn tables() -> Result<Vec<Table>, Failure> {
         1e3 * coupled.thickness,
         2.0,
     ));
-    table.push(Row::info(
-        name,
-        "total time of full PD over coupled (1.8 wanted)",
-        full.seconds / coupled.seconds,
-    ));
+    // a time is no reason to fail, but a miss is not to be read as a pass
+    let ratio = full.seconds / coupled.seconds;
+    let time = Row::info(name, "total time of full PD over coupled", ratio);
+    table.push(if ratio < 1.8 {
+        time.differs("1.8 is wanted; docs/fracture.md says what it is lost to")
+    } else {
+        time
+    });
     table.push(Row::info(
         name,
         "points over those of full PD",

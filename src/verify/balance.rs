@@ -28,8 +28,7 @@ use crate::{
 };
 
 /// Largest out-of-balance force of a method in exact equilibrium, over the force on a face.
-// rows equal within 1e-13 of their largest entry are stored once, which leaves up to 3e-12
-pub const EQUILIBRIUM_LIMIT: f64 = 1e-11;
+pub const EQUILIBRIUM_LIMIT: f64 = 1e-12;
 
 /// Largest relative distance from the leading term.
 pub const LEADING_TERM_LIMIT: f64 = 0.01;
