@@ -10,7 +10,7 @@
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs` | shared: sites, families, what completes them | |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
-//! | `derivative.rs`, `edge.rs`, `sample.rs` | shared: least squares, distances, displacements anywhere | |
+//! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `motion.rs` | a model that moves: bonds that stretch and break beside the rows of the rest | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
@@ -23,6 +23,7 @@ pub mod blending;
 mod bonds;
 pub mod derivative;
 pub mod edge;
+mod fit;
 pub mod model;
 pub mod motion;
 pub mod partial_stress;

@@ -4,24 +4,20 @@ use std::path::{Path, PathBuf};
 
 use super::breaking::Breaking;
 use super::check;
-use super::conditions::{self, Condition, extent};
+use super::conditions::{self, Condition};
 use super::error::{SceneError, SceneErrorKind};
 use super::initial::Initial;
 use super::materials::{self, Material, Peridynamics, Points};
 use super::meshing;
 use super::motion::RunOptions;
 use super::predict::{self, Prediction};
-use super::region::{self, Region};
+use super::region::Region;
 use super::run::{self, RunError};
 use super::solve::Solve;
 use super::source::{Source, Span};
-use super::spec::{
-    CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ShapeSpec, TipSpec, ZonesNeeded,
-};
-use super::value::Text;
-use super::{breaking, initial, solve, zones};
+use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
+use super::{breaking, initial, obstacles, output, solve, zones};
 use crate::coupling::Zone;
-use crate::fem::Locator;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
@@ -278,7 +274,7 @@ fn scene<const D: usize>(
     if let Some(p) = &peridynamics {
         horizon(spec, p, &mesh, &zones)?;
     }
-    let (voids, barriers) = barriers(spec, &mesh, &zones)?;
+    let (voids, barriers) = obstacles::obstacles(spec, &mesh, &zones)?;
     add_mesh(&mesh, &mut fingerprint);
     let solve = solve::solve(spec.solve.as_ref())?;
     let clock = solve.clock();
@@ -293,7 +289,7 @@ fn scene<const D: usize>(
         .find(|(_, zone)| **zone != Zone::Local)
         .map_or(0, |(m, _)| *m);
     let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
-    let output = output(spec, &mesh, name)?;
+    let output = output::output(spec, &mesh, name)?;
     Ok(Scene {
         title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
         kinematics,
@@ -457,214 +453,6 @@ fn horizon<const D: usize>(
         .help("make it three to six times the spacing, or refine the points"));
     }
     Ok(())
-}
-
-type Obstacles<const D: usize> = (Vec<Shape<D>>, Vec<Barrier<D>>);
-
-fn barriers<const D: usize>(
-    spec: &SceneSpec,
-    mesh: &Mesh<D>,
-    zones: &[Zone],
-) -> Result<Obstacles<D>, SceneError> {
-    let (mut voids, mut barriers) = (Vec::new(), Vec::new());
-    for (name, v) in &spec.voids {
-        let place = format!("voids.{name}.inside");
-        let shape = region::shape(&place, &v.inside, mesh, &name.span)?;
-        if !matches!(
-            shape,
-            Shape::Box { .. } | Shape::Ball { .. } | Shape::Polygon(_)
-        ) {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}` has no volume"),
-            )
-            .label(name.span.clone(), "nothing lies inside")
-            .help("use `box`, `ball` or, in 2D, `polygon`; a surface is a crack: [cracks.NAME]"));
-        }
-        let inside = |c: &usize| shape.signed_distance(&mesh.centroid(*c)) < 0.0;
-        if let Some(c) = (0..mesh.cell_count())
-            .filter(|&c| zones[c] != Zone::Nonlocal)
-            .find(inside)
-        {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "`{place}` covers cell {c} at {:?}, which is not nonlocal",
-                    mesh.centroid(c).as_slice()
-                ),
-            )
-            .label(name.span.clone(), "finite elements cannot be emptied")
-            .help(
-                "enlarge [zones.nonlocal] around the void, or leave it out of the mesh (cutouts)",
-            ));
-        }
-        if v.cut_bonds {
-            barriers.push(Barrier::Void(shape.clone()));
-        }
-        voids.push(shape);
-    }
-    let locator = Locator::new(mesh, 0..mesh.cell_count());
-    for (name, c) in &spec.cracks {
-        let place = format!("cracks.{name}");
-        let shape = region::shape(&place, c, mesh, &name.span)?;
-        let thin = matches!(
-            (&shape, c, D),
-            (Shape::Segment { .. }, ShapeSpec::Point(_), 1)
-                | (Shape::Segment { .. }, ShapeSpec::Segment(_), 2)
-                | (Shape::Polyline(_), _, 2)
-                | (Shape::Polygon(_), _, 3)
-        );
-        if !thin {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}` is no surface in a scene of dimension {D}"),
-            )
-            .label(name.span.clone(), "cuts nothing")
-            .help([
-                "give a point: point = 0.5",
-                "give a segment = { from, to } or a polyline; what has an area is a void: [voids.NAME]",
-                "give a plane polygon = [[x, y, z], ...]; what has a volume is a void: [voids.NAME]",
-            ][D - 1]));
-        }
-        let samples = samples(&shape);
-        let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
-        let cells: Vec<(Vector<D>, usize)> = samples
-            .iter()
-            .filter_map(|x| locator.locate(mesh, x, tolerance).map(|l| (*x, l.cell)))
-            .collect();
-        if cells.is_empty() {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("`{place}` lies outside the mesh"),
-            )
-            .label(name.span.clone(), "cuts nothing")
-            .help(extent(mesh)));
-        }
-        if let Some((x, _)) = cells.iter().find(|(_, cell)| zones[*cell] == Zone::Local) {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!("`{place}` passes through the local zone at {:?}", x.as_slice()),
-            )
-            .label(name.span.clone(), "finite elements cannot be cut")
-            .help("enlarge [zones.nonlocal], for example near = { segment = ..., within = 3 horizons }"));
-        }
-        barriers.push(Barrier::Crack(shape));
-    }
-    Ok((voids, barriers))
-}
-
-/// Points on a thin shape, dense enough to meet every zone it passes through.
-fn samples<const D: usize>(shape: &Shape<D>) -> Vec<Vector<D>> {
-    const PER_EDGE: usize = 64;
-    let edge = |a: &Vector<D>, b: &Vector<D>| -> Vec<Vector<D>> {
-        (0..=PER_EDGE)
-            .map(|i| a.lerp(b, i as f64 / PER_EDGE as f64))
-            .collect()
-    };
-    match shape {
-        Shape::Segment { a, b } => edge(a, b),
-        Shape::Polyline(points) => points.windows(2).flat_map(|w| edge(&w[0], &w[1])).collect(),
-        Shape::Polygon(points) => {
-            let centre = points.iter().sum::<Vector<D>>() / points.len().max(1) as f64;
-            let closed = points.iter().zip(points.iter().cycle().skip(1));
-            closed
-                .flat_map(|(a, b)| edge(a, b))
-                .flat_map(|x| [x, x.lerp(&centre, 0.5)])
-                .chain([centre])
-                .collect()
-        }
-        _ => Vec::new(),
-    }
-}
-
-fn output<const D: usize>(
-    spec: &SceneSpec,
-    mesh: &Mesh<D>,
-    name: &str,
-) -> Result<Output<D>, SceneError> {
-    let o = &spec.output;
-    let mut lines = Vec::with_capacity(o.lines.len());
-    for (key, line) in &o.lines {
-        let place = format!("output.lines.{key}");
-        let from = region::position::<D>(&format!("{place}.from"), &line.from)?;
-        let to = region::position::<D>(&format!("{place}.to"), &line.to)?;
-        let n = line.samples.value;
-        if !(2..=1_000_000).contains(&n) {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}.samples` is {n}"),
-            )
-            .label(line.samples.span.clone(), "2 to 1000000")
-            .help("a line needs at least its two ends"));
-        }
-        let positions = (0..n)
-            .map(|i| from.lerp(&to, i as f64 / (n - 1) as f64))
-            .collect();
-        lines.push((key.value.clone(), positions));
-    }
-    let locator = Locator::new(mesh, 0..mesh.cell_count());
-    let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
-    let mut probes = Vec::with_capacity(o.probes.len());
-    for (key, probe) in &o.probes {
-        let place = format!("output.probes.{key}.at");
-        let at = region::position::<D>(&place, &probe.at)?;
-        if locator.locate(mesh, &at, tolerance).is_none() {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("`{place}` = {:?} lies outside the mesh", at.as_slice()),
-            )
-            .label(probe.at.span.clone(), "outside")
-            .help(extent(mesh)));
-        }
-        probes.push((key.value.clone(), at));
-    }
-    let mut tips = Vec::with_capacity(o.tips.len());
-    for (key, tip) in &o.tips {
-        tips.push(self::tip(key, tip, mesh)?);
-    }
-    Ok(Output {
-        directory: o
-            .directory
-            .as_ref()
-            .map_or("out".into(), |d| d.value.clone().into()),
-        name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
-        vtu: o.vtu.unwrap_or(true),
-        lines,
-        probes,
-        tips,
-    })
-}
-
-fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip<D>, SceneError> {
-    let place = format!("output.tips.{key}");
-    let direction = region::position::<D>(&format!("{place}.direction"), &spec.direction)?;
-    if direction.norm() <= 0.0 {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}.direction` is zero"),
-        )
-        .label(spec.direction.span.clone(), "points nowhere")
-        .help("give the direction in which the crack runs"));
-    }
-    let threshold = match &spec.threshold {
-        Some(t) => check::within(
-            &format!("{place}.threshold"),
-            t,
-            t.value > 0.0 && t.value < 1.0,
-            "must lie between 0 and 1",
-            "0.35 suits most scenes: a straight crack cuts up to half of the bonds",
-        )?,
-        None => 0.35,
-    };
-    Ok(Tip {
-        name: key.value.clone(),
-        direction: direction.normalize(),
-        inside: match &spec.inside {
-            Some(shape) => region::region(&format!("{place}.inside"), shape, mesh)?,
-            None => Scene::everywhere(),
-        },
-        threshold,
-    })
 }
 
 impl<const D: usize> Scene<D> {

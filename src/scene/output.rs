@@ -1,0 +1,102 @@
+//! What a scene writes: lines, probes, tips of cracks.
+
+use super::check;
+use super::conditions::extent;
+use super::error::{SceneError, SceneErrorKind};
+use super::region;
+use super::spec::{SceneSpec, TipSpec};
+use super::validate::{Output, Scene, Tip};
+use super::value::Text;
+use crate::fem::Locator;
+use crate::mesh::Mesh;
+
+/// The outputs of a scene whose files are named `name` by default.
+pub(super) fn output<const D: usize>(
+    spec: &SceneSpec,
+    mesh: &Mesh<D>,
+    name: &str,
+) -> Result<Output<D>, SceneError> {
+    let o = &spec.output;
+    let mut lines = Vec::with_capacity(o.lines.len());
+    for (key, line) in &o.lines {
+        let place = format!("output.lines.{key}");
+        let from = region::position::<D>(&format!("{place}.from"), &line.from)?;
+        let to = region::position::<D>(&format!("{place}.to"), &line.to)?;
+        let n = line.samples.value;
+        if !(2..=1_000_000).contains(&n) {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("`{place}.samples` is {n}"),
+            )
+            .label(line.samples.span.clone(), "2 to 1000000")
+            .help("a line needs at least its two ends"));
+        }
+        let positions = (0..n)
+            .map(|i| from.lerp(&to, i as f64 / (n - 1) as f64))
+            .collect();
+        lines.push((key.value.clone(), positions));
+    }
+    let locator = Locator::new(mesh, 0..mesh.cell_count());
+    let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
+    let mut probes = Vec::with_capacity(o.probes.len());
+    for (key, probe) in &o.probes {
+        let place = format!("output.probes.{key}.at");
+        let at = region::position::<D>(&place, &probe.at)?;
+        if locator.locate(mesh, &at, tolerance).is_none() {
+            return Err(SceneError::new(
+                SceneErrorKind::Empty,
+                format!("`{place}` = {:?} lies outside the mesh", at.as_slice()),
+            )
+            .label(probe.at.span.clone(), "outside")
+            .help(extent(mesh)));
+        }
+        probes.push((key.value.clone(), at));
+    }
+    let mut tips = Vec::with_capacity(o.tips.len());
+    for (key, tip) in &o.tips {
+        tips.push(self::tip(key, tip, mesh)?);
+    }
+    Ok(Output {
+        directory: o
+            .directory
+            .as_ref()
+            .map_or("out".into(), |d| d.value.clone().into()),
+        name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
+        vtu: o.vtu.unwrap_or(true),
+        lines,
+        probes,
+        tips,
+    })
+}
+
+fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip<D>, SceneError> {
+    let place = format!("output.tips.{key}");
+    let direction = region::position::<D>(&format!("{place}.direction"), &spec.direction)?;
+    if direction.norm() <= 0.0 {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`{place}.direction` is zero"),
+        )
+        .label(spec.direction.span.clone(), "points nowhere")
+        .help("give the direction in which the crack runs"));
+    }
+    let threshold = match &spec.threshold {
+        Some(t) => check::within(
+            &format!("{place}.threshold"),
+            t,
+            t.value > 0.0 && t.value < 1.0,
+            "must lie between 0 and 1",
+            "0.35 suits most scenes: a straight crack cuts up to half of the bonds",
+        )?,
+        None => 0.35,
+    };
+    Ok(Tip {
+        name: key.value.clone(),
+        direction: direction.normalize(),
+        inside: match &spec.inside {
+            Some(shape) => region::region(&format!("{place}.inside"), shape, mesh)?,
+            None => Scene::everywhere(),
+        },
+        threshold,
+    })
+}
