@@ -61,7 +61,14 @@ const SLIT_PLATE: &str = "examples/slit_plate.toml";
 
 #[test]
 fn slit_plate_by_every_method() {
-    for coupling in ["local", "splice", "blending", "partial-stress", "nonlocal"] {
+    for coupling in [
+        "local",
+        "splice",
+        "blending",
+        "balanced",
+        "partial-stress",
+        "nonlocal",
+    ] {
         compare(SLIT_PLATE, &[&format!("coupling={coupling}")]);
     }
 }

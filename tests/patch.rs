@@ -30,6 +30,7 @@ fn affine_fields_are_exact_through_every_seam() {
             for method in [
                 "splice",
                 "blending smooth",
+                "balanced",
                 "meshfree",
                 "elements quadratic",
             ] {

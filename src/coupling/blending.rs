@@ -58,38 +58,112 @@ impl<const D: usize> Coupling<D> for Blending {
     }
 
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {
-        let mut roles: Vec<CellRole> = zones
-            .iter()
-            .map(|zone| match zone {
-                Zone::Local => CellRole::Element,
-                Zone::Transition | Zone::Nonlocal => CellRole::Points,
-            })
-            .collect();
-        // the collar: local cells within a horizon of the region where β > 0
-        let edge = Edge::of(mesh, |c| zones[c] != Zone::Local);
-        // a point on the edge has the constant β, so its bonds of exactly one horizon have weight as well; other functions vanish there
-        let reach = match self.function {
-            BlendingFunction::Constant => largest_horizon * (1.0 + 1e-6),
-            _ => largest_horizon * (1.0 - 1e-9),
-        };
-        for c in 0..mesh.cell_count() {
-            if zones[c] == Zone::Local {
-                let near = mesh
-                    .cell(c)
-                    .iter()
-                    .any(|&n| edge.within(&mesh.nodes[n as usize], reach));
-                if near {
-                    roles[c] = CellRole::Points;
-                }
+        match self.function {
+            BlendingFunction::Constant => {
+                with_collar(mesh, zones, Zone::Transition, largest_horizon * CLOSED)
             }
+            _ => with_collar(mesh, zones, Zone::Transition, largest_horizon * OPEN),
         }
-        roles
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         let Some(body) = model.body() else {
             return Ok(Box::new(super::single::OwnModel { model }));
         };
+        let beta = at_points(Some(self.function), model, body);
+        Ok(Box::new(Blended::new(
+            model,
+            body,
+            beta,
+            SpliceShare::default(),
+        )?))
+    }
+}
+
+/// Just beyond a horizon: where β jumps, bonds of exactly one horizon have weight too.
+pub(super) const CLOSED: f64 = 1.0 + 1e-6;
+
+/// Just below a horizon: where β is 0 at the edge, bonds of exactly one horizon have no weight.
+const OPEN: f64 = 1.0 - 1e-9;
+
+/// The roles of cells where points fill the nonlocal and transition zones, or the first alone, and a collar of width `reach` around them.
+pub(super) fn with_collar<const D: usize>(
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+    outermost: Zone,
+    reach: f64,
+) -> Vec<CellRole> {
+    let filled = |c: usize| zones[c] == Zone::Nonlocal || zones[c] == outermost;
+    let edge = Edge::of(mesh, filled);
+    (0..mesh.cell_count())
+        .map(|c| {
+            let near = || {
+                let nodes = mesh.cell(c).iter();
+                nodes
+                    .into_iter()
+                    .any(|&n| edge.within(&mesh.nodes[n as usize], reach))
+            };
+            if filled(c) || near() {
+                CellRole::Points
+            } else {
+                CellRole::Element
+            }
+        })
+        .collect()
+}
+
+/// β at every point of the cloud: 1 in the nonlocal zone, 0 in the local one, `function` in between or, without one, 0.
+pub(super) fn at_points<const D: usize>(
+    function: Option<BlendingFunction>,
+    model: &Model<D>,
+    body: &PdBody<D>,
+) -> Vec<f64> {
+    let (mesh, zones) = (&model.mesh, &model.zones);
+    let outer = Edge::of(mesh, |c| zones[c] == Zone::Local);
+    let inner = Edge::of(mesh, |c| zones[c] == Zone::Nonlocal);
+    (0..body.cloud.position.len())
+        .map(|p| match model.zone_of_point(p) {
+            Zone::Local => 0.0,
+            Zone::Nonlocal => 1.0,
+            Zone::Transition => {
+                let x = &body.cloud.position[p];
+                let (to_local, to_nonlocal) = (outer.distance(x), inner.distance(x));
+                let s = match (to_local.is_finite(), to_nonlocal.is_finite()) {
+                    (true, true) => to_local / (to_local + to_nonlocal),
+                    (true, false) => 0.0,
+                    _ => 1.0,
+                };
+                function.map_or(0.0, |f| f.value(s))
+            }
+        })
+        .collect()
+}
+
+/// How much of a row is that of a splice, for what bonds do by themselves and for the state part of a law; the rest is that of a blending.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct SpliceShare {
+    pub pair: f64,
+    pub state: f64,
+}
+
+/// Rows of bonds that are weighted by `s β(x) + (1 − s) (β(x) + β(x′))/2`, with what the weights take given back at the point itself.
+pub(super) struct Blended<'a, const D: usize> {
+    model: &'a Model<D>,
+    body: &'a PdBody<D>,
+    beta: Vec<f64>,
+    share: SpliceShare,
+    /// For each point some of whose bonds are weighted.
+    derivatives: Vec<Option<DerivativeWeights<D>>>,
+}
+
+impl<'a, const D: usize> Blended<'a, D> {
+    /// Rows for β at the points of the body.
+    pub fn new(
+        model: &'a Model<D>,
+        body: &'a PdBody<D>,
+        beta: Vec<f64>,
+        share: SpliceShare,
+    ) -> Result<Self, ModelError> {
         let horizon = body.cloud.horizon.first().copied().unwrap_or(0.0);
         if body
             .cloud
@@ -102,7 +176,6 @@ impl<const D: usize> Coupling<D> for Blending {
                 remedy: "give one horizon, or use splice or partial-stress",
             });
         }
-        let beta = self.at_points(model, body);
         let derivatives = (0..body.cloud.position.len())
             .into_par_iter()
             .map(|i| {
@@ -123,46 +196,20 @@ impl<const D: usize> Coupling<D> for Blending {
                 }
             })
             .collect::<Result<_, _>>()?;
-        Ok(Box::new(Blended {
+        Ok(Self {
             model,
             body,
             beta,
+            share,
             derivatives,
-        }))
+        })
     }
-}
 
-impl Blending {
-    /// β at every point of the cloud.
-    fn at_points<const D: usize>(&self, model: &Model<D>, body: &PdBody<D>) -> Vec<f64> {
-        let (mesh, zones) = (&model.mesh, &model.zones);
-        let outer = Edge::of(mesh, |c| zones[c] == Zone::Local);
-        let inner = Edge::of(mesh, |c| zones[c] == Zone::Nonlocal);
-        (0..body.cloud.position.len())
-            .map(|p| match model.zone_of_point(p) {
-                Zone::Local => 0.0,
-                Zone::Nonlocal => 1.0,
-                Zone::Transition => {
-                    let x = &body.cloud.position[p];
-                    let (to_local, to_nonlocal) = (outer.distance(x), inner.distance(x));
-                    let s = match (to_local.is_finite(), to_nonlocal.is_finite()) {
-                        (true, true) => to_local / (to_local + to_nonlocal),
-                        (true, false) => 0.0,
-                        _ => 1.0,
-                    };
-                    self.function.value(s)
-                }
-            })
-            .collect()
+    /// The weights of the bond from point `i` to point `j`, for what it does by itself and for the state part.
+    fn weights(&self, i: usize, j: usize) -> [f64; 2] {
+        let (own, mean) = (self.beta[i], 0.5 * (self.beta[i] + self.beta[j]));
+        [self.share.pair, self.share.state].map(|s| s * own + (1.0 - s) * mean)
     }
-}
-
-struct Blended<'a, const D: usize> {
-    model: &'a Model<D>,
-    body: &'a PdBody<D>,
-    beta: Vec<f64>,
-    /// For each point some of whose bonds are weighted.
-    derivatives: Vec<Option<DerivativeWeights<D>>>,
 }
 
 impl<const D: usize> Operator<D> for Blended<'_, D> {
@@ -171,11 +218,10 @@ impl<const D: usize> Operator<D> for Blended<'_, D> {
             self.model.add_element_rows(site, row);
             return;
         };
-        let beta = &self.beta;
-        let weight = |j: usize| 0.5 * (beta[i] + beta[j]);
-        self.body.add_force_row(i, weight, row);
+        self.body
+            .add_force_row_of_parts(i, |j| self.weights(i, j), row);
         if let Some(derivatives) = &self.derivatives[i] {
-            self.add_remainder(i, &weight, derivatives, row);
+            self.add_remainder(i, derivatives, row);
         }
     }
 
@@ -192,13 +238,7 @@ impl<const D: usize> Operator<D> for Blended<'_, D> {
 
 impl<const D: usize> Blended<'_, D> {
     /// Adds what the weights took away, expanded at the point: the second and third terms of [SAND2015-7998] eq. (3.14).
-    fn add_remainder(
-        &self,
-        i: usize,
-        weight: &dyn Fn(usize) -> f64,
-        at: &DerivativeWeights<D>,
-        row: &mut Row<D>,
-    ) {
+    fn add_remainder(&self, i: usize, at: &DerivativeWeights<D>, row: &mut Row<D>) {
         let body = self.body;
         let (pair, omega) = body.kernel(i);
         let state = body.state(i);
@@ -209,8 +249,8 @@ impl<const D: usize> Blended<'_, D> {
         for (k, &j) in family.iter().enumerate() {
             let j = j as usize;
             let xi = body.bond(i, j);
-            let rest = (1.0 - weight(j)) * body.cloud.volume[j];
-            if rest == 0.0 {
+            let [rest, of_state] = self.weights(i, j).map(|w| (1.0 - w) * body.cloud.volume[j]);
+            if rest == 0.0 && of_state == 0.0 {
                 continue;
             }
             let mut block = xi * xi.transpose() * (2.0 * rest * pair[k]);
@@ -227,7 +267,7 @@ impl<const D: usize> Blended<'_, D> {
                                         * state.shape[(b, g)]
                                         * xi[a]
                                         * omega[k]
-                                        * rest;
+                                        * of_state;
                                 }
                             }
                         }

@@ -5,6 +5,7 @@
 //! | `single.rs` | pure FE, pure PD: ordinary values of the same switch | |
 //! | `splice.rs` | each site takes the equation of its own model | [SAND2015-7998] eq. (2.30) |
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
+//! | `balanced.rs` | half of a splice's rows, half of a blending's: no force out of balance under quartic fields | `docs/methods.md` |
 //! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
@@ -19,6 +20,7 @@
 //! cells around every site and (b) places outside a site's own region whose displacement is interpolated exactly for affine fields.
 //! A method is one file with a [`Coupling`], one line here and its entry in the scene.
 
+pub mod balanced;
 pub mod blending;
 mod bonds;
 pub mod derivative;
@@ -35,6 +37,7 @@ pub mod single;
 pub mod splice;
 pub mod truncated;
 
+pub use balanced::Balanced;
 pub use blending::{Blending, BlendingFunction};
 pub use derivative::FitDegree;
 pub use model::{Model, Site, SiteKind};

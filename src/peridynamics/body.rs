@@ -204,6 +204,16 @@ impl<const D: usize> PdBody<D> {
     /// Source: [SAND2015-7998] eq. (2.5) times the point's volume: `Σ_j w_ij V_i V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)`.
     /// The second sum runs over the points whose families contain `i`, so horizons may differ.
     pub fn add_force_row(&self, i: usize, weight: impl Fn(usize) -> f64, row: &mut Row<D>) {
+        self.add_force_row_of_parts(i, |j| [weight(j); 2], row);
+    }
+
+    /// As [`PdBody::add_force_row`], with one weight for what a bond does by itself (`p` and `q`) and another for the state part `𝓜 : Ḡ`.
+    pub fn add_force_row_of_parts(
+        &self,
+        i: usize,
+        weights: impl Fn(usize) -> [f64; 2],
+        row: &mut Row<D>,
+    ) {
         let transfer = &self.cloud.transfer;
         let volume = self.cloud.volume[i];
         let (pair, omega) = self.kernel(i);
@@ -214,11 +224,11 @@ impl<const D: usize> PdBody<D> {
         for (k, &j) in self.families.of(i).iter().enumerate() {
             let j = j as usize;
             let xi = self.bond(i, j);
-            let vv = volume * self.cloud.volume[j] * weight(j);
+            let [vv, of_state] = weights(j).map(|w| volume * self.cloud.volume[j] * w);
             let mut block = xi * xi.transpose() * (both * vv * pair[k]);
             if !self.pairwise {
                 block += Tensor::identity() * (q * omega[k] * vv);
-                first += xi * (omega[k] * vv);
+                first += xi * (omega[k] * of_state);
             }
             own += block;
             row.add(transfer, j, &(-block));
@@ -233,12 +243,12 @@ impl<const D: usize> PdBody<D> {
             for (j, bond) in reversed.of(i) {
                 let j = j as usize;
                 let xi = self.bond(j, i);
-                let vv = volume * self.cloud.volume[j] * weight(j);
+                let [vv, of_state] = weights(j).map(|w| volume * self.cloud.volume[j] * w);
                 let mut block = xi * xi.transpose() * (vv * self.pair[bond]);
                 if let Some(state) = self.state(j) {
                     let omega = self.omega[bond];
                     block += Tensor::identity() * (state.stabilisation * omega * vv);
-                    let c = along(&state.modulus, &(xi * (omega * vv)), 1.0);
+                    let c = along(&state.modulus, &(xi * (omega * of_state)), 1.0);
                     self.add_weighted_gradient(j, &c, row);
                 }
                 own += block;

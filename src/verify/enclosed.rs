@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     coupling::{
-        Blending, BlendingFunction, Coupling, FitDegree, Local, Model, ModelError,
+        Balanced, Blending, BlendingFunction, Coupling, FitDegree, Local, Model, ModelError,
         PartialStressElements, PartialStressMeshfree, Peridynamics, PointSource, Problem, Splice,
         Surfaces, Truncated, Zone,
     },
@@ -41,6 +41,10 @@ pub enum Method {
     Splice,
     /// [`Blending`].
     Blending(BlendingFunction),
+    /// [`Balanced`] with a step in β at the edge of the nonlocal zone.
+    Balanced,
+    /// [`Balanced`] with β over the transition zone.
+    BalancedOver(BlendingFunction),
     /// [`PartialStressMeshfree`] with this ω of the divergence.
     Meshfree(Influence),
     /// [`PartialStressElements`].
@@ -51,7 +55,7 @@ pub enum Method {
 
 impl Method {
     /// Every method.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Splice,
         Self::Blending(BlendingFunction::Constant),
         Self::Blending(BlendingFunction::Linear),
@@ -60,6 +64,8 @@ impl Method {
         Self::Elements(FitDegree::Affine),
         Self::Elements(FitDegree::Quadratic),
         Self::Truncated,
+        Self::Balanced,
+        Self::BalancedOver(BlendingFunction::Smooth),
     ];
 
     /// Its name in tables.
@@ -69,6 +75,10 @@ impl Method {
             Self::Blending(BlendingFunction::Constant) => "blending constant",
             Self::Blending(BlendingFunction::Linear) => "blending linear",
             Self::Blending(BlendingFunction::Smooth) => "blending smooth",
+            Self::Balanced => "balanced",
+            Self::BalancedOver(BlendingFunction::Constant) => "balanced constant",
+            Self::BalancedOver(BlendingFunction::Linear) => "balanced linear",
+            Self::BalancedOver(BlendingFunction::Smooth) => "balanced smooth",
             Self::Meshfree(_) => "partial stress meshfree",
             Self::Elements(FitDegree::Affine) => "partial stress elements affine",
             Self::Elements(FitDegree::Quadratic) => "partial stress elements quadratic",
@@ -78,7 +88,7 @@ impl Method {
 
     /// Whether a transition zone has a meaning of its own.
     pub fn has_transition(self) -> bool {
-        !matches!(self, Self::Splice | Self::Truncated)
+        !matches!(self, Self::Splice | Self::Truncated | Self::Balanced)
     }
 
     /// Whether the method takes a law.
@@ -90,6 +100,10 @@ impl Method {
         match self {
             Self::Splice => Box::new(Splice),
             Self::Blending(function) => Box::new(Blending { function }),
+            Self::Balanced => Box::new(Balanced { function: None }),
+            Self::BalancedOver(function) => Box::new(Balanced {
+                function: Some(function),
+            }),
             Self::Meshfree(influence) => Box::new(PartialStressMeshfree { influence }),
             Self::Elements(fit) => Box::new(PartialStressElements { fit }),
             Self::Truncated => Box::new(Truncated),

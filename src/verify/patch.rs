@@ -195,7 +195,11 @@ pub fn widths<const D: usize>(method: Method, cells: Cells) -> Widths {
         (1 | 2, ..) => (6, 6, 12),
         (_, Cells::Coarse, _) => (3, 3, 6),
         // the collar of a blending region takes whole cells, here up to two horizons
-        (_, Cells::Jittered | Cells::Simplices, Method::Blending(_)) => (2, 2, 8),
+        (
+            _,
+            Cells::Jittered | Cells::Simplices,
+            Method::Blending(_) | Method::Balanced | Method::BalancedOver(_),
+        ) => (2, 2, 8),
         _ => (2, 2, 4),
     };
     // some have no use for a transition zone

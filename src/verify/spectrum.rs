@@ -135,6 +135,8 @@ fn kinds() -> Vec<Kind> {
         Kind::Nonlocal,
         Kind::Coupled(Method::Truncated),
         Kind::Coupled(Method::Splice),
+        Kind::Coupled(Method::Balanced),
+        Kind::Coupled(Method::BalancedOver(BlendingFunction::Smooth)),
     ];
     kinds.extend(
         [

@@ -1,0 +1,70 @@
+//! Balanced rows: part of a splice's and part of a blending's, so that what both leave out of balance cancels.
+
+use crate::{
+    coupling::{
+        BlendingFunction, CellRole, Coupling, Model, ModelError, Operator, Zone,
+        blending::{self, Blended, SpliceShare},
+    },
+    mesh::Mesh,
+    peridynamics::PdBody,
+};
+
+/// Half of a splice's rows and half of a blending's, with a step in β at the edge of the nonlocal zone.
+///
+/// Source: none; derived in `docs/methods.md`, section 8. Under a field with a third derivative the internal forces of a splice add up to `(M₆ − g) u‴/24` at a seam, those of a blending to
+/// `−(M₆′ − g) u‴/24`, whatever the width of β (`crate::verify::balance`). The shares `s` of the splice with `s (M₆ − g) = (1 − s)(M₆′ − g)` leave nothing: ½ for what bonds do by
+/// themselves. For the state part of a law the dilatation reaches over two horizons and its expansion over one, `M₆ = 8 L K′`, `M₆′ = 2 L K′`, `g = 2 h² K′` with
+/// `L = 3 Σω|ξ|⁴V / ((D + 2) Σω|ξ|²V)`, hence `s = (L − h²)/(5 L − 2 h²)`.
+///
+/// Given a function, β runs through the transition zone instead of jumping; without, a transition zone is local. The stiffness is not symmetric. On meshes of the lattice's spacing nothing is left under cubic and quartic fields, for pairwise laws in 1D, 2D and 3D and for
+/// state-based ones in 1D; in 2D and 3D the shape tensors' fourth moments are not isotropic and a little remains. Elements coarser than the lattice leave the error of their own discretisation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Balanced {
+    /// β in the transition zone; none for a step at the edge of the nonlocal zone.
+    pub function: Option<BlendingFunction>,
+}
+
+impl<const D: usize> Coupling<D> for Balanced {
+    fn name(&self) -> &'static str {
+        "balanced"
+    }
+
+    fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {
+        let outermost = match self.function {
+            Some(_) => Zone::Transition,
+            None => Zone::Nonlocal,
+        };
+        blending::with_collar(mesh, zones, outermost, largest_horizon * blending::CLOSED)
+    }
+
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        let Some(body) = model.body() else {
+            return Ok(Box::new(super::single::OwnModel { model }));
+        };
+        let share = SpliceShare {
+            pair: 0.5,
+            state: state_share(body, model.spacing()),
+        };
+        let beta = blending::at_points(self.function, model, body);
+        Ok(Box::new(Blended::new(model, body, beta, share)?))
+    }
+}
+
+/// The share of the splice for the state part of the law, from the moments of the largest family.
+fn state_share<const D: usize>(body: &PdBody<D>, spacing: f64) -> f64 {
+    let largest = (0..body.families.len()).max_by_key(|&i| body.families.of(i).len());
+    let Some(i) = largest.filter(|&i| body.state(i).is_some()) else {
+        return 0.5;
+    };
+    let (_, omega) = body.kernel(i);
+    let (mut second, mut fourth) = (0.0, 0.0);
+    for (&j, omega) in body.families.of(i).iter().zip(omega) {
+        let square = body.bond(i, j as usize).norm_squared();
+        let weight = omega * body.cloud.volume[j as usize];
+        second += weight * square;
+        fourth += weight * square * square;
+    }
+    let length = 3.0 * fourth / ((D as f64 + 2.0) * second);
+    let grid = spacing * spacing;
+    (length - grid) / (5.0 * length - 2.0 * grid)
+}
