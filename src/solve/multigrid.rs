@@ -34,7 +34,7 @@ impl Default for MultigridParams {
             coarsest: 3000,
             max_levels: 20,
             degree: 2,
-            smoothed_range: 10.0,
+            smoothed_range: 6.0,
         }
     }
 }
