@@ -170,6 +170,7 @@ pub mod shape;
 pub mod solve;
 pub mod system;
 pub mod tensor;
+pub mod trade;
 pub mod verify;
 
 pub use coupling::{

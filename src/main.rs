@@ -11,6 +11,7 @@ use bondline::observe::progress::TerminalProgress;
 use bondline::observe::report;
 use bondline::observe::summary::Ended;
 use bondline::scene::{self, AnyScene, RunOptions, StartFrom, Template};
+use bondline::trade::{self, CostBy, Reference, TradeEnd, TradeParams};
 use bondline::verify::{self, Effort};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -29,7 +30,17 @@ const EXAMPLES: &str = "Examples:
   bondline run wave.toml --checkpoint-every 10min   a scene in time; Ctrl-C leaves a checkpoint
   bondline run wave.toml --resume             go on where it stopped
   bondline run plate.toml --json              the summary as JSON on standard output
+  bondline trade plate.toml                   what speed costs in accuracy: method, horizon, spacing, zone
   bondline schema > bondline.schema.json      completion and checks in an editor";
+
+const TRADE: &str = "The scene runs as it is, then with each setting of each knob alone, then with the combinations that promise most by what these showed.
+Every outcome is kept in the output folder: the same command goes on where the last one ended.
+
+Examples:
+  bondline trade plate.toml                                  all knobs, ten minutes
+  bondline trade plate.toml --knob coupling,m --budget 2min
+  bondline trade plate.toml --vary 'solver.tolerance=[1e-4, 1e-6]' --quantity displacement,strain
+  bondline trade glass.toml --quantity path.upper,tip-time.upper --wanted 0.02";
 
 /// Couples classical finite elements to meshfree peridynamics.
 #[derive(Parser)]
@@ -85,6 +96,9 @@ enum Command {
     },
     /// Print the JSON Schema of scenes, for editors.
     Schema,
+    /// Run a scene with its knobs turned, and say what speed costs in accuracy.
+    #[command(after_help = TRADE)]
+    Trade(TradeArguments),
     /// Measure what the code claims, as tables with limits; the exit status is 1 if any row is short.
     Verify {
         /// One suite; all of them if left out, but for those that take an hour.
@@ -106,6 +120,69 @@ struct SceneArguments {
     /// Set a key of the scene; the value is TOML, or else text.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+}
+
+#[derive(clap::Args)]
+struct TradeArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Knobs to turn, and no others; all that apply if left out.
+    #[arg(long = "knob", value_name = "NAME", value_delimiter = ',', value_parser = PossibleValuesParser::new(trade::KNOBS))]
+    knobs: Vec<String>,
+    /// A key of the scene with other values: 'solver.tolerance=[1e-4, 1e-8]'.
+    #[arg(long, value_name = "KEY=[...]", value_parser = trade::typed)]
+    vary: Vec<trade::Knob>,
+    /// What is compared: displacement, strain, reaction, energy, history.COLUMN, path.TIP, tip-time.TIP; what suits the outputs if left out.
+    #[arg(long = "quantity", value_name = "NAME", value_delimiter = ',', value_parser = trade::Quantity::parse)]
+    quantities: Vec<trade::Quantity>,
+    /// What it is compared with: full peridynamics, or half the horizon and spacing; by default the first where cracks run, else the second.
+    #[arg(long, value_enum)]
+    reference: Option<ReferenceName>,
+    /// A key of the reference, instead of --reference.
+    #[arg(
+        long = "reference-set",
+        value_name = "KEY=VALUE",
+        conflicts_with = "reference"
+    )]
+    reference_keys: Vec<String>,
+    /// What a case costs.
+    #[arg(long, value_enum, default_value = "time")]
+    cost: CostName,
+    /// Relative errors for which the cheapest case is wanted, and written as a scene.
+    #[arg(
+        long,
+        value_name = "ERROR",
+        value_delimiter = ',',
+        default_value = "0.05,0.01"
+    )]
+    wanted: Vec<f64>,
+    /// Time for all cases together: 90s, 10min, 2h.
+    #[arg(long, value_name = "TIME", default_value = "10min")]
+    budget: Pace,
+    /// Folder for tables, plot and scenes; out/trade/SCENE if left out.
+    #[arg(long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Print the path of each file that was written, and nothing else.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ReferenceName {
+    /// Peridynamics everywhere.
+    FullPd,
+    /// Half the horizon and spacing; half the spacing where cracks run.
+    Finer,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum CostName {
+    /// Seconds.
+    Time,
+    /// The most memory held.
+    Memory,
+    /// Bonds times steps: without noise.
+    BondVisits,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -206,6 +283,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             let text = serde_json::to_string_pretty(&scene::schema());
             print(text.map_err(|e| miette::miette!("{e}"))?)?;
         }
+        Command::Trade(arguments) => return traded(arguments),
         Command::Verify { name, json, quick } => {
             let effort = if quick { Effort::Quick } else { Effort::Full };
             let progress = TerminalProgress::on_stderr();
@@ -227,6 +305,70 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn traded(arguments: TradeArguments) -> miette::Result<ExitCode> {
+    // an error in the scene is shown where it stands
+    load(&arguments.scene)?;
+    let Pace::Clock(budget) = arguments.budget else {
+        return Err(miette::miette!(
+            "--budget is a time: write 90s, 10min or 2h"
+        ));
+    };
+    let stem = arguments.scene.scene.file_stem().unwrap_or_default();
+    let params = TradeParams {
+        output: arguments
+            .output
+            .unwrap_or_else(|| PathBuf::from("out/trade").join(stem)),
+        scene: arguments.scene.scene,
+        overrides: arguments.scene.overrides,
+        knobs: arguments.knobs,
+        vary: arguments.vary,
+        quantities: arguments.quantities,
+        reference: match arguments.reference {
+            Some(ReferenceName::FullPd) => Reference::FullPd,
+            Some(ReferenceName::Finer) => Reference::Finer,
+            None if arguments.reference_keys.is_empty() => Reference::Auto,
+            None => Reference::Keys(arguments.reference_keys),
+        },
+        cost: match arguments.cost {
+            CostName::Time => CostBy::Time,
+            CostName::Memory => CostBy::Memory,
+            CostName::BondVisits => CostBy::BondVisits,
+        },
+        wanted: arguments.wanted,
+        budget,
+    };
+    let program =
+        std::env::current_exe().map_err(|e| miette::miette!("cannot find this program: {e}"))?;
+    let found = trade::trade(
+        &params,
+        &program,
+        Some(interrupt()?),
+        &TerminalProgress::on_stderr(),
+    )
+    .map_err(|e| miette::miette!("{e}"))?;
+    let files = found.write(&params).map_err(|e| miette::miette!("{e}"))?;
+    if !arguments.quiet {
+        print(&found)?;
+        for &wanted in &params.wanted {
+            print(match found.cheapest(wanted) {
+                Some(case) => format!(
+                    "cheapest with an error of at most {wanted}: {}",
+                    case.name()
+                ),
+                None => format!("no case has an error of at most {wanted}"),
+            })?;
+        }
+    }
+    for file in files {
+        print(file.display())?;
+    }
+    Ok(if found.ended == TradeEnd::Interrupted {
+        ExitCode::from(INTERRUPTED)
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 /// A flag that Ctrl-C or a termination sets; the second one ends the program at once.

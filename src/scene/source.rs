@@ -138,6 +138,22 @@ impl Source {
         Ok(print)
     }
 
+    /// The scene as one TOML text with all overrides applied; a mesh file is looked for from `folder`, wherever the text will lie.
+    ///
+    /// # Errors
+    /// [`SceneErrorKind::Syntax`], [`SceneErrorKind::Choice`] where the scene is none.
+    pub fn text(&self, folder: &std::path::Path) -> Result<String, SceneError> {
+        let mut table = plain_table(self.merged()?.get_ref());
+        let path = table
+            .get_mut("mesh")
+            .and_then(|m| m.get_mut("file"))
+            .and_then(|f| f.get_mut("path"));
+        if let Some(toml::Value::String(path)) = path {
+            *path = folder.join(&*path).display().to_string();
+        }
+        Ok(table.to_string())
+    }
+
     fn parse<'a>(&self, piece: &'a Piece) -> Result<Spanned<DeTable<'a>>, SceneError> {
         let text = if piece.start == 0 {
             &piece.text
@@ -155,6 +171,33 @@ impl Source {
         })
     }
 }
+
+fn plain_table(table: &DeTable<'_>) -> toml::Table {
+    table
+        .iter()
+        .map(|(k, v)| (k.get_ref().to_string(), plain(v.get_ref())))
+        .collect()
+}
+
+/// A value without its place.
+fn plain(value: &DeValue<'_>) -> toml::Value {
+    match value {
+        DeValue::Table(table) => toml::Value::Table(plain_table(table)),
+        DeValue::Array(items) => {
+            toml::Value::Array(items.iter().map(|i| plain(i.get_ref())).collect())
+        }
+        DeValue::String(text) => toml::Value::String(text.to_string()),
+        DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix())
+            .map_or_else(|_| toml::Value::String(i.to_string()), toml::Value::Integer),
+        DeValue::Float(f) => f
+            .as_str()
+            .parse()
+            .map_or_else(|_| toml::Value::String(f.to_string()), toml::Value::Float),
+        DeValue::Boolean(b) => toml::Value::Boolean(*b),
+        DeValue::Datetime(d) => toml::Value::Datetime(*d),
+    }
+}
+
 /// Keys that change no result.
 const WITHOUT_EFFECT: &[&[&str]] = &[
     &["title"],

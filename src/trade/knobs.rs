@@ -1,0 +1,555 @@
+//! What of a scene trades speed for accuracy: the settings of each knob, and the overrides that several of them make together.
+
+use crate::scene::SceneSpec;
+use crate::scene::spec::{
+    AxisSpec, CouplingSpec, Joining, LatticeStart, MaterialSpec, MeshSpec, PointsSpec, ShapeSpec,
+    SolveSpec, TransitionSpec, ZonesNeeded,
+};
+
+/// One setting of a knob: how it is called in tables, and what it does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// In tables, for example `m = 4`.
+    pub label: String,
+    pub(super) change: Change,
+}
+
+/// What a setting does to a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Change {
+    /// Another coupling.
+    Coupling(String),
+    /// The horizon times this factor, m kept; elements follow where points lie in them.
+    Horizon(f64),
+    /// Another m = δ/h under the same horizon.
+    Ratio(f64),
+    /// Elements so many times larger, where points do not lie in them.
+    Elements(f64),
+    /// The nonlocal zone wider by so many horizons on every side.
+    Padding(f64),
+    /// Keys of the scene, as after `--set`.
+    Keys(Vec<String>),
+}
+
+/// A choice with its settings; that of the scene itself is not among them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Knob {
+    /// Its name: `coupling`, `horizon`, `m`, `elements`, `padding`, `step-fraction`, or a key of the scene.
+    pub name: String,
+    /// What else it can be set to.
+    pub settings: Vec<Setting>,
+}
+
+/// Names of the knobs that are turned without being asked for, where they apply.
+pub const KNOBS: [&str; 6] = [
+    "coupling",
+    "horizon",
+    "m",
+    "elements",
+    "padding",
+    "step-fraction",
+];
+
+/// The numbers of a scene that knobs change.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Base {
+    joining: Joining,
+    /// δ, where it is one number.
+    horizon: Option<f64>,
+    /// Spacing and origin of a typed lattice.
+    lattice: Option<(f64, Option<Vec<f64>>)>,
+    mesh: Option<Generated>,
+    nonlocal: Option<Grown>,
+    transition: Option<Grown>,
+    has_transition: bool,
+    /// Cracks or voids that elements do not see, or bonds that may break: δ is a length of the material, and elements alone are no model.
+    pub breaks: bool,
+    pub moves: bool,
+}
+
+/// A generated mesh: the table's name, its corners, its axes.
+#[derive(Clone, Debug, PartialEq)]
+struct Generated {
+    shape: &'static str,
+    min: Vec<f64>,
+    max: Vec<f64>,
+    axes: Vec<(&'static str, Axis)>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Axis {
+    Cells(usize),
+    Spacing(f64),
+    Graded { spacing: f64, largest: Option<f64> },
+}
+
+/// A zone whose edge can be moved outwards.
+#[derive(Clone, Debug, PartialEq)]
+enum Grown {
+    Box(Vec<f64>, Vec<f64>),
+    Near(f64),
+}
+
+impl Base {
+    pub(super) fn of(spec: &SceneSpec) -> Self {
+        let pd = spec.peridynamics.as_ref();
+        let lattice = pd.and_then(|p| match &p.points {
+            PointsSpec::Lattice(l) => {
+                Some((l.spacing.value, l.origin.as_ref().map(|o| o.values.clone())))
+            }
+            PointsSpec::Cells => None,
+        });
+        let breaks = |m: &MaterialSpec| match m {
+            MaterialSpec::BondBased(m) => {
+                m.fracture_energy.is_some() || m.critical_stretch.is_some()
+            }
+            MaterialSpec::Lps(m) => m.fracture_energy.is_some() || m.critical_stretch.is_some(),
+            MaterialSpec::Correspondence(_) => false,
+        };
+        let moves = !matches!(
+            spec.solve.as_ref().map(|s| s.get_ref()),
+            None | Some(SolveSpec::Static(_))
+        );
+        let transition = spec.zones.transition.as_ref().map(|t| t.get_ref());
+        Self {
+            joining: spec.coupling.get_ref().joining(),
+            horizon: pd.and_then(|p| p.horizon.as_constant()),
+            lattice,
+            mesh: generated(&spec.mesh),
+            nonlocal: spec
+                .zones
+                .nonlocal
+                .as_ref()
+                .and_then(|z| match z.get_ref() {
+                    ShapeSpec::Box(b) => {
+                        Some(Grown::Box(b.min.values.clone(), b.max.values.clone()))
+                    }
+                    ShapeSpec::Near(n) => Some(Grown::Near(n.within.value)),
+                    _ => None,
+                }),
+            transition: transition.and_then(|t| match t {
+                TransitionSpec::Box(b) => {
+                    Some(Grown::Box(b.min.values.clone(), b.max.values.clone()))
+                }
+                TransitionSpec::Near(n) => Some(Grown::Near(n.within.value)),
+                _ => None,
+            }),
+            has_transition: transition.is_some(),
+            breaks: !spec.cracks.is_empty()
+                || !spec.voids.is_empty()
+                || spec.materials.values().any(breaks),
+            moves,
+        }
+    }
+
+    fn cell(&self) -> Option<f64> {
+        let mesh = self.mesh.as_ref()?;
+        let length = mesh.max.first()? - mesh.min.first()?;
+        Some(match mesh.axes.first()?.1 {
+            Axis::Cells(n) => length / n.max(1) as f64,
+            Axis::Spacing(s) | Axis::Graded { spacing: s, .. } => s,
+        })
+    }
+
+    /// Spacing of the points.
+    fn spacing(&self) -> Option<f64> {
+        self.lattice.as_ref().map(|l| l.0).or_else(|| self.cell())
+    }
+
+    /// m = δ/h.
+    fn ratio(&self) -> Option<f64> {
+        Some(self.horizon? / self.spacing()?)
+    }
+
+    /// Everything that can be turned in this scene without being asked for.
+    pub(super) fn knobs(&self) -> Vec<Knob> {
+        KNOBS
+            .iter()
+            .filter_map(|name| {
+                let settings = self.settings(name);
+                (!settings.is_empty()).then(|| Knob {
+                    name: (*name).to_owned(),
+                    settings,
+                })
+            })
+            .collect()
+    }
+
+    fn settings(&self, knob: &str) -> Vec<Setting> {
+        let setting = |label: String, change: Change| Setting { label, change };
+        match knob {
+            "coupling" => CouplingSpec::names()
+                .iter()
+                .filter(|name| **name != self.joining.name)
+                // elements alone see no crack and break no bond
+                .filter(|name| !(**name == "local" && self.breaks))
+                .map(|name| setting((*name).to_owned(), Change::Coupling((*name).to_owned())))
+                .collect(),
+            // where bonds break, the horizon is a length of the material
+            "horizon" if !self.breaks && self.horizon.is_some() && self.mesh.is_some() => {
+                [1.5, 2.0]
+                    .map(|f| setting(format!("horizon x {f}"), Change::Horizon(f)))
+                    .into()
+            }
+            "m" => {
+                let Some(base) = self.ratio() else {
+                    return Vec::new();
+                };
+                [2.0, 3.0, 4.0, 6.0]
+                    .iter()
+                    .filter(|m| (*m / base - 1.0).abs() > 1e-6)
+                    .map(|m| setting(format!("m = {m}"), Change::Ratio(*m)))
+                    .collect()
+            }
+            "elements" if self.lattice.is_some() && self.mesh.is_some() => [0.5, 2.0, 4.0]
+                .map(|f| setting(format!("elements x {f}"), Change::Elements(f)))
+                .into(),
+            "padding" if self.nonlocal.is_some() && self.horizon.is_some() => [-1.0, 1.0, 2.0]
+                .map(|f| setting(format!("padding {f:+} horizons"), Change::Padding(f)))
+                .into(),
+            "step-fraction" if self.moves => vec![setting(
+                "step-fraction = 0.5".to_owned(),
+                Change::Keys(vec!["solve.explicit.step-fraction=0.5".to_owned()]),
+            )],
+            _ => Vec::new(),
+        }
+    }
+
+    /// What a reference is made of: twice as fine in horizon (unless it is a length of the material), points and elements.
+    pub(super) fn finer(&self) -> Vec<Change> {
+        let points = match self.ratio() {
+            Some(_) if !self.breaks => Change::Horizon(0.5),
+            Some(m) => Change::Ratio(2.0 * m),
+            None => return vec![Change::Elements(0.5)],
+        };
+        vec![points, Change::Elements(0.5)]
+    }
+
+    /// The overrides of several settings together.
+    pub(super) fn overrides<'a>(
+        &self,
+        changes: impl IntoIterator<Item = &'a Change>,
+    ) -> Vec<String> {
+        let (mut delta, mut ratio, mut elements, mut padding) = (1.0, None, 1.0, 0.0);
+        let mut coupling: Option<&str> = None;
+        let mut list = Vec::new();
+        for change in changes {
+            match change {
+                Change::Coupling(name) => coupling = Some(name),
+                Change::Horizon(f) => delta = *f,
+                Change::Ratio(m) => ratio = Some(*m),
+                Change::Elements(f) => elements = *f,
+                Change::Padding(f) => padding = *f,
+                Change::Keys(keys) => list.extend(keys.iter().cloned()),
+            }
+        }
+        let mut joining = self.joining;
+        if let Some(name) = coupling {
+            list.push(format!("coupling={name}"));
+            if let Some(other) = named(name) {
+                joining = other.joining();
+            }
+        }
+        let (Some(horizon), Some(spacing)) = (self.horizon, self.spacing()) else {
+            self.mesh_overrides(elements, &mut list);
+            return list;
+        };
+        let finer = match ratio {
+            Some(m) => horizon * delta / m / spacing,
+            None => delta,
+        };
+        if delta != 1.0 {
+            list.push(format!("peridynamics.horizon={:e}", horizon * delta));
+        }
+        self.lattice_overrides(spacing * finer, coupling.map(|_| joining), &mut list);
+        // where points lie in the cells, the two are one
+        let cells = if self.lattice.is_some() {
+            elements
+        } else {
+            finer
+        };
+        self.mesh_overrides(cells, &mut list);
+        let grown = padding * horizon;
+        zone_overrides("zones.nonlocal", self.nonlocal.as_ref(), grown, &mut list);
+        zone_overrides(
+            "zones.transition",
+            self.transition.as_ref(),
+            grown,
+            &mut list,
+        );
+        if let ZonesNeeded::Transition { width, .. } = joining.zones
+            && !self.has_transition
+        {
+            // half a cell more, so that the cells make up the width
+            let width = width * horizon * delta + 0.5 * spacing * finer;
+            list.push(format!("zones.transition.around={width:e}"));
+        }
+        list
+    }
+
+    fn lattice_overrides(&self, spacing: f64, coupling: Option<Joining>, list: &mut Vec<String>) {
+        let Some((old, origin)) = &self.lattice else {
+            return;
+        };
+        let same = (spacing / old - 1.0).abs() < 1e-12;
+        if !same {
+            list.push(format!("peridynamics.points.lattice.spacing={spacing:e}"));
+        }
+        let (Some(origin), Some(mesh)) = (origin, &self.mesh) else {
+            return;
+        };
+        let typed = origin
+            .iter()
+            .zip(&mesh.min)
+            .all(|(o, m)| ((o - m) / old).rem_euclid(1.0) > 0.25);
+        let halfway = match coupling {
+            // pure models take the lattice as it is typed
+            Some(j) if !matches!(j.zones, ZonesNeeded::Everywhere(_)) => {
+                j.lattice == LatticeStart::Halfway
+            }
+            _ => typed,
+        };
+        if !same || halfway != typed {
+            let start: Vec<f64> = mesh
+                .min
+                .iter()
+                .map(|m| if halfway { m + 0.5 * spacing } else { *m })
+                .collect();
+            list.push(format!(
+                "peridynamics.points.lattice.origin={}",
+                coordinates(&start)
+            ));
+        }
+    }
+
+    fn mesh_overrides(&self, factor: f64, list: &mut Vec<String>) {
+        let Some(mesh) = &self.mesh else { return };
+        if (factor - 1.0).abs() < 1e-12 {
+            return;
+        }
+        for (name, axis) in &mesh.axes {
+            let key = format!("mesh.{}.{name}", mesh.shape);
+            match axis {
+                Axis::Cells(n) => {
+                    let cells = (*n as f64 / factor).round().max(1.0);
+                    list.push(format!("{key}.cells={cells}"));
+                }
+                Axis::Spacing(s) => list.push(format!("{key}.spacing={:e}", s * factor)),
+                Axis::Graded { spacing, largest } => {
+                    list.push(format!("{key}.graded.spacing={:e}", spacing * factor));
+                    if let Some(l) = largest {
+                        list.push(format!("{key}.graded.largest={:e}", l * factor));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The coupling of this name, without options.
+fn named(name: &str) -> Option<CouplingSpec> {
+    let table: std::collections::BTreeMap<String, CouplingSpec> =
+        toml::from_str(&format!("[coupling.{name}]")).ok()?;
+    table.into_values().next()
+}
+
+fn zone_overrides(key: &str, zone: Option<&Grown>, grown: f64, list: &mut Vec<String>) {
+    if grown == 0.0 {
+        return;
+    }
+    match zone {
+        Some(Grown::Box(min, max)) => {
+            let moved = |x: &[f64], by: f64| x.iter().map(|v| v + by).collect::<Vec<_>>();
+            list.push(format!(
+                "{key}.box.min={}",
+                coordinates(&moved(min, -grown))
+            ));
+            list.push(format!("{key}.box.max={}", coordinates(&moved(max, grown))));
+        }
+        Some(Grown::Near(within)) => list.push(format!("{key}.near.within={:e}", within + grown)),
+        None => {}
+    }
+}
+
+/// Coordinates as a scene has them: a list, in one dimension a number.
+pub(super) fn coordinates(x: &[f64]) -> String {
+    match x {
+        [x] => format!("{x:e}"),
+        _ => {
+            let list: Vec<String> = x.iter().map(|v| format!("{v:e}")).collect();
+            format!("[{}]", list.join(", "))
+        }
+    }
+}
+
+fn generated(mesh: &MeshSpec) -> Option<Generated> {
+    let axis = |a: &AxisSpec| match a {
+        AxisSpec::Cells(n) => Axis::Cells(n.value),
+        AxisSpec::Spacing(s) => Axis::Spacing(s.value),
+        AxisSpec::Graded(g) => Axis::Graded {
+            spacing: g.spacing.value,
+            largest: g.largest.as_ref().map(|l| l.value),
+        },
+    };
+    Some(match mesh {
+        MeshSpec::Line(m) => Generated {
+            shape: "line",
+            min: m.min.values.clone(),
+            max: m.max.values.clone(),
+            axes: vec![("x", axis(m.x.get_ref()))],
+        },
+        MeshSpec::Rectangle(m) => Generated {
+            shape: "rectangle",
+            min: m.min.values.clone(),
+            max: m.max.values.clone(),
+            axes: vec![("x", axis(m.x.get_ref())), ("y", axis(m.y.get_ref()))],
+        },
+        MeshSpec::Box(m) => Generated {
+            shape: "box",
+            min: m.min.values.clone(),
+            max: m.max.values.clone(),
+            axes: vec![
+                ("x", axis(m.x.get_ref())),
+                ("y", axis(m.y.get_ref())),
+                ("z", axis(m.z.get_ref())),
+            ],
+        },
+        MeshSpec::File(_) => return None,
+    })
+}
+
+/// Corners of a generated mesh.
+pub(super) fn corners(spec: &SceneSpec) -> Option<(Vec<f64>, Vec<f64>)> {
+    generated(&spec.mesh).map(|m| (m.min, m.max))
+}
+
+/// A knob that turns a key of the scene: `solver.tolerance=[1e-4, 1e-8]`.
+///
+/// # Errors
+/// What is wrong with the text, and the remedy.
+pub fn typed(text: &str) -> Result<Knob, String> {
+    let (key, values) = text.split_once('=').ok_or_else(|| {
+        format!("`{text}` has no `=`; write --vary 'solver.tolerance=[1e-4, 1e-8]'")
+    })?;
+    let list: toml::Table = toml::from_str(&format!("values={values}")).map_err(|_| {
+        format!("`{values}` is no list; write --vary '{key}=[..., ...]', text in quotes")
+    })?;
+    let Some(toml::Value::Array(values)) = list.get("values") else {
+        return Err(format!(
+            "`{values}` is no list; write --vary '{key}=[{values}]' for one other value"
+        ));
+    };
+    if values.is_empty() {
+        return Err(format!(
+            "`{key}` has no values to vary over; give at least one"
+        ));
+    }
+    Ok(Knob {
+        name: key.to_owned(),
+        settings: values
+            .iter()
+            .map(|v| {
+                let short = key.rsplit('.').next().unwrap_or(key);
+                let value = v.to_string();
+                Setting {
+                    label: format!("{short} = {}", value.trim_matches('"')),
+                    change: Change::Keys(vec![format!("{key}={value}")]),
+                }
+            })
+            .collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{AnyScene, Source};
+
+    const PLATE: &str = r#"
+kinematics = "plane-stress"
+coupling = "splice"
+mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 40 }, y = { cells = 20 } }
+[materials.plate.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = 0.15
+points.lattice = { spacing = 0.05, origin = [0, 0] }
+[zones.nonlocal]
+box = { min = [0.7, 0.3], max = [1.3, 0.7] }
+[conditions.left.displacement]
+on = "left"
+x = 0
+y = 0
+[conditions.right.displacement]
+on = "right"
+x = 0.01
+"#;
+
+    fn base() -> Base {
+        let source = Source::new("plate", PLATE);
+        Base::of(&SceneSpec::parse(&source).unwrap())
+    }
+
+    fn admitted(overrides: &[String]) {
+        let mut source = Source::new("plate", PLATE);
+        for o in overrides {
+            source.push_override(o).unwrap();
+        }
+        if let Err(e) = AnyScene::from_source(&source, std::path::Path::new(""), "plate") {
+            panic!("{overrides:?}: {}", e.message());
+        }
+    }
+
+    #[test]
+    fn every_setting_makes_a_scene() {
+        let base = base();
+        let knobs = base.knobs();
+        let names: Vec<&str> = knobs.iter().map(|k| k.name.as_str()).collect();
+        assert_eq!(names, ["coupling", "horizon", "m", "elements", "padding"]);
+        for setting in knobs.iter().flat_map(|k| &k.settings) {
+            let overrides = base.overrides([&setting.change]);
+            assert!(!overrides.is_empty(), "{}", setting.label);
+            admitted(&overrides);
+        }
+    }
+
+    #[test]
+    fn settings_combine() {
+        let base = base();
+        let all = [
+            Change::Coupling("truncated".to_owned()),
+            Change::Horizon(2.0),
+            Change::Ratio(6.0),
+            Change::Elements(2.0),
+            Change::Padding(1.0),
+        ];
+        let overrides = base.overrides(&all);
+        // δ = 0.3, h = 0.05 as before, elements twice as large
+        for wanted in [
+            "coupling=truncated",
+            "peridynamics.horizon=3e-1",
+            "mesh.rectangle.x.cells=20",
+            "mesh.rectangle.y.cells=10",
+        ] {
+            assert!(overrides.iter().any(|o| o == wanted), "{overrides:?}");
+        }
+        assert!(
+            overrides
+                .iter()
+                .any(|o| o.starts_with("peridynamics.points.lattice.origin=[2.5e-2")),
+            "{overrides:?}"
+        );
+        assert!(!overrides.iter().any(|o| o.contains("lattice.spacing")));
+        admitted(&overrides);
+    }
+
+    #[test]
+    fn a_typed_knob_is_a_list() {
+        let knob = typed("solver.tolerance=[1e-4, 1e-8]").unwrap();
+        assert_eq!(knob.settings.len(), 2);
+        assert_eq!(knob.settings[0].label, "tolerance = 0.0001");
+        assert!(typed("solver.tolerance").unwrap_err().contains("no `=`"));
+        assert!(typed("a=3").unwrap_err().contains("no list"));
+        assert!(typed("a=[]").unwrap_err().contains("no values"));
+    }
+}

@@ -1,0 +1,187 @@
+//! `bondline trade`: what speed costs, measured through the command line.
+
+use std::path::Path;
+use std::process::Output;
+
+/// A plate with a crack, pulled; small enough for a dozen runs in a second or two.
+const PLATE: &str = r#"
+kinematics = "plane-stress"
+coupling = "splice"
+mesh.rectangle = { min = [0, 0], max = [1, 1], x = { cells = 20 }, y = { cells = 20 } }
+cracks.edge.segment = { from = [-0.1, 0.51], to = [0.4, 0.51] }
+[materials.plate.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = 0.15
+points.lattice = { spacing = 0.05, origin = [0, 0] }
+[zones.nonlocal]
+box = { min = [-1, 0.2], max = [0.8, 0.8] }
+[conditions.bottom.displacement]
+on = "bottom"
+x = 0
+y = 0
+[conditions.top.displacement]
+on = "top"
+y = 0.01
+"#;
+
+fn bondline(folder: &Path, arguments: &[&str]) -> Output {
+    assert_cmd::Command::cargo_bin("bondline")
+        .unwrap()
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_study_finds_a_front_goes_on_and_writes_the_scene_for_a_wanted_error() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("plate.toml"), PLATE).unwrap();
+    let study = [
+        "trade",
+        "plate.toml",
+        "--knob",
+        "coupling,m,padding",
+        "--cost",
+        "bond-visits",
+        "--wanted",
+        "0.05",
+    ];
+    let first = bondline(folder.path(), &study);
+    assert!(first.status.success(), "{}", text(&first.stderr));
+    let out = folder.path().join("out/trade/plate");
+    let found = json(&out.join("trade.json"));
+    let cases = found["cases"].as_array().unwrap();
+    assert!(cases.len() > 8, "{}", text(&first.stdout));
+    // elements that see no crack are not offered
+    assert!(cases.iter().all(|c| c["settings"][0] != "local"));
+    // fewer bonds at m = 2, and a larger error, than at m = 6
+    let of = |label: &str| {
+        let case = cases
+            .iter()
+            .find(|c| c["settings"] == serde_json::json!([label]))
+            .unwrap();
+        let ran = &case["outcome"]["ran"];
+        (
+            ran["cost"]["bond_visits"].as_f64().unwrap(),
+            ran["errors"][0].as_f64().unwrap(),
+        )
+    };
+    let (coarse, fine) = (of("m = 2"), of("m = 6"));
+    assert!(
+        coarse.0 < fine.0 && coarse.1 > fine.1,
+        "{coarse:?} {fine:?}"
+    );
+    // nothing on the front is beaten
+    let front = found["front"].as_array().unwrap();
+    assert!(!front.is_empty() && out.join("trade.svg").exists());
+    // a second call has nothing left to run
+    let record = std::fs::read(out.join("cases.jsonl")).unwrap();
+    let second = bondline(folder.path(), &study);
+    assert!(second.status.success(), "{}", text(&second.stderr));
+    let settings = |study: &serde_json::Value| -> Vec<String> {
+        let cases = study["cases"].as_array().unwrap();
+        cases.iter().map(|c| c["settings"].to_string()).collect()
+    };
+    let again = json(&out.join("trade.json"));
+    assert_eq!(settings(&again), settings(&found));
+    assert_eq!(again["front"], found["front"]);
+    // half a line, as a killed study leaves it, is done again
+    std::fs::write(out.join("cases.jsonl"), &record[..record.len() - 7]).unwrap();
+    assert!(bondline(folder.path(), &study).status.success());
+    assert_eq!(
+        json(&out.join("trade.json"))["cases"]
+            .as_array()
+            .unwrap()
+            .len(),
+        cases.len()
+    );
+    // the scene for the wanted error runs, with the bonds that the front says
+    let scene = out.join("plate-0.05.toml");
+    let text_of_scene = std::fs::read_to_string(&scene).unwrap();
+    assert!(text_of_scene.starts_with("# "), "{text_of_scene}");
+    let run = bondline(
+        folder.path(),
+        &[
+            "run",
+            scene.to_str().unwrap(),
+            "--json",
+            "--output",
+            "again",
+        ],
+    );
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    let bonds = summary["sizes"]["bonds"].as_f64().unwrap();
+    let name = text_of_scene.lines().next().unwrap();
+    let meets = |c: &&serde_json::Value| {
+        let ran = &c["outcome"]["ran"];
+        ran["errors"][0].as_f64().is_some_and(|e| e <= 0.05)
+    };
+    let cheapest = cases
+        .iter()
+        .filter(meets)
+        .map(|c| c["outcome"]["ran"]["cost"]["bond_visits"].as_f64().unwrap())
+        .fold(f64::INFINITY, f64::min);
+    assert_eq!(bonds, cheapest, "{name}");
+    // another quantity is another study
+    let other = bondline(
+        folder.path(),
+        &["trade", "plate.toml", "--quantity", "reaction"],
+    );
+    assert!(!other.status.success());
+    assert!(
+        text(&other.stderr).contains("another scene"),
+        "{}",
+        text(&other.stderr)
+    );
+}
+
+#[test]
+fn what_cannot_be_studied_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("plate.toml"), PLATE).unwrap();
+    let complaint = |arguments: &[&str]| {
+        let all: Vec<&str> = ["trade", "plate.toml"]
+            .iter()
+            .chain(arguments)
+            .copied()
+            .collect();
+        let output = bondline(folder.path(), &all);
+        assert!(!output.status.success(), "{arguments:?}");
+        text(&output.stderr)
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    for (arguments, wanted) in [
+        (&["--knob", "horizon"][..], "does not apply"),
+        (&["--knob", "colour"], "possible values"),
+        (&["--vary", "solver.tolerance=1e-4"], "no list"),
+        (&["--quantity", "path.front"], "no `path.front` to compare"),
+        (&["--quantity", "colour"], "no quantity"),
+        (&["--budget", "10"], "a time"),
+        (&["--set", "coupling=slice"], "did you mean `splice`"),
+        (
+            &[
+                "--reference-set",
+                "peridynamics.horizon=0.01",
+                "--output",
+                "x",
+            ],
+            "the reference does not run",
+        ),
+    ] {
+        let found = complaint(arguments);
+        assert!(found.contains(wanted), "{arguments:?}: {found}");
+    }
+}
