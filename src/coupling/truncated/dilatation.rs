@@ -42,9 +42,7 @@ impl<const D: usize> Dilatations<D> {
 
     /// The dilatations of the elements behind faces, and of all points that `listed` or whose neighbours it names.
     ///
-    /// A piece from `t0` to `t1` hands `(1 − 2 t0)/(t1 − t0)` of its elongation to the dilatation at its start and `(2 t1 − 1)/(t1 − t0)` to that at its end. The two
-    /// add up to 2, so a uniform pressure pulls at it as at the whole bond; over the pieces of parallel bonds of a lattice the surplus of the long ones
-    /// makes up for the deficit of the short ones, so that an affine field has its own dilatation everywhere.
+    /// Each piece hands its share, `Segment::hands`, of its elongation to the dilatations at its ends.
     ///
     /// # Errors
     /// [`ModelError::Unsupported`] for a law whose state is more than a dilatation.
@@ -52,15 +50,9 @@ impl<const D: usize> Dilatations<D> {
         let body = segments.body;
         let volume = &body.cloud.volume;
         let whole = &segments.passing.whole;
-        let Some(reference) = whole.state.as_ref() else {
+        let Some(reference) = state_of(segments)? else {
             return Ok(Self::none(segments.model.sites.len()));
         };
-        if !is_volumetric(reference) {
-            return Err(ModelError::Unsupported {
-                what: "a seam of truncated bonds for a law with a state beyond its dilatation",
-                remedy: "use an lps or bond-based material, or couple by splice or blending",
-            });
-        }
         let mut functionals: BTreeMap<Carrier, Functional<D>> = BTreeMap::new();
         let mut carried: BTreeMap<u32, f64> = BTreeMap::new();
         let d = D as f64;
@@ -71,11 +63,7 @@ impl<const D: usize> Dilatations<D> {
             let xi = body.bond(i, j);
             let (from, to) = (s.piece.from, s.piece.to);
             let difference = segments.difference(s);
-            let weights = [
-                (1.0 - 2.0 * from) / (to - from),
-                (2.0 * to - 1.0) / (to - from),
-            ];
-            for (side, (end, weight)) in s.ends.iter().zip(weights).enumerate() {
+            for (side, (end, weight)) in s.ends.iter().zip(s.hands).enumerate() {
                 let weight = weight * s.piece.share;
                 let (own, other) = if side == 0 { (s.i, s.j) } else { (s.j, s.i) };
                 let mut add = |carrier: Carrier, factor: f64| {
@@ -118,7 +106,8 @@ impl<const D: usize> Dilatations<D> {
             let (_, omega) = body.kernel(i as usize);
             for (k, &j) in body.families.of(i as usize).iter().enumerate() {
                 if segments.is_whole(i, j) {
-                    let b = body.bond(i as usize, j as usize) * (omega[k] * volume[j as usize]);
+                    let share = segments.hands(i, j)[0] * omega[k] * volume[j as usize];
+                    let b = body.bond(i as usize, j as usize) * share;
                     let other = segments.site[j as usize];
                     *functional.entry(other).or_insert_with(Vector::zeros) += b;
                     *functional.entry(own).or_insert_with(Vector::zeros) -= b;
@@ -193,6 +182,22 @@ impl<const D: usize> Dilatations<D> {
                 row.add_site(*other, &block);
             }
         }
+    }
+}
+
+/// The state of the law, if it has one.
+///
+/// # Errors
+/// [`ModelError::Unsupported`] for a law whose state is more than a dilatation.
+pub(super) fn state_of<'a, const D: usize>(
+    segments: &Segments<'a, D>,
+) -> Result<Option<&'a StatePart<D>>, ModelError> {
+    match segments.passing.whole.state.as_ref() {
+        Some(state) if !is_volumetric(state) => Err(ModelError::Unsupported {
+            what: "a seam of truncated bonds for a law with a state beyond its dilatation",
+            remedy: "use an lps or bond-based material, or couple by splice or blending",
+        }),
+        state => Ok(state),
     }
 }
 

@@ -44,10 +44,7 @@ const ALIGNED: f64 = 1e-6;
 impl<const D: usize> Strings<D> {
     /// The strings along the edges where two faces of a zone meet at a right angle, in 3D, on a lattice that is its own mirror image in both faces.
     pub fn new(segments: &Segments<'_, D>) -> Self {
-        let mut strings = Self {
-            list: Vec::new(),
-            of_site: HashMap::new(),
-        };
+        let mut strings = Self::none();
         if D != 3 {
             return strings;
         }
@@ -126,6 +123,19 @@ impl<const D: usize> Strings<D> {
             }
         }
         strings
+    }
+
+    /// None.
+    pub fn none() -> Self {
+        Self {
+            list: Vec::new(),
+            of_site: HashMap::new(),
+        }
+    }
+
+    /// Whether a string ends at a site.
+    pub fn holds(&self, site: u32) -> bool {
+        self.of_site.contains_key(&site)
     }
 
     /// Adds the row of a site.

@@ -6,6 +6,7 @@
 //! | `segments.rs` | pieces with their ends, and their springs |
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
 //! | `edges.rs` | strings along the edges of a zone in 3D |
+//! | `fit.rs`, `sparse_change.rs` | factors of pieces where faces cut the lattice anywhere, and their smallest change |
 //!
 //! The energy is that of the finite elements, of the bonds within the peridynamic zone, and of the pieces of all other bonds of the lattice, continued behind the faces, that lie within the zone:
 //!
@@ -19,8 +20,10 @@
 
 mod dilatation;
 mod edges;
+mod fit;
 mod seam;
 mod segments;
+mod sparse_change;
 
 use self::{
     dilatation::Dilatations,
@@ -72,19 +75,20 @@ impl<const D: usize> Coupling<D> for Truncated {
         let (Some(body), Some(passing)) = (model.body(), model.passing()) else {
             return Ok(Box::new(super::single::OwnModel { model }));
         };
-        let segments = Segments::new(model, body, passing);
-        // a state reaches one family farther than a bond
-        let mut listed = segments.at_seam.clone();
-        if passing.whole.state.is_some() {
-            for i in (0..listed.len()).filter(|&i| segments.at_seam[i]) {
-                for &j in body.families.of(i) {
-                    listed[j as usize] |= segments.is_point(j);
-                }
-            }
+        let mut segments = Segments::new(model, body, passing);
+        let mut strings = Strings::new(&segments);
+        if fit::fit(&mut segments, &strings)? {
+            // the fit has balanced the corners too
+            strings = Strings::none();
         }
+        // a state reaches one family farther than a bond
+        let listed = if passing.whole.state.is_some() {
+            segments.with_neighbours()
+        } else {
+            segments.at_seam.clone()
+        };
         let springs = Springs::new(&segments, &listed);
         let dilatations = Dilatations::new(&segments, &listed)?;
-        let strings = Strings::new(&segments);
         Ok(Box::new(TruncatedRows {
             model,
             strings,

@@ -1,6 +1,6 @@
 //! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and what they hand to dilatations.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -30,6 +30,17 @@ pub(super) struct Segment {
     pub j: u32,
     pub piece: Piece,
     pub ends: [End; 2],
+    /// Factor of its energy: 1 where the seam follows the lattice.
+    pub scale: f64,
+    /// What the dilatations at its ends get of its elongation.
+    pub hands: [f64; 2],
+}
+
+/// What a fit adds to a whole bond's energy, and to what it hands to the dilatations at its ends.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Changed {
+    pub scale: f64,
+    pub hands: [f64; 2],
 }
 
 /// Which bonds are whole, and the pieces of those that are not.
@@ -43,8 +54,10 @@ pub(super) struct Segments<'a, const D: usize> {
     pub cut: Vec<Segment>,
     /// Bonds between points of the zone that are not whole, lower number first.
     broken: HashSet<(u32, u32)>,
-    /// Whether a point has a bond that is not whole.
+    /// Whether a point has a bond that is not whole, or one that a fit has changed.
     pub at_seam: Vec<bool>,
+    /// Whole bonds that a fit has changed, lower number first.
+    pub changed: HashMap<(u32, u32), Changed>,
 }
 
 impl<'a, const D: usize> Segments<'a, D> {
@@ -94,6 +107,8 @@ impl<'a, const D: usize> Segments<'a, D> {
                                 i: i as u32,
                                 j,
                                 piece: *piece,
+                                scale: 1.0,
+                                hands: hands_of(piece),
                                 ends: [
                                     end(piece.from, i as u32, piece.from == 0.0)?,
                                     end(piece.to, j, piece.to == 1.0)?,
@@ -126,7 +141,25 @@ impl<'a, const D: usize> Segments<'a, D> {
             cut,
             broken,
             at_seam,
+            changed: HashMap::new(),
         }
+    }
+
+    /// Counts the neighbours of the points at the seam as at the seam.
+    pub fn widen(&mut self) {
+        let wide = self.with_neighbours();
+        self.at_seam = wide;
+    }
+
+    /// The points at the seam, and those that a bond joins to one.
+    pub fn with_neighbours(&self) -> Vec<bool> {
+        let mut wide = self.at_seam.clone();
+        for i in (0..wide.len()).filter(|&i| self.at_seam[i]) {
+            for &j in self.body.families.of(i) {
+                wide[j as usize] |= self.is_point(j);
+            }
+        }
+        wide
     }
 
     /// Whether a point of the cloud is a site.
@@ -154,6 +187,23 @@ impl<'a, const D: usize> Segments<'a, D> {
         }
     }
 
+    /// What the whole bond from `i` to `j` hands to the dilatations of the two.
+    pub fn hands(&self, i: u32, j: u32) -> [f64; 2] {
+        let changed = self.changed.get(&(i.min(j), i.max(j)));
+        let [a, b] = changed.map_or([0.0; 2], |c| c.hands);
+        if i < j {
+            [1.0 + a, 1.0 + b]
+        } else {
+            [1.0 + b, 1.0 + a]
+        }
+    }
+
+    /// Factor of the energy of the whole bond from `i` to `j`.
+    pub fn scale(&self, i: u32, j: u32) -> f64 {
+        let changed = self.changed.get(&(i.min(j), i.max(j)));
+        1.0 + changed.map_or(0.0, |c| c.scale)
+    }
+
     /// Stiffness of the bond's energy `½ k (ξ·η)²`.
     pub fn stiffness(&self, i: u32, j: u32) -> f64 {
         let volume = &self.body.cloud.volume;
@@ -173,6 +223,18 @@ impl<'a, const D: usize> Segments<'a, D> {
         }
         row
     }
+}
+
+/// What a piece hands to the dilatations at its ends.
+///
+/// The two add up to 2, so a uniform pressure pulls at it as at the whole bond; over the pieces of parallel bonds of a lattice the surplus of the long ones makes up for the deficit of the short ones, so that an
+/// affine field has its own dilatation everywhere.
+fn hands_of(piece: &Piece) -> [f64; 2] {
+    let length = piece.to - piece.from;
+    [
+        (1.0 - 2.0 * piece.from) / length,
+        (2.0 * piece.to - 1.0) / length,
+    ]
 }
 
 /// Springs along bonds: the energy `½ k (ξ·D)²` of each, with `D = Σ w u`.
@@ -202,7 +264,7 @@ impl<const D: usize> Springs<D> {
                 .push(body.bond(s.i as usize, s.j as usize));
             springs
                 .stiffness
-                .push(segments.stiffness(s.i, s.j) * s.piece.share / length);
+                .push(segments.stiffness(s.i, s.j) * s.piece.share * s.scale / length);
             springs.difference.push(&segments.difference(s));
         }
         for i in 0..segments.site.len() as u32 {
@@ -213,7 +275,9 @@ impl<const D: usize> Springs<D> {
                 let wanted = listed[i as usize] || listed[j as usize];
                 if j > i && wanted && segments.is_whole(i, j) {
                     springs.direction.push(body.bond(i as usize, j as usize));
-                    springs.stiffness.push(segments.stiffness(i, j));
+                    springs
+                        .stiffness
+                        .push(segments.stiffness(i, j) * segments.scale(i, j));
                     springs.difference.push(&[
                         (segments.site[i as usize], -1.0),
                         (segments.site[j as usize], 1.0),

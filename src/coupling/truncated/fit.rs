@@ -1,0 +1,408 @@
+//! Seams whose faces cut the lattice anywhere: factors for the energies of pieces, and shares of dilatations, that make affine fields exact again.
+//!
+//! A piece keeps its form, `c s w(ξ, D/s)` with a factor `c`, and so do the whole bonds between the points that have pieces. Under `u = G x` it pulls with `c` times the force of the whole bond,
+//! so equilibrium at every site is linear in the factors: the sums of `c k ξ⊗ξ⊗ξ` over the ends at a point vanish, those at a node, weighted with its shape function, equal the traction of the lattice times
+//! the integral of the shape function. These are D (D+1) (D+2)/6 conditions per site (the third-order tensor is symmetric). Of all factors that meet them, and stay above a floor so that every energy is positive, those nearest
+//! to 1 are taken. What a piece hands to the dilatations of an LPS is changed in the same way, without a floor: every point's dilatation is tr G, every element's a multiple of it, and their pressures balance
+//! at every site.
+//!
+//! Where the seam follows the lattice nothing is missing, and nothing is changed.
+
+use std::collections::HashMap;
+
+use super::{
+    dilatation::state_of,
+    edges::Strings,
+    segments::{End, Segments},
+    sparse_change::Conditions,
+};
+use crate::{
+    coupling::{ModelError, SiteKind},
+    fem,
+    peridynamics::StatePart,
+    tensor::{Tensor4, Vector},
+};
+
+/// Least factor of the energy of a piece; the largest was 4 where this one was asked for.
+const FLOOR: f64 = 0.1;
+
+/// What is missing in the force on a node, relative to the largest traction of a face, below which a seam follows the lattice.
+const FOLLOWS: f64 = 1e-10;
+
+/// What may be missing after a fit.
+const MET: f64 = 1e-10;
+
+/// Something whose energy may change: a piece, or a whole bond between points that have pieces.
+enum Part {
+    Piece(usize),
+    Bond(u32, u32),
+}
+
+/// What a part is made of.
+struct Shape<const D: usize> {
+    xi: Vector<D>,
+    /// Its length as a fraction of the bond.
+    length: f64,
+    /// How much of the bond it is.
+    share: f64,
+    difference: Vec<(u32, f64)>,
+}
+
+impl Part {
+    fn shape<const D: usize>(&self, segments: &Segments<'_, D>) -> Shape<D> {
+        match *self {
+            Self::Piece(k) => {
+                let s = &segments.cut[k];
+                Shape {
+                    xi: segments.body.bond(s.i as usize, s.j as usize),
+                    length: s.piece.to - s.piece.from,
+                    share: s.piece.share,
+                    difference: segments.difference(s),
+                }
+            }
+            Self::Bond(i, j) => Shape {
+                xi: segments.body.bond(i as usize, j as usize),
+                length: 1.0,
+                share: 1.0,
+                difference: vec![
+                    (segments.site[i as usize], -1.0),
+                    (segments.site[j as usize], 1.0),
+                ],
+            },
+        }
+    }
+
+    fn points<const D: usize>(&self, segments: &Segments<'_, D>) -> (u32, u32) {
+        match *self {
+            Self::Piece(k) => (segments.cut[k].i, segments.cut[k].j),
+            Self::Bond(i, j) => (i, j),
+        }
+    }
+
+    fn end<const D: usize>(&self, segments: &Segments<'_, D>, side: usize) -> End {
+        match *self {
+            Self::Piece(k) => segments.cut[k].ends[side].clone(),
+            Self::Bond(i, j) => End::Point([i, j][side]),
+        }
+    }
+
+    /// What it hands to the dilatations at its two ends, as factors of its elongation.
+    fn hands<const D: usize>(&self, segments: &Segments<'_, D>) -> [f64; 2] {
+        match *self {
+            Self::Piece(k) => segments.cut[k].hands,
+            Self::Bond(i, j) => segments.hands(i, j),
+        }
+    }
+
+    fn add_hands<const D: usize>(&self, segments: &mut Segments<'_, D>, change: [f64; 2]) {
+        let hands = match *self {
+            Self::Piece(k) => &mut segments.cut[k].hands,
+            Self::Bond(i, j) => &mut segments.changed.entry((i, j)).or_default().hands,
+        };
+        for (h, c) in hands.iter_mut().zip(change) {
+            *h += c;
+        }
+    }
+}
+
+/// Fits the seam unless it follows the lattice; returns whether it did.
+///
+/// # Errors
+/// [`ModelError::Seam`] with what is left if no positive factors meet the conditions.
+pub(super) fn fit<const D: usize>(
+    segments: &mut Segments<'_, D>,
+    strings: &Strings<D>,
+) -> Result<bool, ModelError> {
+    let nodes = loaded_nodes(segments);
+    let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
+    let tensor = pair_tensor(segments);
+    let scale = largest * tensor.amax();
+    let follows = |missing: &HashMap<u32, Vec<f64>>| {
+        missing.iter().all(|(site, m)| {
+            strings.holds(*site) || m.iter().all(|m| m.abs() <= FOLLOWS * scale)
+        })
+    };
+    let mut missing = HashMap::new();
+    for (&site, b) in &nodes {
+        let mut row = third(b, &tensor);
+        row.iter_mut().for_each(|v| *v = -*v);
+        missing.insert(site, row);
+    }
+    for k in 0..segments.cut.len() {
+        let (i, j) = (segments.cut[k].i, segments.cut[k].j);
+        let shape = Part::Piece(k).shape(segments);
+        let cube = cube(&shape.xi, segments.stiffness(i, j) * shape.share);
+        for (site, w) in shape.difference {
+            if let Some(row) = missing.get_mut(&site) {
+                row.iter_mut().zip(&cube).for_each(|(m, c)| *m -= w * c);
+            }
+        }
+    }
+    if follows(&missing) {
+        return Ok(false);
+    }
+    let mut left = f64::INFINITY;
+    // a lattice with few bonds may need a second layer of points
+    for _ in 0..2 {
+        let parts = parts(segments);
+        let (change, rest) = pair_change(segments, &parts, &missing);
+        left = rest / scale;
+        if left <= MET {
+            for (part, c) in parts.iter().zip(&change) {
+                match *part {
+                    Part::Piece(k) => segments.cut[k].scale += c,
+                    Part::Bond(i, j) => segments.changed.entry((i, j)).or_default().scale += c,
+                }
+            }
+            if let Some(state) = state_of(segments)? {
+                let rest = state_change(segments, &parts, &nodes, state);
+                if rest > MET {
+                    return Err(ModelError::Seam {
+                        what: "shares of the dilatation",
+                        residual: rest,
+                    });
+                }
+            }
+            return Ok(true);
+        }
+        segments.widen();
+    }
+    Err(ModelError::Seam {
+        what: "positive factors",
+        residual: left,
+    })
+}
+
+/// Integrals of the gradient of the shape functions of the nodes at the seam over the elements around them, without nodes from whose faces bonds are missing.
+fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> HashMap<u32, Vector<D>> {
+    let model = segments.model;
+    let full = segments.passing.whole.bonds().count();
+    let mut nodes = HashMap::new();
+    let mut dropped = Vec::new();
+    for s in &segments.cut {
+        let broken = [s.i, s.j].iter().any(|&p| {
+            segments.is_point(p) && segments.body.families.of(p as usize).len() < full
+        });
+        for (site, _) in segments.difference(s) {
+            if !matches!(model.sites[site as usize].kind, SiteKind::Node(_)) {
+                continue;
+            }
+            if broken {
+                dropped.push(site);
+            }
+            nodes.entry(site).or_insert_with(|| {
+                let mut sum = Vector::<D>::zeros();
+                for (c, local) in model.cells_of_site(site as usize) {
+                    if model.node_takes(c) {
+                        fem::for_each_point(&model.mesh, c, fem::Rule::Stiffness, |p| {
+                            sum += p.gradient[local] * p.weight;
+                        });
+                    }
+                }
+                sum
+            });
+        }
+    }
+    for site in dropped {
+        nodes.remove(&site);
+    }
+    nodes
+}
+
+/// The fourth moments of the lattice's pairwise part.
+fn pair_tensor<const D: usize>(segments: &Segments<'_, D>) -> Tensor4<D> {
+    let h = segments.model.spacing();
+    let mut tensor = Tensor4::zeros();
+    for (offset, (pair, _)) in segments.passing.whole.bonds() {
+        let xi = Vector::from_fn(|i, _| f64::from(offset[i]) * h);
+        tensor.add_fourth_power(pair * segments.model.typical_volume(), &xi);
+    }
+    tensor
+}
+
+/// The components `i ≤ j ≤ k` of a symmetric tensor of third order.
+fn triples<const D: usize>() -> impl Iterator<Item = [usize; 3]> {
+    (0..D).flat_map(|i| (i..D).flat_map(move |j| (j..D).map(move |k| [i, j, k])))
+}
+
+fn cube<const D: usize>(xi: &Vector<D>, factor: f64) -> Vec<f64> {
+    triples::<D>()
+        .map(|[i, j, k]| factor * xi[i] * xi[j] * xi[k])
+        .collect()
+}
+
+/// `C_ijkl b_l`.
+fn third<const D: usize>(b: &Vector<D>, tensor: &Tensor4<D>) -> Vec<f64> {
+    triples::<D>()
+        .map(|[i, j, k]| (0..D).map(|l| tensor.get(i, j, k, l) * b[l]).sum())
+        .collect()
+}
+
+/// All pieces, and the whole bonds between points at the seam.
+fn parts<const D: usize>(segments: &Segments<'_, D>) -> Vec<Part> {
+    let mut parts: Vec<Part> = (0..segments.cut.len()).map(Part::Piece).collect();
+    for i in (0..segments.site.len()).filter(|&i| segments.at_seam[i]) {
+        for &j in segments.body.families.of(i) {
+            let i = i as u32;
+            if j > i && segments.at_seam[j as usize] && segments.is_whole(i, j) {
+                parts.push(Part::Bond(i, j));
+            }
+        }
+    }
+    parts
+}
+
+/// Changes of the factors, and the largest component that is still missing.
+fn pair_change<const D: usize>(
+    segments: &Segments<'_, D>,
+    parts: &[Part],
+    missing: &HashMap<u32, Vec<f64>>,
+) -> (Vec<f64>, f64) {
+    let count = triples::<D>().count();
+    let mut rows: HashMap<u32, usize> = HashMap::new();
+    let mut sites: Vec<u32> = missing.keys().copied().collect();
+    sites.extend(points_at_seam(segments).map(|p| segments.site[p as usize]));
+    sites.sort_unstable();
+    for &site in &sites {
+        let next = rows.len();
+        rows.insert(site, next);
+    }
+    let mut conditions = Conditions::new(rows.len() * count);
+    for part in parts {
+        let (i, j) = part.points(segments);
+        let shape = part.shape(segments);
+        let cube = cube(&shape.xi, segments.stiffness(i, j) * shape.share);
+        for (site, w) in shape.difference {
+            if let Some(&row) = rows.get(&site) {
+                for (c, v) in cube.iter().enumerate() {
+                    conditions.add(row * count + c, w * v);
+                }
+            }
+        }
+        conditions.close();
+    }
+    let mut target = vec![0.0; rows.len() * count];
+    for (site, m) in missing {
+        target[rows[site] * count..][..count].copy_from_slice(m);
+    }
+    finish(&conditions, &target, FLOOR - 1.0)
+}
+
+fn finish(conditions: &Conditions, target: &[f64], floor: f64) -> (Vec<f64>, f64) {
+    let change = conditions.least_change(target, floor);
+    let left = conditions
+        .sum(&change)
+        .iter()
+        .zip(target)
+        .map(|(s, t)| (t - s).abs())
+        .fold(0.0, f64::max);
+    (change, left)
+}
+
+fn points_at_seam<'b, const D: usize>(
+    segments: &'b Segments<'_, D>,
+) -> impl Iterator<Item = u32> + 'b {
+    (0..segments.site.len() as u32).filter(|&p| segments.at_seam[p as usize])
+}
+
+/// Changes what parts hand to dilatations; returns what is left, relative.
+///
+/// Conditions: the second moments of what a point is handed stay as they are, those of an element become isotropic; the forces of a uniform pressure on a point stay in balance, those on a node become its share of the
+/// pressure of the zone. Moments are per volume of a cell of the lattice, forces per area of its face, so that all are of the size of 1.
+fn state_change<const D: usize>(
+    segments: &mut Segments<'_, D>,
+    parts: &[Part],
+    nodes: &HashMap<u32, Vector<D>>,
+    reference: &StatePart<D>,
+) -> f64 {
+    let volume = segments.model.typical_volume();
+    let area = segments.model.spacing().powi(D as i32 - 1);
+    let over_m = D as f64 / reference.shape.trace();
+    let mut count = 0;
+    let mut rows = |size: usize| {
+        count += size;
+        count - size
+    };
+    let moments = D * (D + 1) / 2;
+    let mut points: HashMap<u32, usize> = HashMap::new();
+    let mut sites: HashMap<u32, usize> = HashMap::new();
+    for p in points_at_seam(segments) {
+        points.insert(p, rows(moments));
+        sites.insert(segments.site[p as usize], rows(D));
+    }
+    let closed = rows(0);
+    let mut order: Vec<u32> = nodes.keys().copied().collect();
+    order.sort_unstable();
+    for &site in &order {
+        sites.insert(site, rows(D));
+    }
+    let mut cells: HashMap<u32, usize> = HashMap::new();
+    for s in &segments.cut {
+        for end in &s.ends {
+            if let End::Face(foot) = end {
+                for &c in &foot.cells {
+                    cells.entry(c).or_insert_with(|| rows(moments - 1));
+                }
+            }
+        }
+    }
+    let mut conditions = Conditions::new(count);
+    let mut hands = Vec::with_capacity(2 * parts.len());
+    for part in parts {
+        let (i, j) = part.points(segments);
+        let shape = part.shape(segments);
+        let xx = shape.xi * shape.xi.transpose();
+        let now = part.hands(segments);
+        for side in 0..2 {
+            let (own, other) = if side == 0 { (i, j) } else { (j, i) };
+            let strength =
+                over_m * segments.coefficients(own, other).1 * volume * volume * shape.share;
+            let per_volume = strength * shape.length / volume;
+            match part.end(segments, side) {
+                End::Point(p) => {
+                    let all = (0..D).flat_map(|a| (a..D).map(move |b| (a, b)));
+                    for (c, (a, b)) in all.enumerate() {
+                        conditions.add(points[&p] + c, per_volume * xx[(a, b)]);
+                    }
+                }
+                End::Face(foot) => {
+                    let per_cell = per_volume / foot.cells.len() as f64;
+                    for cell in &foot.cells {
+                        let mut row = cells[cell];
+                        for a in 0..D {
+                            for b in a.max(1)..D {
+                                // off the diagonal, and the diagonal's deviation from its first
+                                let first = if a == b { xx[(0, 0)] } else { 0.0 };
+                                conditions.add(row, per_cell * (xx[(a, b)] - first));
+                                row += 1;
+                            }
+                        }
+                    }
+                }
+            }
+            for &(site, w) in &shape.difference {
+                if let Some(&row) = sites.get(&site) {
+                    for a in 0..D {
+                        conditions.add(row + a, strength * w * shape.xi[a] / area);
+                    }
+                }
+            }
+            conditions.close();
+            hands.push(now[side]);
+        }
+    }
+    let mut target = vec![0.0; count];
+    for site in &order {
+        for a in 0..D {
+            target[sites[site] + a] = -nodes[site][a] / area;
+        }
+    }
+    for (t, now) in target.iter_mut().zip(conditions.sum(&hands)).skip(closed) {
+        *t -= now;
+    }
+    let (change, left) = finish(&conditions, &target, f64::NEG_INFINITY);
+    for (part, c) in parts.iter().zip(change.chunks_exact(2)) {
+        part.add_hands(segments, [c[0], c[1]]);
+    }
+    left
+}

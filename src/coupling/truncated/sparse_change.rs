@@ -1,0 +1,241 @@
+//! The smallest change that meets many sparse linear conditions.
+
+use rayon::prelude::*;
+
+/// Steps of the dual Newton method; seams took up to 9.
+const MOST_STEPS: usize = 40;
+
+/// Iterations of conjugate gradients within a step.
+const MOST_ITERATIONS: usize = 4000;
+
+/// Conditions on changes, one column per change.
+#[derive(Clone)]
+pub(super) struct Conditions {
+    count: usize,
+    offsets: Vec<usize>,
+    rows: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Conditions {
+    /// For so many conditions, without a change yet.
+    pub fn new(count: usize) -> Self {
+        Self {
+            count,
+            offsets: vec![0],
+            rows: Vec::new(),
+            values: Vec::new(),
+        }
+    }
+
+    /// Adds what a change of 1 adds to one condition; belongs to the column that [`Conditions::close`] ends.
+    pub fn add(&mut self, row: usize, value: f64) {
+        self.rows.push(row as u32);
+        self.values.push(value);
+    }
+
+    /// Ends a column.
+    pub fn close(&mut self) {
+        self.offsets.push(self.rows.len());
+    }
+
+    /// Number of changes.
+    pub fn changes(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    fn column(&self, k: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.offsets[k]..self.offsets[k + 1];
+        self.rows[range.clone()]
+            .iter()
+            .map(|&r| r as usize)
+            .zip(self.values[range].iter().copied())
+    }
+
+    /// What changes add to every condition.
+    pub fn sum(&self, change: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.count];
+        for (k, &x) in change.iter().enumerate() {
+            if x != 0.0 {
+                for (r, v) in self.column(k) {
+                    sum[r] += v * x;
+                }
+            }
+        }
+        sum
+    }
+
+    fn transposed(&self, multiplier: &[f64]) -> Vec<f64> {
+        (0..self.changes())
+            .into_par_iter()
+            .with_min_len(512)
+            .map(|k| self.column(k).map(|(r, v)| v * multiplier[r]).sum())
+            .collect()
+    }
+
+    /// Minimises `½ Σ x²` subject to `A x = missing` and `x ≥ floor`.
+    ///
+    /// As for the weights of a family the dual is smooth, `x = max(floor, Aᵀ λ)`; Newton's method, its steps by conjugate gradients with the normal equations of the changes off
+    /// the floor. Where the conditions contradict each other or the floor, the change that came nearest is returned: the caller looks at what is still missing.
+    pub fn least_change(&self, missing: &[f64], floor: f64) -> Vec<f64> {
+        // all rows to the same size, or conjugate gradients take ages
+        let mut size = vec![0.0f64; self.count];
+        for (&r, v) in self.rows.iter().zip(&self.values) {
+            size[r as usize] += v * v;
+        }
+        let scale: Vec<f64> = size
+            .iter()
+            .map(|&s| if s > 0.0 { 1.0 / s.sqrt() } else { 0.0 })
+            .collect();
+        let mut scaled = self.clone();
+        for (&r, v) in self.rows.iter().zip(scaled.values.iter_mut()) {
+            *v *= scale[r as usize];
+        }
+        let target: Vec<f64> = missing.iter().zip(&scale).map(|(m, s)| m * s).collect();
+        let norm = |v: &[f64]| dot(v, v).sqrt();
+        let goal = 1e-15 * norm(&target);
+        let lifted = |z: &[f64]| -> Vec<f64> { z.iter().map(|z| z.max(floor)).collect() };
+        let left = |x: &[f64]| -> Vec<f64> {
+            let sum = scaled.sum(x);
+            target.iter().zip(sum).map(|(t, s)| t - s).collect()
+        };
+        // the dual, to be made large
+        let dual = |multiplier: &[f64], z: &[f64]| -> f64 {
+            let penalty: f64 = z
+                .iter()
+                .map(|&z| {
+                    if z >= floor {
+                        0.5 * z * z
+                    } else {
+                        floor * (z - 0.5 * floor)
+                    }
+                })
+                .sum();
+            dot(multiplier, &target) - penalty
+        };
+        let mut multiplier = vec![0.0; self.count];
+        let mut z = vec![0.0; self.changes()];
+        let mut x = lifted(&z);
+        let mut gap = left(&x);
+        let mut best = (norm(&gap), x.clone());
+        for _ in 0..MOST_STEPS {
+            if best.0 <= goal {
+                break;
+            }
+            let direction = scaled.newton_step(&gap, &z, floor);
+            let rise = dot(&gap, &direction);
+            let (here, was) = (dual(&multiplier, &z), norm(&gap));
+            let mut step = 1.0;
+            let mut moved = false;
+            while step > 1e-4 {
+                let trial: Vec<f64> = multiplier
+                    .iter()
+                    .zip(&direction)
+                    .map(|(m, d)| m + step * d)
+                    .collect();
+                let next = scaled.transposed(&trial);
+                let changed = lifted(&next);
+                let remaining = left(&changed);
+                // near the end the dual is flat to round-off, the gap is not
+                if norm(&remaining) < 0.9 * was
+                    || dual(&trial, &next) > here + 1e-4 * step * rise
+                {
+                    (multiplier, z, x, gap) = (trial, next, changed, remaining);
+                    moved = true;
+                    break;
+                }
+                step *= 0.5;
+            }
+            if !moved {
+                break;
+            }
+            let reached = norm(&gap);
+            if reached < best.0 {
+                best = (reached, x.clone());
+            }
+        }
+        best.1
+    }
+
+    /// Solves the normal equations of the changes off the floor.
+    fn newton_step(&self, gap: &[f64], z: &[f64], floor: f64) -> Vec<f64> {
+        let apply = |v: &[f64]| {
+            let mut t = self.transposed(v);
+            for (t, &z) in t.iter_mut().zip(z) {
+                if z < floor {
+                    *t = 0.0;
+                }
+            }
+            self.sum(&t)
+        };
+        let mut solution = vec![0.0; gap.len()];
+        let mut residual = gap.to_vec();
+        let mut direction = residual.clone();
+        let mut size = dot(&residual, &residual);
+        let goal = size * 1e-20;
+        for _ in 0..MOST_ITERATIONS {
+            let along = apply(&direction);
+            let curvature = dot(&direction, &along);
+            if size <= goal || curvature <= 0.0 {
+                break;
+            }
+            let step = size / curvature;
+            for k in 0..solution.len() {
+                solution[k] += step * direction[k];
+                residual[k] -= step * along[k];
+            }
+            let next = dot(&residual, &residual);
+            let ratio = next / size;
+            size = next;
+            for (d, r) in direction.iter_mut().zip(&residual) {
+                *d = r + ratio * *d;
+            }
+        }
+        solution
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn conditions(rows: &[&[f64]]) -> Conditions {
+        let mut c = Conditions::new(rows.len());
+        for k in 0..rows[0].len() {
+            for (r, row) in rows.iter().enumerate() {
+                c.add(r, row[k]);
+            }
+            c.close();
+        }
+        c
+    }
+
+    #[test]
+    fn smallest_change_by_hand() {
+        // x + y = 2 and nothing else: (1, 1)
+        let x = conditions(&[&[1.0, 1.0]]).least_change(&[2.0], -0.9);
+        assert!(x.iter().all(|x| (x - 1.0).abs() < 1e-14), "{x:?}");
+        // x - y = 3 with a floor of -1/2: (5/2, -1/2)
+        let x = conditions(&[&[1.0, -1.0]]).least_change(&[3.0], -0.5);
+        assert!((x[0] - 2.5).abs() < 1e-13 && (x[1] + 0.5).abs() < 1e-13, "{x:?}");
+        // the same condition twice, at another scale, does no harm
+        let x = conditions(&[&[1.0, 2.0], &[1e6, 2e6]]).least_change(&[5.0, 5e6], -0.9);
+        assert!((x[0] - 1.0).abs() < 1e-13 && (x[1] - 2.0).abs() < 1e-13, "{x:?}");
+    }
+
+    #[test]
+    fn contradictions_leave_a_gap() {
+        let rows: [&[f64]; 2] = [&[1.0, 1.0], &[1.0, 1.0]];
+        let x = conditions(&rows).least_change(&[1.0, 2.0], -0.9);
+        let sum = conditions(&rows).sum(&x);
+        assert!((sum[0] - 1.5).abs() < 1e-12, "{sum:?}");
+        // a floor in the way
+        let rows: [&[f64]; 1] = [&[1.0, 1.0]];
+        let x = conditions(&rows).least_change(&[-3.0], -0.9);
+        assert!((conditions(&rows).sum(&x)[0] + 1.8).abs() < 1e-12, "{x:?}");
+    }
+}
