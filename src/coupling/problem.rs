@@ -154,7 +154,9 @@ pub enum ModelError {
     #[error(transparent)]
     Shells(#[from] crate::peridynamics::ShellError),
     /// Faces cut the lattice in such a way that no energies of pieces make affine fields exact.
-    #[error("the faces of the nonlocal zone cut the lattice where truncated bonds cannot be fitted to them: no {what} leave less than {residual:.1e} of the largest traction; let the faces follow the lattice (element edges a whole number of spacings long), use a horizon of three spacings or more or elements of two spacings or more at the seam, or couple by splice")]
+    #[error(
+        "the faces of the nonlocal zone cut the lattice where truncated bonds cannot be fitted to them: no {what} leave less than {residual:.1e} of the largest traction; let the faces follow the lattice (element edges a whole number of spacings long), use a horizon of three spacings or more or elements of two spacings or more at the seam, or couple by splice"
+    )]
     Seam {
         /// What was looked for.
         what: &'static str,

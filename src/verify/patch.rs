@@ -5,6 +5,7 @@ pub mod influence;
 use rayon::prelude::*;
 
 use crate::{
+    coupling::ModelError,
     observe::report::{Columns, Row, Table},
     progress::{Progress, Silent},
     solve::{
@@ -15,7 +16,9 @@ use crate::{
     tensor::{Tensor, Vector, padded},
     verify::{
         Effort,
-        enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNGS_MODULUS},
+        enclosed::{
+            Case, Cells, Enclosed, EnclosedError, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
+        },
         fields::{Field, affine_modes, monomials, worst},
     },
 };
@@ -33,10 +36,24 @@ pub const SOLUTION_LIMIT: f64 = 1e-9;
 ///
 /// [SAND2015-7998] section 2.3 calls such a force a ghost force.
 pub fn affine_residual<const D: usize>(enclosed: &Enclosed<D>) -> f64 {
+    affine_residual_where(enclosed, |_| true)
+}
+
+/// The same over the sites at the places that `counts`.
+pub fn affine_residual_where<const D: usize>(
+    enclosed: &Enclosed<D>,
+    counts: impl Fn(&Vector<D>) -> bool,
+) -> f64 {
+    let counts = |s: usize| counts(&enclosed.model.sites[s].position);
     affine_modes::<D>()
         .iter()
         .map(|mode| {
-            let force = enclosed.stiffness.multiply(&mode.at(enclosed.positions()));
+            let mut force = enclosed.stiffness.multiply(&mode.at(enclosed.positions()));
+            for (s, f) in force.chunks_mut(D).enumerate() {
+                if !counts(s) {
+                    f.fill(0.0);
+                }
+            }
             largest_density(enclosed, &force, |_, _| 0.0) * SPACING / YOUNGS_MODULUS
         })
         .fold(0.0, worst)
@@ -266,6 +283,9 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
     };
     let enclosed = match Enclosed::<D>::new(case) {
         Ok(enclosed) => enclosed,
+        Err(e @ EnclosedError::Model(ModelError::Seam { .. })) => {
+            return vec![Row::refused(&name, "residual", e.to_string())];
+        }
         Err(e) => {
             return ["residual", "solution error"]
                 .map(|q| Row::at_most(&name, q, f64::NAN, limit).because(e.to_string()))

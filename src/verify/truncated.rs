@@ -1,5 +1,7 @@
 //! Truncated bonds, measured: symmetry, definiteness, affine fields, equilibrium, order in the horizon, and what a symmetric matrix saves.
 
+mod zones;
+
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -21,7 +23,7 @@ use crate::{
     verify::{
         Effort,
         enclosed::{Case, Cells, Enclosed, INFLUENCE, Law, Method, Widths, YOUNGS_MODULUS},
-        patch::affine_residual,
+        patch::affine_residual_where,
         tangents::momentum,
     },
 };
@@ -161,28 +163,38 @@ fn property_rows<const D: usize>(case: &Case, material: Material) -> Vec<Row> {
             ];
         }
     };
+    rows_of(&name, &e, material, AFFINE_LIMIT, |_| true)
+}
+
+/// The rows of an assembled model; the affine residual of the places that `counts`.
+fn rows_of<const D: usize>(
+    name: &str,
+    e: &Enclosed<D>,
+    material: Material,
+    limit: f64,
+    counts: impl Fn(&Vector<D>) -> bool,
+) -> Vec<Row> {
     let places: Vec<Vector<D>> = e.positions().copied().collect();
     let (forces, moments) = momentum(&e.stiffness, &places);
     let asymmetry = e.stiffness.asymmetry();
+    let residual = affine_residual_where(e, counts);
     let mut rows = vec![
-        Row::at_most(&name, "asymmetry", asymmetry, SYMMETRY_LIMIT),
-        Row::at_most(&name, "residual", affine_residual(&e), AFFINE_LIMIT),
-        Row::at_most(&name, "forces", forces, EQUILIBRIUM_LIMIT),
+        Row::at_most(name, "asymmetry", asymmetry, SYMMETRY_LIMIT),
+        Row::at_most(name, "residual", residual, limit),
+        Row::at_most(name, "forces", forces, EQUILIBRIUM_LIMIT),
     ];
     if D > 1 {
-        rows.push(Row::at_most(&name, "moments", moments, EQUILIBRIUM_LIMIT));
+        rows.push(Row::at_most(name, "moments", moments, EQUILIBRIUM_LIMIT));
     }
-    rows.push(match (smallest_eigenvalue(&e), material.is_definite()) {
-        (Ok(Some(v)), true) => Row::at_least(&name, "smallest eigenvalue", v, f64::MIN_POSITIVE),
-        (Ok(Some(v)), false) => Row::info(&name, "smallest eigenvalue", v),
-        (Ok(None), true) => {
-            Row::at_least(&name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE)
-                .because("not positive definite")
-        }
-        (Ok(None), false) => Row::info(&name, "smallest eigenvalue", -1.0)
+    rows.push(match (smallest_eigenvalue(e), material.is_definite()) {
+        (Ok(Some(v)), true) => Row::at_least(name, "smallest eigenvalue", v, f64::MIN_POSITIVE),
+        (Ok(Some(v)), false) => Row::info(name, "smallest eigenvalue", v),
+        (Ok(None), true) => Row::at_least(name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE)
+            .because("not positive definite"),
+        (Ok(None), false) => Row::info(name, "smallest eigenvalue", -1.0)
             .because("not positive definite: the LPS has a negative state modulus below nu = 1/4"),
         (Err(why), _) => {
-            Row::at_least(&name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE).because(why)
+            Row::at_least(name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE).because(why)
         }
     });
     rows
@@ -498,6 +510,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         properties::<1>(effort, progress),
         properties::<2>(effort, progress),
         properties::<3>(effort, progress),
+        zones::table(effort, progress),
         orders(effort, progress),
     ];
     tables.push(super::skin::table(progress));

@@ -58,9 +58,13 @@ impl<const D: usize> Strings<D> {
             .map(|c| model.is_element(c))
             .collect();
         let mut faces: HashMap<[u32; 2], Vec<(Vector<D>, Vector<D>)>> = HashMap::new();
-        for facet in mesh.interface_facets(&element, &false, &true) {
-            let area = mesh.facet_normal_area(&facet.first);
-            let n = &facet.first.nodes;
+        let seam = mesh.interface_facets(&element, &false, &true);
+        let seam = seam.into_iter().map(|facet| facet.first);
+        // where a zone ends at the boundary of the mesh, its edges there close the frame: an open string would turn under a rotation
+        let outer = mesh.outer_facets().into_iter();
+        for facet in seam.chain(outer.filter(|f| !element[f.cell as usize])) {
+            let area = mesh.facet_normal_area(&facet);
+            let n = &facet.nodes;
             let centre =
                 n.iter().map(|&n| mesh.nodes[n as usize]).sum::<Vector<D>>() / n.len() as f64;
             for k in 0..n.len() {

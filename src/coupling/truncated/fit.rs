@@ -118,9 +118,9 @@ pub(super) fn fit<const D: usize>(
     let tensor = pair_tensor(segments);
     let scale = largest * tensor.amax();
     let follows = |missing: &HashMap<u32, Vec<f64>>| {
-        missing.iter().all(|(site, m)| {
-            strings.holds(*site) || m.iter().all(|m| m.abs() <= FOLLOWS * scale)
-        })
+        missing
+            .iter()
+            .all(|(site, m)| strings.holds(*site) || m.iter().all(|m| m.abs() <= FOLLOWS * scale))
     };
     let mut missing = HashMap::new();
     for (&site, b) in &nodes {
@@ -145,7 +145,12 @@ pub(super) fn fit<const D: usize>(
     // a lattice with few bonds may need a second layer of points
     for _ in 0..2 {
         let parts = parts(segments);
-        let (change, rest) = pair_change(segments, &parts, &missing);
+        let (conditions, target) = pair_conditions(segments, &parts, &missing);
+        // without the floor first: where even that fails, nothing else has to be tried
+        let (mut change, mut rest) = finish(&conditions, &target, f64::NEG_INFINITY);
+        if rest <= 1e-3 * scale && change.iter().any(|&c| c < FLOOR - 1.0) {
+            (change, rest) = finish(&conditions, &target, FLOOR - 1.0);
+        }
         left = rest / scale;
         if left <= MET {
             for (part, c) in parts.iter().zip(&change) {
@@ -180,9 +185,9 @@ fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> HashMap<u32, Vect
     let mut nodes = HashMap::new();
     let mut dropped = Vec::new();
     for s in &segments.cut {
-        let broken = [s.i, s.j].iter().any(|&p| {
-            segments.is_point(p) && segments.body.families.of(p as usize).len() < full
-        });
+        let broken = [s.i, s.j]
+            .iter()
+            .any(|&p| segments.is_point(p) && segments.body.families.of(p as usize).len() < full);
         for (site, _) in segments.difference(s) {
             if !matches!(model.sites[site as usize].kind, SiteKind::Node(_)) {
                 continue;
@@ -252,12 +257,12 @@ fn parts<const D: usize>(segments: &Segments<'_, D>) -> Vec<Part> {
     parts
 }
 
-/// Changes of the factors, and the largest component that is still missing.
-fn pair_change<const D: usize>(
+/// The conditions on changes of the factors, and what is missing.
+fn pair_conditions<const D: usize>(
     segments: &Segments<'_, D>,
     parts: &[Part],
     missing: &HashMap<u32, Vec<f64>>,
-) -> (Vec<f64>, f64) {
+) -> (Conditions, Vec<f64>) {
     let count = triples::<D>().count();
     let mut rows: HashMap<u32, usize> = HashMap::new();
     let mut sites: Vec<u32> = missing.keys().copied().collect();
@@ -285,9 +290,10 @@ fn pair_change<const D: usize>(
     for (site, m) in missing {
         target[rows[site] * count..][..count].copy_from_slice(m);
     }
-    finish(&conditions, &target, FLOOR - 1.0)
+    (conditions, target)
 }
 
+/// The smallest change, and the largest component that it leaves.
 fn finish(conditions: &Conditions, target: &[f64], floor: f64) -> (Vec<f64>, f64) {
     let change = conditions.least_change(target, floor);
     let left = conditions
