@@ -222,11 +222,12 @@ fn costs(table: &mut Table, name: &str, case: &Case) {
     table.push(Row::info(name, "total [s]", case.seconds()));
 }
 
-const METHODS: [(&str, &str); 6] = [
+const METHODS: [(&str, &str); 7] = [
     ("blending, constant", "coupling.blending.beta=constant"),
     ("blending, linear", "coupling.blending.beta=linear"),
     ("blending, smooth", "coupling.blending.beta=smooth"),
     ("splice", "coupling=splice"),
+    ("truncated", "coupling=truncated"),
     (
         "partial stress, elements",
         "coupling.partial-stress.form=elements",

