@@ -98,7 +98,7 @@
 //! ```
 //! use bondline::coupling::{PointSource, Surfaces};
 //! use bondline::mesh::{CellShape, Mesh};
-//! use bondline::peridynamics::{BondBased, BondWeights};
+//! use bondline::peridynamics::{BondBased, BondWeights, PartialVolume};
 //! use bondline::solve::statics::{StaticParams, solve};
 //! use bondline::tensor::{Tensor4, Vector, padded};
 //! use bondline::{Coupling, Micromodulus, Model, Peridynamics, Problem, Silent, Splice, StaticProblem, Zone};
@@ -119,6 +119,7 @@
 //!         horizon: Arc::new(|_| 3.0),
 //!         points: PointSource::Cells,
 //!         weights: BondWeights::Isotropic,
+//!         volumes: PartialVolume::Full,
 //!         barriers: vec![],
 //!         voids: vec![],
 //!         surfaces: Surfaces::Cut,

@@ -5,13 +5,17 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use bondline::observe::checkpoint::Pace;
 use bondline::observe::progress::TerminalProgress;
 use bondline::observe::report;
 use bondline::observe::summary::Ended;
-use bondline::scene::{self, AnyScene, RunOptions, StartFrom, Template};
+use bondline::scene::{
+    self, AnyScene, ConvergeError, ConvergeParams, Refinement, RunOptions, StartFrom, Template,
+};
 use bondline::trade::{self, CostBy, Reference, TradeEnd, TradeParams};
+use bondline::verify::page::{Outcome, page};
 use bondline::verify::{self, Effort};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -31,6 +35,7 @@ const EXAMPLES: &str = "Examples:
   bondline run wave.toml --resume             go on where it stopped
   bondline run plate.toml --json              the summary as JSON on standard output
   bondline trade plate.toml                   what speed costs in accuracy: method, horizon, spacing, zone
+  bondline converge plate.toml --kind m       solve it on finer and finer lattices, and print orders
   bondline schema > bondline.schema.json      completion and checks in an editor";
 
 const TRADE: &str = "The scene runs as it is, then with each setting of each knob alone, then with the combinations that promise most by what these showed.
@@ -85,6 +90,26 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Solve a scene at several refinements; prints observed orders, writes them as a plot and a table.
+    Converge {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// What shrinks from level to level.
+        #[arg(long, value_enum, default_value = "delta")]
+        kind: RefinementName,
+        /// Number of levels, the scene itself the first.
+        #[arg(long, value_name = "N", default_value_t = 3)]
+        levels: usize,
+        /// By how much from level to level.
+        #[arg(long, value_name = "R", default_value_t = 2.0)]
+        factor: f64,
+        /// Folder for SCENE-KIND.svg and SCENE-KIND.csv, instead of the current one.
+        #[arg(long, value_name = "DIR", default_value = ".")]
+        output: PathBuf,
+        /// Print the rows as JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Write a commented scene to start from; never overwrites.
     New {
         /// The file to write.
@@ -107,9 +132,12 @@ enum Command {
         /// Print one JSON array of all rows.
         #[arg(long)]
         json: bool,
-        /// Only a part, in seconds.
+        /// Only a part, in less than three minutes.
         #[arg(long)]
         quick: bool,
+        /// Also write the tables as a page in Markdown.
+        #[arg(long, value_name = "FILE")]
+        markdown: Option<PathBuf>,
     },
 }
 
@@ -183,6 +211,26 @@ enum CostName {
     Memory,
     /// Bonds times steps: without noise.
     BondVisits,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RefinementName {
+    /// Horizon and spacing together; delta/h stays.
+    Delta,
+    /// The spacing under a fixed horizon.
+    M,
+    /// The spacing by the factor, the horizon by its square root.
+    DeltaM,
+}
+
+impl From<RefinementName> for Refinement {
+    fn from(name: RefinementName) -> Self {
+        match name {
+            RefinementName::Delta => Self::Delta,
+            RefinementName::M => Self::M,
+            RefinementName::DeltaM => Self::DeltaM,
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -266,6 +314,46 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                 print(prediction)?;
             }
         }
+        Command::Converge {
+            scene,
+            kind,
+            levels,
+            factor,
+            output,
+            json,
+        } => {
+            let params = ConvergeParams {
+                refinement: kind.into(),
+                levels,
+                factor,
+            };
+            let progress = TerminalProgress::on_stderr();
+            let found = scene::converge(&scene.scene, &scene.overrides, &params, &progress)
+                .map_err(|e| match e {
+                    ConvergeError::Scene(e) => e.report(),
+                    other => miette::miette!("{other}"),
+                })?;
+            let format = if json {
+                report::Format::Json
+            } else {
+                report::Format::Text
+            };
+            print(report::render(&[found.table()], format).trim_end())?;
+            let stem = scene.scene.file_stem().unwrap_or_default();
+            let name = format!("{}-{}", stem.to_string_lossy(), found.refinement.name());
+            let csv = output.join(format!("{name}.csv"));
+            found.write_csv(&csv).map_err(|e| miette::miette!("{e}"))?;
+            eprintln!("wrote {}", csv.display());
+            // levels that agree to round-off leave nothing to plot on logarithmic axes
+            if found.orders().iter().any(Option::is_some) {
+                let svg = output.join(format!("{name}.svg"));
+                found
+                    .plot()
+                    .write(&svg)
+                    .map_err(|e| miette::miette!("{e}"))?;
+                eprintln!("wrote {}", svg.display());
+            }
+        }
         Command::New { path, template } => {
             let template = match template {
                 TemplateName::Bar => Template::Bar,
@@ -284,17 +372,41 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             print(text.map_err(|e| miette::miette!("{e}"))?)?;
         }
         Command::Trade(arguments) => return traded(arguments),
-        Command::Verify { name, json, quick } => {
+        Command::Verify {
+            name,
+            json,
+            quick,
+            markdown,
+        } => {
             let effort = if quick { Effort::Quick } else { Effort::Full };
             let progress = TerminalProgress::on_stderr();
-            let chosen: Vec<&verify::Suite> = match &name {
+            let chosen: Vec<&'static verify::Suite> = match &name {
                 None => verify::SUITES.iter().collect(),
                 Some(name) => verify::suite(name).into_iter().collect(),
             };
-            let tables: Vec<report::Table> = chosen
+            let outcomes: Vec<Outcome> = chosen
                 .into_iter()
-                .flat_map(|s| (s.run)(effort, &progress))
+                .map(|suite| {
+                    let start = Instant::now();
+                    let tables = (suite.run)(effort, &progress);
+                    let seconds = start.elapsed().as_secs_f64();
+                    eprintln!("{}: {seconds:.1} s", suite.name);
+                    Outcome {
+                        suite,
+                        tables,
+                        seconds,
+                    }
+                })
                 .collect();
+            let total: f64 = outcomes.iter().map(|o| o.seconds).sum();
+            eprintln!("{} suite(s): {total:.1} s", outcomes.len());
+            if let Some(path) = markdown {
+                std::fs::write(&path, page(&outcomes, effort)).map_err(|e| {
+                    miette::miette!("cannot write {}: {e}; check the folder", path.display())
+                })?;
+                eprintln!("wrote {}", path.display());
+            }
+            let tables: Vec<report::Table> = outcomes.into_iter().flat_map(|o| o.tables).collect();
             let format = if json {
                 report::Format::Json
             } else {

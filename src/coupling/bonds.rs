@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 
 use crate::{
-    coupling::{ModelError, Peridynamics, Surfaces, points::PointCloud},
+    coupling::{ModelError, Peridynamics, PointSource, Surfaces, points::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, cutter::SegmentCutter},
     peridynamics::{
-        BondWeights, Families, Family, LatticeFamily, StatePart, TIE_TOLERANCE, collapsed_tensor,
+        BondWeights, Families, Family, PartialVolume, StatePart, TIE_TOLERANCE, collapsed_tensor,
         isotropic_shell_factors,
+        partial_volume::{lattice_shells, orbit},
     },
     shape::Barriers,
     tensor::{Tensor4, Vector},
@@ -27,8 +28,11 @@ pub(super) fn cut<const D: usize>(
     if barriers.is_empty() && surface.is_none() {
         return;
     }
-    let reach = position.iter().map(|x| (p.horizon)(x)).fold(0.0, f64::max);
-    // a bond crosses a facet only if both of its ends are within a horizon of it
+    let reach = position
+        .iter()
+        .map(|x| p.reach((p.horizon)(x)))
+        .fold(0.0, f64::max);
+    // a bond crosses a facet only if both of its ends are within its length of it
     let bins = surface
         .as_ref()
         .map(|facets| NearBins::new(mesh, facets, reach));
@@ -85,46 +89,58 @@ impl<const D: usize> NearBins<D> {
     }
 }
 
-/// Bond factors of a lattice, shell by shell, for every horizon in use.
-pub(super) struct LatticeFactors {
-    tables: HashMap<u64, HashMap<u64, f64>>,
+/// Bond factors of a lattice, shell by shell, for every horizon in use: the weight of the shell times the share of the far cell.
+pub(super) struct LatticeFactors<const D: usize> {
+    tables: HashMap<u64, HashMap<[u32; D], f64>>,
     spacing: f64,
     is_lattice: bool,
+    volumes: PartialVolume,
 }
 
-impl LatticeFactors {
-    /// Factors for the horizons of a cloud; without effect unless the points are a lattice's and the weights isotropic.
-    pub fn new<const D: usize>(
-        p: &Peridynamics<D>,
-        cloud: &PointCloud<D>,
-    ) -> Result<Self, ModelError> {
+impl<const D: usize> LatticeFactors<D> {
+    /// Factors for the horizons of a cloud; without effect unless the points are a lattice's, and the weights isotropic or the volumes partial.
+    pub fn new(p: &Peridynamics<D>, cloud: &PointCloud<D>) -> Result<Self, ModelError> {
         let mut factors = Self {
             tables: HashMap::new(),
             spacing: cloud.spacing,
             is_lattice: cloud.is_lattice,
+            volumes: p.volumes,
         };
-        if !cloud.is_lattice || p.weights != BondWeights::Isotropic {
+        let isotropic = p.weights == BondWeights::Isotropic;
+        if factors.has_partial_volumes() {
+            let regular = cloud.is_lattice && matches!(p.points, PointSource::Lattice { .. });
+            if !regular || p.weights == BondWeights::Fitted {
+                return Err(ModelError::Unsupported {
+                    what: "a partial volume without a lattice, or with fitted weights",
+                    remedy: "give peridynamics.points a lattice and isotropic or plain weights, or leave out peridynamics.volumes",
+                });
+            }
+        } else if !cloud.is_lattice || !isotropic {
             return Ok(factors);
         }
         for &horizon in &cloud.horizon {
             if factors.tables.contains_key(&horizon.to_bits()) {
                 continue;
             }
+            let (lattice, shares) =
+                lattice_shells::<D>(p.volumes, horizon / cloud.spacing, TIE_TOLERANCE)?;
+            let weights = match p.law.shell_target().filter(|_| isotropic) {
+                Some(target) => {
+                    let base: Vec<f64> = lattice
+                        .shells
+                        .iter()
+                        .zip(&shares)
+                        .map(|(s, share)| share * p.law.kernel(s.length(cloud.spacing), horizon))
+                        .collect();
+                    isotropic_shell_factors(&lattice, cloud.spacing, &base, target)?
+                }
+                None => vec![1.0; shares.len()],
+            };
             let mut table = HashMap::new();
-            if let Some(target) = p.law.shell_target() {
-                let lattice = LatticeFamily::<D>::new(horizon / cloud.spacing, TIE_TOLERANCE)?;
-                let base: Vec<f64> = lattice
-                    .shells
-                    .iter()
-                    .map(|s| p.law.kernel(s.length(cloud.spacing), horizon))
-                    .collect();
-                let weights = isotropic_shell_factors(&lattice, cloud.spacing, &base, target)?;
-                table = lattice
-                    .shells
-                    .iter()
-                    .map(|s| s.squared)
-                    .zip(weights)
-                    .collect();
+            for ((shell, weight), share) in lattice.shells.iter().zip(weights).zip(shares) {
+                for offset in &shell.offsets {
+                    table.insert(orbit(offset), weight * share);
+                }
             }
             factors.tables.insert(horizon.to_bits(), table);
         }
@@ -136,18 +152,32 @@ impl LatticeFactors {
         self.is_lattice
     }
 
+    /// Whether cells count in part.
+    pub fn has_partial_volumes(&self) -> bool {
+        self.volumes != PartialVolume::Full
+    }
+
+    /// Removes the bonds to cells of which nothing counts.
+    pub fn drop_without_share(&self, cloud: &PointCloud<D>, families: &mut Families) {
+        if self.has_partial_volumes() {
+            let x = &cloud.position;
+            families.retain(|i, j| self.factor(cloud.horizon[i], &(x[j as usize] - x[i])) > 0.0);
+        }
+    }
+
     /// The factor of a bond.
-    pub fn factor<const D: usize>(&self, horizon: f64, xi: &Vector<D>) -> f64 {
-        let squared = (xi.norm_squared() / (self.spacing * self.spacing)).round() as u64;
+    pub fn factor(&self, horizon: f64, xi: &Vector<D>) -> f64 {
+        // an isotropic table lacks no bond of its family; a table of shares lacks those to cells of which nothing counts
+        let other = if self.has_partial_volumes() { 0.0 } else { 1.0 };
         self.tables
             .get(&horizon.to_bits())
-            .and_then(|table| table.get(&squared))
+            .and_then(|table| table.get(&orbit(&offset_of(xi, self.spacing))))
             .copied()
-            .unwrap_or(1.0)
+            .unwrap_or(other)
     }
 
     /// The whole family of a lattice point with the coefficients that the law gives it; none without a lattice.
-    pub fn whole_family<const D: usize>(
+    pub fn whole_family(
         &self,
         p: &Peridynamics<D>,
         horizon: f64,
@@ -155,7 +185,8 @@ impl LatticeFactors {
         if !self.is_lattice {
             return Ok(None);
         }
-        let lattice = LatticeFamily::<D>::new(horizon / self.spacing, TIE_TOLERANCE)?;
+        let (lattice, _) =
+            lattice_shells::<D>(self.volumes, horizon / self.spacing, TIE_TOLERANCE)?;
         let bonds: Vec<Vector<D>> = lattice
             .shells
             .iter()
@@ -198,7 +229,7 @@ impl LatticeFactors {
     }
 
     /// The elastic tensor of the plain full lattice; none without a lattice.
-    pub fn tensor<const D: usize>(
+    pub fn tensor(
         &self,
         p: &Peridynamics<D>,
         horizon: f64,

@@ -95,7 +95,7 @@ impl<const D: usize> Model<D> {
         } = problem;
         let largest = peridynamics.as_ref().map_or(0.0, |p| {
             (0..mesh.cell_count())
-                .map(|c| (p.horizon)(&mesh.centroid(c)))
+                .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))
                 .fold(0.0, f64::max)
         });
         let roles = coupling.roles(&mesh, &zones, largest);
@@ -241,7 +241,10 @@ impl<const D: usize> Model<D> {
             .horizon
             .iter()
             .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
-        let mut families = Families::search(&cloud.position, &cloud.horizon, TIE_TOLERANCE)?;
+        let reaches: Vec<f64> = cloud.horizon.iter().map(|&d| p.reach(d)).collect();
+        let mut families = Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?;
+        let lattice = LatticeFactors::new(p, &cloud)?;
+        lattice.drop_without_share(&cloud, &mut families);
         bonds::cut(p, &self.mesh, &cloud.position, &mut families);
         // which points need a family of their own, and which only complete those of others
         let reach = match coupling.reach(p.law.as_ref()) {
@@ -296,10 +299,10 @@ impl<const D: usize> Model<D> {
             });
         }
         progress.stage("bonds", None);
-        let lattice = LatticeFactors::new(p, &cloud)?;
         let shells = |horizon: f64, xi: &Vector<D>| lattice.factor(horizon, xi);
         let factors = match (p.weights, lattice.is_lattice()) {
             (BondWeights::Isotropic, true) => Factors::Shells(&shells),
+            (BondWeights::Plain, true) if lattice.has_partial_volumes() => Factors::Shells(&shells),
             (BondWeights::Fitted, _) => Factors::Fitted,
             _ => Factors::Plain,
         };

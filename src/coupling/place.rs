@@ -23,7 +23,7 @@ pub(super) fn place<const D: usize>(
         .map(|c| fem::cell_volume(mesh, c))
         .collect();
     let largest = (0..mesh.cell_count())
-        .map(|c| (p.horizon)(&mesh.centroid(c)))
+        .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))
         .fold(0.0, f64::max);
     let nodes: Vec<u32> = (0..mesh.cell_count())
         .filter(|&c| roles[c] != CellRole::Element)
@@ -293,7 +293,7 @@ mod tests {
             generate::{Axis, CutOut, rectangle},
             read,
         },
-        peridynamics::{BondBased, BondWeights, Micromodulus},
+        peridynamics::{BondBased, BondWeights, Micromodulus, PartialVolume},
         progress::Silent,
         tensor::Tensor4,
     };
@@ -317,6 +317,7 @@ mod tests {
                 horizon: Arc::new(move |_| horizon),
                 points,
                 weights: BondWeights::Plain,
+                volumes: PartialVolume::Full,
                 barriers: Vec::new(),
                 voids: Vec::new(),
                 surfaces: Surfaces::Uncut,

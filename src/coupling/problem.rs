@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::{
     coupling::{Coupling, Zone},
     mesh::Mesh,
-    peridynamics::{BondLaw, BondWeights, PointError},
+    peridynamics::{BondLaw, BondWeights, BoxCell, PartialVolume, PointError},
     shape::{Barrier, Shape},
     tensor::{Tensor4, Vector},
 };
@@ -39,12 +39,27 @@ pub struct Peridynamics<const D: usize> {
     pub points: PointSource<D>,
     /// How bonds are weighted.
     pub weights: BondWeights,
+    /// What share of a cell counts that the horizon cuts; all but [`PartialVolume::Full`] need the points of a lattice.
+    pub volumes: PartialVolume,
     /// Voids and cracks that cut bonds.
     pub barriers: Vec<Barrier<D>>,
     /// Shapes whose interior holds no points although the mesh may cover it.
     pub voids: Vec<Shape<D>>,
     /// Whether bonds that leave the mesh are cut (holes of a mesh that no barrier describes).
     pub surfaces: Surfaces,
+}
+
+impl<const D: usize> Peridynamics<D> {
+    /// How far a family of that horizon reaches \[m\]: with partial volumes farther than the horizon, since cells count whose points lie beyond it.
+    pub fn reach(&self, horizon: f64) -> f64 {
+        let spacing = match self.points {
+            PointSource::Lattice { spacing, .. } => spacing,
+            PointSource::Cells => return horizon,
+        };
+        let beyond = BoxCell::<D>::cube(Vector::zeros(), spacing)
+            .map_or(0.0, |cell| self.volumes.reach_beyond(&cell));
+        horizon + beyond
+    }
 }
 
 /// What becomes of bonds that cross the boundary of the mesh.
@@ -150,6 +165,9 @@ pub enum ModelError {
     /// The points do not make families.
     #[error(transparent)]
     Families(#[from] crate::peridynamics::FamilyError),
+    /// The lattice has no partial volumes.
+    #[error(transparent)]
+    Volumes(#[from] crate::peridynamics::PartialVolumeError),
     /// Weights of the lattice's shells cannot be made isotropic.
     #[error(transparent)]
     Shells(#[from] crate::peridynamics::ShellError),

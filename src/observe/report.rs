@@ -21,6 +21,18 @@ pub enum Verdict {
     Differs,
 }
 
+impl Verdict {
+    /// Its word in tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Short => "SHORT",
+            Self::Refused => "refused",
+            Self::Differs => "differs",
+        }
+    }
+}
+
 /// Which way a limit works; only the text table shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
@@ -163,7 +175,7 @@ impl Row {
     }
 
     /// Value over reference, where there is one.
-    fn ratio(&self) -> Option<f64> {
+    pub fn ratio(&self) -> Option<f64> {
         self.reference.filter(|&r| r != 0.0).map(|r| self.value / r)
     }
 
@@ -260,7 +272,7 @@ impl Table {
         ];
         let mut reasons: Vec<&str> = Vec::new();
         for row in &self.rows {
-            let mut verdict = word(row.verdict).to_owned();
+            let mut verdict = row.verdict.word().to_owned();
             if let Some(reason) = &row.reason {
                 let known = reasons.iter().position(|r| r == reason);
                 let at = known.unwrap_or(reasons.len());
@@ -394,15 +406,6 @@ fn row_json(row: &Row) -> String {
 /// The exit status of a command: 1 if any row is short, else 0.
 pub fn exit_code(tables: &[Table]) -> u8 {
     u8::from(tables.iter().any(|t| t.count(Verdict::Short) > 0))
-}
-
-fn word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Pass => "pass",
-        Verdict::Short => "SHORT",
-        Verdict::Refused => "refused",
-        Verdict::Differs => "differs",
-    }
 }
 
 /// A number for people: integers whole, others with four significant digits.

@@ -23,18 +23,18 @@ pub enum Bound {
 
 /// What stopped [`least_change`].
 #[derive(Debug)]
-pub(super) struct NotMet {
+pub(crate) struct NotMet {
     /// Independent conditions.
-    pub(super) rank: usize,
+    pub(crate) rank: usize,
     /// Whether they can be met without the bound.
-    pub(super) unbounded_met: bool,
+    pub(crate) unbounded_met: bool,
 }
 
 /// Minimises `½ Σ d Δ²` subject to `Σ_k b_ck d_k Δ_k = missing_c` and `1 + Δ ≥ bound`; `rows` holds b, `shares` d.
 ///
 /// The dual is smooth: `Δ_k = max(l, Σ_c b_ck μ_c)`. Newton's method with the normal equations of the bonds off the bound and a step
 /// halved until the dual falls; without a bound its first step solves, the second is the refinement that restores lost digits.
-pub(super) fn least_change(
+pub(crate) fn least_change(
     rows: &DMatrix<f64>,
     shares: &[f64],
     missing: &DVector<f64>,

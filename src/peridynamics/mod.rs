@@ -24,7 +24,7 @@ mod grid;
 pub mod influence;
 pub mod kernel;
 pub mod law;
-mod least_change;
+pub(crate) mod least_change;
 pub mod lps;
 pub mod partial_volume;
 pub mod shape_tensor;

@@ -6,14 +6,15 @@ use super::check;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::{cells_of_set, position};
+use super::solve::Solve;
 use super::spec::{
     InfluenceSpec, LatticeStart, MaterialSpec, MicromodulusSpec, PeridynamicsSpec, PointsSpec,
-    SurfacesSpec, WeightsSpec,
+    SceneSpec, SurfacesSpec, VolumesSpec, WeightsSpec,
 };
 use super::value::{Number, Text};
 use crate::material::{Elastic, Kinematics};
 use crate::mesh::Mesh;
-use crate::peridynamics::{Influence, Micromodulus};
+use crate::peridynamics::{Influence, Micromodulus, PartialVolume};
 use crate::tensor::{Tensor4, Vector};
 
 /// The law that bonds of a material follow.
@@ -81,6 +82,8 @@ pub struct Peridynamics<const D: usize> {
     pub points: Points<D>,
     /// Bond weights.
     pub weights: WeightsSpec,
+    /// Shares of the cells that the horizon cuts.
+    pub volumes: PartialVolume,
     /// Whether the mesh's boundary cuts bonds.
     pub surfaces: SurfacesSpec,
 }
@@ -336,8 +339,56 @@ pub(crate) fn peridynamics<const D: usize>(
         horizon: spec.horizon.clone(),
         points,
         weights: spec.weights,
+        volumes: volumes(spec)?,
         surfaces: spec.surfaces,
     })
+}
+
+/// The partial volumes typed; they need to know the cells of a lattice.
+fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
+    let Some(typed) = &spec.volumes else {
+        return Ok(PartialVolume::Full);
+    };
+    let volumes = match typed.get_ref() {
+        VolumesSpec::Full => return Ok(PartialVolume::Full),
+        VolumesSpec::Pdlammps => PartialVolume::PdLammps,
+        VolumesSpec::Hhb => PartialVolume::Hhb,
+        VolumesSpec::Exact => PartialVolume::Exact,
+    };
+    let conflict = |message: &str, help: &str| {
+        Err(SceneError::new(SceneErrorKind::Conflict, message)
+            .label(typed.span(), "needs a lattice of points")
+            .help(help))
+    };
+    if matches!(spec.points, PointsSpec::Cells) {
+        return conflict(
+            "`peridynamics.volumes` is partial, and the points are those of the mesh's cells",
+            "give peridynamics.points.lattice a spacing, or use volumes = \"full\"",
+        );
+    }
+    if spec.weights == WeightsSpec::Fitted {
+        return conflict(
+            "`peridynamics.volumes` is partial, and the weights are fitted to full volumes",
+            "use weights = \"isotropic\" or \"plain\", or volumes = \"full\"",
+        );
+    }
+    Ok(volumes)
+}
+
+/// Refuses partial volumes in a scene that moves, whose bonds are passed over without them.
+pub(crate) fn volumes_at_rest(spec: &SceneSpec, solve: &Solve) -> Result<(), SceneError> {
+    let typed = spec.peridynamics.as_ref().and_then(|p| p.volumes.as_ref());
+    match typed {
+        Some(typed) if *typed.get_ref() != VolumesSpec::Full && *solve != Solve::Static => {
+            Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                "`peridynamics.volumes` is partial in a scene that moves",
+            )
+            .label(typed.span(), "offered at rest only")
+            .help("use volumes = \"full\", or solve = \"static\""))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Refuses an expression in `y` or `z` where the scene has no such axis.
@@ -359,5 +410,157 @@ pub(crate) fn no_further_axes<const D: usize>(
             "use {} only",
             ["x", "x and y", "x, y and z"][D - 1]
         ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::coupling::Sampler;
+    use crate::progress::Silent;
+    use crate::scene::{AnyScene, Solved, Source, solve_with};
+
+    /// A plate whose edge moves as `u = G x`; a lattice with δ/h = 3.3 in its middle.
+    const PLATE: &str = r#"
+kinematics = "plane-stress"
+coupling.splice = {}
+[mesh.rectangle]
+min = [0, 0]
+max = [1, 1]
+x = { cells = 40 }
+y = { cells = 40 }
+[materials.plate.lps]
+youngs-modulus = 2
+poisson-ratio = 0.25
+[peridynamics]
+horizon = "3.3/40"
+points.lattice = { spacing = "1/40" }
+[zones.nonlocal]
+box = { min = [0.4, 0.4], max = [0.6, 0.6] }
+[zones.transition]
+box = { min = [0.25, 0.25], max = [0.75, 0.75] }
+[conditions.left.displacement]
+on = "left"
+x = "2e-3*x+1e-3*y"
+y = "-5e-4*x+1e-3*y"
+[conditions.right.displacement]
+on = "right"
+x = "2e-3*x+1e-3*y"
+y = "-5e-4*x+1e-3*y"
+"#;
+
+    fn plate(overrides: &[&str]) -> Result<Scene2, SceneError> {
+        let mut source = Source::new("plate.toml", PLATE);
+        for o in overrides {
+            source.push_override(o)?;
+        }
+        match AnyScene::from_source(&source, Path::new(""), "plate")? {
+            AnyScene::Plane(scene) => Ok(*scene),
+            _ => unreachable!("a plate is plane"),
+        }
+    }
+
+    type Scene2 = crate::scene::Scene<2>;
+
+    /// Largest distance from `u = G x` over the displacement, the material's `C_1111` and `C_1122` in the middle, the elements', and the bonds.
+    fn pulled(overrides: &[&str]) -> (f64, [f64; 2], [f64; 2], usize, Vec<String>) {
+        let mut found = (f64::NAN, [0.0; 2], [0.0; 2]);
+        let summary = solve_with(
+            plate(overrides).unwrap(),
+            &Silent,
+            |_, solved: &Solved<'_, 2>| {
+                let sampler = Sampler::new(solved.model);
+                let mut miss: f64 = 0.0;
+                for site in &solved.model.sites {
+                    let x = site.position;
+                    let u = sampler.displacement(&x, solved.displacement).unwrap();
+                    let wanted =
+                        Vector::<2>::new(2e-3 * x[0] + 1e-3 * x[1], -5e-4 * x[0] + 1e-3 * x[1]);
+                    miss = miss.max((u - wanted).norm() / 2e-3);
+                }
+                let body = solved.model.body().unwrap();
+                let middle = Vector::<2>::new(0.5, 0.5);
+                let nearest = (0..body.cloud.position.len())
+                    .min_by(|&a, &b| {
+                        let distance = |i: usize| (body.cloud.position[i] - middle).norm();
+                        distance(a).total_cmp(&distance(b))
+                    })
+                    .unwrap();
+                let two = |c: &Tensor4<2>| [c.get(0, 0, 0, 0), c.get(0, 0, 1, 1)];
+                found = (
+                    miss,
+                    two(&body.collapsed_tensor(nearest)),
+                    two(solved.model.tensor_of_cell(0)),
+                );
+                Ok(Vec::new())
+            },
+        )
+        .unwrap();
+        let choices = summary.choices.into_iter().map(|c| c.choice).collect();
+        (found.0, found.1, found.2, summary.sizes.bonds, choices)
+    }
+
+    #[test]
+    fn partial_volumes_reach_scenes_and_the_seam_stays_exact() {
+        // plane stress, E = 2 and nu = 1/4
+        let typed = [2.0 / (1.0 - 0.0625), 0.5 / (1.0 - 0.0625)];
+        let all_free = [
+            "conditions.bottom.displacement={on=\"bottom\",x=\"2e-3*x+1e-3*y\",y=\"-5e-4*x+1e-3*y\"}",
+            "conditions.top.displacement={on=\"top\",x=\"2e-3*x+1e-3*y\",y=\"-5e-4*x+1e-3*y\"}",
+        ];
+        let mut bonds = Vec::new();
+        for volumes in ["full", "pdlammps", "hhb", "exact"] {
+            for coupling in ["splice", "blending", "partial-stress"] {
+                for weights in ["isotropic", "plain"] {
+                    // Gauss points of elements have families fitted to the typed constants, not to a plain lattice
+                    if (coupling, weights) == ("partial-stress", "plain") {
+                        continue;
+                    }
+                    let set = [
+                        all_free[0].to_owned(),
+                        all_free[1].to_owned(),
+                        format!("peridynamics.volumes={volumes}"),
+                        format!("peridynamics.weights={weights}"),
+                        format!("coupling={coupling}"),
+                    ];
+                    let set: Vec<&str> = set.iter().map(String::as_str).collect();
+                    let (miss, points, elements, count, choices) = pulled(&set);
+                    let case = format!("{volumes}, {coupling}, {weights}");
+                    assert!(miss < 1e-10, "{case}: {miss:e}");
+                    let both = points.iter().zip(&elements);
+                    assert!(
+                        both.clone().all(|(p, e)| (p - e).abs() < 1e-11),
+                        "{case}: {points:?} {elements:?}"
+                    );
+                    let off = points[0] - typed[0];
+                    assert_eq!(off.abs() < 1e-11, weights == "isotropic", "{case}: {off:e}");
+                    let said = choices.iter().any(|c| c.contains("partial volumes"));
+                    assert_eq!(said, volumes != "full", "{choices:?}");
+                    if (coupling, weights) == ("splice", "plain") {
+                        bonds.push((count, off.abs()));
+                    }
+                }
+            }
+        }
+        // the ramp of PDLAMMPS is zero for no point of the family, HHB and exact areas count cells beyond it
+        assert_eq!(bonds[0].0, bonds[1].0);
+        assert!(
+            bonds[2].0 > bonds[0].0 && bonds[3].0 > bonds[0].0,
+            "{bonds:?}"
+        );
+    }
+
+    #[test]
+    fn partial_volumes_without_their_lattice_are_refused() {
+        for (set, word) in [
+            ("peridynamics.points=cells", "lattice"),
+            ("peridynamics.weights=fitted", "fitted"),
+            ("solve.quasi-static={steps=2}", "moves"),
+        ] {
+            let error = plate(&["peridynamics.volumes=hhb", set]).err().unwrap();
+            assert!(error.to_string().contains(word), "{set}: {error}");
+        }
     }
 }

@@ -13,6 +13,7 @@
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
 //! | `predict.rs` | what a run will need, without solving |
+//! | `converge.rs` | one scene at several refinements |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
 
@@ -20,6 +21,7 @@ mod breaking;
 mod check;
 mod choice;
 mod conditions;
+mod converge;
 mod error;
 mod expression;
 mod initial;
@@ -44,6 +46,7 @@ mod zones;
 
 pub use breaking::{Breaking, Contact};
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
+pub use converge::{ConvergeError, ConvergeParams, Converged, Level, Refinement, converge};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use initial::{Initial, InitialKind};

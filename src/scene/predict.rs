@@ -22,7 +22,9 @@ use crate::observe::summary::{
     Choice, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
     resident_memory_bytes,
 };
-use crate::peridynamics::{BondWeights, LatticeFamily, TIE_TOLERANCE, isotropic_shell_factors};
+use crate::peridynamics::{
+    BondWeights, LatticeFamily, PartialVolume, TIE_TOLERANCE, isotropic_shell_factors,
+};
 use crate::progress::Progress;
 use crate::solve::FreeDofs;
 use crate::solve::direct::Analysis;
@@ -194,6 +196,7 @@ pub(crate) fn predict<const D: usize>(
             }
             .to_owned(),
         });
+        choices.extend(run::volumes_choice(&model));
     }
 
     let stiffness =
@@ -284,6 +287,7 @@ pub(super) fn warnings<const D: usize>(
             ));
         }
         if p.weights == BondWeights::Isotropic
+            && p.volumes == PartialVolume::Full
             && let Some((low, high)) = shell_factors(model, smallest)
             && (low < 0.5 || high > 2.0)
         {

@@ -24,6 +24,7 @@ use crate::observe::summary::{
 use crate::peridynamics::FractureError;
 use crate::peridynamics::{
     BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
+    PartialVolume,
 };
 use crate::progress::Progress;
 use crate::solve::explicit::ExplicitError;
@@ -159,6 +160,7 @@ pub fn solve_with<const D: usize>(
         choice: info.method.name().to_owned(),
         why: format!("{} system of {} unknowns", symmetry.name(), info.free_dofs),
     });
+    choices.extend(volumes_choice(&model));
 
     let u = &solution.displacement;
     let internal = stiffness.multiply(u);
@@ -283,6 +285,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
                 WeightsSpec::Plain => BondWeights::Plain,
                 WeightsSpec::Fitted => BondWeights::Fitted,
             },
+            volumes: p.volumes,
             barriers,
             voids,
             surfaces: match p.surfaces {
@@ -321,6 +324,21 @@ pub(super) fn params(solver: &Solver) -> StaticParams {
         max_iterations: solver.max_iterations,
         ..StaticParams::default()
     }
+}
+
+/// Says which partial volumes are in use, if not full ones.
+pub(super) fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Choice> {
+    let volumes = model.peridynamics.as_ref()?.volumes;
+    let why = match volumes {
+        PartialVolume::Full => return None,
+        PartialVolume::PdLammps => "a ramp over the last half spacing within the horizon",
+        PartialVolume::Hhb => "a ramp over the spacing about the horizon",
+        PartialVolume::Exact => "what the horizon cuts from each cell of the lattice",
+    };
+    Some(Choice {
+        choice: format!("{volumes:?} partial volumes"),
+        why: why.to_owned(),
+    })
 }
 
 /// The symmetry that the coupling promises, if the matrix keeps it: a horizon that varies breaks it.

@@ -14,7 +14,7 @@ use crate::{
     },
     peridynamics::{
         BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
-        Micromodulus,
+        Micromodulus, PartialVolume,
         influence::{Alpha, Degree},
     },
     progress::Silent,
@@ -320,6 +320,7 @@ impl<const D: usize> Enclosed<D> {
                     origin,
                 },
                 weights: BondWeights::Isotropic,
+                volumes: PartialVolume::Full,
                 barriers: Vec::new(),
                 voids: Vec::new(),
                 surfaces: Surfaces::Uncut,

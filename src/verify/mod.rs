@@ -11,6 +11,7 @@
 //! | `partial-volumes` | weights of full families, other cells, cost of the closed forms |
 //! | `convergence` | the studies of [SAND2015-7998] chapter 5 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
+//! | `horizons` | ways to change the horizon: ghost force, pairs, reflection, eight passes |
 //! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
@@ -19,7 +20,7 @@
 //! | `reflection` | what a seam sends back of a pulse |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
 //!
-//! A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
+//! `page.rs` writes what they found as `docs/verification.md`. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 
 pub mod balance;
 pub mod bar;
@@ -29,6 +30,8 @@ pub mod emmrich_weckner;
 pub mod enclosed;
 pub mod estimates;
 pub mod fields;
+pub mod horizons;
+pub mod page;
 pub mod partial_volumes;
 pub mod patch;
 pub mod reflection;
@@ -115,6 +118,11 @@ pub const SUITES: &[Suite] = &[
         name: "variable-horizon",
         about: "the bar of variable horizon, SAND2015-7998 section 7.2: accelerations under linear and quadratic fields",
         run: variable_horizon::run,
+    },
+    Suite {
+        name: "horizons",
+        about: "ways to change the horizon, published and ours: ghost force, reciprocity, reflection, eight passes of a wave",
+        run: horizons::run,
     },
     Suite {
         name: "spectrum",

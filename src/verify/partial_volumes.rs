@@ -7,13 +7,14 @@ use std::{f64::consts::PI, hint::black_box, time::Instant};
 use crate::{
     observe::report::{Columns, Row, Table},
     peridynamics::{
-        BoxCell, PartialVolume, TIE_TOLERANCE,
+        BoxCell, Micromodulus, PartialVolume, ShellTarget, TIE_TOLERANCE, isotropic_shell_factors,
         partial_volume::{
-            Hexahedron, SAND_LEVELS, SAND_SAMPLES_PER_EDGE, lattice_cells, subdivide_and_sample,
+            Hexahedron, SAND_LEVELS, SAND_SAMPLES_PER_EDGE, lattice_cells, lattice_shells,
+            subdivide_and_sample,
         },
     },
     progress::Progress,
-    tensor::Vector,
+    tensor::{Tensor4, Vector},
     verify::{Effort, convergence::norms::median},
 };
 
@@ -34,9 +35,64 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     add_sums::<1>(&mut sums, step);
     add_sums::<2>(&mut sums, step);
     add_sums::<3>(&mut sums, step);
-    let tables = vec![sums, partitions(), costs(effort)];
+    let mut tensors = Table::new(
+        "What partial volumes do to a bond-based lattice, lambda = c/|xi|^3: its elastic constants over the typed ones, and the factors that make it isotropic",
+        Columns::ByQuantity,
+    );
+    for ratio in [2.0, 3.0, 3.3, 6.0] {
+        add_tensors::<2>(&mut tensors, ratio);
+        add_tensors::<3>(&mut tensors, ratio);
+    }
+    let tables = vec![sums, tensors, partitions(), costs(effort)];
     progress.finish();
     tables
+}
+
+/// Plain and isotropic weights of a full lattice family.
+fn add_tensors<const D: usize>(table: &mut Table, ratio: f64) {
+    let kernel = Micromodulus::InverseDistance;
+    let typed = 3.0;
+    let constant = kernel.constant::<D>(ratio, typed);
+    for algorithm in PartialVolume::ALL {
+        let case = format!("{D}D delta/h = {ratio}, {algorithm:?}");
+        let (lattice, shares) = match lattice_shells::<D>(algorithm, ratio, TIE_TOLERANCE) {
+            Ok(found) => found,
+            Err(why) => {
+                table.push(Row::refused(case, "C1111 over typed", why.to_string()));
+                continue;
+            }
+        };
+        let base: Vec<f64> = lattice
+            .shells
+            .iter()
+            .zip(&shares)
+            .map(|(s, share)| constant * share * kernel.shape(s.length(1.0), ratio))
+            .collect();
+        let plain = lattice.fourth_moments(1.0, &base).scaled(0.5);
+        let (normal, across) = (plain.get(0, 0, 0, 0), plain.get(0, 0, 1, 1));
+        table.push(Row::info(&case, "C1111 over typed", normal / typed));
+        table.push(Row::info(&case, "C1122 over typed", 3.0 * across / typed));
+        let target = ShellTarget::Strength(2.0 * typed);
+        match isotropic_shell_factors(&lattice, 1.0, &base, target) {
+            Ok(factors) => {
+                let weighted: Vec<f64> = base.iter().zip(&factors).map(|(b, f)| b * f).collect();
+                let mut miss = lattice.fourth_moments(1.0, &weighted).scaled(0.5);
+                miss.add_scaled(-1.0, &Tensor4::isotropic(typed / 3.0, typed / 3.0));
+                let (least, most) = factors
+                    .iter()
+                    .fold((f64::INFINITY, 0.0f64), |(a, b), &f| (a.min(f), b.max(f)));
+                table.push(Row::info(&case, "smallest factor", least));
+                table.push(Row::info(&case, "largest factor", most));
+                table.push(Row::at_most(
+                    &case,
+                    "then off by",
+                    miss.amax() / typed,
+                    1e-12,
+                ));
+            }
+            Err(why) => table.push(Row::refused(&case, "then off by", why.to_string())),
+        }
+    }
 }
 
 fn ball<const D: usize>(radius: f64) -> f64 {

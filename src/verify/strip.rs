@@ -15,7 +15,7 @@ use crate::{
     },
     peridynamics::{
         BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
-        Micromodulus,
+        Micromodulus, PartialVolume,
     },
     progress::Silent,
     system::LinearMotion,
@@ -177,6 +177,7 @@ impl Strip {
                     origin: Vector::zeros(),
                 },
                 weights: BondWeights::Isotropic,
+                volumes: PartialVolume::Full,
                 barriers: Vec::new(),
                 voids: Vec::new(),
                 surfaces: Surfaces::Uncut,

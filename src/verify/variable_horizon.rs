@@ -24,7 +24,7 @@ use crate::{
         report::{Columns, Row, Table},
     },
     peridynamics::{
-        BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
+        BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid, PartialVolume,
         influence::{Alpha, Degree},
     },
     progress::Progress,
@@ -209,6 +209,7 @@ pub fn profile<const D: usize>(
                 }),
             },
             weights: BondWeights::Isotropic,
+            volumes: PartialVolume::Full,
             barriers: Vec::new(),
             voids: Vec::new(),
             surfaces: Surfaces::Uncut,
@@ -300,15 +301,15 @@ fn dimension<const D: usize>(
     laws: &[BarLaw],
     table: &mut Table,
     progress: &dyn Progress,
-) {
-    let mut counted = false;
+) -> Option<usize> {
+    let mut counted = None;
     for &law in laws {
         for model in [BarModel::PartialStress, BarModel::Standard] {
             let case = format!("{D}D {}, {}", law.name(), model.name());
             match profile::<D>(law, model, spacing, across, horizon, progress) {
                 Ok(p) => {
                     rows(&case, model, &p, table);
-                    if !std::mem::replace(&mut counted, true) {
+                    if counted.replace(p.bonds).is_none() {
                         table.push(Row::info(format!("{D}D"), "points", p.points as f64));
                         table.push(Row::info(format!("{D}D"), "bonds", p.bonds as f64));
                     }
@@ -320,6 +321,7 @@ fn dimension<const D: usize>(
             }
         }
     }
+    counted
 }
 
 /// The whole comparison: 1D and the axis of a bar in 3D, correspondence and LPS (in 3D only with full effort).
@@ -334,7 +336,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         Effort::Quick => &laws[..1],
         Effort::Full => &laws,
     };
-    dimension::<3>(SPACING_3D, ACROSS, laws, &mut table, progress);
+    let varying_bonds = dimension::<3>(SPACING_3D, ACROSS, laws, &mut table, progress);
     let constant = profile::<1>(
         BarLaw::Correspondence,
         BarModel::Standard,
@@ -355,7 +357,115 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             EXACT,
         ));
     }
-    vec![table]
+    vec![table, printed(&varying_bonds)]
+}
+
+/// What section 7.2 prints of its bar: numbers of bonds, and stable steps.
+fn printed(varying: &Option<usize>) -> Table {
+    let mut table = Table::new(
+        "[SAND2015-7998] section 7.2: bonds, stable steps, and the influence function of Algorithm 1",
+        Columns::Full,
+    );
+    let why = "the text gives neither length, section nor spacing of its bar; ours is 10 long, h = 0.05, 21 h wide";
+    let cells = [
+        (LENGTH / SPACING_3D).round() as i64,
+        ACROSS as i64,
+        ACROSS as i64,
+    ];
+    let constant = directed_bonds(cells, LARGE / SPACING_3D) as f64;
+    let add = |table: &mut Table, case: &str, quantity: &str, ours: f64, theirs: f64| {
+        let row = Row::info(case, quantity, ours).with_reference(theirs);
+        table.push(row.differs(why));
+    };
+    add(
+        &mut table,
+        "constant horizon",
+        "bonds, directed",
+        constant,
+        92.6e6,
+    );
+    if let Some(bonds) = varying {
+        let bonds = *bonds as f64;
+        add(
+            &mut table,
+            "varying horizon",
+            "bonds, directed",
+            bonds,
+            46.5e6,
+        );
+        add(
+            &mut table,
+            "both",
+            "varying over constant",
+            bonds / constant,
+            46.5 / 92.6,
+        );
+    }
+    // Silling and Askari: Δt = √(2ρ/Σ C V), C = 18 K/(π δ⁴ |ξ|), over a full family
+    let bulk = YOUNGS_MODULUS / 3.0;
+    let step = |horizon: f64| horizon * (DENSITY / (18.0 * bulk)).sqrt();
+    table.push(Row::within(
+        "constant horizon",
+        "stable step of a whole family of 0.25, delta sqrt(rho/(18 K)) [s]",
+        step(LARGE),
+        2.03e-5,
+        0.01,
+    ));
+    table.push(
+        Row::info(
+            "varying horizon",
+            "the same of our smallest horizon, 0.10 [s]",
+            step(SMALL),
+        )
+        .with_reference(7.15e-6)
+        .differs(
+            "figure 7.1a has no numbers; the printed steps belong to a smallest horizon of 0.088",
+        ),
+    );
+    let implied = LARGE * 7.15e-6 / 2.03e-5;
+    table.push(Row::info(
+        "varying horizon",
+        "smallest horizon that the printed steps imply [m]",
+        implied,
+    ));
+    let lattice = crate::peridynamics::LatticeFamily::<3>::new(12.0, 1e-6);
+    if let Ok(lattice) = lattice {
+        let sum: f64 = lattice
+            .shells
+            .iter()
+            .map(|s| {
+                let r = s.length(1.0);
+                s.offsets.len() as f64 * Influence::Gaussian.value(r, 12.0) * r * r
+            })
+            .sum();
+        table.push(Row::within(
+            "Gaussian of Algorithm 1",
+            "weighted volume, closed form over the sum of a lattice of m = 12",
+            Influence::Gaussian.weighted_volume::<3>(12.0) / sum,
+            1.0,
+            0.02,
+        ));
+    }
+    table
+}
+
+/// Directed bonds of a box of so many lattice points with one horizon, in spacings.
+fn directed_bonds(cells: [i64; 3], ratio: f64) -> i64 {
+    let reach = ratio * (1.0 + crate::peridynamics::TIE_TOLERANCE);
+    let n = reach.floor() as i64;
+    let mut bonds = 0;
+    for a in -n..=n {
+        for b in -n..=n {
+            for c in -n..=n {
+                let square = a * a + b * b + c * c;
+                if square > 0 && square as f64 <= reach * reach {
+                    let left = |count: i64, k: i64| (count - k.abs()).max(0);
+                    bonds += left(cells[0], a) * left(cells[1], b) * left(cells[2], c);
+                }
+            }
+        }
+    }
+    bonds
 }
 
 /// Draws figures 7.1a, 7.2 and 7.3 as `bar_horizon.svg`, `bar_linear.svg` and `bar_quadratic.svg`.

@@ -26,7 +26,7 @@ mod sampling;
 mod volume;
 
 pub use hexahedron::Hexahedron;
-pub use lattice::{LatticeCell, lattice_cells};
+pub use lattice::{LatticeCell, lattice_cells, lattice_shells, orbit};
 pub use sampling::{SAND_LEVELS, SAND_SAMPLES_PER_EDGE, subdivide_and_sample};
 
 use crate::tensor::Vector;

@@ -172,6 +172,10 @@ pub struct PeridynamicsSpec {
     /// Bond weights.
     #[serde(default)]
     pub weights: WeightsSpec,
+    /// What share of a cell counts that the horizon cuts (SAND2015-7998 section 5.2.1); all but "full" need `points.lattice` and a scene at rest.
+    #[serde(default)]
+    #[schemars(with = "Option<VolumesSpec>")]
+    pub volumes: Option<toml::Spanned<VolumesSpec>>,
     /// Influence function of state-based laws; `{ degree = 3, alpha = 0 }` if left out.
     #[serde(default)]
     pub influence: Option<InfluenceSpec>,
@@ -198,6 +202,21 @@ pub enum WeightsSpec {
     Plain,
     /// Fitted family by family to the typed elastic constants; for points that are no lattice.
     Fitted,
+}
+
+/// Partial volumes of the cells that the horizon cuts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum VolumesSpec {
+    /// A cell counts wholly if its point lies within the horizon (FL, FA, FV).
+    #[default]
+    Full,
+    /// A linear ramp over the last half spacing within the horizon.
+    Pdlammps,
+    /// The ramp of Hu, Ha and Bobaru, which goes on to half a spacing beyond the horizon.
+    Hhb,
+    /// The length, area or volume itself that the horizon cuts from the cell.
+    Exact,
 }
 
 /// Where the peridynamic points are.

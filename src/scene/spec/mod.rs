@@ -20,7 +20,8 @@ pub use coupling::{
 };
 pub use material::{
     BondBasedSpec, CorrespondenceSpec, InfluenceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec,
-    PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec, WeightsSpec,
+    PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec, VolumesSpec,
+    WeightsSpec,
 };
 pub use mesh::{
     AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,

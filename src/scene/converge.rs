@@ -1,0 +1,599 @@
+//! One scene at several refinements: δ-, m- and δm-convergence, measured by the differences between one level and the next.
+
+use std::path::Path;
+
+use super::{
+    AnyScene, RunError, Scene, SceneError, SceneErrorKind, SceneSpec, Solved, Source, solve_with,
+    spec::{AxisSpec, MeshSpec, PointsSpec},
+};
+use crate::{
+    coupling::Sampler,
+    observe::{
+        ObserveError,
+        csv::{CsvTable, Entry},
+        figure::{LinePlot, Scale, Series, Stroke},
+        report::{Columns, Row, Table},
+    },
+    progress::Progress,
+    tensor::{Vector, padded},
+};
+
+/// What shrinks from level to level. Source: \[Bobaru2009\] section 3.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refinement {
+    /// δ-convergence: the horizon and the spacing shrink together, `m = δ/h` stays.
+    Delta,
+    /// m-convergence: the spacing shrinks under a fixed horizon.
+    M,
+    /// δm-convergence: the spacing shrinks by the factor, the horizon by its square root, so that `m` grows.
+    DeltaM,
+}
+
+impl Refinement {
+    /// Powers of the factor by which horizon and spacing shrink.
+    fn powers(self) -> (f64, f64) {
+        match self {
+            Self::Delta => (1.0, 1.0),
+            Self::M => (0.0, 1.0),
+            Self::DeltaM => (0.5, 1.0),
+        }
+    }
+
+    /// Its name, in tables and in the names of files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Delta => "delta-convergence",
+            Self::M => "m-convergence",
+            Self::DeltaM => "delta-m-convergence",
+        }
+    }
+}
+
+/// A study of one scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConvergeParams {
+    /// What shrinks.
+    pub refinement: Refinement,
+    /// Number of levels, the scene itself the first; at least 2, and 3 for an order.
+    pub levels: usize,
+    /// By how much from level to level, more than 1.
+    pub factor: f64,
+}
+
+/// One level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// Its horizon \[m\].
+    pub horizon: f64,
+    /// Spacing of its points, or without points the mean size of its cells \[m\].
+    pub spacing: f64,
+    /// Degrees of freedom.
+    pub dofs: usize,
+    /// Root mean square, over the samples, of the difference from the next level's displacement, relative to the last level's displacement.
+    pub difference: Option<f64>,
+    /// The largest difference at a sample, relative to the largest displacement.
+    pub largest: Option<f64>,
+}
+
+/// What a study gave.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Converged {
+    /// What shrank.
+    pub refinement: Refinement,
+    /// The levels, coarse to fine.
+    pub levels: Vec<Level>,
+    /// Samples at which every level has a displacement.
+    pub samples: usize,
+}
+
+/// Why there is no study.
+#[derive(Debug, thiserror::Error)]
+pub enum ConvergeError {
+    /// The scene.
+    #[error("{}", .0.message())]
+    Scene(Box<SceneError>),
+    /// A level.
+    #[error("level {level}: {source}")]
+    Run {
+        /// Its number, the scene itself is 0.
+        level: usize,
+        /// Why.
+        source: Box<RunError>,
+    },
+    /// The numbers of the study.
+    #[error(
+        "convergence: {levels} levels of factor {factor}; use at least 2 levels and a factor above 1"
+    )]
+    Params {
+        /// Levels asked for.
+        levels: usize,
+        /// Factor asked for.
+        factor: f64,
+    },
+    /// A scene in time, or under a load that grows.
+    #[error(
+        "convergence: the scene moves, and states at different times are not compared; leave out `solve`, or set --set solve=static"
+    )]
+    Moves,
+    /// No sample lies in every level's body.
+    #[error(
+        "convergence: no sample lies in the body of every level; use a larger body or finer points"
+    )]
+    Samples,
+}
+
+/// Differences at or below this are round-off of the solutions; orders are not made of them.
+const ROUND_OFF: f64 = 1e-9;
+
+/// Runs a scene at every level and compares displacements at fixed samples; nothing is written.
+///
+/// The horizon must be a constant; generated meshes are refined with the points, a mesh from a file stays. Zones given in horizons follow the
+/// horizon. Samples are the sites of the first level. Where the sites of finer levels include them (a lattice on the nodes of the mesh, a whole
+/// factor), nothing is interpolated; elsewhere in a lattice an affine fit is, whose own error is of the second order in the spacing.
+///
+/// # Errors
+/// [`ConvergeError`].
+pub fn converge(
+    path: &Path,
+    overrides: &[String],
+    params: &ConvergeParams,
+    progress: &dyn Progress,
+) -> Result<Converged, ConvergeError> {
+    let (levels, factor) = (params.levels, params.factor);
+    if levels < 2 || factor.is_nan() || factor <= 1.0 {
+        return Err(ConvergeError::Params { levels, factor });
+    }
+    let scene_error = |e: SceneError| ConvergeError::Scene(Box::new(e));
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        scene_error(SceneError::new(
+            SceneErrorKind::File,
+            format!(
+                "cannot read the scene {}: {error}; check the path",
+                path.display()
+            ),
+        ))
+    })?;
+    let mut source = Source::new(path.display().to_string(), text);
+    for o in overrides {
+        source.push_override(o).map_err(scene_error)?;
+    }
+    let spec = SceneSpec::parse(&source).map_err(scene_error)?;
+    let directory = path.parent().unwrap_or(Path::new(""));
+    let mut solved: Vec<Snapshot> = Vec::new();
+    let mut positions = Vec::new();
+    for level in 0..levels {
+        let mut source = source.clone();
+        if level > 0 {
+            let (delta, h) = params.refinement.powers();
+            let shrink = |power: f64| factor.powf(-power * level as f64);
+            for o in refined(&spec, shrink(delta), shrink(h)).map_err(scene_error)? {
+                source.push_override(&o).map_err(scene_error)?;
+            }
+        }
+        let scene = AnyScene::from_source(&source, directory, "converge").map_err(scene_error)?;
+        if scene.moves() {
+            return Err(ConvergeError::Moves);
+        }
+        let snapshot = match scene {
+            AnyScene::Bar(s) => snapshot(*s, &mut positions, progress),
+            AnyScene::Plane(s) => snapshot(*s, &mut positions, progress),
+            AnyScene::Solid(s) => snapshot(*s, &mut positions, progress),
+        };
+        solved.push(snapshot.map_err(|e| ConvergeError::Run {
+            level,
+            source: Box::new(e),
+        })?);
+    }
+    compare(params.refinement, &solved)
+}
+
+/// The overrides that make a level of the scene.
+fn refined(spec: &SceneSpec, delta: f64, h: f64) -> Result<Vec<String>, SceneError> {
+    let mut overrides = Vec::new();
+    let Some(pd) = &spec.peridynamics else {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            "the scene has no [peridynamics], hence no horizon to refine with",
+        ));
+    };
+    let Some(horizon) = pd.horizon.as_constant() else {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            "`peridynamics.horizon` varies in space; a study of convergence needs one number",
+        ));
+    };
+    overrides.push(format!("peridynamics.horizon={:e}", horizon * delta));
+    let (shape, axes) = match &spec.mesh {
+        MeshSpec::Line(m) => ("line", vec![("x", m.x.get_ref())]),
+        MeshSpec::Rectangle(m) => (
+            "rectangle",
+            vec![("x", m.x.get_ref()), ("y", m.y.get_ref())],
+        ),
+        MeshSpec::Box(m) => (
+            "box",
+            vec![
+                ("x", m.x.get_ref()),
+                ("y", m.y.get_ref()),
+                ("z", m.z.get_ref()),
+            ],
+        ),
+        MeshSpec::File(_) => ("", Vec::new()),
+    };
+    // a whole number of cells cannot shrink by any factor: points follow the mesh, or they would leave its nodes
+    let mut shrunk = h;
+    for (axis, division) in axes.into_iter().rev() {
+        overrides.push(match division {
+            AxisSpec::Cells(n) => {
+                let cells = (n.value as f64 / h).round();
+                shrunk = n.value as f64 / cells;
+                format!("mesh.{shape}.{axis}.cells={cells}")
+            }
+            AxisSpec::Spacing(s) => format!("mesh.{shape}.{axis}.spacing={:e}", s.value * h),
+            AxisSpec::Graded(g) => {
+                format!(
+                    "mesh.{shape}.{axis}.graded.spacing={:e}",
+                    g.spacing.value * h
+                )
+            }
+        });
+    }
+    if let PointsSpec::Lattice(lattice) = &pd.points {
+        let spacing = lattice.spacing.value * shrunk;
+        overrides.push(format!("peridynamics.points.lattice.spacing={spacing:e}"));
+    }
+    Ok(overrides)
+}
+
+/// Displacements of one level at the samples.
+struct Snapshot {
+    horizon: f64,
+    spacing: f64,
+    dofs: usize,
+    samples: Vec<Option<[f64; 3]>>,
+}
+
+/// At most so many samples are compared; of more sites, every so many.
+const MOST_SAMPLES: usize = 20_000;
+
+/// Solves a level and takes its displacement at `positions`, which the first level fills with its own sites.
+fn snapshot<const D: usize>(
+    scene: Scene<D>,
+    positions: &mut Vec<[f64; 3]>,
+    progress: &dyn Progress,
+) -> Result<Snapshot, RunError> {
+    let (low, high) = scene.mesh.bounds();
+    let horizon = scene.horizon_at(&((low + high) * 0.5));
+    let cell = ((high - low).product() / scene.mesh.cell_count() as f64).powf(1.0 / D as f64);
+    let mut snapshot = Snapshot {
+        horizon,
+        spacing: 0.0,
+        dofs: 0,
+        samples: Vec::new(),
+    };
+    solve_with(scene, progress, |_, solved: &Solved<'_, D>| {
+        let sampler = Sampler::new(solved.model);
+        let points = solved.model.spacing();
+        snapshot.spacing = if points > 0.0 { points } else { cell };
+        snapshot.dofs = solved.displacement.len();
+        if positions.is_empty() {
+            let sites = &solved.model.sites;
+            let every = sites.len().div_ceil(MOST_SAMPLES).max(1);
+            positions.extend(sites.iter().step_by(every).map(|s| padded(&s.position)));
+        }
+        snapshot.samples = positions
+            .iter()
+            .map(|x| {
+                let x = Vector::from_fn(|a, _| x[a]);
+                let u = sampler.displacement(&x, solved.displacement)?;
+                Some(padded(&u))
+            })
+            .collect();
+        Ok(Vec::new())
+    })?;
+    Ok(snapshot)
+}
+
+fn compare(refinement: Refinement, solved: &[Snapshot]) -> Result<Converged, ConvergeError> {
+    let Some(last) = solved.last() else {
+        return Err(ConvergeError::Samples);
+    };
+    let common: Vec<usize> = (0..last.samples.len())
+        .filter(|&k| solved.iter().all(|s| s.samples[k].is_some()))
+        .collect();
+    if common.is_empty() {
+        return Err(ConvergeError::Samples);
+    }
+    let at = |s: &Snapshot, k: usize| s.samples[k].unwrap_or_default();
+    let square = |u: [f64; 3]| u.iter().map(|c| c * c).sum::<f64>();
+    let (mut scale, mut most) = (0.0, 0.0f64);
+    for &k in &common {
+        let s = square(at(last, k));
+        scale += s;
+        most = most.max(s);
+    }
+    let levels = solved
+        .iter()
+        .enumerate()
+        .map(|(l, s)| {
+            let differences = solved.get(l + 1).map(|next| {
+                let (mut sum, mut largest) = (0.0, 0.0f64);
+                for &k in &common {
+                    let (a, b) = (at(s, k), at(next, k));
+                    let d = square([a[0] - b[0], a[1] - b[1], a[2] - b[2]]);
+                    sum += d;
+                    largest = largest.max(d);
+                }
+                ((sum / scale).sqrt(), (largest / most).sqrt())
+            });
+            Level {
+                horizon: s.horizon,
+                spacing: s.spacing,
+                dofs: s.dofs,
+                difference: differences.map(|d| d.0),
+                largest: differences.map(|d| d.1),
+            }
+        })
+        .collect();
+    Ok(Converged {
+        refinement,
+        levels,
+        samples: common.len(),
+    })
+}
+
+impl Converged {
+    /// What is plotted along x: the spacing, or the horizon where it shrinks.
+    fn size(&self, level: &Level) -> f64 {
+        match self.refinement {
+            Refinement::M => level.spacing,
+            Refinement::Delta | Refinement::DeltaM => level.horizon,
+        }
+    }
+
+    /// Observed orders, from each level that has two finer ones; `None` where differences are round-off.
+    ///
+    /// An error that falls like `size^p` leaves differences that do, so that `p = ln(d_k/d_(k+1))/ln(size_k/size_(k+1))`.
+    pub fn orders(&self) -> Vec<Option<f64>> {
+        self.levels
+            .windows(2)
+            .filter_map(|w| Some((w[0].difference?, w[1].difference?, w)))
+            .map(|(coarse, fine, w)| {
+                (coarse > ROUND_OFF && fine > ROUND_OFF)
+                    .then(|| (coarse / fine).ln() / (self.size(&w[0]) / self.size(&w[1])).ln())
+            })
+            .collect()
+    }
+
+    /// The levels as a table.
+    pub fn table(&self) -> Table {
+        let mut table = Table::new(
+            format!(
+                "{}: displacement against the next level, {} samples",
+                self.refinement.name(),
+                self.samples
+            ),
+            Columns::ByQuantity,
+        );
+        let orders = self.orders();
+        for (l, level) in self.levels.iter().enumerate() {
+            let case = format!("level {l}");
+            table.push(Row::info(&case, "horizon [m]", level.horizon));
+            table.push(Row::info(&case, "spacing [m]", level.spacing));
+            table.push(Row::info(&case, "m", level.horizon / level.spacing));
+            table.push(Row::info(&case, "unknowns", level.dofs as f64));
+            if let (Some(d), Some(largest)) = (level.difference, level.largest) {
+                table.push(Row::info(&case, "difference, L2 over samples", d));
+                table.push(Row::info(&case, "difference, max", largest));
+            }
+            match orders.get(l) {
+                Some(Some(p)) => table.push(Row::info(&case, "observed order", *p)),
+                Some(None) => table.push(Row::refused(
+                    &case,
+                    "observed order",
+                    "levels agree to round-off",
+                )),
+                None => {}
+            }
+        }
+        table
+    }
+
+    /// Writes one line per level; what a level lacks is empty.
+    ///
+    /// # Errors
+    /// [`ObserveError`], with the path.
+    pub fn write_csv(&self, path: &Path) -> Result<(), ObserveError> {
+        let header = [
+            "level",
+            "horizon",
+            "spacing",
+            "m",
+            "unknowns",
+            "difference_l2",
+            "difference_max",
+            "order",
+        ];
+        let mut table = CsvTable::create(path, &header)?;
+        let entry = |value: Option<f64>| value.map_or(Entry::from(""), Entry::from);
+        let orders = self.orders();
+        for (l, level) in self.levels.iter().enumerate() {
+            table.entries(&[
+                (l as i64).into(),
+                level.horizon.into(),
+                level.spacing.into(),
+                (level.horizon / level.spacing).into(),
+                (level.dofs as i64).into(),
+                entry(level.difference),
+                entry(level.largest),
+                entry(orders.get(l).copied().flatten()),
+            ])?;
+        }
+        Ok(())
+    }
+
+    /// The differences over the size, both axes logarithmic.
+    pub fn plot(&self) -> LinePlot {
+        let series = |name: &str, f: fn(&Level) -> Option<f64>| {
+            let points = self
+                .levels
+                .iter()
+                .filter_map(|l| Some((self.size(l), f(l)?)));
+            Series::new(name, Stroke::LineAndDots, points.collect())
+        };
+        LinePlot {
+            title: self.refinement.name().to_owned(),
+            x_label: match self.refinement {
+                Refinement::M => "spacing [m]".to_owned(),
+                Refinement::Delta | Refinement::DeltaM => "horizon [m]".to_owned(),
+            },
+            y_label: "difference from the next level".to_owned(),
+            x_scale: Scale::Log,
+            y_scale: Scale::Log,
+            series: vec![
+                series("L2 over samples", |l| l.difference),
+                series("max", |l| l.largest),
+            ],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+
+    fn snapshot(spacing: f64, error: f64) -> Snapshot {
+        Snapshot {
+            horizon: 3.0 * spacing,
+            spacing,
+            dofs: 1,
+            samples: vec![Some([1.0 + error, 0.0, 0.0]), None, Some([2.0, error, 0.0])],
+        }
+    }
+
+    #[test]
+    fn orders_of_a_power_law_are_its_power() {
+        let levels: Vec<Snapshot> = [0.4, 0.2, 0.1, 0.05]
+            .map(|h: f64| snapshot(h, 0.1 * h.powf(1.5)))
+            .into();
+        let found = compare(Refinement::M, &levels).unwrap();
+        assert_eq!(found.samples, 2);
+        for p in found.orders() {
+            assert!((p.unwrap() - 1.5).abs() < 1e-12);
+        }
+        let same = [snapshot(0.4, 0.0), snapshot(0.2, 0.0), snapshot(0.1, 0.0)];
+        assert_eq!(compare(Refinement::M, &same).unwrap().orders(), [None]);
+    }
+
+    /// A bar of peridynamics under a body force, held over a layer at both ends.
+    const BAR: &str = r#"
+kinematics = "bar"
+coupling = "nonlocal"
+[mesh.line]
+min = 0
+max = 1
+x = { cells = 40 }
+[materials.bar.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = 0.1
+points = "cells"
+weights = "plain"
+influence = { degree = 3, alpha = 0 }
+[conditions.left.displacement]
+on = "left"
+x = 0
+[conditions.right.displacement]
+on = "right"
+x = 0
+[conditions.pull.body-force]
+x = "1+x"
+"#;
+
+    fn study(
+        text: &str,
+        refinement: Refinement,
+        levels: usize,
+        overrides: &[&str],
+    ) -> Result<Converged, ConvergeError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bar.toml");
+        std::fs::write(&path, text).unwrap();
+        let overrides: Vec<String> = overrides.iter().map(|&o| o.to_owned()).collect();
+        let params = ConvergeParams {
+            refinement,
+            levels,
+            factor: 2.0,
+        };
+        converge(&path, &overrides, &params, &Silent)
+    }
+
+    #[test]
+    fn a_scene_is_refined_as_asked() {
+        let m = study(BAR, Refinement::M, 3, &[]).unwrap();
+        let spacing: Vec<f64> = m.levels.iter().map(|l| l.spacing).collect();
+        for (h, wanted) in spacing.iter().zip([0.025, 0.0125, 0.00625]) {
+            assert!((h / wanted - 1.0).abs() < 1e-9, "{spacing:?}");
+        }
+        assert!(m.levels.iter().all(|l| (l.horizon - 0.1).abs() < 1e-15));
+        let delta = study(BAR, Refinement::Delta, 3, &[]).unwrap();
+        let ratio = |l: &Level| l.horizon / l.spacing;
+        assert!(delta.levels.iter().all(|l| (ratio(l) - 4.0).abs() < 1e-9));
+        // a lattice keeps to the nodes of a mesh whose cells cannot shrink by just that factor
+        let lattice = ["peridynamics.points.lattice={spacing=0.025, origin=[0]}"];
+        let both = study(BAR, Refinement::DeltaM, 2, &lattice).unwrap();
+        assert!((both.levels[1].spacing / 0.0125 - 1.0).abs() < 1e-9);
+        assert!((both.levels[1].horizon / (0.1 / 2.0f64.sqrt()) - 1.0).abs() < 1e-9);
+        let varying = ["peridynamics.horizon=\"0.1+0.01*x\""];
+        let varying = study(BAR, Refinement::Delta, 3, &varying).unwrap_err();
+        assert!(varying.to_string().contains("varies in space"));
+        let few = study(BAR, Refinement::M, 1, &[]).unwrap_err();
+        assert!(matches!(few, ConvergeError::Params { .. }));
+    }
+
+    #[test]
+    fn levels_that_are_exact_have_no_order() {
+        // linear elements of a bar are exact at their nodes under any force
+        let found = study(BAR, Refinement::M, 3, &["coupling=local"]).unwrap();
+        assert_eq!(found.orders(), [None]);
+        assert!(found.table().text().contains("round-off"));
+    }
+
+    #[test]
+    fn the_raw_triangular_bar_converges_as_its_stiffness() {
+        // raw midpoint weights of the triangular micromodulus have 1 - 1/m^2 of the stiffness; u = x^2 in layers of one horizon at both ends, and
+        // under that curvature's force the error is 1/(1 - 1/m^2) - 1 times one and the same parabola, up to a spacing of its width
+        let layers = BAR
+            .replace("on = \"left\"", "inside.box = { min = 0, max = 0.101 }")
+            .replace("on = \"right\"", "inside.box = { min = 0.899, max = 1 }")
+            .replace("\nx = 0\n", "\nx = \"x^2\"\n")
+            .replace("\"1+x\"", "-2");
+        let overrides = [
+            "peridynamics.points.lattice={spacing=0.025, origin=[0]}",
+            "materials.bar.bond-based.micromodulus=triangular",
+        ];
+        let found = study(&layers, Refinement::M, 4, &overrides).unwrap();
+        let defect = |l: i32| 1.0 / (1.0 - 1.0 / (4.0 * 2.0f64.powi(l)).powi(2)) - 1.0;
+        for (l, order) in found.orders().into_iter().enumerate() {
+            let l = l as i32;
+            let wanted = ((defect(l) - defect(l + 1)) / (defect(l + 1) - defect(l + 2))).log2();
+            assert!((order.unwrap() - wanted).abs() < 0.15, "{order:?}");
+        }
+    }
+
+    #[test]
+    fn a_study_leaves_one_line_per_level() {
+        let levels: Vec<Snapshot> = [0.4, 0.2, 0.1].map(|h: f64| snapshot(h, 0.1 * h)).into();
+        let found = compare(Refinement::M, &levels).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("study.csv");
+        found.write_csv(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+        assert!(lines.len() == 4 && lines.iter().all(|l| l.len() == 8));
+        let value = |l: usize, c: usize| lines[l][c].parse::<f64>().ok();
+        assert_eq!(value(1, 2), Some(0.4));
+        assert!((value(1, 7).unwrap() - 1.0).abs() < 1e-4);
+        assert_eq!((value(2, 7), value(3, 5)), (None, None));
+    }
+}
