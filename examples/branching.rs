@@ -14,6 +14,9 @@ use shared::{Columns, Failure, argument, run};
 
 mod shared;
 
+/// Runs of each model, of which the fastest counts.
+const TURNS: usize = 3;
+
 /// What a run tells.
 struct Crack {
     time: f64,
@@ -87,16 +90,22 @@ fn crack(name: &str, overrides: &[&str], output: &std::path::Path) -> Result<Cra
 
 fn tables() -> Result<Vec<Table>, Failure> {
     let output = PathBuf::from(argument("--output").unwrap_or("out/branching".into()));
-    let full = crack("full", &["coupling=nonlocal"], &output)?;
+    // in turn, so that what else the machine does meets both; the least disturbed run of each tells its time
+    let (name, pure): (_, &[&str]) = ("truncated", &["coupling=nonlocal"]);
+    let (mut full, mut coupled) = (crack("full", pure, &output)?, crack(name, &[], &output)?);
+    for _ in 1..TURNS {
+        full.seconds = full.seconds.min(crack("full", pure, &output)?.seconds);
+        coupled.seconds = coupled.seconds.min(crack(name, &[], &output)?.seconds);
+    }
     let mut table = Table::new(
         "branching, coupled against full PD",
         report::Columns::default(),
     );
     let mut series = vec![];
-    let name = "full PD";
-    table.push(Row::info(name, "branch point, mm", full.point * 1e3));
-    table.push(Row::info(name, "branch time, us", full.time * 1e6));
-    table.push(Row::info(name, "dissipated energy, J/m", full.dissipated));
+    let alone = "full PD";
+    table.push(Row::info(alone, "branch point, mm", full.point * 1e3));
+    table.push(Row::info(alone, "branch time, us", full.time * 1e6));
+    table.push(Row::info(alone, "dissipated energy, J/m", full.dissipated));
     let mut paths = |name: &str, crack: &Crack, stroke| {
         for (half, path) in ["upper", "lower"].iter().zip(&crack.paths) {
             let path = path.iter().map(|p| (p.0 * 1e3, p.1 * 1e3)).collect();
@@ -104,8 +113,6 @@ fn tables() -> Result<Vec<Table>, Failure> {
         }
     };
     paths("full PD", &full, Stroke::Dashed);
-    let name = "truncated";
-    let coupled = crack(name, &[], &output)?;
     paths(name, &coupled, Stroke::Line);
     let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0).abs();
     table.push(Row::at_most(

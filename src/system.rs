@@ -59,6 +59,21 @@ pub trait Dynamic: Send + Sync {
     /// For every unknown an upper bound of `Σ_b |K_ab|`, with the tangent at rest.
     fn row_sums(&self) -> Vec<f64>;
 
+    /// Upper bound of what forces that rest does not show (contact) may add to the eigenvalues of `M⁻¹ K` \[1/s²\].
+    fn hidden_rate(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether the tangent of each site, its row and its column, never changes; none does if the system does not know.
+    fn unbreakable(&self) -> Vec<bool> {
+        vec![false; self.mass().len()]
+    }
+
+    /// Rows of the tangent at rest, in the order of `sites`: those of [`Dynamic::unbreakable`] sites and of sites that these are columns of.
+    fn tangent_rows(&self, _sites: &[u32]) -> BlockCsr {
+        BlockCsr::default()
+    }
+
     /// Whether the tangent is symmetric, so that there is an energy to conserve.
     fn symmetry(&self) -> Symmetry;
 
@@ -122,6 +137,25 @@ impl Dynamic for LinearMotion {
 
     fn row_sums(&self) -> Vec<f64> {
         self.stiffness.row_sums()
+    }
+
+    fn unbreakable(&self) -> Vec<bool> {
+        vec![true; self.mass.len()]
+    }
+
+    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
+        let mut rows = BlockCsr {
+            block: self.stiffness.block,
+            row_offsets: vec![0],
+            ..BlockCsr::default()
+        };
+        for &site in sites {
+            let (columns, blocks) = self.stiffness.row(site as usize);
+            rows.columns.extend(columns);
+            rows.values.extend(blocks);
+            rows.row_offsets.push(rows.columns.len());
+        }
+        rows
     }
 
     fn symmetry(&self) -> Symmetry {

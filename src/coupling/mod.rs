@@ -12,7 +12,7 @@
 //! | `model.rs` | shared: sites, families, what completes them | |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
-//! | `motion.rs` | a model that moves: bonds that stretch and break beside the rows of the rest | |
+//! | `motion.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
 //! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
@@ -138,6 +138,11 @@ pub trait Operator<const D: usize>: Sync {
 
     /// Whether the row of a site is that of the peridynamic body alone, all of its bonds whole: only there may bonds be geometrically exact, and break.
     fn is_body_row(&self, _site: usize) -> bool {
+        false
+    }
+
+    /// Whether the row of a site, not that of the body alone, holds the bonds of the body among its other terms: a motion then passes over them, and the rest stays a row.
+    fn has_body_bonds(&self, _site: usize) -> bool {
         false
     }
 

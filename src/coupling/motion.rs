@@ -7,9 +7,10 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use self::{energy::ElementEnergy, rows::SiteRows};
 use crate::{
     assembly::{self, Transfer},
-    coupling::{CellRole, Model, Operator, SiteKind},
+    coupling::{Model, Operator, SiteKind},
     fem,
     peridynamics::{
         BondEnergy, PdBody,
@@ -22,6 +23,9 @@ use crate::{
     system::{BlockCsr, Breakage, Dynamic, Symmetry},
     tensor::Vector,
 };
+
+mod energy;
+mod rows;
 
 #[cfg(test)]
 #[path = "motion_tests.rs"]
@@ -77,8 +81,10 @@ pub struct Motion<'a, const D: usize> {
     model: &'a Model<D>,
     symmetry: Symmetry,
     mass: Vec<f64>,
-    /// Rows of all sites but those of the body alone.
-    linear: BlockCsr,
+    /// Rows of all sites but those of the body alone; of sites that share the body's bonds, what is left of them.
+    linear: SiteRows,
+    /// Their products, kept between passes.
+    products: Vec<f64>,
     body: Option<MovingBody<D>>,
     energy: ElementEnergy,
 }
@@ -94,8 +100,10 @@ struct MovingBody<const D: usize> {
     /// All points follow this many sites later, if they do.
     shift: Option<usize>,
     transfer: Transfer,
-    /// Sites whose row is that of the body alone, with their points.
-    rows: Vec<(u32, u32)>,
+    /// For each site the point whose force from the bonds it takes; `NONE` for a site that takes none.
+    bonds_of_site: Vec<u32>,
+    /// Sites whose row is that of the body alone.
+    alone: usize,
     /// Points at the edge of the region where bonds can break, none if nothing can.
     edge: Vec<u32>,
     displacement: Vec<f64>,
@@ -119,18 +127,16 @@ impl<'a, const D: usize> Motion<'a, D> {
     ) -> Result<Self, MotionError> {
         let sites = model.sites.len();
         let body = MovingBody::new(model, operator, behaviour)?;
-        let mut in_body = vec![false; sites];
-        if let Some(body) = &body {
-            for &(site, _) in &body.rows {
-                in_body[site as usize] = true;
-            }
-        }
-        let linear = assembly::assemble(
+        let linear = SiteRows::assemble(
             sites,
-            |_| (),
+            |site| !operator.is_body_row(site),
             |site, row| {
-                if !in_body[site] {
-                    operator.add_row(site, row);
+                operator.add_row(site, row);
+                if let (true, Some((body, point))) =
+                    (operator.has_body_bonds(site), model.point_of(site))
+                {
+                    // the bonds are passed over anyway
+                    row.subtract(|row| body.add_force_row(point, |_| -1.0, row));
                 }
             },
         );
@@ -141,6 +147,7 @@ impl<'a, const D: usize> Motion<'a, D> {
             symmetry,
             mass,
             linear,
+            products: Vec::new(),
             body,
             energy,
         })
@@ -153,10 +160,10 @@ impl<'a, const D: usize> Motion<'a, D> {
 
     /// Bytes held by rows and bonds.
     pub fn memory_bytes(&self) -> usize {
-        let rows = self.linear.values.len() * 8 + self.linear.columns.len() * 4;
-        rows + self.body.as_ref().map_or(0, |b| {
-            b.pass.memory_bytes() + (b.displacement.len() + b.force.len()) * 8
-        })
+        self.linear.memory_bytes()
+            + self.body.as_ref().map_or(0, |b| {
+                b.pass.memory_bytes() + (b.displacement.len() + b.force.len()) * 8
+            })
     }
 }
 
@@ -185,14 +192,16 @@ impl<const D: usize> MovingBody<D> {
         };
         let points = body.cloud.position.len();
         let mut site_of_point = vec![NONE; points];
-        let mut rows = Vec::new();
+        let mut bonds_of_site = vec![NONE; model.sites.len()];
         let mut own_row = vec![false; points];
         for (site, s) in model.sites.iter().enumerate() {
             if let SiteKind::Point(point) = s.kind {
                 site_of_point[point as usize] = site as u32;
                 if operator.is_body_row(site) {
                     own_row[point as usize] = true;
-                    rows.push((site as u32, point));
+                }
+                if operator.is_body_row(site) || operator.has_body_bonds(site) {
+                    bonds_of_site[site] = point;
                 }
             }
         }
@@ -267,7 +276,8 @@ impl<const D: usize> MovingBody<D> {
             site_of_point,
             shift,
             transfer: body.cloud.transfer.clone(),
-            rows,
+            bonds_of_site,
+            alone: own_row.iter().filter(|own| **own).count(),
             edge,
             displacement: vec![0.0; points * D],
             force: vec![0.0; points * D],
@@ -296,13 +306,6 @@ impl<const D: usize> MovingBody<D> {
                 }
             });
     }
-
-    /// Writes the forces of the points into those of their sites.
-    fn gather(&self, points: &[f64], force: &mut [f64]) {
-        for &(site, point) in &self.rows {
-            force[site as usize * D..][..D].copy_from_slice(&points[point as usize * D..][..D]);
-        }
-    }
 }
 
 /// `c` of `f = c s`, the largest of the bonds of the point with the most of them.
@@ -326,8 +329,11 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     }
 
     fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
-        self.linear.multiply_into(u, force);
-        let Some(body) = &mut self.body else { return 0 };
+        let Some(body) = &mut self.body else {
+            self.linear
+                .multiply_into::<D>(u, None, &mut self.products, force);
+            return 0;
+        };
         let mut points = std::mem::take(&mut body.displacement);
         body.spread(u, &mut points);
         let broken = body.pass.force_into(&points, &mut body.force, breakage);
@@ -339,22 +345,27 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 .add_force(&points, &|i, j| pass.bonded(i, j), &mut body.force);
         }
         body.displacement = points;
-        body.gather(&body.force, force);
+        let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
+        self.linear
+            .multiply_into::<D>(u, bonds, &mut self.products, force);
         broken
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
-        self.linear.multiply_into(x, y);
-        let Some(body) = &self.body else { return };
+        let Some(body) = &self.body else {
+            self.linear.multiply_into::<D>(x, None, &mut Vec::new(), y);
+            return;
+        };
         let mut points = vec![0.0; body.displacement.len()];
         let mut force = points.clone();
         body.spread(x, &mut points);
         body.pass.tangent_into(&points, &mut force);
-        body.gather(&force, y);
+        let bonds = Some((&body.bonds_of_site[..], &force[..]));
+        self.linear.multiply_into::<D>(x, bonds, &mut Vec::new(), y);
     }
 
     fn row_sums(&self) -> Vec<f64> {
-        let mut sums = self.linear.row_sums();
+        let mut sums = self.linear.row_sums::<D>();
         let Some(body) = &self.body else { return sums };
         let points = body.pass.row_sums();
         // a point that follows sites spreads its column over them: at most the sum of its weights' sizes
@@ -365,13 +376,58 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             .contact
             .as_ref()
             .map(|c| c.lock().unwrap_or_else(PoisonError::into_inner));
-        for &(site, point) in &body.rows {
-            let touching = contact.as_ref().map_or(0.0, |c| c.row_sum(point as usize));
-            for k in 0..D {
-                sums[site as usize * D + k] = points[point as usize * D + k] * spread + touching;
+        for (sums, &point) in sums.chunks_exact_mut(D).zip(&body.bonds_of_site) {
+            if point == NONE {
+                continue;
+            }
+            let point = point as usize;
+            let touching = contact.as_ref().map_or(0.0, |c| c.row_sum(point));
+            for (sum, of_bonds) in sums.iter_mut().zip(&points[point * D..]) {
+                *sum += of_bonds * spread + touching;
             }
         }
         sums
+    }
+
+    fn hidden_rate(&self) -> f64 {
+        let Some(body) = &self.body else { return 0.0 };
+        let Some(contact) = &body.contact else {
+            return 0.0;
+        };
+        let contact = contact.lock().unwrap_or_else(PoisonError::into_inner);
+        body.bonds_of_site
+            .iter()
+            .zip(&self.mass)
+            .filter(|(point, _)| **point != NONE)
+            .map(|(&point, mass)| contact.stiffest(point as usize) / mass)
+            .fold(0.0, f64::max)
+    }
+
+    fn unbreakable(&self) -> Vec<bool> {
+        let breaks = self
+            .body
+            .as_ref()
+            .is_some_and(|b| b.critical_stretch.is_some());
+        (0..self.mass.len())
+            .map(|site| !breaks || self.linear.has(site))
+            .collect()
+    }
+
+    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
+        assembly::assemble_rows(
+            sites.len(),
+            self.mass.len(),
+            |_| (),
+            |r, row| {
+                let site = sites[r] as usize;
+                self.linear.add_row(site, row);
+                if let (Some(moving), Some(body)) = (&self.body, self.model.body())
+                    && moving.bonds_of_site[site] != NONE
+                {
+                    body.add_force_row(moving.bonds_of_site[site] as usize, |_| 1.0, row);
+                }
+            },
+        )
     }
 
     fn symmetry(&self) -> Symmetry {
@@ -382,7 +438,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let is_body_alone = self
             .body
             .as_ref()
-            .is_some_and(|b| b.rows.len() == self.mass.len());
+            .is_some_and(|b| b.alone == self.mass.len());
         if self.symmetry == Symmetry::Symmetric && !is_body_alone {
             // a seam that has an energy: that of the whole, to first order in the stretch of exact bonds
             let mut force = vec![0.0; u.len()];
@@ -458,14 +514,10 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
 
     fn damage_at_edge(&self) -> Option<usize> {
         let body = self.body.as_ref()?;
-        if body.edge.is_empty() || body.pass.broken() == 0 {
-            return None;
-        }
-        let mut points = vec![0.0; body.site_of_point.len()];
-        body.pass.damage_into(&mut points);
+        // asked for after every pass that broke a bond: only the points at the edge are looked at
         body.edge
             .iter()
-            .find(|&&p| points[p as usize] > 0.0)
+            .find(|&&p| body.pass.is_damaged(p as usize))
             .map(|&p| body.site_of_point[p as usize] as usize)
     }
 
@@ -481,87 +533,4 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             None => state.is_empty(),
         }
     }
-}
-
-/// Energy of the cells that are finite elements, without those that only overlap: `½ Σ_a u_a · F_a`, the sum over their nodes of the forces that these cells alone exert.
-///
-/// A node within the finite elements has that force in its own row. One at the seam, whose row knows of overlapping cells or of partial stress, needs a row of its own.
-struct ElementEnergy {
-    /// Sites whose row is that of all cells around a node.
-    inner: Vec<u32>,
-    /// Nodes with other rows, and these.
-    seam: Vec<u32>,
-    rows: BlockCsr,
-}
-
-impl ElementEnergy {
-    fn new<const D: usize>(model: &Model<D>) -> Self {
-        let nodes = model.mesh.nodes.len();
-        let (mut touched, mut whole) = (vec![false; nodes], vec![true; nodes]);
-        for c in 0..model.mesh.cell_count() {
-            for &n in model.mesh.cell(c) {
-                touched[n as usize] |= model.is_element(c);
-                whole[n as usize] &= model.roles[c] == CellRole::Element;
-            }
-        }
-        let inner = (0..model.sites.len() as u32)
-            .filter(
-                |&s| matches!(model.sites[s as usize].kind, SiteKind::Node(n) if whole[n as usize]),
-            )
-            .collect();
-        let seam: Vec<u32> = (0..nodes as u32)
-            .filter(|&n| touched[n as usize] && !whole[n as usize])
-            .collect();
-        let rows = assembly::assemble_rows(
-            seam.len(),
-            model.sites.len(),
-            |_| (),
-            |r, row| model.add_own_element_rows(seam[r], row),
-        );
-        Self { inner, seam, rows }
-    }
-
-    fn of<const D: usize>(&self, linear: &BlockCsr, nodes: &Transfer, u: &[f64]) -> f64 {
-        let inner: f64 = self
-            .inner
-            .par_chunks(CHUNK)
-            .map(|sites| {
-                sites
-                    .iter()
-                    .map(|&site| {
-                        let force = row_product::<D>(linear, site as usize, u);
-                        (0..D)
-                            .map(|k| force[k] * u[site as usize * D + k])
-                            .sum::<f64>()
-                    })
-                    .sum::<f64>()
-            })
-            .collect::<Vec<_>>()
-            .iter()
-            .sum();
-        let seam: f64 = self
-            .seam
-            .iter()
-            .enumerate()
-            .map(|(r, &n)| {
-                let here: Vector<D> = nodes.displacement(n as usize, u);
-                here.dot(&row_product::<D>(&self.rows, r, u))
-            })
-            .sum();
-        0.5 * (inner + seam)
-    }
-}
-
-/// One block row times a vector.
-fn row_product<const D: usize>(matrix: &BlockCsr, row: usize, u: &[f64]) -> Vector<D> {
-    let (columns, blocks) = matrix.row(row);
-    let mut sum = Vector::zeros();
-    for (&c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
-        for a in 0..D {
-            for b in 0..D {
-                sum[a] += block[a * D + b] * u[c as usize * D + b];
-            }
-        }
-    }
-    sum
 }

@@ -280,6 +280,14 @@ impl<const D: usize> Contact<D> {
         // Σ_b |n_a n_b| ≤ √D, once for the point and once for the other one
         2.0 * touching * (D as f64).sqrt() * self.stiffness * self.volume[i] * self.volume[i]
     }
+
+    /// Upper bound of the eigenvalues of contact alone, per `1/m` of the point, in the same packing.
+    ///
+    /// `½ Σ k (n·(x_i − x_j))² ≤ Σ_i x_iᵀ (Σ_j k n nᵀ) x_i`, and of directions that fill the space evenly `Σ n nᵀ` is their number over `D`; of a face against a face it is less (2 in 2D, 3 in 3D).
+    pub fn stiffest(&self, i: usize) -> f64 {
+        let touching = [2.0, 6.0, 12.0][D - 1];
+        2.0 * touching / D as f64 * self.stiffness * self.volume[i] * self.volume[i]
+    }
 }
 
 fn distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {

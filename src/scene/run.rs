@@ -31,6 +31,7 @@ use crate::solve::explicit::ExplicitError;
 use crate::solve::quasi_static::QuasiStaticError;
 use crate::solve::stable_step::StepError;
 use crate::solve::statics::{self, StaticError, StaticParams, StaticProblem};
+use crate::solve::sub_cycling::SubCyclingError;
 use crate::system::Symmetry;
 use crate::tensor::{Vector, padded};
 
@@ -58,6 +59,9 @@ pub enum RunError {
     /// The time step, or the model at any step, is not stable.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// The stiffest sites cannot take sub-steps.
+    #[error(transparent)]
+    SubCycling(#[from] SubCyclingError),
     /// The bonds cannot move.
     #[error(transparent)]
     Motion(#[from] MotionError),

@@ -8,6 +8,7 @@ use super::expression::Expression;
 use super::spec::{BeyondLimitSpec, ExplicitSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec};
 use super::value::{Count, Every};
 use crate::observe::checkpoint::Pace;
+use crate::solve::sub_cycling;
 
 /// What a scene computes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,6 +33,8 @@ pub struct Explicit {
     pub fraction: f64,
     /// What becomes of a step beyond the stable one.
     pub beyond_limit: BeyondLimitSpec,
+    /// Steps that the stiffest sites take in each step of all others, if not one.
+    pub sub_steps: Option<u32>,
     /// Time between VTU files.
     pub output_interval: f64,
     /// Time between rows of the history.
@@ -207,6 +210,7 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
         step,
         fraction,
         beyond_limit: spec.beyond_limit,
+        sub_steps: sub_steps(spec.sub_steps.as_ref())?,
         output_interval,
         history_interval: interval(
             "history-interval",
@@ -215,6 +219,23 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
         )?,
         checkpoint_every: pace(spec.checkpoint_every.as_ref()),
     })
+}
+
+fn sub_steps(count: Option<&Count>) -> Result<Option<u32>, SceneError> {
+    let Some(count) = count else { return Ok(None) };
+    match u32::try_from(count.value) {
+        Ok(1) => Ok(None),
+        Ok(n) if (2..=sub_cycling::MOST).contains(&n) => Ok(Some(n)),
+        _ => Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`solve.explicit.sub-steps` is {}", count.value),
+        )
+        .label(
+            count.span.clone(),
+            format!("must be from 1 to {}", sub_cycling::MOST),
+        )
+        .help("2 or 3 suit a seam or a few small cells; where larger ratios are needed, even out the mesh")),
+    }
 }
 
 /// The most VTU files of a run: beyond it a typing error is likelier than a wish.

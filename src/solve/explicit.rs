@@ -209,6 +209,11 @@ impl<'a> Explicit<'a> {
     /// # Errors
     /// [`ExplicitError::NotFinite`] or [`ExplicitError::Runaway`], with step, time and site.
     pub fn step(&mut self) -> Result<(), ExplicitError> {
+        // one change of threads per step instead of one per loop
+        rayon::scope(|_| self.advance())
+    }
+
+    fn advance(&mut self) -> Result<(), ExplicitError> {
         let (d, dt) = (self.block, self.params.step);
         for (previous, &k) in self.previous.iter_mut().zip(&self.prescribed) {
             *previous = self.state.u[k as usize];

@@ -61,11 +61,14 @@ pub fn growth(
     steps: u64,
 ) -> Result<Growth, StepError> {
     let mut operator = Scaled::new(system, prescribed)?;
-    if operator.free.count() <= DENSE {
-        growth_by_eigenvalues(&mut operator)
-    } else {
-        growth_from_noise(&mut operator, step, (steps / 10).clamp(200, 4000))
-    }
+    // one change of threads instead of several per product
+    rayon::scope(|_| {
+        if operator.free.count() <= DENSE {
+            growth_by_eigenvalues(&mut operator)
+        } else {
+            growth_from_noise(&mut operator, step, (steps / 10).clamp(200, 4000))
+        }
+    })
 }
 
 /// All eigenvalues of a small model, real and imaginary parts \[1/s²\].

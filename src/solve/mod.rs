@@ -1,5 +1,5 @@
 //! Solvers of `K u = f`: elimination orders, a multifrontal direct solver, Krylov methods with multigrid, and the
-//! static problem that chooses among them; explicit dynamics with its stable step; quasi-static load steps.
+//! static problem that chooses among them; explicit dynamics with its stable step and sub-cycling; quasi-static load steps.
 
 mod aggregate;
 pub mod direct;
@@ -16,6 +16,7 @@ pub mod smoother;
 pub mod stable_step;
 pub mod statics;
 pub mod stencils;
+pub mod sub_cycling;
 pub mod symbolic;
 
 use crate::solve::krylov::LinearMap;

@@ -9,6 +9,8 @@
 //!   `k` products on `n` unknowns `λ ≤ θ/(1 − ε)` fails with a probability of at most `1.648 √n exp(−√ε (2k − 1))` (\[Kuczynski1992\], theorem 3, symmetric);
 //!   `ε` is [`MARGIN`], and `k` is chosen for one in 10⁹. Without symmetry there is no such theorem and the same margin is kept.
 //!
+//! Contact is not in the tangent at rest: what it may add to λ at most ([`Dynamic::hidden_rate`]) is added to both bounds.
+//!
 //! The second question is that of [`crate::solve::growth`].
 
 use crate::{
@@ -199,6 +201,11 @@ fn normal_numbers(count: usize) -> Vec<f64> {
 /// # Errors
 /// [`StepError::Row`] for a site without mass or a row that is not finite, [`StepError::Eigenvalues`].
 pub fn stable_step(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepError> {
+    // one change of threads instead of several per product
+    rayon::scope(|_| limits(system, prescribed))
+}
+
+fn limits(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepError> {
     let mut operator = Scaled::new(system, prescribed)?;
     let d = system.block().max(1);
     let (mut largest, mut certified_site) = (0.0, 0);
@@ -212,16 +219,36 @@ pub fn stable_step(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit
         }
     }
     let certified = 2.0 / largest.sqrt();
-    let theta = highest(&mut operator)?.0;
-    let estimate = 2.0 / theta.max(0.0).sqrt();
+    let theta = highest(&mut operator, Want::Value)?.0.max(0.0);
+    // eigenvalues of a sum are at most the sum of the largest ones
+    let hidden = system.hidden_rate();
+    let estimate = 2.0 / (theta + hidden).sqrt();
+    let sharp = 2.0 / (theta / (1.0 - MARGIN) + hidden).sqrt();
     Ok(StepLimit {
         certified,
         certified_site,
         // a Ritz value may exceed the bound on eigenvalues by rounding
         estimate: estimate.max(certified),
         // where the row sum is the eigenvalue, rounding must not decide
-        stable: certified.max(estimate * (1.0 - MARGIN).sqrt()) * (1.0 - 1e-9),
+        stable: certified.max(sharp) * (1.0 - 1e-9),
         products: operator.products,
+    })
+}
+
+/// `2/√θ` after a few products: a little above the limit, where that matters little.
+pub(super) fn rough_limit(
+    system: &dyn Dynamic,
+    prescribed: &[u32],
+    products: usize,
+) -> Result<f64, StepError> {
+    rayon::scope(|_| {
+        let mut operator = Scaled::new(system, prescribed)?;
+        let count = products.min(operator.free.count());
+        if count == 0 {
+            return Ok(f64::INFINITY);
+        }
+        let (theta, _) = lanczos(&mut operator, count, Want::Value)?;
+        Ok(2.0 / theta.max(0.0).sqrt())
     })
 }
 
@@ -246,7 +273,7 @@ impl StepLimit {
             return Ok(requested);
         }
         let mut operator = Scaled::new(system, prescribed)?;
-        let mode = highest(&mut operator)?.1;
+        let mode = highest(&mut operator, Want::Mode)?.1;
         Err(StepError::TooLarge {
             requested,
             stable: self.stable,
@@ -262,15 +289,21 @@ fn products_for(unknowns: usize) -> usize {
     (0.5 * (needed + 1.0)).ceil() as usize
 }
 
-/// The largest Ritz value in size, and its vector.
-fn highest(operator: &mut Scaled<'_>) -> Result<(f64, Vec<f64>), StepError> {
+/// What of the highest mode is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Want {
+    Value,
+    Mode,
+}
+
+/// The largest Ritz value in size, and its vector if that is wanted.
+fn highest(operator: &mut Scaled<'_>, want: Want) -> Result<(f64, Vec<f64>), StepError> {
     let count = products_for(operator.free.count()).min(operator.free.count());
     if count == 0 {
         return Ok((0.0, vec![0.0; operator.dofs()]));
     }
-    let bytes = count * operator.dofs() * size_of::<f64>();
     match operator.system.symmetry() {
-        Symmetry::Symmetric if bytes > BASIS_BYTES => lanczos(operator, count),
+        Symmetry::Symmetric => lanczos(operator, count, want),
         // in one go, or in as many cycles as memory asks for
         _ => {
             let cycle = count.min((BASIS_BYTES / (operator.dofs() * size_of::<f64>())).max(20));
@@ -287,13 +320,20 @@ fn highest(operator: &mut Scaled<'_>) -> Result<(f64, Vec<f64>), StepError> {
     }
 }
 
-/// Lanczos with three vectors; the basis is gone through a second time for the vector.
-fn lanczos(operator: &mut Scaled<'_>, count: usize) -> Result<(f64, Vec<f64>), StepError> {
+/// Lanczos with three vectors; the basis is gone through a second time for the vector, if that is wanted.
+///
+/// Vectors lose their orthogonality once a Ritz value has converged, which repeats that value and spoils none; to keep them orthogonal would
+/// cost more than the products.
+fn lanczos(
+    operator: &mut Scaled<'_>,
+    count: usize,
+    want: Want,
+) -> Result<(f64, Vec<f64>), StepError> {
     let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut coefficients: Vec<f64> = Vec::new();
     let mut theta = 0.0;
     let mut mode = vec![0.0; operator.dofs()];
-    for pass in 0..2 {
+    for pass in 0..if want == Want::Mode { 2 } else { 1 } {
         let mut last = vec![0.0; operator.dofs()];
         let mut q = operator.noise();
         let mut w = vec![0.0; operator.dofs()];

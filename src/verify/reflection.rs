@@ -218,7 +218,7 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
             for side in [Side::Elements, Side::Points] {
                 for method in Method::ALL {
                     let zones: &[u32] = match method {
-                        Method::Blending(_) => &[1, 2, 4],
+                        Method::Blending(_) => &[1, 2, 4, 6],
                         _ => &[2],
                     };
                     for &transition in zones {

@@ -112,6 +112,8 @@ pub struct Strip {
     pub motion: LinearMotion,
     /// Position of each site along the strip, in spacings.
     pub x: Vec<f64>,
+    /// Position of each site across it; 0 in 1D.
+    pub y: Vec<f64>,
     /// Blending function of each site: 1 where it is peridynamic, 0 where it is local.
     pub beta: Vec<f64>,
     /// Where zones meet: local to transition, transition to nonlocal, and so on.
@@ -190,6 +192,11 @@ impl Strip {
         Ok(Strip {
             beta: (0..model.sites.len()).map(|s| operator.beta(s)).collect(),
             x: model.sites.iter().map(|s| s.position[0]).collect(),
+            y: model
+                .sites
+                .iter()
+                .map(|s| if D > 1 { s.position[1] } else { 0.0 })
+                .collect(),
             motion: LinearMotion {
                 stiffness,
                 mass: model.sites.iter().map(|s| s.volume).collect(),

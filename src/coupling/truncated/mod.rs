@@ -94,6 +94,7 @@ impl<const D: usize> Coupling<D> for Truncated {
             strings,
             springs,
             dilatations,
+            pairwise: passing.whole.state.is_none(),
             listed,
         }))
     }
@@ -106,6 +107,7 @@ struct TruncatedRows<'a, const D: usize> {
     strings: Strings<D>,
     /// Points whose rows are sums of springs and dilatations, not rows of the body.
     listed: Vec<bool>,
+    pairwise: bool,
 }
 
 impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
@@ -129,6 +131,11 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         self.model
             .point_of(site)
             .is_some_and(|(_, i)| !self.listed[i])
+    }
+
+    fn has_body_bonds(&self, site: usize) -> bool {
+        // the dilatations of an LPS differ from the body's, so that nothing cancels
+        self.pairwise && self.model.point_of(site).is_some() && !self.is_body_row(site)
     }
 
     fn beta(&self, site: usize) -> f64 {

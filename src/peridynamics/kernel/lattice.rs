@@ -447,6 +447,19 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
             });
     }
 
+    fn is_damaged(&self, i: usize) -> bool {
+        let place = self.place[i];
+        if place == NONE {
+            return false;
+        }
+        let (group, lane) = (place as usize / LANES, place as usize % LANES);
+        let count = self.stencil.offsets.len();
+        let of_group = group * count..(group + 1) * count;
+        let now = &self.stencil.intact[of_group.clone()];
+        let then = &self.stencil.reference[of_group];
+        now != then && now.iter().zip(then).any(|(a, b)| (a ^ b) >> lane & 1 == 1)
+    }
+
     fn broken(&self) -> u64 {
         self.reference - ones(&self.stencil.intact)
     }

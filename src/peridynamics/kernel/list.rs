@@ -531,6 +531,10 @@ impl<const D: usize> BondPass<D> for List<D> {
         }
     }
 
+    fn is_damaged(&self, i: usize) -> bool {
+        (0..self.offsets[i + 1] - self.offsets[i]).any(|k| !self.stands(i, k))
+    }
+
     fn broken(&self) -> u64 {
         let standing: u64 = self
             .intact

@@ -68,6 +68,9 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Overwrites `damage` with `1 − Σ_intact V / Σ V` of every point; zero where there is no family.
     fn damage_into(&self, damage: &mut [f64]);
 
+    /// Whether a bond of point `i` is broken.
+    fn is_damaged(&self, i: usize) -> bool;
+
     /// Directed bonds of the reference families that are broken.
     fn broken(&self) -> u64;
 

@@ -263,6 +263,7 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
                             (damage[i] - (1.0 - volume(false) / volume(true))).abs() < 1e-14,
                             "{name}"
                         );
+                        assert_eq!(pass.is_damaged(i), damage[i] > 0.0, "{name}");
                     }
                     // and comes back only with a saved state
                     assert!(pass.restore_damage(&state) && !pass.restore_damage(&state[1..]));

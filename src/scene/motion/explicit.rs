@@ -4,28 +4,24 @@ use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use super::RunOptions;
 use super::drive::SceneDrive;
-use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
-use super::system::{dynamic, start};
-use super::{RunOptions, StartFrom};
+use super::laid_out::{LaidOut, breaks, laid_out, opened, restore};
+use super::pace::{held, paced};
+use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved};
+use super::system::start;
 use crate::coupling::{Model, Operator, Sampler, SiteKind};
 use crate::observe::ObserveError;
-use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
-use crate::observe::report::number;
+use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::summary::{
-    Choice, Ended, MotionSummary, RunSummary, Sizes, Stopwatch, Timings, bytes_text,
-    peak_memory_bytes,
+    Choice, Ended, MotionSummary, RunSummary, Sizes, bytes_text, peak_memory_bytes,
 };
 use crate::progress::Progress;
-use crate::scene::conditions::Condition;
-use crate::scene::loads::holders;
 use crate::scene::run::{self, RunError, Solved};
 use crate::scene::solve::Explicit as Spec;
-use crate::scene::spec::{BeyondLimitSpec, EdgeSpec};
+use crate::scene::spec::EdgeSpec;
 use crate::scene::validate::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams};
-use crate::solve::stable_step::{StepLimit, stable_step};
-use crate::system::Dynamic;
 
 /// How often whoever watches is told.
 const TOLD_EVERY: Duration = Duration::from_millis(200);
@@ -35,64 +31,6 @@ fn is_due(step: u64, dt: f64, interval: f64) -> bool {
     // an instant that falls on the end of a step belongs to it, whatever rounding says
     let count = |n: u64| (n as f64 * dt / interval * (1.0 + 1e-12) + 1e-9).floor();
     step > 0 && count(step) > count(step - 1)
-}
-
-/// The time step of a run, such that a whole number of steps fills its duration.
-///
-/// # Errors
-/// [`RunError::Step`] for a step beyond the stable one, unless the scene says to shorten it.
-pub(super) fn choose_step(
-    spec: &Spec,
-    limit: &StepLimit,
-    system: &dyn Dynamic,
-    prescribed: &[u32],
-    choices: &mut Vec<Choice>,
-) -> Result<StepChoice, RunError> {
-    let own = spec.fraction * limit.stable;
-    let (step, why) = match spec.step {
-        None => (own, format!("{} of the stable step", spec.fraction)),
-        Some(asked) if asked > limit.stable && spec.beyond_limit == BeyondLimitSpec::Shorten => (
-            own,
-            format!(
-                "{} of the stable step, for the one asked for, {asked:e}, is beyond it",
-                spec.fraction
-            ),
-        ),
-        asked => (
-            limit.admit(asked, system, prescribed)?,
-            "as asked for".to_owned(),
-        ),
-    };
-    let steps = (spec.duration / step * (1.0 - 1e-12)).ceil().max(1.0);
-    let choice = StepChoice {
-        step: spec.duration / steps,
-        steps: steps as u64,
-        stable: limit.stable,
-        certified: limit.certified,
-        site: limit.certified_site as u64,
-    };
-    choices.push(Choice {
-        choice: format!("{} steps of {}", choice.steps, number(choice.step)),
-        why: format!(
-            "{why}, and a whole number of them; stable up to {}, from row sums up to {}",
-            number(limit.stable),
-            number(limit.certified)
-        ),
-    });
-    Ok(choice)
-}
-
-/// The dofs whose motion is prescribed.
-///
-/// # Errors
-/// [`RunError::Idle`] for a condition that meets no site.
-pub(super) fn held<const D: usize>(
-    model: &Model<D>,
-    conditions: &[Condition<D>],
-) -> Result<Vec<u32>, RunError> {
-    let holders = holders(model, conditions)?;
-    let dofs = holders.iter().enumerate();
-    Ok(dofs.filter_map(|(dof, h)| h.map(|_| dof as u32)).collect())
 }
 
 /// The sizes of a model that moves.
@@ -127,52 +65,48 @@ pub(super) fn run<const D: usize>(
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    let mut timings = Timings::default();
-    let mut watch = Stopwatch::start();
-    let title = scene.title.clone();
-    let joining = scene.coupling.joining();
-    let (problem, rest) = run::problem(scene);
-    let file = CheckpointFile::new(
-        rest.output
-            .directory
-            .join(format!("{}.checkpoint", rest.output.name)),
-        rest.fingerprint.value(),
-    );
-    let mut choices = Vec::new();
-    // before anything is computed: a checkpoint that cannot be used says so at once
-    let saved = match options.start {
-        StartFrom::Beginning => None,
-        StartFrom::Checkpoint => read(&file, &mut choices)?,
-    };
-    let (model, coupling) = Model::new(problem, progress)?;
-    watch.lap(&mut timings, "sites and bonds");
-    let operator = coupling.operator(&model)?;
-    let mut moving = dynamic(
-        &model,
-        coupling.as_ref(),
-        operator.as_ref(),
-        &rest,
-        &mut choices,
+    laid_out(
+        scene,
         progress,
-    )?;
+        |rest, choices| opened(rest, options, choices),
+        |laid_out, (file, saved)| steps(laid_out, file, saved, spec, options, progress),
+    )
+}
+
+/// Steps from the beginning or a checkpoint.
+fn steps<const D: usize>(
+    laid_out: LaidOut<'_, D>,
+    file: CheckpointFile,
+    saved: Option<Saved>,
+    spec: &Spec,
+    options: &RunOptions<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, RunError> {
+    let LaidOut {
+        title,
+        joining,
+        growing,
+        model,
+        operator,
+        rest,
+        moving,
+        mut choices,
+        mut timings,
+        mut watch,
+        ..
+    } = laid_out;
     choices.push(Choice {
         choice: format!("{} in rows and bonds", bytes_text(moving.bytes as u64)),
         why: "read once per step".to_owned(),
     });
-    watch.lap(&mut timings, "rows and bonds");
-    let pace = match &saved {
-        Some(saved) => saved.pace,
-        None => {
-            progress.stage("stable step", None);
-            let held = held(&model, &rest.conditions)?;
-            let limit = stable_step(moving.system.as_ref(), &held)?;
-            choose_step(spec, &limit, moving.system.as_ref(), &held, &mut choices)?
-        }
-    };
+    progress.stage("stable step", None);
+    let held = held(model, &rest.conditions)?;
+    let known = saved.as_ref().map(|saved| saved.pace);
+    let (mut moving, pace) = paced(spec, growing, moving, &held, known, &mut choices)?;
     watch.lap(&mut timings, "stable step");
 
-    let begin = start(&model, &rest.initial);
-    let drive = SceneDrive::new(&model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
+    let begin = start(model, &rest.initial);
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
     if drive.evaluates_everywhere() {
         choices.push(Choice {
             choice: "loads evaluated at every place and step".to_owned(),
@@ -180,20 +114,9 @@ pub(super) fn run<const D: usize>(
                 .to_owned(),
         });
     }
-    if let Some(saved) = &saved
-        && !moving.system.restore_damage(&saved.damage)
-    {
-        return Err(CheckpointError::Content {
-            path: file.path().to_path_buf(),
-            message: "its bonds are not those of this model".to_owned(),
-        }
-        .into());
-    }
-    let breaks = match moving.system.damage() {
-        Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
-        _ => Breaks::Never,
-    };
-    let sampler = Sampler::new(&model);
+    restore(moving.system.as_mut(), saved.as_ref(), &file)?;
+    let breaks = breaks(moving.system.as_ref(), rest);
+    let sampler = Sampler::new(model);
     let mut recorder = Recorder::new(
         &rest.output,
         &sampler,
@@ -203,7 +126,7 @@ pub(super) fn run<const D: usize>(
         options.checkpoint_every.or(spec.checkpoint_every),
         saved.as_ref().map(|s| &s.written),
     )?;
-    let zones = run::zone_of_site(&model);
+    let zones = run::zone_of_site(model);
     let is_linear = moving.is_linear;
     let mut edge = saved.as_ref().and_then(|s| s.edge);
     let resumed = saved.is_some();
@@ -216,8 +139,8 @@ pub(super) fn run<const D: usize>(
     )?;
     let solved = |u: &[f64], visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
         visit(&Solved {
-            model: &model,
-            operator: operator.as_ref(),
+            model,
+            operator,
             displacement: u,
             residual: &[],
             zone_of_site: &zones,
@@ -319,7 +242,7 @@ pub(super) fn run<const D: usize>(
         scene: title,
         dimension: D,
         coupling: joining.name.to_owned(),
-        sizes: sizes(&model, operator.as_ref()),
+        sizes: sizes(model, operator),
         choices,
         total_seconds: timings.total(),
         timings,
@@ -359,37 +282,6 @@ fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
         kinetic: energies.kinetic,
         discrete: is_linear.then_some(energies.discrete),
     }
-}
-
-/// The last checkpoint, if there is one.
-///
-/// # Errors
-/// [`CheckpointError`] for one that cannot be used.
-pub(super) fn read(
-    file: &CheckpointFile,
-    choices: &mut Vec<Choice>,
-) -> Result<Option<Saved>, CheckpointError> {
-    let (saved, found): (Saved, Found) = match file.read() {
-        Err(CheckpointError::None { path }) => {
-            choices.push(Choice {
-                choice: "from the beginning".to_owned(),
-                why: format!("there is no checkpoint {} yet", path.display()),
-            });
-            return Ok(None);
-        }
-        other => other?,
-    };
-    choices.push(Choice {
-        choice: format!(
-            "resumed after step {} of {}",
-            saved.state.step, saved.pace.steps
-        ),
-        why: match found {
-            Found::Current => "the last checkpoint".to_owned(),
-            Found::Previous(why) => format!("the last checkpoint but one, for {why}"),
-        },
-    });
-    Ok(Some(saved))
 }
 
 #[cfg(test)]

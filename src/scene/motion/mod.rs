@@ -2,18 +2,24 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `laid_out.rs` | what every run begins with |
 //! | `system.rs` | what moves, its masses, its start |
 //! | `drive.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
 //! | `quasi_static.rs` | the run under a load that grows |
+//! | `pace.rs` | the time step, with sub-cycling |
+//! | `stability.rs` | whether the motion stays bounded |
 //! | `predict.rs` | what a run in time will need |
 //! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
 
 mod drive;
 mod explicit;
+mod laid_out;
+mod pace;
 mod predict;
 mod quasi_static;
 mod record;
+mod stability;
 mod system;
 
 use std::sync::atomic::AtomicBool;

@@ -3,21 +3,19 @@
 use std::time::Instant;
 
 use super::drive::SceneDrive;
-use super::explicit::{choose_step, held, sizes};
-use super::system::{dynamic, start};
-use crate::coupling::Model;
-use crate::observe::summary::{
-    Choice, Stopwatch, Timings, peak_memory_bytes, resident_memory_bytes,
-};
+use super::explicit::sizes;
+use super::laid_out::{LaidOut, laid_out};
+use super::pace::{held, paced};
+use super::system::start;
+use crate::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
 use crate::scene::predict::{
     MotionPrediction, OUTPUT_BYTES, Prediction, SECONDS_PER_CELL, Share, warnings,
 };
-use crate::scene::run::{self, RunError};
+use crate::scene::run::RunError;
 use crate::scene::solve::{Explicit as Spec, QuasiStatic};
 use crate::scene::validate::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams};
-use crate::solve::stable_step::stable_step;
 
 /// Steps are taken for this long to tell what one costs \[s\].
 const TRIED_FOR: f64 = 0.5;
@@ -31,39 +29,88 @@ pub(crate) fn predict<const D: usize>(
     spec: &Spec,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    let mut timings = Timings::default();
-    let mut watch = Stopwatch::start();
-    let title = scene.title.clone();
-    let joining = scene.coupling.joining();
-    let (problem, rest) = run::problem(scene);
-    let (model, coupling) = Model::new(problem, progress)?;
-    watch.lap(&mut timings, "sites and bonds");
-    let operator = coupling.operator(&model)?;
-    let mut choices = vec![Choice {
-        choice: format!("coupling {}", joining.name),
-        why: joining.about.to_owned(),
-    }];
-    let laid_out = resident_memory_bytes().unwrap_or(0);
-    let mut moving = dynamic(
-        &model,
-        coupling.as_ref(),
-        operator.as_ref(),
-        &rest,
-        &mut choices,
-        progress,
-    )?;
-    let symmetry = moving.system.symmetry();
-    watch.lap(&mut timings, "rows and bonds");
-    let held = held(&model, &rest.conditions)?;
-    let limit = stable_step(moving.system.as_ref(), &held)?;
-    let pace = choose_step(spec, &limit, moving.system.as_ref(), &held, &mut choices)?;
-    watch.lap(&mut timings, "stable step");
+    let nothing = |_: &_, _: &mut Vec<Choice>| Ok(());
+    laid_out(scene, progress, nothing, |laid_out, ()| {
+        steps(laid_out, spec, progress)
+    })
+}
 
-    let begin = start(&model, &rest.initial);
-    let drive = SceneDrive::new(&model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
+/// Sizes, memory and the choices so far, as they stand with what moves.
+fn prediction<const D: usize>(
+    laid_out: &LaidOut<'_, D>,
+    held: usize,
+    files: Files,
+    state: Option<u64>,
+) -> Prediction {
+    let sizes = sizes(laid_out.model, laid_out.operator);
+    let output = match files {
+        Files::Some => OUTPUT_BYTES * (sizes.cells + sizes.points) as u64,
+        Files::None => 0,
+    };
+    let share = |name, bytes| Share { name, bytes };
+    let mut memory = vec![
+        share("model", laid_out.bytes),
+        share("rows, bonds", laid_out.moving.bytes as u64),
+    ];
+    memory.extend(state.map(|bytes| share("state", bytes)));
+    memory.push(share("output", output));
+    let about = Choice {
+        choice: format!("coupling {}", laid_out.joining.name),
+        why: laid_out.joining.about.to_owned(),
+    };
+    let mut choices = vec![about];
+    choices.extend(laid_out.choices.iter().cloned());
+    Prediction {
+        scene: laid_out.title.clone(),
+        dimension: D,
+        coupling: laid_out.joining.name.to_owned(),
+        sizes,
+        method: None,
+        symmetry: laid_out.moving.system.symmetry(),
+        unknowns: sizes.dofs - held,
+        factor_nonzeros: 0,
+        operations: 0.0,
+        peak_memory_bytes: (resident_memory_bytes().unwrap_or(0) + output)
+            .max(peak_memory_bytes().unwrap_or(0)),
+        memory,
+        total_seconds: laid_out.timings.total(),
+        timings: laid_out.timings.clone(),
+        choices,
+        warnings: Vec::new(),
+        motion: None,
+    }
+}
+
+/// Whether a run writes VTU files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Files {
+    Some,
+    None,
+}
+
+fn steps<const D: usize>(
+    mut laid_out: LaidOut<'_, D>,
+    spec: &Spec,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    let (model, rest) = (laid_out.model, laid_out.rest);
+    let held = held(model, &rest.conditions)?;
+    let (moving, pace) = paced(
+        spec,
+        laid_out.growing,
+        laid_out.moving,
+        &held,
+        None,
+        &mut laid_out.choices,
+    )?;
+    laid_out.moving = moving;
+    laid_out.watch.lap(&mut laid_out.timings, "stable step");
+
+    let begin = start(model, &rest.initial);
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
     let state_bytes = 12 * 8 * begin.u.len() as u64;
     let mut motion = Explicit::new(
-        moving.system.as_mut(),
+        laid_out.moving.system.as_mut(),
         &drive,
         ExplicitParams::with_step(pace.step),
         begin,
@@ -75,78 +122,43 @@ pub(crate) fn predict<const D: usize>(
         taken += 1;
     }
     let seconds_per_step = clock.elapsed().as_secs_f64() / taken as f64;
+    drop(motion);
     progress.finish();
 
-    let sizes = sizes(&model, operator.as_ref());
-    let shown = sizes.cells + sizes.points;
-    let files = if rest.output.vtu {
-        (spec.duration / spec.output_interval).ceil() + 1.0
+    let (files, written) = if rest.output.vtu {
+        let count = (spec.duration / spec.output_interval).ceil() + 1.0;
+        (Files::Some, count)
     } else {
-        0.0
+        (Files::None, 0.0)
     };
     let rows = (spec.duration / spec.history_interval)
         .ceil()
         .min(pace.steps as f64)
         + 1.0;
+    let sizes = sizes(model, laid_out.operator);
+    let shown = (sizes.cells + sizes.points) as f64;
+    let timings = &mut laid_out.timings;
     timings.add("steps", pace.steps as f64 * seconds_per_step);
     timings.add(
         "output",
-        files * shown as f64 * SECONDS_PER_CELL + rows * seconds_per_step,
+        written * shown * SECONDS_PER_CELL + rows * seconds_per_step,
     );
-    let output = if rest.output.vtu {
-        OUTPUT_BYTES * shown as u64
-    } else {
-        0
-    };
-    let memory = vec![
-        Share {
-            name: "model",
-            bytes: laid_out,
-        },
-        Share {
-            name: "rows, bonds",
-            bytes: moving.bytes as u64,
-        },
-        Share {
-            name: "state",
-            bytes: state_bytes,
-        },
-        Share {
-            name: "output",
-            bytes: output,
-        },
-    ];
-    let held_now = resident_memory_bytes().unwrap_or(0);
     let mut prediction = Prediction {
-        scene: title,
-        dimension: D,
-        coupling: joining.name.to_owned(),
-        sizes,
-        method: None,
-        symmetry,
-        unknowns: sizes.dofs - held.len(),
-        factor_nonzeros: 0,
-        operations: 0.0,
-        peak_memory_bytes: (held_now + output).max(peak_memory_bytes().unwrap_or(0)),
-        memory,
-        total_seconds: timings.total(),
-        timings,
-        choices,
-        warnings: Vec::new(),
         motion: Some(MotionPrediction {
             step: pace.step,
             steps: pace.steps,
-            stable_step: limit.stable,
-            certified_step: limit.certified,
-            certified_at: model.sites[limit.certified_site]
+            stable_step: pace.stable,
+            certified_step: pace.certified,
+            certified_at: model.sites[pace.site as usize]
                 .position
                 .iter()
                 .copied()
                 .collect(),
             seconds_per_step,
         }),
+        ..prediction(&laid_out, held.len(), files, Some(state_bytes))
     };
-    prediction.warnings = warnings(&model, joining, &prediction);
+    prediction.warnings = warnings(model, laid_out.joining, &prediction);
     Ok(prediction)
 }
 
@@ -159,68 +171,16 @@ pub(crate) fn load_steps<const D: usize>(
     spec: &QuasiStatic,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    let mut timings = Timings::default();
-    let mut watch = Stopwatch::start();
-    let title = scene.title.clone();
-    let joining = scene.coupling.joining();
-    let (problem, rest) = run::problem(scene);
-    let (model, coupling) = Model::new(problem, progress)?;
-    watch.lap(&mut timings, "sites and bonds");
-    let operator = coupling.operator(&model)?;
-    let mut choices = vec![Choice {
-        choice: format!("coupling {}", joining.name),
-        why: joining.about.to_owned(),
-    }];
-    let laid_out = resident_memory_bytes().unwrap_or(0);
-    let moving = dynamic(
-        &model,
-        coupling.as_ref(),
-        operator.as_ref(),
-        &rest,
-        &mut choices,
-        progress,
-    )?;
-    let held = held(&model, &rest.conditions)?;
-    watch.lap(&mut timings, "rows and bonds");
-    progress.finish();
-    let sizes = sizes(&model, operator.as_ref());
-    let output = OUTPUT_BYTES * (sizes.cells + sizes.points) as u64;
-    let mut prediction = Prediction {
-        scene: title,
-        dimension: D,
-        coupling: joining.name.to_owned(),
-        sizes,
-        method: None,
-        symmetry: moving.system.symmetry(),
-        unknowns: sizes.dofs - held.len(),
-        factor_nonzeros: 0,
-        operations: 0.0,
-        peak_memory_bytes: (resident_memory_bytes().unwrap_or(0) + output)
-            .max(peak_memory_bytes().unwrap_or(0)),
-        memory: vec![
-            Share {
-                name: "model",
-                bytes: laid_out,
-            },
-            Share {
-                name: "rows, bonds",
-                bytes: moving.bytes as u64,
-            },
-            Share {
-                name: "output",
-                bytes: output,
-            },
-        ],
-        total_seconds: timings.total(),
-        timings,
-        choices,
-        warnings: Vec::new(),
-        motion: None,
-    };
-    prediction.warnings = warnings(&model, joining, &prediction);
-    prediction.warnings.push(format!(
-        "the time of {} load steps is not in the estimate: it depends on the bonds that break",
-        spec.steps
-    ));
-    Ok(prediction)
+    let nothing = |_: &_, _: &mut Vec<Choice>| Ok(());
+    laid_out(scene, progress, nothing, |laid_out, ()| {
+        let held = held(laid_out.model, &laid_out.rest.conditions)?;
+        progress.finish();
+        let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);
+        prediction.warnings = warnings(laid_out.model, laid_out.joining, &prediction);
+        prediction.warnings.push(format!(
+            "the time of {} load steps is not in the estimate: it depends on the bonds that break",
+            spec.steps
+        ));
+        Ok(prediction)
+    })
 }

@@ -4,18 +4,17 @@ use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+use super::RunOptions;
 use super::drive::SceneDrive;
-use super::explicit::{read, sizes};
-use super::record::{Breaks, EdgeReached, Moment, Recorder, StepChoice};
-use super::system::{dynamic, start};
-use super::{RunOptions, StartFrom};
-use crate::coupling::{Model, Sampler};
+use super::explicit::sizes;
+use super::laid_out::{LaidOut, breaks, laid_out, opened, restore};
+use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
+use super::system::start;
+use crate::coupling::Sampler;
 use crate::observe::ObserveError;
-use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
+use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
-use crate::observe::summary::{
-    Choice, Ended, MotionSummary, RunSummary, Stopwatch, Timings, peak_memory_bytes,
-};
+use crate::observe::summary::{Choice, Ended, MotionSummary, RunSummary, peak_memory_bytes};
 use crate::progress::Progress;
 use crate::scene::run::{self, RunError, Solved};
 use crate::scene::solve::QuasiStatic as Spec;
@@ -32,33 +31,35 @@ pub(super) fn run<const D: usize>(
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    let mut timings = Timings::default();
-    let mut watch = Stopwatch::start();
-    let title = scene.title.clone();
-    let joining = scene.coupling.joining();
-    let (problem, rest) = run::problem(scene);
-    let path = rest
-        .output
-        .directory
-        .join(format!("{}.checkpoint", rest.output.name));
-    let file = CheckpointFile::new(path.clone(), rest.fingerprint.value());
-    let mut choices = Vec::new();
-    let saved = match options.start {
-        StartFrom::Beginning => None,
-        StartFrom::Checkpoint => read(&file, &mut choices)?,
-    };
-    let (model, coupling) = Model::new(problem, progress)?;
-    watch.lap(&mut timings, "sites and bonds");
-    let operator = coupling.operator(&model)?;
-    let mut moving = dynamic(
-        &model,
-        coupling.as_ref(),
-        operator.as_ref(),
-        &rest,
-        &mut choices,
+    laid_out(
+        scene,
         progress,
-    )?;
-    watch.lap(&mut timings, "rows and bonds");
+        |rest, choices| opened(rest, options, choices),
+        |laid_out, (file, saved)| load_steps(laid_out, file, saved, spec, options, progress),
+    )
+}
+
+/// Load steps from the beginning or a checkpoint.
+fn load_steps<const D: usize>(
+    laid_out: LaidOut<'_, D>,
+    file: CheckpointFile,
+    saved: Option<Saved>,
+    spec: &Spec,
+    options: &RunOptions<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, RunError> {
+    let LaidOut {
+        title,
+        joining,
+        model,
+        operator,
+        rest,
+        mut moving,
+        mut choices,
+        mut timings,
+        mut watch,
+        ..
+    } = laid_out;
     let step = spec.duration / spec.steps as f64;
     let pace = StepChoice {
         step,
@@ -84,32 +85,24 @@ pub(super) fn run<const D: usize>(
         .to_owned(),
         why: format!("{} load steps to t = {}", spec.steps, number(spec.duration)),
     });
-    let begin = start(&model, &rest.initial);
-    let drive = SceneDrive::new(&model, &rest.conditions, &begin.u, step, pace.steps)?;
-    if let Some(saved) = &saved
-        && !moving.system.restore_damage(&saved.damage)
-    {
-        let message = "its bonds are not those of this model".to_owned();
-        return Err(CheckpointError::Content { path, message }.into());
-    }
-    let breaks = match moving.system.damage() {
-        Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
-        _ => Breaks::Never,
-    };
+    let begin = start(model, &rest.initial);
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, step, pace.steps)?;
+    restore(moving.system.as_mut(), saved.as_ref(), &file)?;
+    let breaks = breaks(moving.system.as_ref(), rest);
     let mut recorder = Recorder::new(
         &rest.output,
-        &Sampler::new(&model),
+        &Sampler::new(model),
         breaks,
         false,
         file,
         options.checkpoint_every.or(spec.checkpoint_every),
         saved.as_ref().map(|s| &s.written),
     )?;
-    let zones = run::zone_of_site(&model);
+    let zones = run::zone_of_site(model);
     let solved = |u: &[f64], visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
         visit(&Solved {
-            model: &model,
-            operator: operator.as_ref(),
+            model,
+            operator,
             displacement: u,
             residual: &[],
             zone_of_site: &zones,
@@ -231,7 +224,7 @@ pub(super) fn run<const D: usize>(
         scene: title,
         dimension: D,
         coupling: joining.name.to_owned(),
-        sizes: sizes(&model, operator.as_ref()),
+        sizes: sizes(model, operator),
         choices,
         total_seconds: timings.total(),
         timings,

@@ -35,6 +35,9 @@ pub struct ExplicitSpec {
     /// What becomes of a step beyond the stable one; "refuse" if left out.
     #[serde(default)]
     pub beyond_limit: BeyondLimitSpec,
+    /// Steps that the stiffest sites take in each step of all others; 1 if left out.
+    #[serde(default)]
+    pub sub_steps: Option<Count>,
     /// Number of VTU files after the first; 20 if left out, 0 for none but first and last.
     #[serde(default)]
     pub outputs: Option<Count>,

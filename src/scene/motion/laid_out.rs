@@ -1,0 +1,152 @@
+//! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
+
+use super::record::{Breaks, Saved};
+use super::stability::Growing;
+use super::system::{Moving, dynamic};
+use super::{RunOptions, StartFrom};
+use crate::coupling::{Model, Operator};
+use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
+use crate::observe::summary::{Choice, Stopwatch, Timings, resident_memory_bytes};
+use crate::progress::Progress;
+use crate::scene::run::{self, Rest, RunError};
+use crate::scene::spec::Joining;
+use crate::scene::validate::Scene;
+use crate::system::Dynamic;
+
+/// A scene with all that it computes before its first step.
+pub(super) struct LaidOut<'a, const D: usize> {
+    pub title: String,
+    pub joining: Joining,
+    pub growing: Growing,
+    pub model: &'a Model<D>,
+    pub operator: &'a dyn Operator<D>,
+    pub rest: &'a Rest<D>,
+    pub moving: Moving<'a>,
+    pub choices: Vec<Choice>,
+    /// Memory that the program held when sites and bonds were there.
+    pub bytes: u64,
+    pub timings: Timings,
+    pub watch: Stopwatch,
+}
+
+/// Lays a scene out and hands it on; `first` has a say before anything is computed.
+pub(super) fn laid_out<const D: usize, S, T>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+    first: impl FnOnce(&Rest<D>, &mut Vec<Choice>) -> Result<S, RunError>,
+    then: impl FnOnce(LaidOut<'_, D>, S) -> Result<T, RunError>,
+) -> Result<T, RunError> {
+    let mut timings = Timings::default();
+    let mut watch = Stopwatch::start();
+    let title = scene.title.clone();
+    let joining = scene.coupling.joining();
+    let growing = Growing::of(&scene.coupling);
+    let (problem, rest) = run::problem(scene);
+    let mut choices = Vec::new();
+    let begun = first(&rest, &mut choices)?;
+    let (model, coupling) = Model::new(problem, progress)?;
+    watch.lap(&mut timings, "sites and bonds");
+    let bytes = resident_memory_bytes().unwrap_or(0);
+    let operator = coupling.operator(&model)?;
+    let moving = dynamic(
+        &model,
+        coupling.as_ref(),
+        operator.as_ref(),
+        &rest,
+        &mut choices,
+        progress,
+    )?;
+    watch.lap(&mut timings, "rows and bonds");
+    then(
+        LaidOut {
+            title,
+            joining,
+            growing,
+            model: &model,
+            operator: operator.as_ref(),
+            rest: &rest,
+            moving,
+            choices,
+            bytes,
+            timings,
+            watch,
+        },
+        begun,
+    )
+}
+
+/// The checkpoint file of a run, and what it holds if the run goes on from it.
+///
+/// # Errors
+/// [`RunError::Checkpoint`] for one that cannot be used: at once, not after the model is there.
+pub(super) fn opened<const D: usize>(
+    rest: &Rest<D>,
+    options: &RunOptions<'_>,
+    choices: &mut Vec<Choice>,
+) -> Result<(CheckpointFile, Option<Saved>), RunError> {
+    let name = format!("{}.checkpoint", rest.output.name);
+    let path = rest.output.directory.join(name);
+    let file = CheckpointFile::new(path, rest.fingerprint.value());
+    let saved = match options.start {
+        StartFrom::Beginning => None,
+        StartFrom::Checkpoint => read(&file, choices)?,
+    };
+    Ok((file, saved))
+}
+
+/// Puts the damage of a checkpoint back.
+///
+/// # Errors
+/// [`CheckpointError::Content`] if it is that of another model.
+pub(super) fn restore(
+    system: &mut dyn Dynamic,
+    saved: Option<&Saved>,
+    file: &CheckpointFile,
+) -> Result<(), CheckpointError> {
+    match saved {
+        Some(saved) if !system.restore_damage(&saved.damage) => Err(CheckpointError::Content {
+            path: file.path().to_path_buf(),
+            message: "its bonds are not those of this model".to_owned(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Whether bonds may break.
+pub(super) fn breaks<const D: usize>(system: &dyn Dynamic, rest: &Rest<D>) -> Breaks {
+    match system.damage() {
+        Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
+        _ => Breaks::Never,
+    }
+}
+
+/// The last checkpoint, if there is one.
+///
+/// # Errors
+/// [`CheckpointError`] for one that cannot be used.
+fn read(
+    file: &CheckpointFile,
+    choices: &mut Vec<Choice>,
+) -> Result<Option<Saved>, CheckpointError> {
+    let (saved, found): (Saved, Found) = match file.read() {
+        Err(CheckpointError::None { path }) => {
+            choices.push(Choice {
+                choice: "from the beginning".to_owned(),
+                why: format!("there is no checkpoint {} yet", path.display()),
+            });
+            return Ok(None);
+        }
+        other => other?,
+    };
+    choices.push(Choice {
+        choice: format!(
+            "resumed after step {} of {}",
+            saved.state.step, saved.pace.steps
+        ),
+        why: match found {
+            Found::Current => "the last checkpoint".to_owned(),
+            Found::Previous(why) => format!("the last checkpoint but one, for {why}"),
+        },
+    });
+    Ok(Some(saved))
+}

@@ -1,0 +1,161 @@
+//! Bars that vibrate and are driven, against closed forms; the time step.
+
+use crate::{BREAKING, MODE, bondline, column, run, write};
+
+#[test]
+fn a_vibrating_bar_keeps_the_frequency_of_its_scheme() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "bar.toml", MODE);
+    let said = run(folder.path(), &["bar.toml", "--json"]);
+    let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let motion = &summary["motion"];
+    let dt = motion["step"].as_f64().unwrap();
+    // c = 2, h = 1/40: lumped masses give the limit h/c, of which 0.95 less a margin of some per cent is taken
+    let share = dt / (1.0 / 80.0);
+    assert!((0.90..=0.951).contains(&share), "{share}");
+    // lumped masses: ω = 2c/h sin(πh/4L); velocity Verlet: sin(ω'Δt/2) = ωΔt/2
+    let h = 1.0 / 40.0;
+    let omega = 2.0 * 2.0 / h * (std::f64::consts::PI * h / 4.0).sin();
+    let omega = 2.0 / dt * (0.5 * omega * dt).asin();
+    let history = folder.path().join("out/bar_history.csv");
+    let (times, ends) = (column(&history, "time"), column(&history, "end_ux"));
+    assert!(times.len() > 300);
+    let error = times
+        .iter()
+        .zip(&ends)
+        .map(|(t, u)| (u - 0.01 * (omega * t).cos()).abs())
+        .fold(0.0, f64::max);
+    assert!(error < 1e-12, "{error}");
+    let energy = column(&history, "discrete_energy");
+    let drift = energy[2..]
+        .iter()
+        .map(|e| (e / energy[1] - 1.0).abs())
+        .fold(0.0, f64::max);
+    assert!(drift < 1e-12, "{drift}");
+}
+
+#[test]
+fn a_prescribed_velocity_is_the_derivative_of_its_displacement() {
+    let folder = tempfile::tempdir().unwrap();
+    let free = MODE
+        .replace(
+            "[initial.mode.displacement]\nx = \"0.01 * sin(pi * x / 2)\"",
+            "",
+        )
+        .replace("duration = 5", "duration = 1");
+    let ends = |name: &str, condition: &str| {
+        let scene = free.replace(
+            "[conditions.left.displacement]\non = \"left\"\nx = 0",
+            condition,
+        );
+        write(folder.path(), &format!("{name}.toml"), &scene);
+        run(folder.path(), &[&format!("{name}.toml")]);
+        column(
+            &folder.path().join(format!("out/{name}_history.csv")),
+            "end_ux",
+        )
+    };
+    let moved = ends(
+        "moved",
+        "[conditions.left.displacement]\non = \"left\"\nx = \"0.01 * (1 - cos(3 * t))\"",
+    );
+    let driven = ends(
+        "driven",
+        "[conditions.left.velocity]\non = \"left\"\nx = \"0.03 * sin(3 * t)\"",
+    );
+    let steady = ends(
+        "steady",
+        "[conditions.left.velocity]\non = \"left\"\nx = 0.02",
+    );
+    assert_eq!(moved.len(), driven.len());
+    for (a, b) in moved.iter().zip(&driven) {
+        // Simpson's rule over steps of 0.012
+        assert!((a - b).abs() < 1e-10, "{a} {b}");
+    }
+    // the end of a bar that is pushed at 0.02 moves at twice that once the wave has arrived, at t = 0.5
+    let last = steady.last().unwrap();
+    assert!((last - 0.02).abs() < 4e-4, "{last}");
+}
+
+#[test]
+fn a_traction_that_varies_in_time_is_that_of_its_factors() {
+    let folder = tempfile::tempdir().unwrap();
+    // time alone, and time beside a coordinate that changes nothing: two ways through the driver
+    let mut found = Vec::new();
+    for (name, x) in [
+        ("alone", "0.01 * sin(9 * t)"),
+        ("both", "0.01 * sin(9 * t) * x"),
+    ] {
+        let scene = format!("{MODE}[conditions.pulled.traction]\non = \"right\"\nx = \"{x}\"\n");
+        write(folder.path(), &format!("{name}.toml"), &scene);
+        run(folder.path(), &[&format!("{name}.toml")]);
+        found.push(column(
+            &folder.path().join(format!("out/{name}_history.csv")),
+            "end_ux",
+        ));
+        let work = column(
+            &folder.path().join(format!("out/{name}_history.csv")),
+            "external_work",
+        );
+        assert!(work.iter().any(|w| w.abs() > 1e-6));
+    }
+    for (a, b) in found[0].iter().zip(&found[1]) {
+        assert!((a - b).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn a_step_beyond_the_limit_is_refused_or_shortened() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "bar.toml", MODE);
+    // the limit of lumped masses is h/c = 1/80
+    let step = format!("solve.explicit.step={}", 1.02 / 80.0);
+    let output = bondline(folder.path())
+        .args(["run", "bar.toml", "--set", &step])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said.contains("larger than the stable step"), "{said}");
+    assert!(
+        !folder.path().join("out").exists(),
+        "refused before it starts"
+    );
+    let said = run(
+        folder.path(),
+        &[
+            "bar.toml",
+            "--set",
+            &step,
+            "--set",
+            "solve.explicit.beyond-limit=shorten",
+            "--json",
+        ],
+    );
+    let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert!(summary["motion"]["step"].as_f64().unwrap() < 1.0 / 80.0);
+    assert!(summary["choices"].to_string().contains("is beyond it"));
+}
+
+#[test]
+fn check_predicts_the_steps_of_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "bar.toml", BREAKING);
+    let output = bondline(folder.path())
+        .args(["check", "bar.toml", "--json"])
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let predicted: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let said = run(folder.path(), &["bar.toml", "--json"]);
+    let measured: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(predicted["sizes"], measured["sizes"]);
+    let (p, m) = (&predicted["motion"], &measured["motion"]);
+    assert_eq!(p["steps"], m["of_steps"]);
+    assert_eq!(p["step"], m["step"]);
+    assert!(p["certified_step"].as_f64() <= p["stable_step"].as_f64());
+    assert!(p["seconds_per_step"].as_f64().unwrap() > 0.0);
+    let bytes = |v: &serde_json::Value| v["peak_memory_bytes"].as_f64().unwrap();
+    let ratio = bytes(&predicted) / bytes(&measured);
+    assert!((0.7..=1.4).contains(&ratio), "{ratio}");
+}
