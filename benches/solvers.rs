@@ -1,5 +1,5 @@
 //! Times the solvers against each other, all within one run, in seconds of CPU (the machine may be shared):
-//! `cargo bench --bench solvers -- [direct|faer|krylov …] [CASE …]`.
+//! `cargo bench --bench solvers -- [direct|faer|krylov …] [CASE …]`; `-- crossover` direct against Krylov by size; `-- symmetric` a symmetric seam against a splice.
 
 use bondline::progress::Silent;
 use bondline::solve::direct::{Analysis, DirectParams, Factor};
@@ -16,6 +16,9 @@ use faer::sparse::linalg::cholesky::{SymmetricOrdering, factorize_symbolic_chole
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use std::time::Instant;
+
+#[path = "solvers/symmetric.rs"]
+mod symmetric;
 
 /// A matrix with the sites that belong to it.
 struct Case {
@@ -91,6 +94,14 @@ fn main() {
         .skip(1)
         .filter(|a| !a.starts_with("--"))
         .collect();
+    if let [first, rest @ ..] = wanted.as_slice()
+        && first == symmetric::CHILD
+    {
+        return symmetric::child(rest);
+    }
+    if wanted.iter().any(|w| w == "symmetric") {
+        return symmetric::compare();
+    }
     if wanted.iter().any(|w| w == "crossover") {
         return crossover();
     }

@@ -3,7 +3,7 @@
 use bondline::{
     observe::report::{Table, Verdict},
     progress::Silent,
-    verify::{Effort, balance, partial_volumes, tangents, weights},
+    verify::{Effort, balance, layers, partial_volumes, skin, tangents, weights},
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -63,4 +63,16 @@ fn partial_volumes_fill_the_ball() {
     // exact in three dimensions, the ramp of HHB in one; rectangles, boxes, hexahedra
     assert_eq!(count(&tables, "largest", Verdict::Pass), 4 + 1);
     assert_eq!(count(&tables, "sum against", Verdict::Pass), 2);
+}
+
+#[test]
+fn skins_and_layers_are_exact() {
+    let tables = skin::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    assert_eq!(count(&tables, "modulus", Verdict::Pass), 6);
+    let tables = layers::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    // two laws, two ratios, 1D and 2D
+    assert_eq!(count(&tables, "residual", Verdict::Pass), 8);
+    assert_eq!(count(&tables, "asymmetry", Verdict::Pass), 8);
 }

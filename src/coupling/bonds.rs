@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 
 use crate::{
-    coupling::{ModelError, Peridynamics, PointSource, Surfaces, points::PointCloud},
+    coupling::{ModelError, Peridynamics, PointSource, points::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, cutter::SegmentCutter},
     peridynamics::{
         BondWeights, Families, Family, PartialVolume, StatePart, TIE_TOLERANCE, collapsed_tensor,
@@ -16,22 +16,19 @@ use crate::{
     tensor::{Tensor4, Vector},
 };
 
-/// Removes the bonds that barriers or the boundary of the mesh cut.
+/// Removes the bonds that barriers or facets cut; `reach` is the largest horizon.
 pub(super) fn cut<const D: usize>(
     p: &Peridynamics<D>,
     mesh: &Mesh<D>,
+    surface: Option<Vec<BoundaryFacet>>,
+    reach: f64,
     position: &[Vector<D>],
     families: &mut Families,
 ) {
     let barriers = Barriers::new(p.barriers.clone());
-    let surface = (p.surfaces == Surfaces::Cut).then(|| mesh.outer_facets());
     if barriers.is_empty() && surface.is_none() {
         return;
     }
-    let reach = position
-        .iter()
-        .map(|x| p.reach((p.horizon)(x)))
-        .fold(0.0, f64::max);
     // a bond crosses a facet only if both of its ends are within its length of it
     let bins = surface
         .as_ref()
@@ -147,6 +144,11 @@ impl<const D: usize> LatticeFactors<D> {
         Ok(factors)
     }
 
+    /// Whether a bond of that horizon may have a factor here.
+    pub fn knows(&self, horizon: f64) -> bool {
+        self.tables.contains_key(&horizon.to_bits())
+    }
+
     /// Whether the points are a lattice's.
     pub fn is_lattice(&self) -> bool {
         self.is_lattice
@@ -245,7 +247,8 @@ fn offset_of<const D: usize>(xi: &Vector<D>, spacing: f64) -> [i32; D] {
 
 /// The family of a lattice point far from all surfaces, with its coefficients.
 pub(super) struct WholeFamily<const D: usize> {
-    spacing: f64,
+    /// Spacing of the lattice.
+    pub spacing: f64,
     coefficients: BTreeMap<[i32; D], (f64, f64)>,
     /// The state part of the law, if it has one.
     pub state: Option<StatePart<D>>,

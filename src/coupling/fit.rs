@@ -25,13 +25,13 @@ pub(super) struct Sites<'a, const D: usize> {
 }
 
 /// Positions sorted into bins, to find those near a node without looking at all of them.
-struct Bins<const D: usize> {
+pub(super) struct Bins<const D: usize> {
     size: f64,
     bins: HashMap<[i64; D], Vec<u32>>,
 }
 
 impl<const D: usize> Bins<D> {
-    fn new(positions: &[Vector<D>], size: f64) -> Self {
+    pub fn new(positions: &[Vector<D>], size: f64) -> Self {
         let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
         for (k, x) in positions.iter().enumerate() {
             bins.entry(Self::bin(x, size)).or_default().push(k as u32);
@@ -44,7 +44,7 @@ impl<const D: usize> Bins<D> {
     }
 
     /// The numbers of all positions in bins that a ball meets, and of no others.
-    fn around(&self, x: &Vector<D>, radius: f64) -> impl Iterator<Item = usize> + '_ {
+    pub fn around(&self, x: &Vector<D>, radius: f64) -> impl Iterator<Item = usize> + '_ {
         let reach = radius * (1.0 + 1e-9);
         let low = Self::bin(&x.add_scalar(-reach), self.size);
         let high = Self::bin(&x.add_scalar(reach), self.size);

@@ -10,6 +10,7 @@
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs` | shared: sites, families, what completes them | |
+//! | `lattices.rs` | shared: one lattice of points, or several that elements keep apart |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `motion.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
@@ -26,6 +27,7 @@ mod bonds;
 pub mod derivative;
 pub mod edge;
 mod fit;
+mod lattices;
 pub mod model;
 pub mod motion;
 pub mod partial_stress;
@@ -43,7 +45,7 @@ pub use derivative::FitDegree;
 pub use model::{Model, Site, SiteKind};
 pub use motion::Motion;
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
-pub use problem::{ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
+pub use problem::{Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
 pub use sample::{Carrier, Sampler};
 pub use single::{Local, Nonlocal};
 pub use splice::Splice;

@@ -3,15 +3,15 @@
 use crate::{
     assembly::{self, Row, Transfer},
     coupling::{
-        CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Reach, Zone,
-        bonds::{self, LatticeFactors, WholeFamily},
+        CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Surfaces, Zone, bonds,
         fit::{self, Sites},
-        place,
+        lattices::{self, Grown, Passing},
+        place::{self, Beyond},
         points::{PointCloud, Volumes},
     },
     fem,
     mesh::{CellShape, Mesh},
-    peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody, TIE_TOLERANCE},
+    peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody},
     progress::Progress,
     system::BlockCsr,
     tensor::{Tensor, Tensor4, Vector},
@@ -39,14 +39,6 @@ pub struct Site<const D: usize> {
 
 const NONE: u32 = u32::MAX;
 
-/// What bonds that end on the faces of elements need: the lattice as it goes on behind the faces.
-pub(super) struct Passing<const D: usize> {
-    /// Families of the points in elements, over the cloud of the body.
-    pub families: Families,
-    /// The family of any point far from surfaces.
-    pub whole: WholeFamily<D>,
-}
-
 /// A problem with its sites and families; a coupling turns it into rows.
 pub struct Model<const D: usize> {
     /// The mesh of the whole part.
@@ -69,7 +61,7 @@ pub struct Model<const D: usize> {
     surroundings: Option<Cloud<D>>,
     point_zone: Vec<Zone>,
     node_cells: (Vec<u32>, Vec<u32>),
-    interface: Interface,
+    pub(super) interface: Interface,
     passing: Option<Passing<D>>,
     spacing: f64,
     volumes: Volumes,
@@ -127,20 +119,22 @@ impl<const D: usize> Model<D> {
             });
         }
         progress.stage("sites", None);
-        let cloud = match &model.peridynamics {
-            Some(p) if has_points => Some(place::place(
-                &model.mesh,
-                &model.zones,
-                &model.roles,
-                p,
-                coupling.reach(p.law.as_ref()),
-            )?),
-            _ => None,
+        let clouds = match &model.peridynamics {
+            Some(p) if has_points => {
+                let beyond = match model.interface {
+                    Interface::Faces => Beyond::Continued,
+                    _ => Beyond::Empty,
+                };
+                model.check_lattices(p)?;
+                let reach = coupling.reach(p.law.as_ref());
+                place::place(&model.mesh, &model.zones, &model.roles, p, reach, beyond)?
+            }
+            _ => Vec::new(),
         };
         let node_site = model.place_nodes(coupling.interface());
-        if let Some(cloud) = cloud {
+        if !clouds.is_empty() {
             model.place_points(
-                cloud,
+                clouds,
                 &node_site,
                 coupling.as_ref(),
                 peridynamic_material,
@@ -190,7 +184,7 @@ impl<const D: usize> Model<D> {
     /// Makes sites of points, completes families, and expresses every other place through sites.
     fn place_points(
         &mut self,
-        cloud: PointCloud<D>,
+        clouds: Vec<PointCloud<D>>,
         node_site: &[u32],
         coupling: &dyn Coupling<D>,
         peridynamic_material: u16,
@@ -201,7 +195,7 @@ impl<const D: usize> Model<D> {
         };
         let result = self.place_points_of(
             &p,
-            cloud,
+            clouds,
             node_site,
             coupling,
             peridynamic_material,
@@ -214,57 +208,46 @@ impl<const D: usize> Model<D> {
     fn place_points_of(
         &mut self,
         p: &Peridynamics<D>,
-        mut cloud: PointCloud<D>,
+        clouds: Vec<PointCloud<D>>,
         node_site: &[u32],
         coupling: &dyn Coupling<D>,
         peridynamic_material: u16,
         progress: &dyn Progress,
     ) -> Result<(), ModelError> {
+        progress.stage("families", None);
+        let reach = coupling.reach(p.law.as_ref());
+        let mut grown = clouds
+            .into_iter()
+            .enumerate()
+            .map(|(l, cloud)| self.grow(p, cloud, l, reach))
+            .collect::<Result<Vec<_>, _>>()?
+            .into_iter();
+        let Some(Grown {
+            mut cloud,
+            mut families,
+            mut passing,
+            factors: first,
+            wide,
+            is_constant: constant,
+        }) = grown.next()
+        else {
+            return Ok(());
+        };
+        let mut factors = vec![first];
+        let mut of_point = vec![0u16; cloud.position.len()];
+        let mut horizons = vec![cloud.horizon.first().copied().unwrap_or(0.0)];
+        for next in grown {
+            families.append(&next.families);
+            if let (Some(all), Some(more)) = (&mut passing, &next.passing) {
+                all.append(more);
+            }
+            of_point.extend(vec![factors.len() as u16; next.cloud.position.len()]);
+            horizons.extend(next.cloud.horizon.first());
+            cloud.append(next.cloud);
+            factors.push(next.factors);
+        }
         self.spacing = cloud.spacing;
         self.volumes = cloud.volumes;
-        for (x, &horizon) in cloud.position.iter().zip(&cloud.horizon) {
-            if !(horizon.is_finite() && horizon >= cloud.spacing * (1.0 - 1e-9)) {
-                return Err(ModelError::Horizon {
-                    position: x.iter().copied().collect(),
-                    horizon,
-                    spacing: cloud.spacing,
-                });
-            }
-        }
-        if cloud.element.iter().all(Option::is_some) {
-            return Err(ModelError::NoPoints {
-                spacing: cloud.spacing,
-            });
-        }
-        progress.stage("families", None);
-        let constant = cloud
-            .horizon
-            .iter()
-            .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
-        let reaches: Vec<f64> = cloud.horizon.iter().map(|&d| p.reach(d)).collect();
-        let mut families = Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?;
-        let lattice = LatticeFactors::new(p, &cloud)?;
-        lattice.drop_without_share(&cloud, &mut families);
-        bonds::cut(p, &self.mesh, &cloud.position, &mut families);
-        // which points need a family of their own, and which only complete those of others
-        let reach = match coupling.reach(p.law.as_ref()) {
-            Reach::Own if constant => Reach::Own,
-            _ => Reach::Neighbours,
-        };
-        let (keep, passing) = match self.interface {
-            Interface::Faces => {
-                let (keep, passing) = cloud.prune_through(&families);
-                let families = families.restrict(&keep.renumbered, &passing);
-                (keep, Some(families))
-            }
-            _ => (cloud.prune(&families, reach), None),
-        };
-        let families = families.restrict(&keep.renumbered, &keep.active);
-        let wide = self
-            .roles
-            .contains(&CellRole::StressElement)
-            .then(|| cloud.clone());
-        cloud.retain(&keep.renumbered);
 
         let mut point_site = vec![NONE; cloud.position.len()];
         for (i, element) in cloud.element.iter().enumerate() {
@@ -289,8 +272,8 @@ impl<const D: usize> Model<D> {
             &cloud,
         )?;
         let transfer = self.transfer_of(&cloud, |i| point_site[i]);
-        if let Some(wide) = wide {
-            let transfer = self.transfer_of(&wide, |i| point_site[keep.renumbered[i] as usize]);
+        if let Some((wide, renumbered)) = wide {
+            let transfer = self.transfer_of(&wide, |i| point_site[renumbered[i] as usize]);
             self.surroundings = Some(Cloud {
                 position: wide.position,
                 volume: wide.volume,
@@ -299,10 +282,15 @@ impl<const D: usize> Model<D> {
             });
         }
         progress.stage("bonds", None);
-        let shells = |horizon: f64, xi: &Vector<D>| lattice.factor(horizon, xi);
-        let factors = match (p.weights, lattice.is_lattice()) {
+        let shells = |horizon: f64, xi: &Vector<D>| {
+            let own = factors.iter().find(|l| l.knows(horizon));
+            own.map_or(1.0, |l| l.factor(horizon, xi))
+        };
+        let weighting = match (p.weights, factors[0].is_lattice()) {
             (BondWeights::Isotropic, true) => Factors::Shells(&shells),
-            (BondWeights::Plain, true) if lattice.has_partial_volumes() => Factors::Shells(&shells),
+            (BondWeights::Plain, true) if factors[0].has_partial_volumes() => {
+                Factors::Shells(&shells)
+            }
             (BondWeights::Fitted, _) => Factors::Fitted,
             _ => Factors::Plain,
         };
@@ -312,20 +300,19 @@ impl<const D: usize> Model<D> {
             Ends::Differ
         };
         if p.weights == BondWeights::Plain
-            && let Some(tensor) = lattice.tensor(p, cloud.horizon[0])?
+            && let Some(tensor) = factors[0].tensor(p, horizons[0])?
         {
             // the local side carries the stiffness of the peridynamic quadrature, or the seam would be a jump of material
             self.tensors[peridynamic_material as usize] = tensor;
         }
         if let Some(families) = passing {
-            let whole = lattice.whole_family(p, cloud.horizon[0])?;
-            let (true, Some(whole)) = (constant && p.weights != BondWeights::Fitted, whole) else {
-                return Err(ModelError::Unsupported {
-                    what: "a seam of truncated bonds without a regular lattice of one horizon and one weight per shell of bonds",
-                    remedy: "give peridynamics.points a lattice, a constant horizon and isotropic or plain weights, or couple by splice or blending",
-                });
-            };
-            self.passing = Some(Passing { families, whole });
+            let is_regular = constant && p.weights != BondWeights::Fitted;
+            let whole = lattices::whole_families(p, &factors, &horizons, is_regular)?;
+            self.passing = Some(Passing {
+                families,
+                whole,
+                of_point,
+            });
         }
         self.point_zone = cloud.zone;
         let cloud = Cloud {
@@ -334,7 +321,7 @@ impl<const D: usize> Model<D> {
             horizon: cloud.horizon,
             transfer,
         };
-        let body = PdBody::new(cloud, families, p.law.as_ref(), &factors, ends)
+        let body = PdBody::new(cloud, families, p.law.as_ref(), &weighting, ends)
             .map_err(|e| ModelError::family("the point", e))?;
         self.body = Some(body);
         Ok(())
@@ -369,7 +356,9 @@ impl<const D: usize> Model<D> {
     /// Removes the bonds that voids, cracks or the boundary of the mesh cut.
     pub fn cut_bonds(&self, position: &[Vector<D>], families: &mut Families) {
         let Some(p) = &self.peridynamics else { return };
-        bonds::cut(p, &self.mesh, position, families);
+        let surface = (p.surfaces == Surfaces::Cut).then(|| self.mesh.outer_facets());
+        let longest = position.iter().map(|x| (p.horizon)(x)).fold(0.0, f64::max);
+        bonds::cut(p, &self.mesh, surface, longest, position, families);
     }
 
     /// The peridynamic body, if there is one.

@@ -3,50 +3,86 @@
 use rayon::prelude::*;
 
 use crate::{
-    coupling::{CellRole, ModelError, Peridynamics, PointSource, Reach, Zone, points::PointCloud},
+    coupling::{
+        CellRole, ModelError, Peridynamics, PointSource, Reach, Zone, fit::Bins, points::PointCloud,
+    },
     fem::{self, Locator},
     mesh::Mesh,
     tensor::Vector,
 };
 
-/// Places points in the cells that hold them and, as far as families reach, in the finite elements around.
+/// How far a lattice goes on where neither its own cells nor an element are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Beyond {
+    /// There are no points.
+    Empty,
+    /// There are points, of which bonds that end on faces need the place only.
+    Continued,
+}
+
+/// Places points in the cells that hold them and, as far as families reach, around; one cloud for each lattice.
 pub(super) fn place<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],
     roles: &[CellRole],
     p: &Peridynamics<D>,
     reach: Reach,
-) -> Result<PointCloud<D>, ModelError> {
-    let volumes: Vec<f64> = (0..mesh.cell_count())
-        .into_par_iter()
-        .filter(|&c| roles[c] == CellRole::Points)
-        .map(|c| fem::cell_volume(mesh, c))
-        .collect();
+    beyond: Beyond,
+) -> Result<Vec<PointCloud<D>>, ModelError> {
+    let all: Vec<bool> = roles.iter().map(|&r| r == CellRole::Points).collect();
     let largest = (0..mesh.cell_count())
         .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))
         .fold(0.0, f64::max);
-    let nodes: Vec<u32> = (0..mesh.cell_count())
-        .filter(|&c| roles[c] != CellRole::Element)
-        .flat_map(|c| mesh.cell(c).iter().copied())
-        .collect();
-    let (low, high) = mesh.bounds_of(&nodes);
-    let levels = if reach == Reach::Own { 1.0 } else { 2.0 };
-    let margin = Vector::repeat(levels * largest * (1.0 + 1e-6));
-    let placement = Placement {
-        mesh,
-        zones,
-        roles,
-        p,
-        low: low - margin,
-        high: high + margin,
-        region: volumes.iter().sum(),
-    };
-    match p.points {
-        PointSource::Cells => Ok(placement.at_cells()),
-        PointSource::Lattice { spacing, origin } if spacing.is_finite() && spacing > 0.0 => {
-            placement.on_lattice(spacing, origin)
+    let placement = |mine: Vec<bool>, horizon: Option<f64>| {
+        let region = (0..mesh.cell_count())
+            .into_par_iter()
+            .filter(|&c| mine[c])
+            .map(|c| fem::cell_volume(mesh, c))
+            .collect::<Vec<_>>()
+            .iter()
+            .sum();
+        let nodes: Vec<u32> = (0..mesh.cell_count())
+            .filter(|&c| mine[c] || roles[c] == CellRole::StressElement)
+            .flat_map(|c| mesh.cell(c).iter().copied())
+            .collect();
+        let (low, high) = mesh.bounds_of(&nodes);
+        let levels = if reach == Reach::Own { 1.0 } else { 2.0 };
+        let margin = Vector::repeat(levels * horizon.unwrap_or(largest) * (1.0 + 1e-6));
+        Placement {
+            mesh,
+            zones,
+            roles,
+            p,
+            mine,
+            own_horizon: horizon,
+            beyond,
+            low: low - margin,
+            high: high + margin,
+            region,
         }
-        PointSource::Lattice { spacing, .. } => Err(ModelError::NoPoints { spacing }),
+    };
+    match &p.points {
+        PointSource::Cells => Ok(vec![placement(all, None).at_cells()]),
+        &PointSource::Lattice { spacing, origin } if spacing.is_finite() && spacing > 0.0 => {
+            Ok(vec![placement(all, None).on_lattice(spacing, origin)?])
+        }
+        &PointSource::Lattice { spacing, .. } => Err(ModelError::NoPoints { spacing }),
+        PointSource::Lattices { lattices, of_cell } => lattices
+            .iter()
+            .enumerate()
+            .map(|(l, lattice)| {
+                let mine: Vec<bool> = all
+                    .iter()
+                    .zip(of_cell)
+                    .map(|(&points, &of)| points && usize::from(of) == l)
+                    .collect();
+                let h = lattice.spacing;
+                if !(h.is_finite() && h > 0.0 && mine.contains(&true)) {
+                    return Err(ModelError::NoPoints { spacing: h });
+                }
+                placement(mine, Some(lattice.horizon)).on_lattice(h, lattice.origin)
+            })
+            .collect(),
     }
 }
 
@@ -56,6 +92,11 @@ struct Placement<'a, const D: usize> {
     zones: &'a [Zone],
     roles: &'a [CellRole],
     p: &'a Peridynamics<D>,
+    /// Cells whose points are sites.
+    mine: Vec<bool>,
+    /// The horizon of a lattice that has its own.
+    own_horizon: Option<f64>,
+    beyond: Beyond,
     /// Corners of the box that holds all points.
     low: Vector<D>,
     high: Vector<D>,
@@ -68,7 +109,7 @@ const BLOCK: usize = 1024;
 
 impl<const D: usize> Placement<'_, D> {
     fn horizon(&self, x: &Vector<D>) -> f64 {
-        (self.p.horizon)(x)
+        self.own_horizon.unwrap_or_else(|| (self.p.horizon)(x))
     }
 
     fn in_void(&self, x: &Vector<D>) -> bool {
@@ -113,14 +154,11 @@ impl<const D: usize> Placement<'_, D> {
         let cells = |keep: &dyn Fn(usize) -> bool| {
             Locator::new(mesh, (0..mesh.cell_count()).filter(|&c| keep(c)))
         };
-        let elements = cells(&|c| roles[c] != CellRole::Points);
+        let elements = cells(&|c| !self.mine[c]);
+        let nearest = Nearest::new(mesh, roles, h);
         // at a face that zones share, the zone that comes first here has the point
-        let by_zone = [Zone::Nonlocal, Zone::Transition, Zone::Local].map(|zone| {
-            (
-                zone,
-                cells(&|c| roles[c] == CellRole::Points && zones[c] == zone),
-            )
-        });
+        let by_zone = [Zone::Nonlocal, Zone::Transition, Zone::Local]
+            .map(|zone| (zone, cells(&|c| self.mine[c] && zones[c] == zone)));
         let tolerance = 1e-9;
         let in_region = |x: &Vector<D>| {
             by_zone
@@ -148,8 +186,7 @@ impl<const D: usize> Placement<'_, D> {
         };
         // lattice cells that an edge of the region passes: their volume is sampled
         let mut edge = vec![false; total];
-        let region_cells =
-            (0..mesh.cell_count() as u32).filter(|&c| roles[c as usize] == CellRole::Points);
+        let region_cells = (0..mesh.cell_count() as u32).filter(|&c| self.mine[c as usize]);
         for facet in mesh.boundary_facets(region_cells) {
             let (lo, hi) = mesh.bounds_of(&facet.nodes);
             mark_box(&mut edge, &counts, &first, &origin, h, &lo, &hi);
@@ -171,7 +208,14 @@ impl<const D: usize> Placement<'_, D> {
                         Some(l) => Some(zones[l.cell]),
                         None => in_region(&x),
                     };
-                    let Some(zone) = zone else { continue };
+                    let zone = match (zone, self.beyond) {
+                        (Some(zone), _) => zone,
+                        (None, Beyond::Empty) => continue,
+                        (None, Beyond::Continued) => {
+                            list.push((x, whole, 0.0, Zone::Local, Some(nearest.around(&x))));
+                            continue;
+                        }
+                    };
                     let (mut volume, mut share) =
                         (whole, if located.is_none() { whole } else { 0.0 });
                     if edge[index] {
@@ -191,7 +235,10 @@ impl<const D: usize> Placement<'_, D> {
                         share = whole * here as f64 / count as f64;
                     }
                     if volume > 0.0 {
-                        let element = located.map(|l| (l.cell as u32, l.shape[..l.nodes].to_vec()));
+                        let element = located.map(|l| match roles[l.cell] {
+                            CellRole::Points => nearest.around(&x),
+                            _ => (l.cell as u32, l.shape[..l.nodes].to_vec()),
+                        });
                         list.push((x, volume, share, zone, element));
                     }
                 }
@@ -224,6 +271,56 @@ impl<const D: usize> Placement<'_, D> {
             cloud.push(x, volume * factor, self.horizon(&x), zone, element);
         }
         Ok(cloud)
+    }
+}
+
+/// The elements by their centroids, to extrapolate from the nearest.
+struct Nearest<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    cells: Vec<u32>,
+    centres: Vec<Vector<D>>,
+    bins: Bins<D>,
+    /// Size of a bin, and of the mesh.
+    sizes: [f64; 2],
+}
+
+impl<'a, const D: usize> Nearest<'a, D> {
+    fn new(mesh: &'a Mesh<D>, roles: &[CellRole], spacing: f64) -> Self {
+        let cells: Vec<u32> = (0..mesh.cell_count() as u32)
+            .filter(|&c| roles[c as usize] != CellRole::Points)
+            .collect();
+        let centres: Vec<Vector<D>> = cells.iter().map(|&c| mesh.centroid(c as usize)).collect();
+        let (low, high) = mesh.bounds();
+        Self {
+            mesh,
+            bins: Bins::new(&centres, 4.0 * spacing),
+            cells,
+            centres,
+            sizes: [4.0 * spacing, (high - low).norm()],
+        }
+    }
+
+    /// The element whose centroid is nearest, with shape values that extrapolate affine fields exactly; no shape values if there is none.
+    fn around(&self, x: &Vector<D>) -> (u32, Vec<f64>) {
+        let mut radius = self.sizes[0];
+        while radius < 4.0 * self.sizes[1] {
+            let distance = |k: usize| (self.centres[k] - x).norm();
+            let found = self
+                .bins
+                .around(x, radius)
+                .filter(|&k| distance(k) <= radius)
+                .min_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+            if let Some(k) = found {
+                let c = self.cells[k];
+                let shape = fem::reference_of(self.mesh, c as usize, x).map(|at| {
+                    let (shape, count) = fem::shape_values(self.mesh, c as usize, &at);
+                    shape[..count].to_vec()
+                });
+                return (c, shape.unwrap_or_default());
+            }
+            radius *= 2.0;
+        }
+        (0, Vec::new())
     }
 }
 
@@ -361,7 +458,7 @@ mod tests {
         ] {
             let mesh = holed_plate();
             let zones = vec![Zone::Nonlocal; mesh.cell_count()];
-            let [region, sum] = volumes(mesh, zones, points, 0.3);
+            let [region, sum] = volumes(mesh, zones, points.clone(), 0.3);
             assert!(
                 (region - exact).abs() < 1e-12 && (sum - exact).abs() < 1e-12,
                 "{points:?}: {sum}"
@@ -377,7 +474,7 @@ mod tests {
                     }
                 })
                 .collect();
-            let [region, sum] = volumes(mesh, zones, points, 0.3);
+            let [region, sum] = volumes(mesh, zones, points.clone(), 0.3);
             assert!(
                 (region - exact / 2.0).abs() < 1e-12 && (sum - exact / 2.0).abs() < 1e-12,
                 "{points:?}: {sum}"

@@ -26,7 +26,7 @@ pub(super) struct PointCloud<const D: usize> {
     pub volume: Vec<f64>,
     pub horizon: Vec<f64>,
     pub zone: Vec<Zone>,
-    /// The finite element that interpolates a point, with its shape values; none for a point that is a site.
+    /// The finite element that interpolates a point (or extrapolates one that lies in none), with its shape values; none for a point that is a site.
     pub element: Vec<Option<(u32, Vec<f64>)>>,
     pub spacing: f64,
     /// Whether the points are some of a lattice's.
@@ -158,6 +158,18 @@ impl<const D: usize> PointCloud<D> {
                 points: 0.0,
             },
         }
+    }
+
+    /// Appends the points of another cloud; the spacing becomes the larger one.
+    pub fn append(&mut self, other: Self) {
+        self.position.extend(other.position);
+        self.volume.extend(other.volume);
+        self.horizon.extend(other.horizon);
+        self.zone.extend(other.zone);
+        self.element.extend(other.element);
+        self.spacing = self.spacing.max(other.spacing);
+        self.volumes.region += other.volumes.region;
+        self.volumes.points += other.volumes.points;
     }
 
     pub fn push(

@@ -16,7 +16,7 @@ use crate::{
 pub type ScalarField<const D: usize> = Arc<dyn Fn(&Vector<D>) -> f64 + Send + Sync>;
 
 /// Where peridynamic points come from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum PointSource<const D: usize> {
     /// One point per cell, at its centroid, with its volume.
     Cells,
@@ -27,6 +27,24 @@ pub enum PointSource<const D: usize> {
         /// Any point of the lattice.
         origin: Vector<D>,
     },
+    /// Several lattices, each with its horizon, in cells that no face joins: bonds run within a lattice only.
+    Lattices {
+        /// The lattices.
+        lattices: Vec<Lattice<D>>,
+        /// The lattice of each cell, an index into `lattices`; without meaning in an element.
+        of_cell: Vec<u16>,
+    },
+}
+
+/// A lattice of points with its own horizon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice<const D: usize> {
+    /// Distance h of neighbouring points \[m\].
+    pub spacing: f64,
+    /// Any point of the lattice.
+    pub origin: Vector<D>,
+    /// Horizon δ \[m\].
+    pub horizon: f64,
 }
 
 /// The peridynamic part of a problem.
@@ -35,7 +53,7 @@ pub struct Peridynamics<const D: usize> {
     pub law: Box<dyn BondLaw<D>>,
     /// Horizon δ as a field \[m\].
     pub horizon: ScalarField<D>,
-    /// Where the points come from.
+    /// Where the points come from; a lattice of several has its own horizon instead.
     pub points: PointSource<D>,
     /// How bonds are weighted.
     pub weights: BondWeights,
@@ -54,7 +72,7 @@ impl<const D: usize> Peridynamics<D> {
     pub fn reach(&self, horizon: f64) -> f64 {
         let spacing = match self.points {
             PointSource::Lattice { spacing, .. } => spacing,
-            PointSource::Cells => return horizon,
+            PointSource::Cells | PointSource::Lattices { .. } => return horizon,
         };
         let beyond = BoxCell::<D>::cube(Vector::zeros(), spacing)
             .map_or(0.0, |cell| self.volumes.reach_beyond(&cell));

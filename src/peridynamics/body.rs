@@ -394,6 +394,15 @@ impl Families {
         result
     }
 
+    /// Appends the families of another cloud, whose points are numbered on from those of this one.
+    pub fn append(&mut self, other: &Self) {
+        let (points, bonds) = (self.len() as u32, self.neighbours.len());
+        self.neighbours
+            .extend(other.neighbours.iter().map(|&j| j + points));
+        self.offsets
+            .extend(other.offsets.iter().skip(1).map(|&o| o + bonds));
+    }
+
     /// Families of some points of a cloud of `points`, row `r` that of point `centres[r]` (ascending), as families of all points, the rest empty.
     pub fn spread(&self, centres: &[u32], points: usize) -> Self {
         let mut offsets = Vec::with_capacity(points + 1);

@@ -53,6 +53,7 @@ pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
         ["zones", "transition"] => Some(TRANSITIONS),
         ["zones", "nonlocal"]
         | ["conditions" | "initial", _, _, "inside"]
+        | ["zones", "bodies", _, "inside"]
         | ["voids", _, "inside"]
         | ["output", "tips", _, "inside"]
         | ["cracks" | "no-fail", _] => Some(SHAPES),

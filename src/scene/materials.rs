@@ -12,6 +12,7 @@ use super::spec::{
     SceneSpec, SurfacesSpec, VolumesSpec, WeightsSpec,
 };
 use super::value::{Number, Text};
+use crate::coupling::Lattice;
 use crate::material::{Elastic, Kinematics};
 use crate::mesh::Mesh;
 use crate::peridynamics::{Influence, Micromodulus, PartialVolume};
@@ -60,7 +61,7 @@ impl<const D: usize> Material<D> {
 }
 
 /// Where the peridynamic points are.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Points<const D: usize> {
     /// At the centroids of cells.
     Cells,
@@ -70,6 +71,13 @@ pub enum Points<const D: usize> {
         spacing: f64,
         /// Any point of the lattice.
         origin: Vector<D>,
+    },
+    /// On several lattices, each with its horizon.
+    Lattices {
+        /// The lattices; the first one is that of the scene's `[peridynamics]`.
+        lattices: Vec<Lattice<D>>,
+        /// The lattice of each cell.
+        of_cell: Vec<u16>,
     },
 }
 

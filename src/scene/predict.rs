@@ -15,7 +15,7 @@ use super::solve::Solve;
 use super::spec::{Joining, ZonesNeeded};
 use super::validate::Scene;
 use crate::coupling::edge::Edge;
-use crate::coupling::{Model, SiteKind, Zone};
+use crate::coupling::{Model, PointSource, SiteKind, Zone};
 use crate::mesh::Mesh;
 use crate::observe::report::{aligned, number};
 use crate::observe::summary::{
@@ -272,7 +272,10 @@ pub(super) fn warnings<const D: usize>(
     prediction: &Prediction,
 ) -> Vec<String> {
     let mut list = Vec::new();
-    if let (Some(body), Some(p)) = (model.body(), &model.peridynamics) {
+    // families are judged by the one spacing of a model
+    let alone =
+        |p: &&crate::coupling::Peridynamics<D>| !matches!(p.points, PointSource::Lattices { .. });
+    if let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref().filter(alone)) {
         let h = model.spacing();
         let smallest = body
             .cloud

@@ -283,6 +283,9 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             points: match p.points {
                 Points::Cells => PointSource::Cells,
                 Points::Lattice { spacing, origin } => PointSource::Lattice { spacing, origin },
+                Points::Lattices { lattices, of_cell } => {
+                    PointSource::Lattices { lattices, of_cell }
+                }
             },
             weights: match p.weights {
                 WeightsSpec::Isotropic => BondWeights::Isotropic,

@@ -16,7 +16,7 @@ use super::run::{self, RunError};
 use super::solve::Solve;
 use super::source::{Source, Span};
 use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
-use super::{breaking, initial, obstacles, output, solve, zones};
+use super::{bodies, breaking, initial, obstacles, output, solve, zones};
 use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -269,7 +269,10 @@ fn scene<const D: usize>(
     };
     let (found, cell_material) =
         materials::materials(&spec.materials, influence, kinematics, &mesh)?;
-    let zones = zones::zones(spec, joining, &mesh)?;
+    let mut zones = zones::zones(spec, joining, &mesh)?;
+    let peridynamics = peridynamics
+        .map(|p| bodies::bodies(spec, joining, p, &mesh, &mut zones))
+        .transpose()?;
     one_peridynamic_material(spec, &found, &cell_material, &zones)?;
     if let Some(p) = &peridynamics {
         horizon(spec, p, &mesh, &zones)?;
@@ -290,6 +293,7 @@ fn scene<const D: usize>(
         .map_or(0, |(m, _)| *m);
     materials::volumes_at_rest(spec, &solve)?;
     let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
+    bodies::unbroken(spec, &breaking)?;
     let output = output::output(spec, &mesh, name)?;
     Ok(Scene {
         title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
@@ -426,8 +430,10 @@ fn horizon<const D: usize>(
     for c in (0..mesh.cell_count()).filter(|&c| zones[c] != Zone::Local) {
         let x = mesh.centroid(c);
         let delta = p.horizon_at(&x);
-        let spacing = match p.points {
-            Points::Lattice { spacing, .. } => spacing,
+        let spacing = match &p.points {
+            Points::Lattice { spacing, .. } => *spacing,
+            // checked body by body
+            Points::Lattices { .. } => continue,
             Points::Cells if zones[c] == Zone::Nonlocal => {
                 mesh.cell_volume(c).abs().powf(1.0 / D as f64)
             }

@@ -5,6 +5,8 @@
 //! | `patch` | affine fields through the seam: residual, solution, out-of-balance force |
 //! | `balance` | the out-of-balance force of a seam against its leading term |
 //! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, what symmetry saves |
+//! | `skin` | bars with free sides, with a skin of elements and without |
+//! | `layers` | two lattices of different horizons with a layer of elements between |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
 //! | `bar` | the coupled bar of [SAND2015-7998] section 7.3 |
@@ -31,6 +33,7 @@ pub mod enclosed;
 pub mod estimates;
 pub mod fields;
 pub mod horizons;
+pub mod layers;
 pub mod page;
 pub mod partial_volumes;
 pub mod patch;
@@ -88,6 +91,16 @@ pub const SUITES: &[Suite] = &[
         name: "truncated",
         about: "truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in the horizon, what symmetry saves",
         run: truncated::run,
+    },
+    Suite {
+        name: "skin",
+        about: "3D bars with free sides, with a skin of elements and without: affine field, Young's modulus, Poisson's ratio",
+        run: skin::run,
+    },
+    Suite {
+        name: "layers",
+        about: "two lattices, horizons 4:1, with a layer of elements between: reciprocity, affine fields, reflection",
+        run: layers::run,
     },
     Suite {
         name: "weights",

@@ -9,19 +9,21 @@ use crate::{
     },
     mesh::generate::{Axis, Grid},
     observe::report::{Columns, Row, Table},
-    peridynamics::{BondWeights, LinearPeridynamicSolid, PartialVolume},
+    peridynamics::{BondWeights, Micromodulus, PartialVolume},
     progress::{Progress, Silent},
     solve::statics::{self, StaticParams, StaticProblem},
     system::Symmetry,
     tensor::{Tensor4, Vector, padded},
-    verify::enclosed::{INFLUENCE, SPACING, YOUNGS_MODULUS},
+    verify::{
+        Effort,
+        enclosed::{INFLUENCE, Law, SPACING},
+    },
 };
 
 /// Largest error of an affine field, of Young's modulus and of Poisson's ratio with a skin.
 pub const SKIN_LIMIT: f64 = 1e-9;
 
 const STRETCH: f64 = 1e-3;
-const POISSON: f64 = 0.3;
 /// Cells along the bar and across it, of size h.
 const CELLS: [usize; 3] = [12, 8, 8];
 
@@ -33,7 +35,12 @@ struct Pulled {
 }
 
 /// Pulls the bar by its ends; what it shows is compared with the tensor of its elements.
-fn pull(coupling: Box<dyn Coupling<3>>, weights: BondWeights) -> Result<Pulled, String> {
+fn pull(
+    coupling: Box<dyn Coupling<3>>,
+    law: Law,
+    ratio: u32,
+    weights: BondWeights,
+) -> Result<Pulled, String> {
     let half: [f64; 3] = std::array::from_fn(|i| 0.5 * CELLS[i] as f64 * SPACING);
     let mesh = Grid::<3>::new(std::array::from_fn(|i| Axis::Uniform {
         min: -half[i],
@@ -47,10 +54,8 @@ fn pull(coupling: Box<dyn Coupling<3>>, weights: BondWeights) -> Result<Pulled, 
         .iter()
         .map(|&s| if s { Zone::Local } else { Zone::Nonlocal })
         .collect();
-    let e = YOUNGS_MODULUS;
-    let lambda = e * POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON));
-    let mu = e / (2.0 * (1.0 + POISSON));
-    let horizon = 2.0 * SPACING;
+    let (lambda, mu) = law.lame::<3>();
+    let horizon = f64::from(ratio) * SPACING;
     let problem = Problem {
         cell_material: vec![0; mesh.cell_count()],
         zones,
@@ -58,7 +63,7 @@ fn pull(coupling: Box<dyn Coupling<3>>, weights: BondWeights) -> Result<Pulled, 
         tensors: vec![Tensor4::isotropic(lambda, mu)],
         peridynamic_material: 0,
         peridynamics: Some(Peridynamics {
-            law: Box::new(LinearPeridynamicSolid::new(INFLUENCE, lambda, mu)),
+            law: law.law(),
             horizon: Arc::new(move |_| horizon),
             points: PointSource::Lattice {
                 spacing: SPACING,
@@ -164,17 +169,35 @@ type Make = fn() -> Box<dyn Coupling<3>>;
 pub fn table(progress: &dyn Progress) -> Table {
     progress.stage("skin", None);
     let mut table = Table::new(
-        "3D bar with free sides, LPS, m = 2, pulled at its ends: relative errors of the affine field, Young's modulus and Poisson's ratio (as typed with isotropic weights, of the lattice's tensor with plain ones)",
+        "3D bar with free sides, pulled at its ends: relative errors of the affine field, Young's modulus and Poisson's ratio (as typed with isotropic weights, of the lattice's tensor with plain ones)",
         Columns::ByQuantity,
     );
     let bars: [(&str, Make, bool); 2] = [
         ("skin of elements", || Box::new(Truncated), true),
         ("peridynamics alone", || Box::new(Nonlocal), false),
     ];
-    for weights in [BondWeights::Isotropic, BondWeights::Plain] {
+    // with m = 3 bonds leave the body through the skin
+    let cases = [
+        (Law::StateBased(INFLUENCE), 2, BondWeights::Isotropic),
+        (Law::StateBased(INFLUENCE), 2, BondWeights::Plain),
+        (Law::StateBased(INFLUENCE), 3, BondWeights::Isotropic),
+        (Law::StateBased(INFLUENCE), 3, BondWeights::Plain),
+        (
+            Law::BondBased(Micromodulus::InverseDistance),
+            3,
+            BondWeights::Isotropic,
+        ),
+        (
+            Law::BondBased(Micromodulus::InverseDistance),
+            3,
+            BondWeights::Plain,
+        ),
+    ];
+    for (law, ratio, weights) in cases {
         for (what, coupling, limited) in &bars {
-            let name = format!("{what}, {weights:?} weights").to_lowercase();
-            match pull(coupling(), weights) {
+            let kind = format!("{weights:?}").to_lowercase();
+            let name = format!("{}, m = {ratio}, {kind} weights, {what}", law.name());
+            match pull(coupling(), law, ratio, weights) {
                 Ok(p) => {
                     for (quantity, value) in [
                         ("field", p.field),
@@ -195,4 +218,11 @@ pub fn table(progress: &dyn Progress) -> Table {
         }
     }
     table
+}
+
+/// The suite `skin`.
+pub fn run(_effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let tables = vec![table(progress)];
+    progress.finish();
+    tables
 }

@@ -513,7 +513,6 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         zones::table(effort, progress),
         orders(effort, progress),
     ];
-    tables.push(super::skin::table(progress));
     if effort == Effort::Full {
         tables.push(savings(progress));
     }

@@ -49,14 +49,18 @@ impl<const D: usize> Dilatations<D> {
     pub fn new(segments: &Segments<'_, D>, listed: &[bool]) -> Result<Self, ModelError> {
         let body = segments.body;
         let volume = &body.cloud.volume;
-        let whole = &segments.passing.whole;
+        let passing = segments.passing;
         let Some(reference) = state_of(segments)? else {
             return Ok(Self::none(segments.model.sites.len()));
         };
         let mut functionals: BTreeMap<Carrier, Functional<D>> = BTreeMap::new();
         let mut carried: BTreeMap<u32, f64> = BTreeMap::new();
         let d = D as f64;
-        let over_m = d / reference.shape.trace();
+        let over_m: Vec<f64> = passing
+            .whole
+            .iter()
+            .map(|w| d / w.state.as_ref().map_or(f64::NAN, |s| s.shape.trace()))
+            .collect();
         // what pieces hand over
         for s in &segments.cut {
             let (i, j) = (s.i as usize, s.j as usize);
@@ -78,7 +82,8 @@ impl<const D: usize> Dilatations<D> {
                         add(Carrier::Point(*p), weight * omega * volume[other as usize]);
                     }
                     End::Face(foot) => {
-                        let omega = whole.of(&xi).1;
+                        let omega = passing.whole_of(s.i).of(&xi).1;
+                        let over_m = over_m[usize::from(passing.of_point[i])];
                         let share = weight * over_m * omega * volume[i] * volume[j]
                             / foot.cells.len() as f64;
                         for &cell in &foot.cells {
@@ -115,7 +120,8 @@ impl<const D: usize> Dilatations<D> {
             }
         }
         let mut found = Self::none(0);
-        let bulk = reference.modulus.get(0, 0, 0, 0) / (over_m * over_m);
+        // K′ of the material, the same for all lattices
+        let bulk = reference.modulus.get(0, 0, 0, 0) / (over_m[0] * over_m[0]);
         for (carrier, handed) in functionals {
             match carrier {
                 Carrier::Point(i) => {
@@ -192,7 +198,8 @@ impl<const D: usize> Dilatations<D> {
 pub(super) fn state_of<'a, const D: usize>(
     segments: &Segments<'a, D>,
 ) -> Result<Option<&'a StatePart<D>>, ModelError> {
-    match segments.passing.whole.state.as_ref() {
+    let first = segments.passing.whole.first();
+    match first.and_then(|w| w.state.as_ref()) {
         Some(state) if !is_volumetric(state) => Err(ModelError::Unsupported {
             what: "a seam of truncated bonds for a law with a state beyond its dilatation",
             remedy: "use an lps or bond-based material, or couple by splice or blending",

@@ -19,9 +19,13 @@
 
 use std::collections::HashMap;
 
-use super::segments::Segments;
+use super::{
+    seam::{Side, sides},
+    segments::Segments,
+};
 use crate::{
     assembly::Row,
+    coupling::bonds::WholeFamily,
     tensor::{Tensor, Vector},
 };
 
@@ -45,24 +49,32 @@ impl<const D: usize> Strings<D> {
     /// The strings along the edges where two faces of a zone meet at a right angle, in 3D, on a lattice that is its own mirror image in both faces.
     pub fn new(segments: &Segments<'_, D>) -> Self {
         let mut strings = Self::none();
-        if D != 3 {
-            return strings;
+        if D == 3 {
+            for lattice in 0..segments.passing.whole.len() {
+                strings.add_lattice(segments, lattice);
+            }
         }
+        strings
+    }
+
+    fn add_lattice(&mut self, segments: &Segments<'_, D>, lattice: usize) {
+        let strings = self;
         let model = segments.model;
         let mesh = &model.mesh;
-        let h = model.spacing();
-        let Some(origin) = segments.body.cloud.position.first() else {
-            return strings;
+        let whole = &segments.passing.whole[lattice];
+        let h = whole.spacing;
+        let mut of_point = segments.passing.of_point.iter();
+        let Some(first) = of_point.position(|&l| usize::from(l) == lattice) else {
+            return;
         };
-        let element: Vec<bool> = (0..mesh.cell_count())
-            .map(|c| model.is_element(c))
-            .collect();
+        let origin = &segments.body.cloud.position[first];
+        let side = sides(model, lattice);
         let mut faces: HashMap<[u32; 2], Vec<(Vector<D>, Vector<D>)>> = HashMap::new();
-        let seam = mesh.interface_facets(&element, &false, &true);
+        let seam = mesh.interface_facets(&side, &Side::Points, &Side::Element);
         let seam = seam.into_iter().map(|facet| facet.first);
         // where a zone ends at the boundary of the mesh, its edges there close the frame: an open string would turn under a rotation
         let outer = mesh.outer_facets().into_iter();
-        for facet in seam.chain(outer.filter(|f| !element[f.cell as usize])) {
+        for facet in seam.chain(outer.filter(|f| side[f.cell as usize] == Side::Points)) {
             let area = mesh.facet_normal_area(&facet);
             let n = &facet.nodes;
             let centre =
@@ -95,17 +107,17 @@ impl<const D: usize> Strings<D> {
             // where the lattice lies relative to the edge: halfway, or on it
             let offset = (x[0] - origin) / h;
             let half = |o: f64| (o - o.floor() - 0.5).abs() <= ALIGNED;
-            let whole = |o: f64| (o - o.round()).abs() <= ALIGNED;
+            let aligned = |o: f64| (o - o.round()).abs() <= ALIGNED;
             let between = if offset.iter().all(|&o| half(o)) {
                 true
-            } else if offset.iter().all(|&o| whole(o)) {
+            } else if offset.iter().all(|&o| aligned(o)) {
                 false
             } else {
                 continue;
             };
             let strength = *known
                 .entry(between)
-                .or_insert_with(|| octopole(segments, if between { 0.5 } else { 1.0 }));
+                .or_insert_with(|| octopole(whole, if between { 0.5 } else { 1.0 }));
             // at an outward edge the second face lies behind the first
             let sign = if n.dot(&(beyond - x[0])) < 0.0 {
                 1.0
@@ -126,7 +138,6 @@ impl<const D: usize> Strings<D> {
                 strings.of_site.entry(*s).or_default().push(number);
             }
         }
-        strings
     }
 
     /// None.
@@ -158,11 +169,11 @@ impl<const D: usize> Strings<D> {
 }
 
 /// `q`, the strength of what is left at a corner; the lattice's points lie `shift` spacings and more inside of the faces.
-fn octopole<const D: usize>(segments: &Segments<'_, D>, shift: f64) -> f64 {
-    let h = segments.model.spacing();
-    let volume = segments.model.typical_volume();
+fn octopole<const D: usize>(whole: &WholeFamily<D>, shift: f64) -> f64 {
+    let h = whole.spacing;
+    let volume = h.powi(D as i32);
     let mut q = 0.0;
-    for (offset, (pair, _)) in segments.passing.whole.bonds() {
+    for (offset, (pair, _)) in whole.bonds() {
         if offset.iter().all(|&k| k > 0) {
             let k = 2.0 * pair * volume * volume;
             let product: f64 = offset.iter().map(|&k| f64::from(k) * h).product();

@@ -141,6 +141,12 @@ pub(super) fn fit<const D: usize>(
     if follows(&missing) {
         return Ok(false);
     }
+    if segments.passing.whole.len() > 1 {
+        return Err(ModelError::Unsupported {
+            what: "several lattices with faces that do not follow them",
+            remedy: "let the faces follow the lattices (element edges a whole number of spacings long), or use one lattice",
+        });
+    }
     let mut left = f64::INFINITY;
     // a lattice with few bonds may need a second layer of points
     for _ in 0..2 {
@@ -181,7 +187,7 @@ pub(super) fn fit<const D: usize>(
 /// Integrals of the gradient of the shape functions of the nodes at the seam over the elements around them, without nodes from whose faces bonds are missing.
 fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> HashMap<u32, Vector<D>> {
     let model = segments.model;
-    let full = segments.passing.whole.bonds().count();
+    let full = segments.passing.whole[0].bonds().count();
     let mut nodes = HashMap::new();
     let mut dropped = Vec::new();
     for s in &segments.cut {
@@ -218,7 +224,7 @@ fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> HashMap<u32, Vect
 fn pair_tensor<const D: usize>(segments: &Segments<'_, D>) -> Tensor4<D> {
     let h = segments.model.spacing();
     let mut tensor = Tensor4::zeros();
-    for (offset, (pair, _)) in segments.passing.whole.bonds() {
+    for (offset, (pair, _)) in segments.passing.whole[0].bonds() {
         let xi = Vector::from_fn(|i, _| f64::from(offset[i]) * h);
         tensor.add_fourth_power(pair * segments.model.typical_volume(), &xi);
     }

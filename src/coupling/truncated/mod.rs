@@ -82,7 +82,7 @@ impl<const D: usize> Coupling<D> for Truncated {
             strings = Strings::none();
         }
         // a state reaches one family farther than a bond
-        let listed = if passing.whole.state.is_some() {
+        let listed = if passing.whole.iter().any(|w| w.state.is_some()) {
             segments.with_neighbours()
         } else {
             segments.at_seam.clone()

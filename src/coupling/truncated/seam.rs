@@ -35,6 +35,29 @@ struct Face<const D: usize> {
     cell: u32,
 }
 
+/// What a cell is to a lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// It holds points of the lattice.
+    Points,
+    /// It is an element.
+    Element,
+    /// It holds points of another lattice.
+    Other,
+}
+
+/// What each cell of a model is to a lattice.
+pub(super) fn sides<const D: usize>(model: &Model<D>, lattice: usize) -> Vec<Side> {
+    (0..model.mesh.cell_count())
+        .map(|c| match model.lattice_of_cell(c) {
+            Some(l) if l == lattice => Side::Points,
+            Some(_) => Side::Other,
+            None if model.is_element(c) => Side::Element,
+            None => Side::Other,
+        })
+        .collect()
+}
+
 /// All faces of the zone, in bins.
 pub(super) struct Seam<'a, const D: usize> {
     model: &'a Model<D>,
@@ -54,15 +77,13 @@ pub(super) struct Foot {
 }
 
 impl<'a, const D: usize> Seam<'a, D> {
-    /// Collects the faces of a model; `size` is about the length of its bonds.
-    pub fn new(model: &'a Model<D>, size: f64) -> Self {
+    /// Collects the faces of one lattice of a model; `size` is about the length of its bonds.
+    pub fn new(model: &'a Model<D>, lattice: usize, size: f64) -> Self {
         let mesh = &model.mesh;
-        let element: Vec<bool> = (0..mesh.cell_count())
-            .map(|c| model.is_element(c))
-            .collect();
+        let side = sides(model, lattice);
         let mut faces = Vec::new();
         let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
-        for facet in mesh.interface_facets(&element, &false, &true) {
+        for facet in mesh.interface_facets(&side, &Side::Points, &Side::Element) {
             let n = facet.first.nodes;
             let x = |i: usize| mesh.nodes[n[i.min(n.len() - 1)] as usize];
             let mut simplices = vec![std::array::from_fn(x)];
@@ -89,7 +110,10 @@ impl<'a, const D: usize> Seam<'a, D> {
             faces,
             bins,
             size,
-            zone: Locator::new(mesh, (0..mesh.cell_count()).filter(|&c| !element[c])),
+            zone: Locator::new(
+                mesh,
+                (0..mesh.cell_count()).filter(|&c| side[c] == Side::Points),
+            ),
         }
     }
 

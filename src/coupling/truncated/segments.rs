@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::seam::{Foot, Piece, Seam};
 use crate::{
     assembly::{Row, Transfer},
-    coupling::{Model, SiteKind, model::Passing},
+    coupling::{Model, SiteKind, lattices::Passing},
     peridynamics::PdBody,
     tensor::{Tensor, Vector},
 };
@@ -70,8 +70,14 @@ impl<'a, const D: usize> Segments<'a, D> {
                 site[p as usize] = s as u32;
             }
         }
-        let horizon = cloud.horizon.iter().copied().fold(0.0, f64::max);
-        let seam = Seam::new(model, horizon);
+        let seams: Vec<Seam<'_, D>> = (0..passing.whole.len())
+            .map(|l| {
+                let of = passing.of_point.iter().zip(&cloud.horizon);
+                let own = of.filter(|(of, _)| usize::from(**of) == l);
+                let horizon = own.map(|(_, d)| *d).fold(0.0, f64::max);
+                Seam::new(model, l, horizon)
+            })
+            .collect();
         let found: Vec<Vec<(u32, u32, Vec<Segment>)>> = (0..cloud.position.len())
             .into_par_iter()
             .map(|i| {
@@ -80,6 +86,7 @@ impl<'a, const D: usize> Segments<'a, D> {
                 } else {
                     body.families.of(i)
                 };
+                let seam = &seams[usize::from(passing.of_point[i])];
                 let mut list = Vec::new();
                 let mut pieces = Vec::new();
                 for &j in family.iter().filter(|&&j| j as usize > i) {
@@ -178,7 +185,7 @@ impl<'a, const D: usize> Segments<'a, D> {
     pub fn coefficients(&self, i: u32, j: u32) -> (f64, f64) {
         let xi = self.body.bond(i as usize, j as usize);
         if self.site[i as usize] == NONE {
-            return self.passing.whole.of(&xi);
+            return self.passing.whole_of(i).of(&xi);
         }
         let (pair, omega) = self.body.kernel(i as usize);
         match self.body.families.of(i as usize).binary_search(&j) {

@@ -32,8 +32,8 @@ pub use motion::{
     LoadStepSpec, QuasiStaticSpec, SolveSpec, TipSpec,
 };
 pub use region::{
-    BallSpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec,
-    ZonesSpec,
+    BallSpec, BodySpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec,
+    WithoutSpec, ZonesSpec,
 };
 
 use std::collections::BTreeMap;

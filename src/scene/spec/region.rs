@@ -1,5 +1,7 @@
 //! Shapes and zones of a scene.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
@@ -25,6 +27,21 @@ pub struct ZonesSpec {
     /// Cells of the nonlocal zone that are elements all the same, so that no bond is missing there.
     #[serde(default)]
     pub skin: Option<SkinSpec>,
+    /// Parts of the nonlocal zone with a horizon and a lattice of their own, by name; a layer of elements keeps them apart. Coupling `truncated` only.
+    #[serde(default)]
+    pub bodies: BTreeMap<Text, BodySpec>,
+}
+
+/// A part of the nonlocal zone with a horizon and a lattice of its own.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BodySpec {
+    /// Its shape; cells whose centroid lies inside. Cells of the rest of the zone that touch one of them become elements.
+    pub inside: ShapeSpec,
+    /// Its horizon δ.
+    pub horizon: Number,
+    /// The spacing of its points.
+    pub spacing: Number,
 }
 
 /// Where elements cover the nonlocal zone.
