@@ -94,7 +94,7 @@ impl<const D: usize> Coupling<D> for Truncated {
             strings,
             springs,
             dilatations,
-            pairwise: passing.whole.state.is_none(),
+            pairwise: passing.whole.iter().all(|w| w.state.is_none()),
             listed,
         }))
     }
