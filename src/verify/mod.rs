@@ -20,6 +20,7 @@
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
 //! | `wave` | energy and momentum over 100 000 steps |
 //! | `reflection` | what a seam sends back of a pulse |
+//! | `extremes` | units, places, laws, shapes and steps at their limits |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
 //!
 //! `page.rs` writes what they found as `docs/verification.md`. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
@@ -31,6 +32,7 @@ pub mod convergence;
 pub mod emmrich_weckner;
 pub mod enclosed;
 pub mod estimates;
+pub mod extremes;
 pub mod fields;
 pub mod horizons;
 pub mod layers;
@@ -151,6 +153,11 @@ pub const SUITES: &[Suite] = &[
         name: "reflection",
         about: "what a seam sends back of a pulse, by its width, method, m and side",
         run: reflection::run,
+    },
+    Suite {
+        name: "extremes",
+        about: "units, distances, Poisson ratios, m, thin cells, odd zones, fragments, time steps: each passes or is refused",
+        run: extremes::run,
     },
     Suite {
         name: "bobaru",

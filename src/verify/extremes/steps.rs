@@ -1,0 +1,92 @@
+//! Time steps on either side of the stable one, and very many of them.
+
+use std::path::Path;
+
+use super::{body::Body, kept, refused};
+use crate::{
+    observe::{report::Row, summary::MotionSummary},
+    progress::Silent,
+    scene::{AnyScene, Source},
+    verify::Effort,
+};
+
+/// Drift of the total energy over a run, relative.
+pub const ENERGY_LIMIT: f64 = 1e-2;
+
+/// A pulse in a bar.
+fn bar(coupling: &'static str, time: &str) -> String {
+    let mut body = Body {
+        dimension: 1,
+        cells: 60,
+        ..Body::new(coupling)
+    };
+    body.more = format!(
+        "[initial.pulse.displacement]\nx = \"1e-3*exp(-((x-0.2)/0.08)^2)\"\n[solve.explicit]\n{time}outputs = 1\n[output]\nvtu = false\n"
+    );
+    let scene = body.scene();
+    // free ends keep the energy
+    let (head, rest) = scene
+        .split_once("[conditions.left.displacement]")
+        .unwrap_or((&scene, ""));
+    let tail = rest.split_once("[solver]").map_or("", |t| t.1);
+    let tail = tail.split_once('\n').map_or("", |t| t.1);
+    let tail = tail.split_once('\n').map_or("", |t| t.1);
+    format!("{head}{tail}")
+}
+
+fn moved(text: &str) -> Result<MotionSummary, String> {
+    let source = Source::new("extreme.toml", text);
+    let mut scene = AnyScene::from_source(&source, Path::new(""), "extreme")
+        .map_err(|e| e.message().to_owned())?;
+    let folder = std::env::temp_dir().join(format!("bondline-extremes-{}", std::process::id()));
+    scene.set_output_directory(folder.clone());
+    let summary = scene.run(&Silent).map_err(|e| e.to_string());
+    // what lies there is of no further use
+    let _ = std::fs::remove_dir_all(&folder);
+    summary?.motion.ok_or_else(|| "nothing moved".to_owned())
+}
+
+pub(super) fn rows(effort: Effort) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for coupling in ["local", "nonlocal", "truncated", "splice"] {
+        let stable = match moved(&bar(coupling, "duration = 0.01\n")) {
+            Ok(m) => m.stable_step.unwrap_or(f64::NAN),
+            Err(why) => {
+                rows.push(kept(coupling, "stable step", Err(why), 0.0));
+                continue;
+            }
+        };
+        let at = |factor: f64, steps: f64| {
+            let step = factor * stable;
+            moved(&bar(
+                coupling,
+                &format!("duration = {:e}\nstep = {step:e}\n", steps * step),
+            ))
+        };
+        let drift = |m: MotionSummary| {
+            let total = m.kinetic_energy + m.stored_energy;
+            (m.missing_energy / total).abs()
+        };
+        let case = format!("1D {coupling}");
+        rows.push(kept(
+            &case,
+            "10 000 steps at 0.999 of the stable one: energy not accounted for",
+            at(0.999, 1e4).map(drift),
+            ENERGY_LIMIT,
+        ));
+        rows.push(refused(
+            &format!("{case}, 1.001 of the stable step"),
+            at(1.001, 100.0).map(|m| m.step),
+            &["step"],
+        ));
+        if effort == Effort::Full && coupling != "splice" {
+            rows.push(kept(
+                &case,
+                "1 000 000 steps at 0.95 of the stable one: energy not accounted for",
+                at(0.95, 1e6).map(drift),
+                ENERGY_LIMIT,
+            ));
+        }
+    }
+    rows
+}
