@@ -3,7 +3,7 @@
 use bondline::{
     observe::report::{Table, Verdict},
     progress::Silent,
-    verify::{Effort, balance, layers, partial_volumes, skin, tangents, weights},
+    verify::{Effort, balance, extremes, layers, partial_volumes, skin, tangents, weights},
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -46,6 +46,23 @@ fn isotropic_weights_give_the_typed_tensor() {
         .filter(|r| r.quantity == "plain" && r.value > 1e-3)
         .count();
     assert!(plain > 60, "{plain}");
+}
+
+#[test]
+fn extremes_pass_or_are_refused() {
+    let tables = extremes::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    let refused = |words: &str| {
+        let rows = tables.iter().flat_map(|t| &t.rows);
+        rows.filter(|r| r.reason.as_deref().is_some_and(|w| w.contains(words)))
+            .count()
+    };
+    // seven couplings at two ratios; four of five couplings at four contrasts; two kinds of cells; four couplings beyond their step
+    assert_eq!(refused("poisson-ratio"), 14);
+    assert_eq!(refused("another material"), 16);
+    assert_eq!(refused("as long as it is wide"), 2);
+    assert_eq!(refused("larger than the stable step"), 4);
+    assert!(count(&tables, "lengths 1e-9", Verdict::Pass) == 14);
 }
 
 #[test]

@@ -108,7 +108,15 @@ impl<const D: usize> Model<D> {
             .roles
             .contains(&CellRole::StressElement)
             .then(|| (cloud.clone(), keep.renumbered.clone()));
+        if let Some((wide, _)) = &wide {
+            let near = self.near_stress_elements(wide);
+            self.check_materials(wide, |i| near(&wide.position[i], wide.horizon[i]))?;
+        }
         cloud.retain(&keep.renumbered);
+        // bonds that are cut where elements begin see nothing of what lies beyond
+        if self.interface != Interface::Faces {
+            self.check_materials(&cloud, |_| true)?;
+        }
         Ok(Grown {
             factors,
             cloud,

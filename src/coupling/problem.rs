@@ -162,6 +162,12 @@ pub enum ModelError {
         #[source]
         source: crate::peridynamics::PdError,
     },
+    /// A family reaches over the border of two materials.
+    #[error("bonds reach into another material at ({}): they would take its strain for that of the peridynamic one; keep the peridynamic and transition zones two horizons away from other materials, or use coupling.truncated, whose bonds end at the seam", join(.position))]
+    OtherMaterial {
+        /// Where.
+        position: Vec<f64>,
+    },
     /// A node at the seam cannot be fitted.
     #[error("node {node} at ({}) lies at the seam, but the {found} sites around it do not determine an affine fit: make the peridynamic zone at least three points thick there", join(.position))]
     Fit {

@@ -256,6 +256,22 @@ pub enum MeshError {
         /// What is needed.
         limit: f64,
     },
+    /// A cell far longer than wide.
+    #[error(
+        "cell {cell} ({shape:?}) with its centroid at {centroid} is {ratio:.1e} times as long as it is wide, more than {limit:.0e}: round-off would spoil the strain in it; mesh that region again"
+    )]
+    Thin {
+        /// Number of the cell, from 0.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Where it is.
+        centroid: String,
+        /// Longest edge over the shortest.
+        ratio: f64,
+        /// The largest ratio that is taken.
+        limit: f64,
+    },
     /// Two nodes at one place.
     #[error(
         "nodes {first} and {second} both lie at {position} ({distance:.3e} apart); merge them (in Gmsh: Coherence Mesh)"

@@ -9,6 +9,10 @@ use crate::tensor::{Tensor, Vector};
 /// Round-off in the edges of a flat cell far from the origin leaves about 1e-13; a cell of usable shape has 1e-2 or more.
 pub const SMALLEST_SCALED_JACOBIAN: f64 = 1e-12;
 
+/// A cell whose longest edge is more than this many times its shortest is too thin: round-off of an even stretch grows like 6e-16 times the square of
+/// that ratio (`bondline verify extremes`), so that 1e-6 of it would be wrong.
+pub const LARGEST_EDGE_RATIO: f64 = 3e4;
+
 /// Nodes closer than this fraction of the mesh's largest extent lie at one place.
 const COINCIDENT: f64 = 1e-12;
 
@@ -189,13 +193,25 @@ pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
             });
         }
         let nodes = mesh.cell(cell);
+        let (mut shortest, mut longest) = (f64::INFINITY, 0.0f64);
         for (corner, neighbours) in corners(shape) {
             for &n in *neighbours {
                 let edge = mesh.nodes[nodes[n] as usize] - mesh.nodes[nodes[*corner] as usize];
-                quality.shortest_edge = quality.shortest_edge.min(edge.norm());
-                quality.longest_edge = quality.longest_edge.max(edge.norm());
+                shortest = shortest.min(edge.norm());
+                longest = longest.max(edge.norm());
             }
         }
+        if longest > LARGEST_EDGE_RATIO * shortest {
+            return Err(MeshError::Thin {
+                cell,
+                shape,
+                centroid,
+                ratio: longest / shortest,
+                limit: LARGEST_EDGE_RATIO,
+            });
+        }
+        quality.shortest_edge = quality.shortest_edge.min(shortest);
+        quality.longest_edge = quality.longest_edge.max(longest);
         quality.smallest_scaled_jacobian = quality.smallest_scaled_jacobian.min(value);
         quality.volume += volume;
     }

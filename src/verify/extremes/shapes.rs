@@ -4,10 +4,13 @@ use super::{
     body::{Body, METHODS, solve},
     kept, refused,
 };
-use crate::{observe::report::Row, verify::Effort};
+use crate::{mesh::quality::LARGEST_EDGE_RATIO, observe::report::Row, verify::Effort};
 
 /// Relative residual that every solution must reach.
 const RESIDUAL_LIMIT: f64 = 1e-10;
+
+/// Distance of displacements from those of an even stretch, over the largest.
+pub const STRETCH_LIMIT: f64 = 1e-6;
 
 fn residual(text: &str) -> Result<f64, String> {
     solve(text).and_then(|s| match s.samples.iter().all(|u| u.is_finite()) {
@@ -42,12 +45,21 @@ pub(super) fn cells_and_families(_: Effort) -> Vec<Row> {
     let mut rows = Vec::new();
     for cell in ["quad4", "tri3"] {
         for aspect in [1e2, 1e4, 1e6] {
-            rows.push(kept(
-                &format!("{cell}, ten times ten cells of aspect ratio {aspect:e}"),
-                "relative residual",
-                residual(&thin(aspect, cell)),
-                RESIDUAL_LIMIT,
-            ));
+            let stretched = solve(&thin(aspect, cell)).map(|s| {
+                let each = (s.samples.len() as f64 / 2.0).sqrt().round() as usize;
+                let off = s.samples.chunks(2).enumerate().map(|(k, u)| {
+                    let x = ((k % each) as f64 + 0.53) / each as f64;
+                    (u[0] / 0.01 - x).abs()
+                });
+                off.fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) })
+            });
+            let case = format!("{cell}, cells of aspect ratio {aspect:e}");
+            let quantity = "distance from the even stretch";
+            rows.push(if aspect > LARGEST_EDGE_RATIO {
+                refused(&case, stretched, &["times as long as it is wide"])
+            } else {
+                kept(&case, quantity, stretched, STRETCH_LIMIT)
+            });
         }
     }
     for (case, text, words) in [

@@ -10,8 +10,9 @@ use crate::{
     verify::Effort,
 };
 
-/// Drift of the total energy over a run, relative.
-pub const ENERGY_LIMIT: f64 = 1e-2;
+/// Energy not accounted for over that at the end. Near the limit velocity Verlet keeps ½ v·Mv + ½ u·Ku only up to (ωΔt/2)² of what the
+/// fastest modes hold; what matters is that it stays bounded.
+pub const ENERGY_LIMIT: f64 = 0.1;
 
 /// A pulse in a bar.
 fn bar(coupling: &'static str, time: &str) -> String {
