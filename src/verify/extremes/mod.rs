@@ -24,9 +24,12 @@ use crate::{
     verify::Effort,
 };
 
+/// Measures one kind of extreme.
+type Part = fn(Effort) -> Vec<Row>;
+
 /// Runs the suite. Quick: without the million steps, three dimensions only where nothing else tells.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let parts: [(&str, fn(Effort) -> Vec<Row>); 8] = [
+    let parts: [(&str, Part); 8] = [
         ("Units and places", scales::rows),
         ("Poisson ratio of an LPS", laws::poisson),
         ("Horizon over spacing", laws::ratio),
