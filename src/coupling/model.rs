@@ -182,7 +182,10 @@ impl<const D: usize> Model<D> {
     }
 
     /// Whether a position may be in the family of a Gauss point of an element that carries the partial stress.
-    pub(super) fn near_stress_elements(&self, cloud: &PointCloud<D>) -> impl Fn(&Vector<D>, f64) -> bool {
+    pub(super) fn near_stress_elements(
+        &self,
+        cloud: &PointCloud<D>,
+    ) -> impl Fn(&Vector<D>, f64) -> bool {
         let boxes: Vec<(Vector<D>, Vector<D>)> = (0..self.mesh.cell_count())
             .filter(|&c| self.roles[c] == CellRole::StressElement)
             .map(|c| self.mesh.bounds_of(self.mesh.cell(c)))
