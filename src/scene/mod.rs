@@ -9,6 +9,7 @@
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `output.rs` | its parts |
+//! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
@@ -26,6 +27,7 @@ mod converge;
 mod error;
 mod expression;
 mod initial;
+mod joined;
 mod loads;
 mod materials;
 mod meshing;

@@ -132,9 +132,6 @@ fn missing(key: &str, at: &str) -> (String, String) {
         ("", "materials") => {
             "add a material, for example [materials.steel.lps] with youngs-modulus and poisson-ratio"
         }
-        ("", "coupling") => {
-            "add coupling = \"splice\", \"blending\", \"partial-stress\", \"local\" or \"nonlocal\""
-        }
         ("peridynamics", "horizon") => {
             "add horizon = 0.05, three to six times the spacing of the points"
         }

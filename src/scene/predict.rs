@@ -151,10 +151,7 @@ pub(crate) fn predict<const D: usize>(
     loads::loads(&model, &rest.conditions)?;
     let (prescribed, _) = loads::supports(&model, &rest.conditions)?;
     let free = FreeDofs::from_prescribed(&prescribed, D);
-    let mut choices = vec![Choice {
-        choice: format!("coupling {}", joining.name),
-        why: joining.about.to_owned(),
-    }];
+    let mut choices = vec![rest.coupling(joining)];
     let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();

@@ -9,7 +9,7 @@ use super::loads::{loads, supports};
 use super::materials::{Law, Points};
 use super::motion::{self, RunOptions};
 use super::solve::Solve;
-use super::spec::{SurfacesSpec, WeightsSpec};
+use super::spec::{Joining, SurfacesSpec, WeightsSpec};
 use super::validate::{Output, Scene, Solver};
 use crate::coupling::Surfaces;
 use crate::coupling::motion::MotionError;
@@ -141,7 +141,7 @@ pub fn solve_with<const D: usize>(
     let (load, applied) = loads(&model, &rest.conditions)?;
     let (prescribed, holder) = supports(&model, &rest.conditions)?;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let mut choices = Vec::new();
+    let mut choices: Vec<Choice> = rest.chosen.iter().cloned().collect();
     let symmetry = symmetry(coupling.as_ref(), || stiffness.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");
     let solution = statics::solve(
@@ -249,6 +249,18 @@ pub(super) struct Rest<const D: usize> {
     pub fingerprint: Fingerprint,
     /// Density of each material.
     pub density: Vec<f64>,
+    /// The coupling, where the scene names none.
+    pub chosen: Option<Choice>,
+}
+
+impl<const D: usize> Rest<D> {
+    /// The coupling as a choice: why it was made, or what it does if the scene names it.
+    pub fn coupling(&self, joining: Joining) -> Choice {
+        self.chosen.clone().unwrap_or_else(|| Choice {
+            choice: format!("coupling {}", joining.name),
+            why: joining.about.to_owned(),
+        })
+    }
 }
 
 pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
@@ -258,13 +270,13 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
         .zip(&scene.cell_material)
         .find(|(zone, _)| **zone != Zone::Local)
         .map_or(0, |(_, m)| *m);
-    let chosen = &scene.materials[material as usize];
-    let influence = match chosen.law {
+    let stuff = &scene.materials[material as usize];
+    let influence = match stuff.law {
         Law::Lps(i) | Law::Correspondence(i, _) => i,
         Law::BondBased(_) => Influence::Gaussian,
     };
-    let (lambda, mu) = chosen.lame;
-    let law: Box<dyn BondLaw<D>> = match chosen.law {
+    let (lambda, mu) = stuff.lame;
+    let law: Box<dyn BondLaw<D>> = match stuff.law {
         Law::BondBased(micromodulus) => Box::new(BondBased::new(micromodulus, mu)),
         Law::Lps(influence) => Box::new(LinearPeridynamicSolid::new(influence, lambda, mu)),
         Law::Correspondence(influence, stabilisation) => {
@@ -272,6 +284,10 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
         }
     };
     let method = scene.coupling.build(influence);
+    let chosen = scene.coupling_why.map(|why| Choice {
+        choice: format!("coupling {}", scene.coupling.joining().name),
+        why,
+    });
     let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
@@ -319,6 +335,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             breaking: scene.breaking,
             fingerprint: scene.fingerprint,
             density,
+            chosen,
         },
     )
 }

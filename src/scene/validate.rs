@@ -16,7 +16,7 @@ use super::run::{self, RunError};
 use super::solve::Solve;
 use super::source::{Source, Span};
 use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
-use super::{bodies, breaking, initial, obstacles, output, solve, zones};
+use super::{bodies, breaking, initial, joined, obstacles, output, solve, zones};
 use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -47,6 +47,8 @@ pub struct Scene<const D: usize> {
     pub peridynamics: Option<Peridynamics<D>>,
     /// How the models are joined.
     pub coupling: CouplingSpec,
+    /// Why the coupling was chosen; none if the scene names it.
+    pub coupling_why: Option<String>,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
     /// Empty regions: no point lies inside.
@@ -244,21 +246,8 @@ fn scene<const D: usize>(
     name: &str,
     mut fingerprint: Fingerprint,
 ) -> Result<Scene<D>, SceneError> {
-    let joining = spec.coupling.get_ref().joining();
     let solver = solver(spec)?;
     let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
-    let peridynamics = match (&spec.peridynamics, joining.zones) {
-        (Some(p), _) => Some(materials::peridynamics(p, joining.lattice, &mesh)?),
-        (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
-        (None, _) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("coupling `{}` needs [peridynamics]", joining.name),
-            )
-            .label(spec.coupling.span(), "has a peridynamic side")
-            .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
-        }
-    };
     let influence = match spec
         .peridynamics
         .as_ref()
@@ -269,7 +258,21 @@ fn scene<const D: usize>(
     };
     let (found, cell_material) =
         materials::materials(&spec.materials, influence, kinematics, &mesh)?;
-    let mut zones = zones::zones(spec, joining, &mesh)?;
+    let joined = joined::joined(spec, &found, &mesh)?;
+    let joining = joined.joining;
+    let peridynamics = match (&spec.peridynamics, joining.zones) {
+        (Some(p), _) => Some(materials::peridynamics(p, joining.lattice, &mesh)?),
+        (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
+        (None, _) => {
+            return Err(SceneError::new(
+                SceneErrorKind::Missing,
+                format!("coupling `{}` needs [peridynamics]", joining.name),
+            )
+            .label(joined.span.clone(), "has a peridynamic side")
+            .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
+        }
+    };
+    let mut zones = zones::zones(spec, &joined, &mesh)?;
     let peridynamics = peridynamics
         .map(|p| bodies::bodies(spec, joining, p, &mesh, &mut zones))
         .transpose()?;
@@ -303,7 +306,8 @@ fn scene<const D: usize>(
         materials: found,
         cell_material,
         peridynamics,
-        coupling: spec.coupling.get_ref().clone(),
+        coupling: joined.coupling,
+        coupling_why: joined.why,
         conditions,
         voids,
         barriers,

@@ -5,24 +5,26 @@ use rayon::prelude::*;
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
+use super::joined::Joined;
 use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{Joining, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
+use super::spec::{SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 
 /// The model of each cell.
 pub(crate) fn zones<const D: usize>(
     spec: &SceneSpec,
-    joining: Joining,
+    joined: &Joined,
     mesh: &Mesh<D>,
 ) -> Result<Vec<Zone>, SceneError> {
+    let joining = joined.joining;
     let count = mesh.cell_count();
     if let ZonesNeeded::Everywhere(zone) = joining.zones {
         return Ok(vec![zone; count]);
     }
     let needs_transition = matches!(joining.zones, ZonesNeeded::Transition { .. });
-    let chosen = spec.coupling.span();
+    let chosen = joined.span.clone();
     let Some(nonlocal) = &spec.zones.nonlocal else {
         return Err(SceneError::new(
             SceneErrorKind::Missing,

@@ -187,8 +187,7 @@ fn rows_of<const D: usize>(
         rows.push(Row::at_most(name, "moments", moments, EQUILIBRIUM_LIMIT));
     }
     rows.push(match (smallest_eigenvalue(e), material.is_definite()) {
-        (Ok(Some(v)), true) => Row::at_least(name, "smallest eigenvalue", v, f64::MIN_POSITIVE),
-        (Ok(Some(v)), false) => Row::info(name, "smallest eigenvalue", v),
+        (Ok(Some(v)), _) => Row::at_least(name, "smallest eigenvalue", v, f64::MIN_POSITIVE),
         (Ok(None), true) => Row::at_least(name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE)
             .because("not positive definite"),
         (Ok(None), false) => Row::info(name, "smallest eigenvalue", -1.0)

@@ -42,7 +42,7 @@ pub(super) fn laid_out<const D: usize, S, T>(
     let joining = scene.coupling.joining();
     let growing = Growing::of(&scene.coupling);
     let (problem, rest) = run::problem(scene);
-    let mut choices = Vec::new();
+    let mut choices: Vec<Choice> = rest.chosen.iter().cloned().collect();
     let begun = first(&rest, &mut choices)?;
     let (model, coupling) = Model::new(problem, progress)?;
     watch.lap(&mut timings, "sites and bonds");

@@ -54,12 +54,10 @@ fn prediction<const D: usize>(
     ];
     memory.extend(state.map(|bytes| share("state", bytes)));
     memory.push(share("output", output));
-    let about = Choice {
-        choice: format!("coupling {}", laid_out.joining.name),
-        why: laid_out.joining.about.to_owned(),
-    };
-    let mut choices = vec![about];
-    choices.extend(laid_out.choices.iter().cloned());
+    let mut choices = vec![laid_out.rest.coupling(laid_out.joining)];
+    // a coupling that was chosen is told already
+    let told = choices[0].clone();
+    choices.extend(laid_out.choices.iter().filter(|c| **c != told).cloned());
     Prediction {
         scene: laid_out.title.clone(),
         dimension: D,

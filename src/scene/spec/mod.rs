@@ -68,9 +68,10 @@ pub struct SceneSpec {
     /// Where the body is nonlocal and where the two models overlap; all else is local.
     #[serde(default)]
     pub zones: ZonesSpec,
-    /// How the two models are joined; also as text where no option is set, `coupling = "splice"`.
+    /// How the two models are joined; also as text where no option is set, `coupling = "splice"`. Without it `truncated` where that is exact, or else `splice`; the run says which and why.
+    #[serde(default)]
     #[schemars(schema_with = "coupling::coupling_schema")]
-    pub coupling: Spanned<CouplingSpec>,
+    pub coupling: Option<Spanned<CouplingSpec>>,
     /// What is computed: one state of equilibrium (default), motion in time, or a load that grows; as text where no option is set, `solve = "static"`.
     #[serde(default)]
     #[schemars(schema_with = "solve_schema")]
