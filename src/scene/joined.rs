@@ -90,7 +90,7 @@ fn obstacle<const D: usize>(
                     m.name
                 )));
             }
-            Law::Lps(_) | Law::BondBased(_) => {}
+            _ => {}
         }
     }
     if matches!(p.points, PointsSpec::Cells) {

@@ -85,6 +85,12 @@ pub(crate) fn build<const D: usize>(
             mesh
         }
     };
+    if !matches!(spec, MeshSpec::File(_)) {
+        quality::check_thickness(&mesh).map_err(|error| {
+            SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
+                .help("divide the longer axis into more cells, or the shorter into fewer")
+        })?;
+    }
     Ok(mesh)
 }
 

@@ -172,7 +172,8 @@ impl FineSites {
         let mut sorted = rates.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let usual = sorted[((sorted.len() - 1) as f64 * COARSE) as usize];
-        let borne = breakable.max(usual).max(4.0 * stiffest / recurrence.range);
+        // half of what the coarse step bears: sites beside the fine ones feel the sums of both
+        let borne = breakable.max(usual).max(2.0 * stiffest / recurrence.range);
         let sites: Vec<u32> = (0..rates.len() as u32)
             .filter(|&s| rates[s as usize] > borne * (1.0 + 1e-9))
             .collect();

@@ -104,7 +104,7 @@ impl Base {
                 m.fracture_energy.is_some() || m.critical_stretch.is_some()
             }
             MaterialSpec::Lps(m) => m.fracture_energy.is_some() || m.critical_stretch.is_some(),
-            MaterialSpec::Correspondence(_) => false,
+            _ => false,
         };
         let moves = !matches!(
             spec.solve.as_ref().map(|s| s.get_ref()),
@@ -262,6 +262,12 @@ impl Base {
         let finer = match ratio {
             Some(m) => horizon * delta / m / spacing,
             None => delta,
+        };
+        // the spacing as it is typed, not as it comes back from m
+        let finer = if (finer - 1.0).abs() < 1e-12 {
+            1.0
+        } else {
+            finer
         };
         if delta != 1.0 {
             list.push(format!("peridynamics.horizon={:e}", horizon * delta));

@@ -32,6 +32,13 @@ const FOLLOWS: f64 = 1e-10;
 /// What may be missing after a fit.
 const MET: f64 = 1e-10;
 
+/// What coordinates far from the origin leave of a force that is zero: some ulps of them over the spacing.
+fn rounding<const D: usize>(segments: &Segments<'_, D>) -> f64 {
+    let (low, high) = segments.model.mesh.bounds();
+    let farthest = low.abs().max().max(high.abs().max());
+    8.0 * f64::EPSILON * farthest / segments.model.spacing()
+}
+
 /// Something whose energy may change: a piece, or a whole bond between points that have pieces.
 enum Part {
     Piece(usize),
@@ -117,10 +124,11 @@ pub(super) fn fit<const D: usize>(
     let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
     let tensor = pair_tensor(segments);
     let scale = largest * tensor.amax();
+    let rounding = rounding(segments);
     let follows = |missing: &HashMap<u32, Vec<f64>>| {
-        missing
-            .iter()
-            .all(|(site, m)| strings.holds(*site) || m.iter().all(|m| m.abs() <= FOLLOWS * scale))
+        missing.iter().all(|(site, m)| {
+            strings.holds(*site) || m.iter().all(|m| m.abs() <= (FOLLOWS + rounding) * scale)
+        })
     };
     let mut missing = HashMap::new();
     for (&site, b) in &nodes {
@@ -158,7 +166,7 @@ pub(super) fn fit<const D: usize>(
             (change, rest) = finish(&conditions, &target, FLOOR - 1.0);
         }
         left = rest / scale;
-        if left <= MET {
+        if left <= MET + rounding {
             for (part, c) in parts.iter().zip(&change) {
                 match *part {
                     Part::Piece(k) => segments.cut[k].scale += c,
@@ -167,7 +175,7 @@ pub(super) fn fit<const D: usize>(
             }
             if let Some(state) = state_of(segments)? {
                 let rest = state_change(segments, &parts, &nodes, state);
-                if rest > MET {
+                if rest > MET + rounding {
                     return Err(ModelError::Seam {
                         what: "shares of the dilatation",
                         residual: rest,
