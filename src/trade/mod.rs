@@ -6,6 +6,8 @@
 //! | `case.rs` | one case in a process of its own: its cost, its outcome |
 //! | `measure.rs` | how far its outputs are from those of the reference |
 //! | `effects.rs` | guesses of cost and error for cases that were not run; the Pareto front |
+//! | `study.rs` | which case runs next |
+//! | `record.rs` | what is kept of a study, so that it can go on |
 //! | `report.rs` | table, CSV, JSON, plot, and the scene for a wanted error |
 //!
 //! First the reference runs, then the scene as it is, then every setting alone. From these, cost and error of every combination are guessed, and the
@@ -16,11 +18,12 @@ mod case;
 mod effects;
 mod knobs;
 mod measure;
+mod record;
 mod report;
+mod study;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -34,9 +37,9 @@ use crate::observe::ObserveError;
 use crate::progress::Progress;
 use crate::scene::{SceneError, SceneSpec, Source};
 use case::{Attempt, Runner};
-use effects::{Effects, most_promising};
 use knobs::{Base, coordinates};
-use measure::Measured;
+use record::{Head, kept, new_record, read_record};
+use study::Study;
 
 /// What errors are measured against.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -245,39 +248,6 @@ const ROUND_OFF: f64 = 1e-9;
 /// A case that takes longer than so many times the reference is of no use to anyone.
 const PATIENCE: f64 = 4.0;
 
-/// A combination is worth running if it promises this factor in cost or error over the front.
-const WORTH: f64 = 1.1;
-
-/// The first line of a record: what its errors belong to.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Head {
-    scene: String,
-    overrides: Vec<String>,
-    reference: Vec<String>,
-    quantities: Vec<Quantity>,
-    cost: Cost,
-}
-
-/// A study under way.
-struct Study<'a> {
-    params: &'a TradeParams,
-    runner: Runner<'a>,
-    base: Base,
-    settings: Vec<(usize, Setting)>,
-    common: Vec<String>,
-    reference: Measured,
-    reference_keys: Vec<String>,
-    quantities: Vec<Quantity>,
-    cases: Vec<Case>,
-    /// Combinations that are the reference itself.
-    skipped: Vec<Vec<String>>,
-    record: std::fs::File,
-    record_path: PathBuf,
-    deadline: Instant,
-    /// How long a case may take: some times the reference.
-    patience: Duration,
-}
-
 /// Runs a study with `program`, which must be this command line; `interrupt` ends it between and within cases.
 ///
 /// # Errors
@@ -417,201 +387,6 @@ pub fn trade(
     })
 }
 
-/// Combinations beyond this are not looked at.
-const MOST_COMBINATIONS: usize = 20_000;
-
-impl Study<'_> {
-    fn all(&mut self, progress: &dyn Progress) -> Result<TradeEnd, TradeError> {
-        let singles = 1 + self.settings.len();
-        progress.stage("the scene, and each setting alone", Some(singles as u64));
-        if let Some(end) = self.case(&[], None, progress)? {
-            return Ok(end);
-        }
-        if let Outcome::Refused { why } = &self.cases[0].outcome {
-            return Err(TradeError::Base {
-                what: "the scene",
-                why: why.clone(),
-                remedy: "try it with `bondline run`",
-            });
-        }
-        progress.advance(1);
-        for k in 0..self.settings.len() {
-            if let Some(end) = self.case(&[k], None, progress)? {
-                return Ok(end);
-            }
-            progress.advance(1);
-        }
-        progress.stage("combinations", None);
-        while let Some((chosen, guess)) = self.next() {
-            if let Some(end) = self.case(&chosen, Some(guess), progress)? {
-                return Ok(end);
-            }
-        }
-        Ok(TradeEnd::Complete)
-    }
-
-    fn labels(&self, chosen: &[usize]) -> Vec<String> {
-        chosen
-            .iter()
-            .map(|&k| self.settings[k].1.label.clone())
-            .collect()
-    }
-
-    fn chosen(&self, case: &Case) -> Option<Vec<usize>> {
-        case.settings
-            .iter()
-            .map(|label| self.settings.iter().position(|s| s.1.label == *label))
-            .collect()
-    }
-
-    /// Runs a case unless its outcome is known; why the study has to end, if it has.
-    fn case(
-        &mut self,
-        chosen: &[usize],
-        guessed: Option<(f64, f64)>,
-        progress: &dyn Progress,
-    ) -> Result<Option<TradeEnd>, TradeError> {
-        let settings = self.labels(chosen);
-        let overrides = self
-            .base
-            .overrides(chosen.iter().map(|&k| &self.settings[k].1.change));
-        // the reference agrees with itself
-        if overrides == self.reference_keys {
-            self.skipped.push(settings);
-            return Ok(None);
-        }
-        if self.cases.iter().any(|c| c.settings == settings) {
-            return Ok(None);
-        }
-        let left = self.deadline.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Ok(Some(TradeEnd::Budget));
-        }
-        if self
-            .runner
-            .interrupt
-            .is_some_and(|f| f.load(Ordering::Relaxed))
-        {
-            return Ok(Some(TradeEnd::Interrupted));
-        }
-        progress.tell(&format!(
-            "{} ({:.0} s left)",
-            if settings.is_empty() {
-                "as it is".to_owned()
-            } else {
-                settings.join(", ")
-            },
-            left.as_secs_f64()
-        ));
-        let all: Vec<String> = self.common.iter().chain(&overrides).cloned().collect();
-        let folder = self.params.output.join("case");
-        let started = Instant::now();
-        let outcome = match self.runner.run(&all, &folder, left.min(self.patience))? {
-            Attempt::Interrupted => return Ok(Some(TradeEnd::Interrupted)),
-            Attempt::Refused(why) => Outcome::Refused { why },
-            Attempt::OverTime if left < self.patience => return Ok(Some(TradeEnd::Budget)),
-            Attempt::OverTime => Outcome::OverTime {
-                seconds: started.elapsed().as_secs_f64(),
-            },
-            Attempt::Ran(ran) => {
-                let errors: Vec<Option<f64>> = self
-                    .quantities
-                    .iter()
-                    .map(|q| ran.measured.error(&self.reference, q))
-                    .collect();
-                match errors.iter().position(Option::is_none) {
-                    Some(k) => Outcome::Refused {
-                        why: format!("its outputs have no {}", self.quantities[k].name()),
-                    },
-                    None => Outcome::Ran {
-                        cost: ran.cost,
-                        errors: errors.into_iter().flatten().collect(),
-                    },
-                }
-            }
-        };
-        // what a case writes is of no further use
-        let _ = std::fs::remove_dir_all(&folder);
-        let case = Case {
-            settings,
-            overrides,
-            outcome,
-            guessed,
-        };
-        write_line(&mut self.record, &case).map_err(|source| TradeError::File {
-            path: self.record_path.clone(),
-            source,
-        })?;
-        self.cases.push(case);
-        Ok(None)
-    }
-
-    /// Combinations of settings that ran alone, at most one of each knob, whose outcome is not known.
-    fn combinations(&self) -> Vec<Vec<usize>> {
-        let usable: Vec<usize> = (0..self.settings.len())
-            .filter(|&k| {
-                let label = &self.settings[k].1.label;
-                self.cases.iter().any(|c| {
-                    c.settings.as_slice() == std::slice::from_ref(label)
-                        && matches!(c.outcome, Outcome::Ran { .. })
-                })
-            })
-            .collect();
-        let mut all: Vec<Vec<usize>> = vec![vec![]];
-        for &k in &usable {
-            let knob = self.settings[k].0;
-            let with: Vec<Vec<usize>> = all
-                .iter()
-                .filter(|c| c.iter().all(|&o| self.settings[o].0 != knob))
-                .map(|c| c.iter().copied().chain([k]).collect())
-                .take(MOST_COMBINATIONS.saturating_sub(all.len()))
-                .collect();
-            all.extend(with);
-        }
-        all.retain(|c| {
-            let labels = self.labels(c);
-            c.len() > 1
-                && !self.skipped.contains(&labels)
-                && !self.cases.iter().any(|case| case.settings == labels)
-        });
-        all
-    }
-
-    /// The most promising combination, with cost and error as guessed.
-    fn next(&self) -> Option<(Vec<usize>, (f64, f64))> {
-        let ran: Vec<(Vec<usize>, (f64, f64))> = self
-            .cases
-            .iter()
-            .filter_map(|c| Some((self.chosen(c)?, c.point(self.params.cost)?)))
-            .collect();
-        let number = self.settings.len();
-        let of = |f: fn(&(f64, f64)) -> f64| {
-            let values: Vec<_> = ran.iter().map(|(c, p)| (c.clone(), f(p))).collect();
-            Effects::fit(number, &values)
-        };
-        let (cost, error) = (of(|p| p.0), of(|p| p.1));
-        let candidates = self.combinations();
-        let guessed: Vec<(f64, f64)> = candidates
-            .iter()
-            .map(|c| (cost.guess(c), error.guess(c)))
-            .collect();
-        let measured: Vec<(f64, f64)> = ran.iter().map(|r| r.1).collect();
-        let wanted = self.params.wanted.iter().find_map(|&w| {
-            // the cheapest that should meet a wanted error, if it is cheaper than what does
-            let met = measured
-                .iter()
-                .filter(|p| p.1 <= w)
-                .map(|p| p.0)
-                .fold(f64::INFINITY, f64::min);
-            (0..guessed.len())
-                .filter(|&k| guessed[k].1 <= w && WORTH * guessed[k].0 < met)
-                .min_by(|&a, &b| guessed[a].0.total_cmp(&guessed[b].0))
-        });
-        let k = wanted.or_else(|| most_promising(&guessed, &measured, WORTH))?;
-        Some((candidates[k].clone(), guessed[k]))
-    }
-}
-
 fn chosen_knobs(base: &Base, params: &TradeParams) -> Result<Vec<Knob>, TradeError> {
     let all = base.knobs();
     let mut chosen: Vec<Knob> = if params.knobs.is_empty() {
@@ -669,59 +444,4 @@ fn lines(spec: &SceneSpec) -> Vec<String> {
         }
     }
     list
-}
-
-/// What the reference left.
-fn kept(folder: &Path) -> Result<Measured, TradeError> {
-    let path = folder.join("summary.json");
-    let file_error = |source| TradeError::File {
-        path: path.clone(),
-        source,
-    };
-    let text = std::fs::read_to_string(&path).map_err(file_error)?;
-    let summary = serde_json::from_str(&text).map_err(|e| TradeError::Summary {
-        why: e.to_string(),
-        text,
-    })?;
-    Measured::read(folder, &summary).map_err(file_error)
-}
-
-/// The record of a study, if there is one; a last line that was cut off is left out.
-fn read_record(path: &Path) -> Result<Option<(Head, Vec<Case>)>, TradeError> {
-    let text = match std::fs::read_to_string(path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(source) => {
-            return Err(TradeError::File {
-                path: path.to_path_buf(),
-                source,
-            });
-        }
-        Ok(text) => text,
-    };
-    let mut lines = text.lines();
-    let Some(head) = lines.next().and_then(|l| serde_json::from_str(l).ok()) else {
-        return Err(TradeError::Another {
-            path: path.to_path_buf(),
-        });
-    };
-    let cases = lines.map_while(|l| serde_json::from_str(l).ok()).collect();
-    Ok(Some((head, cases)))
-}
-
-fn new_record(path: &Path, head: &Head, cases: &[Case]) -> std::io::Result<std::fs::File> {
-    let part = path.with_extension("part");
-    let mut file = std::fs::File::create(&part)?;
-    write_line(&mut file, head)?;
-    for case in cases {
-        write_line(&mut file, case)?;
-    }
-    std::fs::rename(&part, path)?;
-    Ok(file)
-}
-
-fn write_line(file: &mut std::fs::File, value: &impl Serialize) -> std::io::Result<()> {
-    let mut line = serde_json::to_string(value).map_err(std::io::Error::other)?;
-    line.push('\n');
-    file.write_all(line.as_bytes())?;
-    file.sync_data()
 }
