@@ -8,7 +8,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use bondline::observe::{
     figure::{LinePlot, Series, Stroke},
-    report::{self, Format, Row, Table, exit_code, render},
+    report::{self, Row, Table},
 };
 use shared::{Columns, Failure, argument, run};
 
@@ -32,21 +32,7 @@ struct Crack {
 }
 
 fn main() -> ExitCode {
-    match tables() {
-        Ok(tables) => {
-            let format = if std::env::args().any(|a| a == "--json") {
-                Format::Json
-            } else {
-                Format::Text
-            };
-            println!("{}", render(&tables, format).trim_end());
-            ExitCode::from(exit_code(&tables))
-        }
-        Err(e) => {
-            eprintln!("{e}");
-            ExitCode::FAILURE
-        }
-    }
+    shared::printed(tables())
 }
 
 fn crack(name: &str, overrides: &[&str], output: &std::path::Path) -> Result<Crack, Failure> {

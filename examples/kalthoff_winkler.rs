@@ -5,7 +5,7 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use bondline::observe::report::{self, Format, Row, Table, exit_code, render};
+use bondline::observe::report::{self, Row, Table};
 use shared::{Columns, Failure, argument, between, run};
 
 mod shared;
@@ -14,21 +14,7 @@ mod shared;
 const RUN: f64 = 0.03;
 
 fn main() -> ExitCode {
-    match tables() {
-        Ok(tables) => {
-            let format = if std::env::args().any(|a| a == "--json") {
-                Format::Json
-            } else {
-                Format::Text
-            };
-            println!("{}", render(&tables, format).trim_end());
-            ExitCode::from(exit_code(&tables))
-        }
-        Err(e) => {
-            eprintln!("{e}");
-            ExitCode::FAILURE
-        }
-    }
+    shared::printed(tables())
 }
 
 /// Angle in degrees between the notch and the way from its tip to that of the crack, when this is `RUN` away; and the time.

@@ -3,13 +3,37 @@
 #![allow(dead_code)]
 
 use std::path::Path;
+use std::process::ExitCode;
 
 use bondline::{
-    observe::{progress::TerminalProgress, report::Row, summary::RunSummary},
+    observe::{
+        progress::TerminalProgress,
+        report::{Format, Row, Table, exit_code, render},
+        summary::RunSummary,
+    },
     scene::AnyScene,
 };
 
 pub type Failure = Box<dyn std::error::Error>;
+
+/// Prints tables, as JSON if the command line asks for it; what the program ends with.
+pub fn printed(tables: Result<Vec<Table>, Failure>) -> ExitCode {
+    match tables {
+        Ok(tables) => {
+            let format = if std::env::args().any(|a| a == "--json") {
+                Format::Json
+            } else {
+                Format::Text
+            };
+            println!("{}", render(&tables, format).trim_end());
+            ExitCode::from(exit_code(&tables))
+        }
+        Err(e) => {
+            eprintln!("{e}");
+            ExitCode::FAILURE
+        }
+    }
+}
 
 /// Columns of numbers with names, as `bondline run` writes them.
 pub struct Columns {

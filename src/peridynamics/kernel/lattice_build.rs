@@ -17,6 +17,14 @@ fn most_common(volume: &[f64]) -> f64 {
     runs.max_by_key(|r| r.len()).map_or(1.0, |r| r[0])
 }
 
+/// What the cells of the padded box hold; see the fields of the same names in [`Lattice`].
+struct Filled {
+    unit: f64,
+    volume: Vec<f64>,
+    no_fail: Vec<bool>,
+    scale: Vec<f64>,
+}
+
 impl<const D: usize> Lattice<D> {
     /// The pass of a cloud, or why it has none.
     pub(super) fn new(setup: &BondSetup<'_, D>) -> Result<Self, String> {
@@ -49,16 +57,13 @@ impl<const D: usize> Lattice<D> {
                 .map(|p| if setup.row(p) { setup.volume[p] } else { 0.0 })
                 .collect()
         };
-        Self::finish(
-            stencil,
+        let filled = Filled {
             unit,
             volume,
             no_fail,
             scale,
-            points,
-            setup.kinematics,
-            &setup.force,
-        )
+        };
+        Self::finish(stencil, filled, points, setup.kinematics, &setup.force)
     }
 
     /// The pass of a full block.
@@ -84,29 +89,29 @@ impl<const D: usize> Lattice<D> {
         let points = setup.counts.iter().product();
         let volume = stencil.point_of.iter();
         let volume = volume.map(|&p| if p == NONE { 0.0 } else { 1.0 }).collect();
-        Self::finish(
-            stencil,
+        let filled = Filled {
             unit,
             volume,
-            Vec::new(),
-            Vec::new(),
-            points,
-            setup.kinematics,
-            &setup.force,
-        )
+            no_fail: Vec::new(),
+            scale: Vec::new(),
+        };
+        Self::finish(stencil, filled, points, setup.kinematics, &setup.force)
     }
 
-    #[allow(clippy::too_many_arguments)] // the two constructors' common end
+    /// The two constructors' common end.
     fn finish(
         stencil: Stencil<D>,
-        unit: f64,
-        volume: Vec<f64>,
-        no_fail: Vec<bool>,
-        scale: Vec<f64>,
+        filled: Filled,
         points: usize,
         kinematics: Kinematics,
         force: &BondForce<'_, D>,
     ) -> Result<Self, String> {
+        let Filled {
+            unit,
+            volume,
+            no_fail,
+            scale,
+        } = filled;
         let groups = stencil.groups.len();
         let cells = stencil.point_of.len();
         let mut place = vec![NONE; points];
