@@ -25,7 +25,7 @@ pub(super) struct Sites<'a, const D: usize> {
 }
 
 /// Positions sorted into bins, to find those near a node without looking at all of them.
-pub(super) struct Bins<const D: usize> {
+pub(crate) struct Bins<const D: usize> {
     size: f64,
     bins: HashMap<[i64; D], Vec<u32>>,
 }

@@ -42,6 +42,7 @@ pub mod truncated;
 pub use balanced::Balanced;
 pub use blending::{Blending, BlendingFunction};
 pub use derivative::FitDegree;
+pub(crate) use fit::Bins;
 pub use model::{Model, Site, SiteKind};
 pub use motion::Motion;
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};

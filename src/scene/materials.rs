@@ -6,10 +6,9 @@ use super::check;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::{cells_of_set, position};
-use super::solve::Solve;
 use super::spec::{
     InfluenceSpec, LatticeStart, MaterialSpec, MicromodulusSpec, PeridynamicsSpec, PointsSpec,
-    SceneSpec, SurfacesSpec, VolumesSpec, WeightsSpec,
+    SurfacesSpec, VolumesSpec, WeightsSpec,
 };
 use super::value::{Number, Text};
 use crate::coupling::Lattice;
@@ -383,22 +382,6 @@ fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
     Ok(volumes)
 }
 
-/// Refuses partial volumes in a scene that moves, whose bonds are passed over without them.
-pub(crate) fn volumes_at_rest(spec: &SceneSpec, solve: &Solve) -> Result<(), SceneError> {
-    let typed = spec.peridynamics.as_ref().and_then(|p| p.volumes.as_ref());
-    match typed {
-        Some(typed) if *typed.get_ref() != VolumesSpec::Full && *solve != Solve::Static => {
-            Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                "`peridynamics.volumes` is partial in a scene that moves",
-            )
-            .label(typed.span(), "offered at rest only")
-            .help("use volumes = \"full\", or solve = \"static\""))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// Refuses an expression in `y` or `z` where the scene has no such axis.
 pub(crate) fn no_further_axes<const D: usize>(
     place: &str,
@@ -426,9 +409,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::coupling::Sampler;
+    use crate::coupling::{Motion, Sampler, motion::BondBehaviour};
+    use crate::peridynamics::kernel::Kinematics as BondKinematics;
     use crate::progress::Silent;
     use crate::scene::{AnyScene, Solved, Source, solve_with};
+    use crate::system::{Breakage, Dynamic, Symmetry};
 
     /// A plate whose edge moves as `u = G x`; a lattice with δ/h = 3.3 in its middle.
     const PLATE: &str = r#"
@@ -460,7 +445,11 @@ y = "-5e-4*x+1e-3*y"
 "#;
 
     fn plate(overrides: &[&str]) -> Result<Scene2, SceneError> {
-        let mut source = Source::new("plate.toml", PLATE);
+        plate_of(PLATE, overrides)
+    }
+
+    fn plate_of(text: &str, overrides: &[&str]) -> Result<Scene2, SceneError> {
+        let mut source = Source::new("plate.toml", text);
         for o in overrides {
             source.push_override(o)?;
         }
@@ -560,12 +549,70 @@ y = "-5e-4*x+1e-3*y"
         );
     }
 
+    /// Largest difference between the force of a model that moves and its assembled rows, over the largest force; the stretch of bonds is small enough for both kinematics.
+    fn moving_off(text: &str, overrides: &[&str], kinematics: BondKinematics) -> f64 {
+        let mut found = f64::NAN;
+        solve_with(
+            plate_of(text, overrides).unwrap(),
+            &Silent,
+            |_, solved: &Solved<'_, 2>| {
+                let model = solved.model;
+                let behaviour = BondBehaviour {
+                    kinematics,
+                    critical_stretch: Some(1.0),
+                    no_fail: &|_| false,
+                    contact: None,
+                };
+                let operator = solved.operator;
+                let mut motion =
+                    Motion::new(model, operator, Symmetry::Unsymmetric, |_| 1.0, &behaviour)
+                        .unwrap();
+                let wave = |s: &crate::coupling::Site<2>| {
+                    let x = s.position;
+                    [1e-9 * (7.0 * x[0] + x[1]).sin(), 1e-9 * (9.0 * x[1]).cos()]
+                };
+                let u: Vec<f64> = model.sites.iter().flat_map(wave).collect();
+                let mut force = vec![0.0; u.len()];
+                motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+                let wanted = model.assemble(operator, &Silent).multiply(&u);
+                let largest =
+                    |v: &mut dyn Iterator<Item = f64>| v.fold(0.0, |m: f64, v| m.max(v.abs()));
+                found = largest(&mut force.iter().zip(&wanted).map(|(a, b)| a - b))
+                    / largest(&mut wanted.iter().copied());
+                Ok(Vec::new())
+            },
+        )
+        .unwrap();
+        found
+    }
+
+    #[test]
+    fn partial_volumes_move_as_they_rest() {
+        let bond_based = PLATE
+            .replace("plate.lps", "plate.bond-based")
+            .replace("poisson-ratio = 0.25\n", "");
+        for volumes in ["full", "pdlammps", "hhb", "exact"] {
+            for text in [PLATE, &bond_based] {
+                for weights in ["isotropic", "plain"] {
+                    let set = [
+                        format!("peridynamics.volumes={volumes}"),
+                        format!("peridynamics.weights={weights}"),
+                    ];
+                    let set: Vec<&str> = set.iter().map(String::as_str).collect();
+                    let linear = moving_off(text, &set, BondKinematics::Linear);
+                    assert!(linear < 1e-12, "{set:?}: {linear:e}");
+                    let exact = moving_off(text, &set, BondKinematics::Exact);
+                    assert!(exact < 1e-5, "{set:?}: {exact:e}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn partial_volumes_without_their_lattice_are_refused() {
         for (set, word) in [
             ("peridynamics.points=cells", "lattice"),
             ("peridynamics.weights=fitted", "fitted"),
-            ("solve.quasi-static={steps=2}", "moves"),
         ] {
             let error = plate(&["peridynamics.volumes=hhb", set]).err().unwrap();
             assert!(error.to_string().contains(word), "{set}: {error}");

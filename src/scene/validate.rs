@@ -294,7 +294,6 @@ fn scene<const D: usize>(
         .zip(&zones)
         .find(|(_, zone)| **zone != Zone::Local)
         .map_or(0, |(m, _)| *m);
-    materials::volumes_at_rest(spec, &solve)?;
     let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
     bodies::unbroken(spec, &breaking)?;
     let output = output::output(spec, &mesh, name)?;

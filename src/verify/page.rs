@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::{Effort, LONG_SUITES, Suite};
 use crate::observe::report::{Row, Table, Verdict, number};
 
-/// Tables of more rows than this are counted, not printed.
-const MOST_ROWS: usize = 80;
+/// Tables that would take more lines than this are counted, not printed; a line may hold many rows.
+const MOST_LINES: usize = 80;
 
 /// What a suite gave.
 #[derive(Clone, Debug)]
@@ -63,7 +63,9 @@ pub fn page(outcomes: &[Outcome], effort: Effort) -> String {
 fn section(table: &Table) -> String {
     let mut text = format!("\n### {}\n\n", table.title);
     if !table.rows.iter().any(|r| r.reference.is_some()) {
-        if table.rows.len() > MOST_ROWS {
+        let body = table.text();
+        let body = body.split_once('\n').map_or("", |(_, rest)| rest);
+        if body.lines().count() > MOST_LINES {
             let counts = [Verdict::Pass, Verdict::Short, Verdict::Refused].map(|v| table.count(v));
             let [pass, short, refused] = counts;
             let _ = writeln!(
@@ -71,8 +73,6 @@ fn section(table: &Table) -> String {
                 "{pass} rows pass, {short} are short, {refused} are refused."
             );
         } else {
-            let body = table.text();
-            let body = body.split_once('\n').map_or("", |(_, rest)| rest);
             let _ = write!(text, "```text\n{body}```\n");
         }
         return text;
@@ -135,6 +135,25 @@ mod tests {
         assert!(text.contains("| 1 | 0 | 1 | 0 |"), "{text}");
         assert!(text.contains("`bondline verify bobaru --quick`"));
         assert!(text.contains("`scale`"));
+    }
+
+    #[test]
+    fn tables_are_folded_by_their_lines_not_their_rows() {
+        let table = |columns, cases: usize, quantities: usize| {
+            let mut table = Table::new("T", columns);
+            for row in 0..cases * quantities {
+                let (case, quantity) = (row / quantities, row % quantities);
+                table.push(Row::info(
+                    format!("case {case}"),
+                    format!("q{quantity}"),
+                    1.0,
+                ));
+            }
+            section(&table)
+        };
+        // 13 lines of 8 figures are printed, 104 lines of one are not
+        assert!(table(Columns::ByQuantity, 13, 8).contains("case 12"));
+        assert!(table(Columns::Full, 13, 8).contains("104 rows pass"));
     }
 
     #[test]

@@ -45,6 +45,7 @@ pub(super) fn laid_out<const D: usize, S, T>(
     let mut choices: Vec<Choice> = rest.chosen.iter().cloned().collect();
     let begun = first(&rest, &mut choices)?;
     let (model, coupling) = Model::new(problem, progress)?;
+    choices.extend(run::volumes_choice(&model));
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;

@@ -25,7 +25,7 @@ pub enum ConditionSpec {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct DisplacementSpec {
-    /// A named set of the mesh. Where peridynamics meets the set, points in a layer one horizon deep follow it.
+    /// A named set of the mesh. Where peridynamics meets the set, points within three quarters of their spacing of it follow it: the first layer.
     #[serde(default)]
     pub on: Option<Text>,
     /// All sites inside a shape.
@@ -46,7 +46,7 @@ pub struct DisplacementSpec {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct VelocitySpec {
-    /// A named set of the mesh. Where peridynamics meets the set, points in a layer one horizon deep follow it.
+    /// A named set of the mesh. Where peridynamics meets the set, points within three quarters of their spacing of it follow it: the first layer.
     #[serde(default)]
     pub on: Option<Text>,
     /// All sites inside a shape.

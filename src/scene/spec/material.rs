@@ -172,7 +172,7 @@ pub struct PeridynamicsSpec {
     /// Bond weights.
     #[serde(default)]
     pub weights: WeightsSpec,
-    /// What share of a cell counts that the horizon cuts (SAND2015-7998 section 5.2.1); all but "full" need `points.lattice` and a scene at rest.
+    /// What share of a cell counts that the horizon cuts (SAND2015-7998 section 5.2.1); all but "full" need `points.lattice`.
     #[serde(default)]
     #[schemars(with = "Option<VolumesSpec>")]
     pub volumes: Option<toml::Spanned<VolumesSpec>>,

@@ -9,6 +9,7 @@
 //! | `dynamics` | Tables III and IV |
 //! | `adaptive` | Algorithm 1: a grid that follows a wave |
 //! | `waves` | Table V; energy, momentum and cost of refinement in dynamics |
+//! | `nested` | the same refinement in a plane, on nested lattices |
 //!
 //! What had to be assumed stands in the rows and in `docs/papers.md`.
 
@@ -17,6 +18,7 @@ pub mod dynamics;
 pub mod goal;
 pub mod line;
 pub mod matrix;
+pub mod nested;
 pub mod statics;
 pub mod waves;
 
@@ -60,6 +62,8 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         |_| statics::table_two(),
         |_| goal::statics(),
         |_| waves::refinement(),
+        nested::ring,
+        |_| nested::opening(),
     ];
     if effort == Effort::Full {
         parts.push(|_| dynamics::table_three());

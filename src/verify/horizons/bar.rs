@@ -11,7 +11,7 @@ pub const CHANGES: [f64; 2] = [24.0, 76.0];
 pub const FINE: f64 = 0.1;
 /// m = δ/h on both sides; the text does not give it.
 pub const RATIO: usize = 3;
-/// Time step; the speed of sound is 1.
+/// Time step of all bars whose finest spacing is not below [`FINE`]; the speed of sound is 1.
 const STEP: f64 = 0.05;
 /// Positions agree within this.
 const SAME: f64 = 1e-9;
@@ -29,20 +29,21 @@ pub struct Layout {
     pub spacing: [f64; 2],
     /// Where the spacing changes, images included.
     pub changes: Vec<f64>,
+    step: f64,
     first: usize,
     count: usize,
 }
 
 impl Layout {
-    /// A bar whose middle has `ratio` times the spacing of its ends.
-    pub fn new(ratio: usize) -> Self {
-        let coarse = FINE * ratio as f64;
+    /// A bar whose middle has `ratio` times the spacing of its ends, which is `fine`.
+    pub fn new(ratio: usize, fine: f64) -> Self {
+        let coarse = fine * ratio as f64;
         let [a, b] = CHANGES;
         let count = |length: f64, h: f64| (length / h).round() as usize;
-        let mut inside: Vec<f64> = (0..count(a, FINE)).map(|i| FINE * i as f64).collect();
+        let mut inside: Vec<f64> = (0..count(a, fine)).map(|i| fine * i as f64).collect();
         inside.extend((0..=count(b - a, coarse)).map(|i| a + coarse * i as f64));
-        inside.extend((1..=count(LENGTH - b, FINE)).map(|i| b + FINE * i as f64));
-        Self::mirrored(&inside, [FINE, coarse], |x| {
+        inside.extend((1..=count(LENGTH - b, fine)).map(|i| b + fine * i as f64));
+        Self::mirrored(&inside, [fine, coarse], |x| {
             (a - SAME..=b + SAME).contains(&x)
         })
     }
@@ -85,6 +86,7 @@ impl Layout {
             wide: x.iter().map(|&x| wide(x)).collect(),
             x,
             volume,
+            step: STEP.min(0.5 * spacing[0]),
             spacing,
             changes,
             first: before,
@@ -157,6 +159,7 @@ impl Layout {
         let mut bar = Bar {
             x: self.x[self.first..=last].to_vec(),
             volume: self.volume[self.first..=last].to_vec(),
+            step: self.step,
             bonds: vec![Vec::new(); self.count],
         };
         for (i, bonds) in bar.bonds.iter_mut().enumerate() {
@@ -191,6 +194,7 @@ pub struct Bar {
     pub x: Vec<f64>,
     /// Masses.
     pub volume: Vec<f64>,
+    step: f64,
     bonds: Vec<Vec<Bond>>,
 }
 
@@ -254,16 +258,17 @@ impl Bar {
 
     /// Lets a state move for a time, by velocity Verlet.
     pub fn run(&self, state: &mut Wave, time: f64) {
+        let step = self.step;
         let mut force = vec![0.0; state.u.len()];
         self.force_into(&state.u, &mut force);
-        for _ in 0..(time / STEP).round() as usize {
+        for _ in 0..(time / step).round() as usize {
             for i in 0..force.len() {
-                state.v[i] += 0.5 * STEP * force[i] / self.volume[i];
-                state.u[i] += STEP * state.v[i];
+                state.v[i] += 0.5 * step * force[i] / self.volume[i];
+                state.u[i] += step * state.v[i];
             }
             self.force_into(&state.u, &mut force);
             for i in 0..force.len() {
-                state.v[i] += 0.5 * STEP * force[i] / self.volume[i];
+                state.v[i] += 0.5 * step * force[i] / self.volume[i];
             }
         }
     }

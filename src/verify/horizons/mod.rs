@@ -7,12 +7,14 @@
 //! | `bar.rs` | a bar of two lattices between walls that mirror, and waves in it |
 //! | `variants.rs` | the ways |
 //! | `plane.rs` | 2:1 and 4:1 lattices in a plane: whether paired bonds can balance every node |
+//! | `lattices.rs` | state-based laws on two lattices in two and three dimensions, and waves through the change |
 //!
 //! In one dimension a node is balanced under a uniform strain if and only if the tensions of all bonds over every cut between two nodes add up to the
 //! stress. That is one linear condition per cut, while bonds are many times as many, so reciprocal and patch-exact bonds always exist; a chain of
 //! springs between neighbours is one choice, and the one that is nearest to given bonds is found by least change.
 
 pub mod bar;
+pub mod lattices;
 pub mod plane;
 pub mod variants;
 
@@ -24,6 +26,7 @@ use crate::{
     verify::Effort,
 };
 use bar::{Bar, CHANGES, FINE, LENGTH, Wave, pulse};
+use lattices::{Families, Meeting, Solid};
 use plane::{Between, Strip};
 use variants::{LEAST, Variant};
 
@@ -63,7 +66,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         let found: Vec<(Variant, Option<Found>)> = Variant::ALL
             .par_iter()
             .map(|&variant| {
-                let bar = variant.bar(ratio);
+                let bar = variant.bar(ratio, FINE);
                 let pure = || Pure::new(variant, ratio);
                 let found = bar.map(|bar| measure(variant, &bar, &pure()));
                 progress.advance(1);
@@ -75,8 +78,12 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         tables.push(passes(ratio, &found));
         tables.push(statements(ratio, &found));
     }
+    progress.stage("horizons, half the spacing", None);
+    tables.push(half_the_spacing());
     progress.stage("horizons, plates", None);
     tables.push(plates(effort));
+    progress.stage("horizons, state-based laws on two lattices", None);
+    tables.push(state_based(effort));
     progress.finish();
     tables
 }
@@ -118,21 +125,7 @@ fn measure(variant: Variant, bar: &Bar, pure: &Pure) -> Found {
             reflection(bar, &pure.fine, 10.0, CHANGES[0], narrow),
         ]
     });
-    let passes = eight_passes(bar)
-        .iter()
-        .enumerate()
-        .map(|(p, v)| {
-            let turned = if p % 2 == 0 { -1.0 } else { 1.0 };
-            let (mut exact, mut fine) = (0.0, 0.0);
-            for (x, v) in bar.x.iter().zip(v) {
-                let wanted = turned * pulse(x - 0.5 * LENGTH, 1.0);
-                exact = larger(exact, v - wanted);
-                let twin = (x / FINE).round() as usize;
-                fine = larger(fine, v - pure.fine_passes[p][twin]);
-            }
-            [exact, fine]
-        })
-        .collect();
+    let passes = errors_of_passes(bar, &pure.fine_passes, FINE);
     Found {
         variant,
         ghost: bar.ghost_force(),
@@ -141,6 +134,22 @@ fn measure(variant: Variant, bar: &Bar, pure: &Pure) -> Found {
         reflected,
         passes,
     }
+}
+
+/// Largest velocity error of each pass, against the exact wave and against the bar of one lattice of spacing `h`.
+fn errors_of_passes(bar: &Bar, fine_passes: &[Vec<f64>], h: f64) -> Vec<[f64; 2]> {
+    let error = |(p, v): (usize, &Vec<f64>)| {
+        let turned = if p % 2 == 0 { -1.0 } else { 1.0 };
+        let (mut exact, mut fine) = (0.0, 0.0);
+        for (x, v) in bar.x.iter().zip(v) {
+            let wanted = turned * pulse(x - 0.5 * LENGTH, 1.0);
+            exact = larger(exact, v - wanted);
+            let twin = (x / h).round() as usize;
+            fine = larger(fine, v - fine_passes[p][twin]);
+        }
+        [exact, fine]
+    };
+    eight_passes(bar).iter().enumerate().map(error).collect()
 }
 
 /// The larger magnitude; one that is not a number stays.
@@ -287,6 +296,147 @@ fn statements(ratio: usize, found: &[Found]) -> Table {
         }
     }
     table
+}
+
+/// The multi-horizon paper's figure 7: the same bar with 0.2 mm in the middle and 0.05 mm at its ends.
+fn half_the_spacing() -> Table {
+    let mut table = Table::new(
+        "4:1, the multi-horizon paper's figure 7, half the spacing of figure 5 (0.2 and 0.05 mm): largest velocity error of the eighth pass over the height of the pulse, and that of figure 5 over it",
+        Columns::ByQuantity,
+    );
+    let variants = [
+        Variant::MultiHorizon,
+        Variant::MultiHorizonState,
+        Variant::DualHorizon,
+        Variant::Splice,
+        Variant::Truncated(0),
+        Variant::Fitted,
+    ];
+    let last = |variant: Variant, h: f64| {
+        let fine = eight_passes(&variant.uniform(h));
+        let bar = variant.bar(4, h)?;
+        errors_of_passes(&bar, &fine, h).pop()
+    };
+    let rows: Vec<Vec<Row>> = variants
+        .par_iter()
+        .map(|&variant| {
+            let (Some(half), Some(whole)) = (last(variant, 0.5 * FINE), last(variant, FINE)) else {
+                let why = "no bonds of that sign balance every node";
+                return vec![Row::refused(variant.name(), "error", why)];
+            };
+            ["the exact wave", "the fine bar"]
+                .iter()
+                .zip(half.iter().zip(whole))
+                .flat_map(|(against, (half, whole))| {
+                    [
+                        Row::info(variant.name(), format!("against {against}"), *half),
+                        Row::info(
+                            variant.name(),
+                            format!("figure 5 over it, {against}"),
+                            whole / half,
+                        ),
+                    ]
+                })
+                .collect()
+        })
+        .collect();
+    table.rows.extend(rows.into_iter().flatten());
+    table
+}
+
+/// Ghost force, reciprocity and reflection of laws on two lattices, as published and with the least change that balances every node.
+fn state_based(effort: Effort) -> Table {
+    let mut table = Table::new(
+        "Two lattices that meet along a line (2D) or a face (3D), state-based (LPS) and bond-based: largest force per volume under a uniform strain times the fine spacing (C_1111 = 1), |K - K'|, \
+         and what a plane pulse exp(-(x/2 delta)^2) from the coarse side leaves behind, of pressure and of shear; balanced: the least change of bonds and dilatations that balances every node",
+        Columns::ByQuantity,
+    );
+    let mut cases = Vec::new();
+    for solid in [Solid::StateBased, Solid::BondBased] {
+        for families in [Families::DualHorizon, Families::MultiHorizon] {
+            let sizes: &[(usize, usize, usize)] = match (effort, solid) {
+                (Effort::Quick, _) => &[(2, 2, 2)],
+                (Effort::Full, Solid::StateBased) => &[
+                    (1, 4, 3),
+                    (2, 2, 2),
+                    (2, 2, 3),
+                    (2, 4, 2),
+                    (2, 4, 3),
+                    (3, 2, 2),
+                ],
+                (Effort::Full, Solid::BondBased) => &[(2, 2, 2), (2, 4, 2), (3, 2, 2)],
+            };
+            for &(dimension, ratio, m) in sizes {
+                let meeting = Meeting {
+                    ratio,
+                    m,
+                    families,
+                    solid,
+                };
+                cases.push((dimension, meeting));
+            }
+        }
+    }
+    let rows: Vec<Vec<Row>> = cases
+        .par_iter()
+        .map(|&(dimension, meeting)| match dimension {
+            1 => meeting_rows::<1>(meeting),
+            2 => meeting_rows::<2>(meeting),
+            _ => meeting_rows::<3>(meeting),
+        })
+        .collect();
+    table.rows.extend(rows.into_iter().flatten());
+    table
+}
+
+fn meeting_rows<const D: usize>(meeting: Meeting) -> Vec<Row> {
+    let law = match meeting.solid {
+        Solid::StateBased => "LPS",
+        Solid::BondBased => "bond-based",
+    };
+    let families = match meeting.families {
+        Families::DualHorizon => "dual horizon",
+        Families::MultiHorizon => "multi-horizon paper",
+    };
+    let case = format!(
+        "{D}D {}:1, m = {}, {law}, {families}",
+        meeting.ratio, meeting.m
+    );
+    // a pulse two horizons wide, and 14 of its widths beyond and before it
+    let mut strip = lattices::Strip::<D>::new(meeting, 36 * meeting.m);
+    let mut rows = vec![Row::info(&case, "ghost force", strip.ghost_force())];
+    let measured = |case: &str, strip: &lattices::Strip<D>| {
+        let [pressure, shear] = strip.reflected();
+        let mut rows = vec![
+            Row::at_most(case, "asymmetry", strip.asymmetry(), ROUND_OFF),
+            Row::info(case, "pressure reflected", pressure),
+        ];
+        if D > 1 {
+            rows.push(Row::info(case, "shear reflected", shear));
+        }
+        rows
+    };
+    rows.extend(measured(&case, &strip));
+    let balanced = format!("{case}, balanced");
+    match strip.balance(LEAST) {
+        Some([least, most]) => {
+            rows.push(Row::at_most(
+                &balanced,
+                "ghost force",
+                strip.ghost_force(),
+                ROUND_OFF,
+            ));
+            rows.extend(measured(&balanced, &strip));
+            rows.push(Row::info(&balanced, "smallest factor", least));
+            rows.push(Row::info(&balanced, "largest factor", most));
+        }
+        None => rows.push(Row::refused(
+            &balanced,
+            "ghost force",
+            "no positive factors balance every node",
+        )),
+    }
+    rows
 }
 
 fn plates(effort: Effort) -> Table {

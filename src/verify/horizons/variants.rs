@@ -113,17 +113,17 @@ impl Variant {
         layout.bar(&rows)
     }
 
-    /// The bar whose middle has `ratio` times the spacing and the horizon of its ends; `None` where a fit does not exist.
-    pub fn bar(self, ratio: usize) -> Option<Bar> {
+    /// The bar whose middle has `ratio` times the spacing and the horizon of its ends, where the spacing is `fine`; `None` where a fit does not exist.
+    pub fn bar(self, ratio: usize, fine: f64) -> Option<Bar> {
         let layout = match self {
-            Self::Ramp => Layout::uniform(super::bar::FINE),
-            _ => Layout::new(ratio),
+            Self::Ramp => Layout::uniform(fine),
+            _ => Layout::new(ratio, fine),
         };
         let l = &layout;
         let rows = match self {
             Self::SourceNode => source(l, |i| l.horizon(i)),
             Self::DualHorizon => of_pairs(l, &shared(&source(l, |i| l.horizon(i)))),
-            Self::Ramp => of_pairs(l, &shared(&source(l, |i| ramp(l.x[i], ratio)))),
+            Self::Ramp => of_pairs(l, &shared(&source(l, |i| ramp(l.x[i], ratio, fine)))),
             Self::DualHorizonState => state_based(l, |i| own_family(l, i)),
             Self::MultiHorizon => of_pairs(l, &multi_horizon(l)),
             Self::MultiHorizonState => state_based(l, |i| multi_family(l, i)),
@@ -138,8 +138,8 @@ impl Variant {
 }
 
 /// The horizon of the gradual change, with straight ramps about the two changes.
-fn ramp(x: f64, ratio: usize) -> f64 {
-    let narrow = RATIO as f64 * super::bar::FINE;
+fn ramp(x: f64, ratio: usize, fine: f64) -> f64 {
+    let narrow = RATIO as f64 * fine;
     let middle = 0.5 * super::bar::LENGTH;
     let half = middle - super::bar::CHANGES[0];
     let t = ((half + 0.5 * RAMP - (x - middle).abs()) / RAMP).clamp(0.0, 1.0);
@@ -441,19 +441,20 @@ fn balanced(l: &Layout, mut pairs: Pairs) -> Option<Pairs> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verify::horizons::bar::FINE;
 
     #[test]
     fn horizons_of_the_ramp_meet_both_ends() {
-        assert!((ramp(0.0, 4) - 0.3).abs() < 1e-12);
-        assert!((ramp(50.0, 4) - 1.2).abs() < 1e-12);
-        assert!((ramp(24.0, 4) - 0.75).abs() < 1e-12);
-        assert!((ramp(76.0, 4) - 0.75).abs() < 1e-12);
+        assert!((ramp(0.0, 4, FINE) - 0.3).abs() < 1e-12);
+        assert!((ramp(50.0, 4, FINE) - 1.2).abs() < 1e-12);
+        assert!((ramp(24.0, 4, FINE) - 0.75).abs() < 1e-12);
+        assert!((ramp(76.0, 4, FINE) - 0.75).abs() < 1e-12);
     }
 
     #[test]
     fn fine_nodes_of_the_multi_horizon_paper_are_balanced_and_coarse_ones_are_not() {
         // eq. (7) for a uniform strain, summed bond by bond
-        let l = Layout::new(4);
+        let l = Layout::new(4, FINE);
         let rows = of_pairs(&l, &multi_horizon(&l));
         let pull = |i: usize| -> f64 { rows[i].iter().map(|&(j, k)| k * (l.x[j] - l.x[i])).sum() };
         let (mut fine, mut coarse) = (0.0f64, 0.0f64);
@@ -467,7 +468,7 @@ mod tests {
     #[test]
     fn every_variant_is_what_it_claims_to_be() {
         for variant in Variant::ALL {
-            let bar = variant.bar(4).unwrap();
+            let bar = variant.bar(4, FINE).unwrap();
             let name = variant.name();
             let (ghost, asymmetry) = (bar.ghost_force(), bar.asymmetry());
             assert_eq!(ghost < 1e-11, variant.is_patch_exact(), "{name}: {ghost:e}");
