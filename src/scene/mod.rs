@@ -13,7 +13,7 @@
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
-//! | `predict.rs` | what a run will need, without solving |
+//! | `predict.rs`, `cost.rs` | what a run will need, without solving; what its outputs will cost |
 //! | `converge.rs` | one scene at several refinements |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
@@ -24,6 +24,7 @@ mod check;
 mod choice;
 mod conditions;
 mod converge;
+mod cost;
 mod error;
 mod expression;
 mod initial;

@@ -5,12 +5,14 @@
 //! factorisation follow. That costs the time of an assembly and a tenth of its memory, and no factorisation.
 
 use std::fmt;
+use std::time::Duration;
 
 use serde::Serialize;
 
+use super::cost::{made_up, output_seconds};
 use super::loads;
 use super::motion;
-use super::run::{self, RunError};
+use super::run::{self, RunError, Solved};
 use super::solve::Solve;
 use super::spec::{Joining, ZonesNeeded};
 use super::validate::Scene;
@@ -29,6 +31,7 @@ use crate::progress::Progress;
 use crate::solve::FreeDofs;
 use crate::solve::direct::Analysis;
 use crate::solve::ordering::SiteGraph;
+use crate::solve::rehearsal::{rehearse, seconds_per_scalar};
 use crate::solve::statics::{MethodUsed, StaticError, expected_method};
 use crate::system::Symmetry;
 use crate::tensor::padded;
@@ -67,7 +70,7 @@ pub struct Prediction {
     pub peak_memory_bytes: u64,
     /// What holds memory; not all of it at the same time.
     pub memory: Vec<Share>,
-    /// Seconds per stage: up to the ordering measured here, of the others estimated from the rates in this file.
+    /// Seconds per stage: up to the ordering measured here, of the others from parts of them that were tried here.
     pub timings: Timings,
     /// Seconds of all stages.
     pub total_seconds: f64,
@@ -97,15 +100,18 @@ pub struct MotionPrediction {
     pub seconds_per_step: f64,
 }
 
-/// Seconds per operation of a factorisation on one thread. `benches/solvers.rs` takes 3e-11 in large fronts; the slit plate, on a
-/// machine in use, 1.1e-10 (3e10 operations) to 1.7e-10 (3e9).
-const SECONDS_PER_OPERATION: f64 = 6e-11;
+/// A factorisation is rehearsed for so long at most, and for no longer than a tenth of what it takes at [`OPERATIONS`].
+const REHEARSED: f64 = 0.5;
 
-/// Seconds per stored scalar of the stiffness for a whole iterative solve; measured there too (0.8e-7 to 2.5e-7).
-const SECONDS_PER_SCALAR: f64 = 2e-7;
+/// Operations per second of one thread, to tell how long to rehearse; the prediction does not use it.
+const OPERATIONS: f64 = 1e10;
 
-/// Seconds per cell and point of the output; measured on the slit plate.
-pub(super) const SECONDS_PER_CELL: f64 = 2.5e-5;
+/// Solves with the factors, each with a product and a residual: one or two refinements, and one that finds nothing to gain.
+const SUBSTITUTIONS: f64 = 3.0;
+
+/// Times that a whole iterative solve reads the stiffness, set-up and cycles included: `benches/solvers.rs` takes 0.8e-7 to
+/// 2.5e-7 s of CPU per stored scalar, and [`seconds_per_scalar`] gives 1e-10 s there.
+const PASSES: f64 = 1500.0;
 
 /// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
 pub(super) const OUTPUT_BYTES: u64 = 900;
@@ -206,7 +212,7 @@ pub(crate) fn predict<const D: usize>(
             .bytes()
             .max((HIERARCHY * (nonzeros * 8 + pattern.stored * 4) as f64) as u64),
     };
-    let output = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
+    let output_bytes = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
     let memory = vec![
         Share {
             name: "model",
@@ -226,18 +232,31 @@ pub(crate) fn predict<const D: usize>(
         },
         Share {
             name: "output",
-            bytes: output,
+            bytes: output_bytes,
         },
     ];
-    let peak = laid_out + PROGRAM + stiffness + solver.max(output);
+    let peak = laid_out + PROGRAM + stiffness + solver.max(output_bytes);
     let threads = rayon::current_num_threads() as f64;
     if factorised {
-        let seconds = cost.flops * SECONDS_PER_OPERATION / threads;
-        timings.add("factorisation", seconds);
+        let most = (0.1 * cost.flops / OPERATIONS / threads).clamp(0.01, REHEARSED);
+        let told = rehearse(&analysis, symmetry, Duration::from_secs_f64(most));
+        let product = nonzeros as f64 * seconds_per_scalar() / threads;
+        timings.add("factorisation", told.factorisation);
+        timings.add("solve", SUBSTITUTIONS * (told.substitution + product));
     } else {
-        timings.add("iteration", nonzeros as f64 * SECONDS_PER_SCALAR / threads);
+        let pass = nonzeros as f64 * seconds_per_scalar() / threads;
+        timings.add("iteration", PASSES * pass);
     }
-    timings.add("output", (cells + points) as f64 * SECONDS_PER_CELL);
+    let zones = run::zone_of_site(&model);
+    let displacement = made_up(model.sites.len() * D);
+    let made_up = Solved {
+        model: &model,
+        operator: operator.as_ref(),
+        displacement: &displacement,
+        residual: &displacement,
+        zone_of_site: &zones,
+    };
+    timings.add("output", output_seconds(&rest.output, &made_up)?);
     let mut prediction = Prediction {
         scene: title,
         dimension: D,

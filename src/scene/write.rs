@@ -27,7 +27,7 @@ pub fn write<const D: usize>(
     let solution = Solution::new(solved);
     if output.vtu {
         let path = output.directory.join(format!("{}.vtu", output.name));
-        write_vtu(&path, &snapshot(solved, &[]), Compression::Zlib)?;
+        write_vtu(&path, &snapshot(solved, &[], Shown::All), Compression::Zlib)?;
         files.push(path);
     }
     for (name, positions) in &output.lines {
@@ -192,7 +192,24 @@ impl<const D: usize> Solved<'_, D> {
     }
 }
 
-/// Cells and points with the fields of a solved.
+/// Which cells and points a file shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// All.
+    All,
+    /// Every so many: a sample, to tell how long all take.
+    Every(usize),
+}
+
+impl Shown {
+    fn includes(self, number: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Every(n) => number.is_multiple_of(n.max(1)),
+        }
+    }
+}
+
 /// A field over sites, beside those that every solution has.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum OverSites<'a> {
@@ -203,7 +220,11 @@ pub(super) enum OverSites<'a> {
 }
 
 /// Cells and points with the fields of a solution; without a residual, that field is left out.
-pub(super) fn snapshot<const D: usize>(solved: &Solved<'_, D>, more: &[OverSites<'_>]) -> Snapshot {
+pub(super) fn snapshot<const D: usize>(
+    solved: &Solved<'_, D>,
+    more: &[OverSites<'_>],
+    shown: Shown,
+) -> Snapshot {
     let model = solved.model;
     let mesh = &model.mesh;
     // nodes that elements use, then points
@@ -220,7 +241,7 @@ pub(super) fn snapshot<const D: usize>(solved: &Solved<'_, D>, more: &[OverSites
             site_of_node[n as usize] = Some(site);
         }
     }
-    for c in (0..mesh.cell_count()).filter(|&c| model.is_element(c)) {
+    for c in (0..mesh.cell_count()).filter(|&c| shown.includes(c) && model.is_element(c)) {
         let mut nodes = [0u32; 8];
         for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
             let entry = &mut point_of_node[n as usize];
@@ -246,7 +267,9 @@ pub(super) fn snapshot<const D: usize>(solved: &Solved<'_, D>, more: &[OverSites
     }
     let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
         .into_par_iter()
-        .filter(|&site| matches!(model.sites[site].kind, SiteKind::Point(_)))
+        .filter(|&site| {
+            shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
+        })
         .map(|site| {
             let stress = model.point_of(site).map_or(Tensor::zeros(), |(body, p)| {
                 body.partial_stress(p, solved.displacement)

@@ -157,6 +157,11 @@ impl Analysis {
         (8 * self.graph.neighbours.len() + self.symbolic.bytes()) as u64
     }
 
+    /// The tree of supernodes.
+    pub(crate) fn symbolic(&self) -> &Symbolic {
+        &self.symbolic
+    }
+
     /// The cost of a Cholesky (`Symmetric`) or an LU factorisation.
     pub fn cost(&self, symmetry: Symmetry) -> FactorCost {
         self.symbolic.cost(symmetry)

@@ -11,6 +11,7 @@ mod multifrontal;
 pub mod multigrid;
 pub mod ordering;
 pub mod quasi_static;
+pub mod rehearsal;
 mod singular;
 pub mod smoother;
 pub mod stable_step;

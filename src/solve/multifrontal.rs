@@ -352,6 +352,40 @@ impl<'a> Assembly<'a> {
     }
 }
 
+/// Assembles and factorises a front of made-up entries with `p` pivots, `r` rows and children of so many `rows`, as a factorisation
+/// does it; to tell how long that takes.
+pub(crate) fn trial_front(p: usize, r: usize, rows: &[usize], symmetry: Symmetry) {
+    let symmetric = symmetry == Symmetry::Symmetric;
+    let mut front = Front {
+        p,
+        r,
+        panel: vec![0.0; (p + r) * p],
+        upper: vec![0.0; if symmetric { 0 } else { p * r }],
+        schur: vec![0.0; r * r],
+    };
+    for &n in rows {
+        let map: Vec<u32> = (0..n).map(|i| (i * (p + r) / n) as u32).collect();
+        front.add_update(&vec![1e-9; n * n], &map, symmetric);
+    }
+    for k in 0..p {
+        front.panel[k * (p + r) + k] += 1.0;
+    }
+    let mut permutation = vec![0; if symmetric { 0 } else { p }];
+    if symmetric {
+        // the diagonal dominates
+        let _ = front::cholesky(&mut front.panel, &mut front.schur, p, r);
+    } else {
+        let Front {
+            panel,
+            upper,
+            schur,
+            ..
+        } = &mut front;
+        front::lu(panel, upper, schur, &mut permutation, p, r);
+    }
+    std::hint::black_box(&front.panel);
+}
+
 /// One front under assembly; see [`front`] for the layout.
 struct Front {
     p: usize,

@@ -274,7 +274,7 @@ fn steps<const D: usize>(
     })
 }
 
-fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
+pub(super) fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
     let energies = motion.energies();
     Moment {
         state: motion.state(),

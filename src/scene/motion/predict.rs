@@ -3,22 +3,35 @@
 use std::time::Instant;
 
 use super::drive::SceneDrive;
-use super::explicit::sizes;
-use super::laid_out::{LaidOut, laid_out};
+use super::explicit::{moment, sizes};
+use super::laid_out::{LaidOut, breaks, laid_out};
 use super::pace::{held, paced};
+use super::record::Recorder;
 use super::system::start;
+use crate::coupling::Sampler;
+use crate::observe::checkpoint::CheckpointFile;
+use crate::observe::series::Series;
 use crate::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
-use crate::scene::predict::{
-    MotionPrediction, OUTPUT_BYTES, Prediction, SECONDS_PER_CELL, Share, warnings,
-};
-use crate::scene::run::RunError;
+use crate::scene::cost::{TrialFolder, file_seconds, made_up};
+use crate::scene::predict::{MotionPrediction, OUTPUT_BYTES, Prediction, Share, warnings};
+use crate::scene::run::{self, RunError, Solved};
 use crate::scene::solve::{Explicit as Spec, QuasiStatic};
-use crate::scene::validate::Scene;
+use crate::scene::validate::{Output, Scene};
+use crate::scene::write::OverSites;
 use crate::solve::explicit::{Explicit, ExplicitParams};
 
-/// Steps are taken for this long to tell what one costs \[s\].
+/// Steps are taken for a tenth of the run to tell what one costs, for this long at most \[s\].
 const TRIED_FOR: f64 = 0.5;
+
+/// And for this long at least \[s\].
+const LEAST_TRIED: f64 = 0.01;
+
+/// Steps before the clock starts.
+const WARM: u64 = 3;
+
+/// Rows of the history that are timed.
+const ROWS: u32 = 5;
 
 /// Predicts a run in time.
 ///
@@ -104,6 +117,8 @@ fn steps<const D: usize>(
     laid_out.moving = moving;
     laid_out.watch.lap(&mut laid_out.timings, "stable step");
 
+    let is_linear = laid_out.moving.is_linear;
+    let breaks = breaks(laid_out.moving.system.as_ref(), rest);
     let begin = start(model, &rest.initial);
     let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
     let state_bytes = 12 * 8 * begin.u.len() as u64;
@@ -113,13 +128,65 @@ fn steps<const D: usize>(
         ExplicitParams::with_step(pace.step),
         begin,
     )?;
-    let clock = Instant::now();
+    // the first touch memory, and wake threads
     let mut taken = 0u64;
-    while taken < pace.steps && (taken < 2 || clock.elapsed().as_secs_f64() < TRIED_FOR) {
+    let mut clock = Instant::now();
+    let mut tried = TRIED_FOR;
+    while taken < pace.steps && (taken < 2 * WARM || clock.elapsed().as_secs_f64() < tried) {
         motion.step()?;
+        moment(&motion, is_linear);
         taken += 1;
+        if taken == WARM {
+            let run = clock.elapsed().as_secs_f64() / WARM as f64 * pace.steps as f64;
+            tried = (0.1 * run).clamp(LEAST_TRIED, TRIED_FOR);
+            clock = Instant::now();
+        }
     }
-    let seconds_per_step = clock.elapsed().as_secs_f64() / taken as f64;
+    let timed = if taken > WARM { taken - WARM } else { taken };
+    let seconds_per_step = clock.elapsed().as_secs_f64() / timed as f64;
+
+    // rows and files as the run writes them, elsewhere
+    let folder = TrialFolder::new(&rest.output.directory);
+    let output = Output {
+        directory: folder.path().to_path_buf(),
+        ..rest.output.clone()
+    };
+    let begun = Instant::now();
+    let mut recorder = Recorder::new(
+        &output,
+        &Sampler::new(model),
+        breaks,
+        is_linear,
+        CheckpointFile::new(folder.path().join("trial.checkpoint"), 0),
+        None,
+        None,
+    )?;
+    let shown = moment(&motion, is_linear);
+    recorder.begin(&shown);
+    let place = |site: usize| model.sites[site].position;
+    recorder.row(&shown, place)?;
+    let opened = begun.elapsed().as_secs_f64();
+    let begun = Instant::now();
+    for _ in 0..ROWS {
+        recorder.row(&shown, place)?;
+    }
+    let per_row = begun.elapsed().as_secs_f64() / f64::from(ROWS);
+    let per_file = if rest.output.vtu {
+        let count = (spec.duration / spec.output_interval).ceil() + 1.0;
+        let u = made_up(shown.state.u.len());
+        let solved = Solved {
+            model,
+            operator: laid_out.operator,
+            displacement: &u,
+            residual: &[],
+            zone_of_site: &run::zone_of_site(model),
+        };
+        let mut series = Series::new(folder.path(), "trial");
+        let more = [OverSites::Vector("velocity", &u)];
+        file_seconds(&solved, &more, count, |s| series.push(0.0, s))?
+    } else {
+        0.0
+    };
     drop(motion);
     progress.finish();
 
@@ -133,13 +200,12 @@ fn steps<const D: usize>(
         .ceil()
         .min(pace.steps as f64)
         + 1.0;
-    let sizes = sizes(model, laid_out.operator);
-    let shown = (sizes.cells + sizes.points) as f64;
     let timings = &mut laid_out.timings;
+    timings.add("start", opened + per_file);
     timings.add("steps", pace.steps as f64 * seconds_per_step);
     timings.add(
         "output",
-        written * shown * SECONDS_PER_CELL + rows * seconds_per_step,
+        (written - 1.0).max(0.0) * per_file + rows * per_row,
     );
     let mut prediction = Prediction {
         motion: Some(MotionPrediction {

@@ -14,7 +14,7 @@ use crate::observe::history::History;
 use crate::observe::series::Series;
 use crate::scene::run::Solved;
 use crate::scene::validate::{Output, Tip};
-use crate::scene::write::{OverSites, snapshot};
+use crate::scene::write::{OverSites, Shown, snapshot};
 use crate::solve::explicit::State;
 use crate::system::Dynamic;
 use crate::tensor::Vector;
@@ -302,7 +302,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             more.push(OverSites::Scalar("damage", damage));
         }
         self.series
-            .push(moment.state.time, snapshot(solved, &more))?;
+            .push(moment.state.time, snapshot(solved, &more, Shown::All))?;
         self.seconds += begun.elapsed().as_secs_f64();
         Ok(())
     }
