@@ -13,6 +13,7 @@
 //! | `lattices.rs` | shared: one lattice of points, or several that elements keep apart |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
+//! | `need.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `motion.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
@@ -30,6 +31,7 @@ mod fit;
 mod lattices;
 pub mod model;
 pub mod motion;
+pub mod need;
 pub mod partial_stress;
 mod place;
 pub mod points;

@@ -86,6 +86,46 @@ impl<const D: usize> Mesh<D> {
             .collect()
     }
 
+    /// Nodes at notches: where two facets of the boundary meet that see each other, their normals at least 60° apart; sorted, without repeats.
+    ///
+    /// None in 1D. A hole whose facets turn by less from one to the next is none.
+    pub fn notches(&self) -> Vec<u32> {
+        const TURN: f64 = 0.5;
+        if D == 1 {
+            return Vec::new();
+        }
+        // facets meet in a node in 2D, in an edge in 3D
+        let mut waiting: HashMap<[u32; 2], (Vector<D>, Vector<D>)> = HashMap::new();
+        let mut found = Vec::new();
+        for facet in self.outer_facets() {
+            let count = facet.nodes.len();
+            let centre = facet
+                .nodes
+                .iter()
+                .map(|&n| self.nodes[n as usize])
+                .sum::<Vector<D>>()
+                / count as f64;
+            let normal = self.facet_normal_area(&facet).normalize();
+            for i in 0..count {
+                let mut edge = [facet.nodes[i], facet.nodes[(i + 1) % count]];
+                if D == 2 {
+                    edge[1] = edge[0];
+                }
+                edge.sort_unstable();
+                let Some((other, turned)) = waiting.remove(&edge) else {
+                    waiting.insert(edge, (centre, normal));
+                    continue;
+                };
+                if (centre - other).dot(&turned) > 0.0 && normal.dot(&turned) <= TURN + 1e-9 {
+                    found.extend(edge);
+                }
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
     /// The facets between a cell of class `first` and one of class `second`; `class` gives each cell's class.
     ///
     /// Shapes: `class` has one entry per cell.

@@ -9,6 +9,7 @@
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
 //! | `cutter.rs` | which bonds leave the mesh |
+//! | `spread.rs` | sets of cells that grow and shrink |
 //! | `error.rs` | what can be wrong |
 
 use std::collections::BTreeMap;
@@ -21,6 +22,7 @@ pub mod gmsh;
 mod gmsh_kinds;
 pub mod quality;
 pub mod read;
+mod spread;
 pub mod vtk;
 
 pub use error::{MeshError, Place};

@@ -37,6 +37,13 @@ impl Timings {
         }
     }
 
+    /// Adds all stages to those of `other`.
+    pub fn add_to(&self, other: &mut Self) {
+        for stage in &self.stages {
+            other.add(&stage.name, stage.seconds);
+        }
+    }
+
     /// Runs `work` and adds its time to a stage.
     pub fn measure<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();

@@ -63,19 +63,21 @@ pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
 
 /// Choices that may be written as text for an empty table.
 fn as_text(path: &[&str]) -> bool {
-    matches!(path, ["coupling"] | ["solve"])
+    matches!(path, ["coupling"] | ["solve"] | ["zones"])
 }
 
 /// Writes `over` into `base`, table by table.
 pub(crate) fn merge<'i>(base: &mut DeTable<'i>, over: DeTable<'i>, path: &mut Vec<String>) {
     for (key, mut value) in over {
         path.push(key.get_ref().to_string());
+        // `zones` is no table of exactly one key, but its name stands for all of it
+        let named = value.get_ref().is_str() && *path == ["zones"];
         text_to_table(&mut value, path);
         let replaced = match (base.get_mut(key.get_ref().as_ref()), value.get_mut()) {
             (Some(old), DeValue::Table(new)) => {
                 text_to_table(old, path);
                 match old.get_mut() {
-                    DeValue::Table(old) if !chooses_otherwise(path, old, new) => {
+                    DeValue::Table(old) if !(named || chooses_otherwise(path, old, new)) => {
                         merge(old, std::mem::take(new), path);
                         false
                     }

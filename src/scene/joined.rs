@@ -1,5 +1,6 @@
 //! The coupling of a scene: the one that is typed, or the one that suits it.
 
+use super::automatic::Placed;
 use super::error::SceneError;
 use super::materials::{Law, Material, Points};
 use super::source::Span;
@@ -23,7 +24,7 @@ pub(super) struct Joined {
     pub why: Option<String>,
 }
 
-/// The coupling that the scene names; without a name `truncated` where it is exact, or else `splice`.
+/// The coupling that the scene names; without a name `truncated` where it is exact, or else `splice`. One model alone where a zone that was placed holds no cell, or every one.
 ///
 /// # Errors
 /// Those of the zones and of the lattice, which the choice looks at.
@@ -31,6 +32,7 @@ pub(super) fn joined<const D: usize>(
     spec: &SceneSpec,
     found: &[Material<D>],
     mesh: &Mesh<D>,
+    placed: Option<&Placed<D>>,
 ) -> Result<Joined, SceneError> {
     let of = |coupling: CouplingSpec, span: Span, why: Option<String>| Joined {
         joining: coupling.joining(),
@@ -38,6 +40,17 @@ pub(super) fn joined<const D: usize>(
         span,
         why,
     };
+    if let Some(placed) = placed {
+        let only = |coupling, why: &str| of(coupling, placed.span.clone(), Some(why.to_owned()));
+        if !placed.nonlocal.contains(&true) {
+            let coupling = CouplingSpec::Local(NoOptionsSpec {});
+            return Ok(only(coupling, "the zone that was placed is empty"));
+        }
+        if !placed.nonlocal.contains(&false) && spec.coupling.is_none() {
+            let coupling = CouplingSpec::Nonlocal(NoOptionsSpec {});
+            return Ok(only(coupling, "the zone that was placed holds every cell"));
+        }
+    }
     if let Some(typed) = &spec.coupling {
         return Ok(of(typed.get_ref().clone(), typed.span(), None));
     }
@@ -58,7 +71,7 @@ pub(super) fn joined<const D: usize>(
         // only bonds that end on faces join bodies of different horizons
         return Ok(truncated);
     }
-    Ok(match obstacle(spec, p, found, mesh, &truncated)? {
+    Ok(match obstacle(spec, p, found, mesh, &truncated, placed)? {
         None => truncated,
         Some(reason) => of(
             CouplingSpec::Splice(NoOptionsSpec {}),
@@ -77,6 +90,7 @@ fn obstacle<const D: usize>(
     found: &[Material<D>],
     mesh: &Mesh<D>,
     truncated: &Joined,
+    placed: Option<&Placed<D>>,
 ) -> Result<Option<String>, SceneError> {
     for m in found {
         let (lambda, mu) = m.lame;
@@ -106,7 +120,7 @@ fn obstacle<const D: usize>(
     let Points::Lattice { spacing, origin } = lattice.points else {
         return Ok(Some("points that are no lattice".to_owned()));
     };
-    let zones = zones::zones(spec, truncated, mesh)?;
+    let zones = zones::zones(spec, truncated, mesh, placed)?;
     Ok((!follows(mesh, &zones, spacing, &origin))
         .then(|| "a nonlocal zone whose faces do not follow the lattice".to_owned()))
 }

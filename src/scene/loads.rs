@@ -132,19 +132,20 @@ pub(super) fn displacement<const D: usize>(
 
 type Held = (Vec<Option<f64>>, Vec<Option<usize>>);
 
-/// The prescribed displacement of each dof at time zero, and the condition that prescribes it.
+/// The prescribed displacement of each dof at time `t`, and the condition that prescribes it.
 ///
 /// # Errors
 /// As [`holders`].
 pub(super) fn supports<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
+    t: f64,
 ) -> Result<Held, RunError> {
     let holder = holders(model, conditions)?;
     let prescribed = holder
         .iter()
         .enumerate()
-        .map(|(dof, holder)| holder.map(|h| displacement(model, &conditions[h], dof, 0.0)))
+        .map(|(dof, holder)| holder.map(|h| displacement(model, &conditions[h], dof, t)))
         .collect();
     Ok((prescribed, holder))
 }
@@ -321,19 +322,20 @@ fn shares<const D: usize>(model: &Model<D>, on_points: &[Facet]) -> Vec<(usize, 
         .collect()
 }
 
-/// The applied force of each dof at time zero, and the sum of the sizes of the forces of all conditions.
+/// The applied force of each dof at time `t`, and the sum of the sizes of the forces of all conditions.
 ///
 /// # Errors
 /// As [`Loads::new`].
 pub(super) fn loads<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
+    t: f64,
 ) -> Result<(Vec<f64>, f64), RunError> {
     let loads = Loads::new(model, conditions)?;
     let mut load = vec![0.0; model.sites.len() * D];
     let mut applied = 0.0;
     for number in loads.conditions() {
-        let field = |x: &Vector<D>| conditions[number].components.vector(x, 0.0);
+        let field = |x: &Vector<D>| conditions[number].components.vector(x, t);
         applied += loads.add(number, field, &mut load).norm();
     }
     Ok((load, applied))

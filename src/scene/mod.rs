@@ -9,6 +9,7 @@
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `output.rs` | its parts |
+//! | `automatic.rs` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
@@ -18,6 +19,9 @@
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
 
+mod automatic;
+#[cfg(test)]
+mod automatic_tests;
 mod bodies;
 mod breaking;
 mod check;

@@ -154,10 +154,11 @@ pub(crate) fn predict<const D: usize>(
     let pattern = model.pattern(operator.as_ref(), progress);
     watch.lap(&mut timings, "assembly");
 
-    loads::loads(&model, &rest.conditions)?;
-    let (prescribed, _) = loads::supports(&model, &rest.conditions)?;
+    loads::loads(&model, &rest.conditions, 0.0)?;
+    let (prescribed, _) = loads::supports(&model, &rest.conditions, 0.0)?;
     let free = FreeDofs::from_prescribed(&prescribed, D);
-    let mut choices = vec![rest.coupling(joining)];
+    let mut choices: Vec<Choice> = rest.placed.iter().cloned().collect();
+    choices.push(rest.coupling(joining));
     let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();

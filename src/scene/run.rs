@@ -6,7 +6,7 @@ use super::breaking::Breaking;
 use super::conditions::Condition;
 use super::initial::Initial;
 use super::loads::{loads, supports};
-use super::materials::{Law, Points};
+use super::materials::{Law, Material, Points};
 use super::motion::{self, RunOptions};
 use super::solve::Solve;
 use super::spec::{Joining, SurfacesSpec, WeightsSpec};
@@ -30,9 +30,9 @@ use crate::progress::Progress;
 use crate::solve::explicit::ExplicitError;
 use crate::solve::quasi_static::QuasiStaticError;
 use crate::solve::stable_step::StepError;
-use crate::solve::statics::{self, StaticError, StaticParams, StaticProblem};
+use crate::solve::statics::{self, StaticError, StaticParams, StaticProblem, StaticSolution};
 use crate::solve::sub_cycling::SubCyclingError;
-use crate::system::Symmetry;
+use crate::system::{BlockCsr, Symmetry};
 use crate::tensor::{Vector, padded};
 
 /// Why a scene that is right could not be run.
@@ -122,7 +122,7 @@ pub fn run<const D: usize>(
 /// # Errors
 /// [`RunError`], each with place and remedy.
 pub fn solve_with<const D: usize>(
-    scene: Scene<D>,
+    mut scene: Scene<D>,
     progress: &dyn Progress,
     visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
 ) -> Result<RunSummary, RunError> {
@@ -131,44 +131,70 @@ pub fn solve_with<const D: usize>(
     let name = scene.title.clone();
     let joining = scene.coupling.joining();
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
-    let (problem, rest) = problem(scene);
-    let (model, coupling) = Model::new(problem, progress)?;
+    let placement = scene.placement.take();
+    let (problem, mut rest) = problem(scene);
+    let kept = placement.and_then(|p| {
+        timings.add("placing the zone", p.seconds);
+        rest.placed = Some(p.choice);
+        p.kept
+    });
+    let fresh;
+    let (model, coupling) = match &kept {
+        Some(k) => (&k.model, k.coupling.as_ref()),
+        None => {
+            fresh = Model::new(problem, progress)?;
+            (&fresh.0, fresh.1.as_ref())
+        }
+    };
     watch.lap(&mut timings, "sites and bonds");
-    let operator = coupling.operator(&model)?;
-    let stiffness = model.assemble(operator.as_ref(), progress);
-    watch.lap(&mut timings, "assembly");
-
-    let (load, applied) = loads(&model, &rest.conditions)?;
-    let (prescribed, holder) = supports(&model, &rest.conditions)?;
-    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let mut choices: Vec<Choice> = rest.chosen.iter().cloned().collect();
-    let symmetry = symmetry(coupling.as_ref(), || stiffness.asymmetry(), &mut choices);
-    watch.lap(&mut timings, "conditions");
-    let solution = statics::solve(
-        &StaticProblem {
-            stiffness: &stiffness,
-            symmetry,
-            positions: &positions,
-            load: &load,
-            prescribed: &prescribed,
-        },
-        &params(&rest.solver),
-        progress,
-    )?;
+    let operator = coupling.operator(model)?;
+    let computed;
+    let equilibrium = match &kept {
+        Some(k) => {
+            k.equilibrium.timings.add_to(&mut timings);
+            &k.equilibrium
+        }
+        None => {
+            watch.lap(&mut timings, "assembly");
+            computed = equilibrium(
+                &At {
+                    model,
+                    coupling,
+                    operator: operator.as_ref(),
+                    conditions: &rest.conditions,
+                    solver: &rest.solver,
+                    time: 0.0,
+                },
+                Timings::default(),
+                progress,
+            )?;
+            computed.timings.add_to(&mut timings);
+            &computed
+        }
+    };
+    let Equilibrium {
+        stiffness,
+        symmetry,
+        load,
+        applied,
+        holder,
+        solution,
+        ..
+    } = equilibrium;
+    let (symmetry, applied) = (*symmetry, *applied);
     let info = &solution.info;
-    timings.add("ordering", info.ordering_seconds);
-    timings.add("factorisation", info.factor_seconds);
-    timings.add("solve", info.solve_seconds);
     watch = Stopwatch::start();
+    let mut choices: Vec<Choice> = rest.placed.iter().chain(&rest.chosen).cloned().collect();
+    choices.extend(equilibrium.choices.iter().cloned());
     choices.push(Choice {
         choice: info.method.name().to_owned(),
         why: format!("{} system of {} unknowns", symmetry.name(), info.free_dofs),
     });
-    choices.extend(volumes_choice(&model));
+    choices.extend(volumes_choice(model));
 
     let u = &solution.displacement;
     let internal = stiffness.multiply(u);
-    let residual: Vec<f64> = internal.iter().zip(&load).map(|(k, f)| k - f).collect();
+    let residual: Vec<f64> = internal.iter().zip(load).map(|(k, f)| k - f).collect();
     let mut reactions = vec![Vector::<D>::zeros(); rest.conditions.len()];
     for (dof, holder) in holder.iter().enumerate() {
         if let Some(condition) = holder {
@@ -181,9 +207,9 @@ pub fn solve_with<const D: usize>(
         .enumerate()
         .for_each(|(dof, f)| balance[dof % D] += f);
     let scale = reactions.iter().map(|r| r.norm()).fold(applied, f64::max);
-    let zone_of_site = zone_of_site(&model);
+    let zone_of_site = zone_of_site(model);
     let solved = Solved {
-        model: &model,
+        model,
         operator: operator.as_ref(),
         displacement: u,
         residual: &residual,
@@ -239,6 +265,78 @@ pub fn solve_with<const D: usize>(
     Ok(summary)
 }
 
+/// A model at rest under its conditions, about to be solved.
+pub(super) struct At<'a, const D: usize> {
+    pub model: &'a Model<D>,
+    pub coupling: &'a dyn Coupling<D>,
+    pub operator: &'a dyn Operator<D>,
+    pub conditions: &'a [Condition<D>],
+    pub solver: &'a Solver,
+    /// The time at which conditions are taken.
+    pub time: f64,
+}
+
+/// A model at rest, solved.
+pub(crate) struct Equilibrium {
+    pub stiffness: BlockCsr,
+    pub symmetry: Symmetry,
+    pub load: Vec<f64>,
+    /// Sum of the sizes of the forces of all loads.
+    pub applied: f64,
+    /// The condition that holds each dof.
+    pub holder: Vec<Option<usize>>,
+    pub solution: StaticSolution,
+    /// What the symmetry of the matrix decided.
+    pub choices: Vec<Choice>,
+    pub timings: Timings,
+}
+
+/// Assembles and solves.
+///
+/// # Errors
+/// [`RunError`] for a condition that meets no site, and for a system without a solution.
+pub(super) fn equilibrium<const D: usize>(
+    at: &At<'_, D>,
+    mut timings: Timings,
+    progress: &dyn Progress,
+) -> Result<Equilibrium, RunError> {
+    let mut watch = Stopwatch::start();
+    let model = at.model;
+    let stiffness = model.assemble(at.operator, progress);
+    watch.lap(&mut timings, "assembly");
+    let (load, applied) = loads(model, at.conditions, at.time)?;
+    let (prescribed, holder) = supports(model, at.conditions, at.time)?;
+    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+    let mut choices = Vec::new();
+    let symmetry = symmetry(at.coupling, || stiffness.asymmetry(), &mut choices);
+    watch.lap(&mut timings, "conditions");
+    let solution = statics::solve(
+        &StaticProblem {
+            stiffness: &stiffness,
+            symmetry,
+            positions: &positions,
+            load: &load,
+            prescribed: &prescribed,
+        },
+        &params(at.solver),
+        progress,
+    )?;
+    let info = &solution.info;
+    timings.add("ordering", info.ordering_seconds);
+    timings.add("factorisation", info.factor_seconds);
+    timings.add("solve", info.solve_seconds);
+    Ok(Equilibrium {
+        stiffness,
+        symmetry,
+        load,
+        applied,
+        holder,
+        solution,
+        choices,
+        timings,
+    })
+}
+
 /// What of a scene remains once its problem is built.
 pub(super) struct Rest<const D: usize> {
     pub conditions: Vec<Condition<D>>,
@@ -251,6 +349,8 @@ pub(super) struct Rest<const D: usize> {
     pub density: Vec<f64>,
     /// The coupling, where the scene names none.
     pub chosen: Option<Choice>,
+    /// How the zone was placed, where the scene draws none.
+    pub placed: Option<Choice>,
 }
 
 impl<const D: usize> Rest<D> {
@@ -260,6 +360,18 @@ impl<const D: usize> Rest<D> {
             choice: format!("coupling {}", joining.name),
             why: joining.about.to_owned(),
         })
+    }
+}
+
+/// The law of the bonds of a material.
+pub(super) fn law<const D: usize>(material: &Material<D>) -> Box<dyn BondLaw<D>> {
+    let (lambda, mu) = material.lame;
+    match material.law {
+        Law::BondBased(micromodulus) => Box::new(BondBased::new(micromodulus, mu)),
+        Law::Lps(influence) => Box::new(LinearPeridynamicSolid::new(influence, lambda, mu)),
+        Law::Correspondence(influence, stabilisation) => {
+            Box::new(Correspondence::new(influence, lambda, mu, stabilisation))
+        }
     }
 }
 
@@ -275,14 +387,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
         Law::Lps(i) | Law::Correspondence(i, _) => i,
         Law::BondBased(_) => Influence::Gaussian,
     };
-    let (lambda, mu) = stuff.lame;
-    let law: Box<dyn BondLaw<D>> = match stuff.law {
-        Law::BondBased(micromodulus) => Box::new(BondBased::new(micromodulus, mu)),
-        Law::Lps(influence) => Box::new(LinearPeridynamicSolid::new(influence, lambda, mu)),
-        Law::Correspondence(influence, stabilisation) => {
-            Box::new(Correspondence::new(influence, lambda, mu, stabilisation))
-        }
-    };
+    let law = law(stuff);
     let method = scene.coupling.build(influence);
     let chosen = scene.coupling_why.map(|why| Choice {
         choice: format!("coupling {}", scene.coupling.joining().name),
@@ -336,6 +441,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             fingerprint: scene.fingerprint,
             density,
             chosen,
+            placed: scene.placement.map(|p| p.choice),
         },
     )
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::automatic::{Placement, Unplaced};
 use super::breaking::Breaking;
 use super::check;
 use super::conditions::{self, Condition};
@@ -16,7 +17,7 @@ use super::run::{self, RunError};
 use super::solve::Solve;
 use super::source::{Source, Span};
 use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
-use super::{bodies, breaking, initial, joined, obstacles, output, solve, zones};
+use super::{automatic, bodies, breaking, initial, joined, obstacles, output, solve, zones};
 use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -49,6 +50,8 @@ pub struct Scene<const D: usize> {
     pub coupling: CouplingSpec,
     /// Why the coupling was chosen; none if the scene names it.
     pub coupling_why: Option<String>,
+    /// How the nonlocal zone came about; none if the scene draws it.
+    pub(crate) placement: Option<Placement<D>>,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
     /// Empty regions: no point lies inside.
@@ -258,7 +261,21 @@ fn scene<const D: usize>(
     };
     let (found, cell_material) =
         materials::materials(&spec.materials, influence, kinematics, &mesh)?;
-    let joined = joined::joined(spec, &found, &mesh)?;
+    let solve = solve::solve(spec.solve.as_ref())?;
+    let clock = solve.clock();
+    let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
+    let initial = initial::initial(&spec.initial, &mesh, clock)?;
+    let placed = automatic::placed(&Unplaced {
+        spec,
+        mesh: &mesh,
+        materials: &found,
+        cell_material: &cell_material,
+        solve: &solve,
+        conditions: &conditions,
+        initial: &initial,
+        solver: &solver,
+    })?;
+    let joined = joined::joined(spec, &found, &mesh, placed.as_ref())?;
     let joining = joined.joining;
     let peridynamics = match (&spec.peridynamics, joining.zones) {
         (Some(p), _) => Some(materials::peridynamics(p, joining.lattice, &mesh)?),
@@ -272,7 +289,7 @@ fn scene<const D: usize>(
             .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
         }
     };
-    let mut zones = zones::zones(spec, &joined, &mesh)?;
+    let mut zones = zones::zones(spec, &joined, &mesh, placed.as_ref())?;
     let peridynamics = peridynamics
         .map(|p| bodies::bodies(spec, joining, p, &mesh, &mut zones))
         .transpose()?;
@@ -282,10 +299,6 @@ fn scene<const D: usize>(
     }
     let (voids, barriers) = obstacles::obstacles(spec, &mesh, &zones)?;
     add_mesh(&mesh, &mut fingerprint);
-    let solve = solve::solve(spec.solve.as_ref())?;
-    let clock = solve.clock();
-    let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
-    let initial = initial::initial(&spec.initial, &mesh, clock)?;
     if matches!(solve, Solve::Explicit(_)) {
         densities(spec, &found)?;
     }
@@ -307,6 +320,7 @@ fn scene<const D: usize>(
         peridynamics,
         coupling: joined.coupling,
         coupling_why: joined.why,
+        placement: placed.map(|p| p.placement),
         conditions,
         voids,
         barriers,

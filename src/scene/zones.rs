@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::automatic::Placed;
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
@@ -11,12 +12,14 @@ use super::source::Span;
 use super::spec::{SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::tensor::{Vector, padded};
 
-/// The model of each cell.
+/// The model of each cell; `placed` is the nonlocal zone of a scene that does not draw it.
 pub(crate) fn zones<const D: usize>(
     spec: &SceneSpec,
     joined: &Joined,
     mesh: &Mesh<D>,
+    placed: Option<&Placed<D>>,
 ) -> Result<Vec<Zone>, SceneError> {
     let joining = joined.joining;
     let count = mesh.cell_count();
@@ -25,19 +28,28 @@ pub(crate) fn zones<const D: usize>(
     }
     let needs_transition = matches!(joining.zones, ZonesNeeded::Transition { .. });
     let chosen = joined.span.clone();
-    let Some(nonlocal) = &spec.zones.nonlocal else {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            format!("coupling `{}` needs a nonlocal zone", joining.name),
-        )
-        .label(chosen, "couples a local and a nonlocal zone")
-        .help(
-            "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }",
-        ));
+    let (region, span) = match (placed, &spec.zones.nonlocal) {
+        (Some(p), _) => {
+            let cells = (0..count as u32).filter(|&c| p.nonlocal[c as usize]);
+            (Region::Cells(cells.collect()), p.span.clone())
+        }
+        (None, Some(n)) => {
+            let region = region::region("zones.nonlocal", n.get_ref(), mesh)?;
+            (region, n.span())
+        }
+        (None, None) => {
+            return Err(SceneError::new(
+                SceneErrorKind::Missing,
+                format!("coupling `{}` needs a nonlocal zone", joining.name),
+            )
+            .label(chosen, "couples a local and a nonlocal zone")
+            .help(
+                "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }, or zones = \"auto\"",
+            ));
+        }
     };
-    let region = region::region("zones.nonlocal", nonlocal.get_ref(), mesh)?;
+    let drawn = span.clone();
     let inner = region.select(mesh);
-    let span = nonlocal.span();
     if !inner.contains(&true) {
         return Err(empty("zones.nonlocal", span, mesh));
     }
@@ -56,7 +68,7 @@ pub(crate) fn zones<const D: usize>(
                 SceneErrorKind::Empty,
                 "`zones.skin` takes every cell of `zones.nonlocal`",
             )
-            .label(span, "is nowhere thicker than two cells")
+            .label(span.clone(), "is nowhere thicker than two cells")
             .help("refine the mesh, enlarge the zone or leave the skin out"));
         }
     }
@@ -76,7 +88,7 @@ pub(crate) fn zones<const D: usize>(
                 ),
             )
             .label(span, "overlaps in part")
-            .label(nonlocal.span(), "this zone")
+            .label(drawn, "this zone")
             .help("let it enclose the nonlocal zone, or keep the two apart; around = 0.1 does the former"));
         }
         let mut any = false;
@@ -86,6 +98,23 @@ pub(crate) fn zones<const D: usize>(
         }
         if !any && needs_transition {
             return Err(empty("zones.transition", span, mesh));
+        }
+    } else if let (Some(_), ZonesNeeded::Transition { width, .. }) = (placed, joining.zones) {
+        // the width that the method asks for, and half a cell, so that cells make it up
+        let horizon = spec.peridynamics.as_ref().map(|p| &p.horizon);
+        let reach = |x: &Vector<D>| horizon.map_or(0.0, |h| h.eval(&padded(x)));
+        let largest = (0..count)
+            .map(|c| reach(&mesh.centroid(c)))
+            .fold(0.0, f64::max);
+        let size = mesh.cell_volume(0).abs().powf(1.0 / D as f64);
+        for (zone, close) in
+            zones
+                .iter_mut()
+                .zip(around(&region, &inner, mesh, width * largest + 0.5 * size))
+        {
+            if close {
+                *zone = Zone::Transition;
+            }
         }
     } else if needs_transition {
         return Err(SceneError::new(
@@ -100,7 +129,7 @@ pub(crate) fn zones<const D: usize>(
             SceneErrorKind::Conflict,
             "the nonlocal and transition zones hold every cell: nothing is local",
         )
-        .label(nonlocal.span(), "reaches everywhere")
+        .label(span, "reaches everywhere")
         .help("make the zones smaller, or use coupling = \"nonlocal\""));
     }
     Ok(zones)

@@ -82,12 +82,19 @@ impl CouplingSpec {
                 zones: ZonesNeeded::Nonlocal,
                 lattice: LatticeStart::OnCorner,
             },
-            Self::Blending(_) => Joining {
+            Self::Blending(b) => Joining {
                 name: "blending",
                 about: "forces are blended over the transition zone",
-                zones: ZonesNeeded::Transition {
-                    width: 3.0,
-                    why: "a smooth blending over three horizons cuts spurious forces a hundredfold",
+                zones: match b.beta {
+                    // a step is a step, however wide; the report's slit plate has one horizon
+                    BetaSpec::Constant => ZonesNeeded::Transition {
+                        width: 1.0,
+                        why: "families of the nonlocal zone then reach past it",
+                    },
+                    _ => ZonesNeeded::Transition {
+                        width: 3.0,
+                        why: "a smooth blending over three horizons cuts spurious forces a hundredfold",
+                    },
                 },
                 lattice: LatticeStart::OnCorner,
             },

@@ -32,8 +32,8 @@ pub use motion::{
     LoadStepSpec, QuasiStaticSpec, SolveSpec, TipSpec,
 };
 pub use region::{
-    BallSpec, BodySpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec,
-    WithoutSpec, ZonesSpec,
+    AutoSpec, BallSpec, BodySpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec,
+    TransitionSpec, WithoutSpec, ZonesSpec,
 };
 
 use std::collections::BTreeMap;
@@ -65,8 +65,9 @@ pub struct SceneSpec {
     /// Horizon, points and weights of the peridynamic region; needed unless the coupling is `local`.
     #[serde(default)]
     pub peridynamics: Option<PeridynamicsSpec>,
-    /// Where the body is nonlocal and where the two models overlap; all else is local.
+    /// Where the body is nonlocal and where the two models overlap; all else is local. "auto" finds it out.
     #[serde(default)]
+    #[schemars(schema_with = "zones_schema")]
     pub zones: ZonesSpec,
     /// How the two models are joined; also as text where no option is set, `coupling = "splice"`. Without it `truncated` where that is exact, or else `splice`; the run says which and why.
     #[serde(default)]
@@ -108,6 +109,15 @@ fn solve_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
     schemars::json_schema!({
         "description": "What is computed: a table, [solve.explicit], or a name where no option is set, \"static\" (default).",
         "anyOf": [table, { "enum": ["static"] }]
+    })
+}
+
+/// A table, or "auto".
+fn zones_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    let table = generator.subschema_for::<ZonesSpec>();
+    schemars::json_schema!({
+        "description": "Where the body is nonlocal: a table, [zones], or \"auto\" for a zone that is placed by itself.",
+        "anyOf": [table, { "enum": ["auto"] }]
     })
 }
 

@@ -12,6 +12,10 @@ use crate::scene::value::{Coordinates, Number, Text};
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ZonesSpec {
+    /// Nonlocal where a solution with finite elements alone says that it must be; `zones = "auto"` where no option is set.
+    #[serde(default)]
+    #[schemars(with = "Option<AutoSpec>")]
+    pub auto: Option<Spanned<AutoSpec>>,
     /// Peridynamics only. Cells whose centroid lies inside.
     #[serde(default)]
     #[schemars(with = "Option<ShapeSpec>")]
@@ -30,6 +34,21 @@ pub struct ZonesSpec {
     /// Parts of the nonlocal zone with a horizon and a lattice of their own, by name; a layer of elements keeps them apart. Coupling `truncated` only.
     #[serde(default)]
     pub bodies: BTreeMap<Text, BodySpec>,
+}
+
+/// Where the body is nonlocal by itself: at cracks and voids, where the local model errs, where bonds may break.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct AutoSpec {
+    /// Fraction of the critical stretch from which a bond is taken to be near its end; 0.5 if left out.
+    #[serde(default)]
+    pub stretch: Option<Number>,
+    /// Horizons by which what is marked is padded, at least 1; 1 if left out, and 2 around cracks, voids and notches.
+    #[serde(default)]
+    pub padding: Option<Number>,
+    /// Error of the local model that may remain, relative in the norm of energy; 0.01 if left out.
+    #[serde(default)]
+    pub tolerance: Option<Number>,
 }
 
 /// A part of the nonlocal zone with a horizon and a lattice of its own.
