@@ -98,7 +98,8 @@ fn costs_are_warned_of() {
         let found = json("check", SLIT_PLATE, overrides, folder.path());
         found["warnings"].to_string()
     };
-    assert!(warnings(&["coupling=blending"]).contains("less than 3"));
+    assert!(warnings(&["coupling.blending.beta=smooth"]).contains("less than 3"));
+    assert!(!warnings(&[]).contains("less than"));
     assert!(
         warnings(&["coupling=splice", "peridynamics.horizon=\"1.5/120\""])
             .contains("1.50 spacings")

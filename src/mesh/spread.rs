@@ -165,4 +165,26 @@ mod tests {
         assert_eq!(filled, set(&mesh, |x, _| x < 8.0));
         assert_eq!(mesh.filled(&cells, 3.5), cells);
     }
+
+    #[test]
+    fn corners_of_a_hole_are_notches_and_those_of_the_body_are_not() {
+        let whole = plate();
+        assert!(whole.notches().is_empty());
+        let mut holed = Mesh {
+            nodes: whole.nodes.clone(),
+            ..Mesh::default()
+        };
+        for c in 0..whole.cell_count() {
+            let x = whole.centroid(c);
+            if (x[0] - 5.0).abs() > 1.0 || (x[1] - 5.0).abs() > 2.0 {
+                holed.push_cell(whole.shapes[c], whole.cell(c));
+            }
+        }
+        let found: Vec<[f64; 2]> = holed
+            .notches()
+            .iter()
+            .map(|&n| holed.nodes[n as usize].into())
+            .collect();
+        assert_eq!(found, [[4.0, 3.0], [6.0, 3.0], [4.0, 7.0], [6.0, 7.0]]);
+    }
 }

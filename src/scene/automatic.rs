@@ -240,6 +240,15 @@ fn size<const D: usize>(mesh: &Mesh<D>, c: usize) -> f64 {
     mesh.cell_volume(c).abs().powf(1.0 / D as f64)
 }
 
+/// Cells that have one of these nodes.
+fn touching<const D: usize>(mesh: &Mesh<D>, nodes: impl IntoIterator<Item = u32>) -> Vec<bool> {
+    let mut flag = vec![false; mesh.nodes.len()];
+    nodes.into_iter().for_each(|n| flag[n as usize] = true);
+    (0..mesh.cell_count())
+        .map(|c| mesh.cell(c).iter().any(|&n| flag[n as usize]))
+        .collect()
+}
+
 /// Cells at cracks and voids, and at notches of the mesh where bonds break.
 fn marked<const D: usize>(scene: &Unplaced<'_, D>) -> Result<Marked, SceneError> {
     let (spec, mesh) = (scene.spec, scene.mesh);
@@ -269,11 +278,7 @@ fn marked<const D: usize>(scene: &Unplaced<'_, D>) -> Result<Marked, SceneError>
         }
     }
     if scene.materials.iter().any(|m| m.fracture.is_some()) {
-        for n in mesh.notches() {
-            for c in 0..count {
-                marked.notches[c] |= mesh.cell(c).contains(&n);
-            }
-        }
+        marked.notches = touching(mesh, mesh.notches());
     }
     Ok(marked)
 }
@@ -456,24 +461,18 @@ fn need<const D: usize>(
 /// Cells within a horizon of nodes whose motion is prescribed.
 fn held<const D: usize>(scene: &Unplaced<'_, D>, horizon: &[f64]) -> Vec<bool> {
     let mesh = scene.mesh;
-    let mut at_support = vec![false; mesh.nodes.len()];
+    let mut nodes: Vec<u32> = Vec::new();
     for condition in scene.conditions {
         match condition.support() {
-            Some(Support::Set { nodes, .. }) => {
-                nodes.iter().for_each(|&n| at_support[n as usize] = true);
-            }
-            Some(Support::Inside(region)) => {
-                for (x, held) in mesh.nodes.iter().zip(&mut at_support) {
-                    *held |= region.contains(x, 0.0);
-                }
-            }
+            Some(Support::Set { nodes: set, .. }) => nodes.extend(set),
+            Some(Support::Inside(region)) => nodes.extend(
+                (0..mesh.nodes.len() as u32)
+                    .filter(|&n| region.contains(&mesh.nodes[n as usize], 0.0)),
+            ),
             None => {}
         }
     }
-    let touching: Vec<bool> = (0..mesh.cell_count())
-        .map(|c| mesh.cell(c).iter().any(|&n| at_support[n as usize]))
-        .collect();
-    mesh.grown(&touching, |c| horizon[c])
+    mesh.grown(&touching(mesh, nodes), |c| horizon[c])
 }
 
 /// The micromodulus of the bonds of a material, up to a factor.
