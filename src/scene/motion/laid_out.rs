@@ -41,10 +41,9 @@ pub(super) fn laid_out<const D: usize, S, T>(
     let title = scene.title.clone();
     let joining = scene.coupling.joining();
     let growing = Growing::of(&scene.coupling);
-    timings.add(
-        "placing the zone",
-        scene.placement.as_ref().map_or(0.0, |p| p.seconds),
-    );
+    if let Some(placement) = &scene.placement {
+        timings.add("placing the zone", placement.seconds);
+    }
     let (problem, rest) = run::problem(scene);
     let mut choices: Vec<Choice> = rest.placed.iter().chain(&rest.chosen).cloned().collect();
     let begun = first(&rest, &mut choices)?;
