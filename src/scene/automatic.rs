@@ -2,9 +2,7 @@
 //!
 //! 1. The scene is solved with elements alone; cells through which a crack or a void passes carry next to nothing.
 //! 2. Cells at cracks, at voids and, where bonds break, at notches are marked; so are those in which [`Criteria`] finds the local model wrong or a bond near its end.
-//! 3. What is marked is padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled.
-//!
-//! Where nothing is marked, elements are the whole model, and their solution is kept: the run writes it without solving again.
+//! 3. What is marked is padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled. Where nothing is marked, elements are the whole model, and their solution is kept: the run writes it without solving again.
 
 use std::fmt;
 use std::sync::Arc;
@@ -224,9 +222,9 @@ fn options(spec: &AutoSpec) -> Result<Options, SceneError> {
             t,
             t.value > 0.0 && t.value < 1.0,
             "must lie between 0 and 1",
-            "0.01 leaves the local model an error of one per cent in the norm of energy",
+            "0.05 leaves the local model an error of 0.25 % of the energy",
         )?,
-        None => 0.01,
+        None => 0.05,
     };
     Ok(Options {
         stretch,

@@ -46,7 +46,7 @@ pub struct AutoSpec {
     /// Horizons by which what is marked is padded, at least 1; 1 if left out, and 2 around cracks, voids and notches.
     #[serde(default)]
     pub padding: Option<Number>,
-    /// Error of the local model that may remain, relative in the norm of energy; 0.01 if left out.
+    /// Error of the local model that may remain, relative in the norm of energy; 0.05 if left out.
     #[serde(default)]
     pub tolerance: Option<Number>,
 }
