@@ -6,6 +6,7 @@ use std::process::Command;
 
 mod contact;
 mod driven;
+mod growth;
 mod keys;
 mod load_steps;
 mod restarts;
