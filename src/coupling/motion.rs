@@ -266,8 +266,9 @@ impl<const D: usize> MovingBody<D> {
         let first = site_of_point.first().copied().unwrap_or(0);
         let shift = site_of_point
             .iter()
-            .zip(first..)
-            .all(|(&site, wanted)| site == wanted && site != NONE)
+            // in 64 bits, since a first point that is no site counts on beyond NONE
+            .zip(u64::from(first)..)
+            .all(|(&site, wanted)| u64::from(site) == wanted && site != NONE)
             .then_some(first as usize);
         Ok(Some(Self {
             pass,

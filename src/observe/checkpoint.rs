@@ -193,11 +193,15 @@ impl CheckpointFile {
                 inner: out,
                 hasher: crc32fast::Hasher::new(),
                 bytes: 0,
+                failed: None,
             };
             out.write_all(MAGIC)?;
             out.write_all(&VERSION.to_le_bytes())?;
             out.write_all(&self.identity.to_le_bytes())?;
-            postcard::to_io(state, &mut out).map_err(std::io::Error::other)?;
+            if let Err(error) = postcard::to_io(state, &mut out) {
+                // postcard says of each failed write that its buffer is full
+                return Err(out.failed.unwrap_or_else(|| std::io::Error::other(error)));
+            }
             let length = out.bytes - HEAD as u64;
             out.write_all(&length.to_le_bytes())?;
             let sum = out.hasher.clone().finalize();
@@ -321,18 +325,33 @@ struct Checked<W> {
     inner: W,
     hasher: crc32fast::Hasher,
     bytes: u64,
+    /// Why a write failed.
+    failed: Option<std::io::Error>,
 }
 
 impl<W: Write> Write for Checked<W> {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let written = self.inner.write(bytes)?;
+        let written = self.inner.write(bytes);
+        let written = self.noted(written)?;
         self.hasher.update(&bytes[..written]);
         self.bytes += written as u64;
         Ok(written)
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        self.inner.flush()
+        let flushed = self.inner.flush();
+        self.noted(flushed)
+    }
+}
+
+impl<W> Checked<W> {
+    /// Keeps an error for whoever asks why nothing was written, and passes its kind on.
+    fn noted<T>(&mut self, result: std::io::Result<T>) -> std::io::Result<T> {
+        result.map_err(|error| {
+            let kind = error.kind();
+            self.failed = Some(error);
+            kind.into()
+        })
     }
 }
 

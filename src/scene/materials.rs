@@ -236,6 +236,9 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
     }
 }
 
+/// The largest modulus, whose square times those of lengths still is a number.
+const STIFFEST: f64 = 1e100;
+
 fn constants<const D: usize>(
     name: &Text,
     spec: &MaterialSpec,
@@ -252,7 +255,14 @@ fn constants<const D: usize>(
         ),
     };
     let place = |key: &str| format!("materials.{name}.{kind}.{key}");
-    let e = check::positive(&place("youngs-modulus"), modulus)?;
+    check::positive(&place("youngs-modulus"), modulus)?;
+    let e = check::within(
+        &place("youngs-modulus"),
+        modulus,
+        modulus.value >= 1.0 / STIFFEST && modulus.value <= STIFFEST,
+        "too small or too large to be computed with",
+        "choose units in which it lies between 1e-100 and 1e100",
+    )?;
     let density = match density {
         Some(d) => check::not_negative(&place("density"), d)?,
         None => 0.0,

@@ -85,6 +85,7 @@ pub(crate) fn build<const D: usize>(
             mesh
         }
     };
+    can_be_computed_with(&mesh)?;
     if !matches!(spec, MeshSpec::File(_)) {
         quality::check_thickness(&mesh).map_err(|error| {
             SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
@@ -92,6 +93,24 @@ pub(crate) fn build<const D: usize>(
         })?;
     }
     Ok(mesh)
+}
+
+/// Lengths beyond whose powers (volumes, moments of bonds) numbers overflow or vanish.
+const SMALLEST: f64 = 1e-40;
+const LARGEST: f64 = 1e40;
+
+fn can_be_computed_with<const D: usize>(mesh: &Mesh<D>) -> Result<(), SceneError> {
+    let (lo, hi) = mesh.bounds();
+    let extent = (hi - lo).amax();
+    let farthest = lo.amax().max(hi.amax());
+    if extent >= SMALLEST && farthest <= LARGEST {
+        return Ok(());
+    }
+    Err(SceneError::new(
+        SceneErrorKind::Mesh,
+        format!("`mesh` is {extent:e} long and reaches {farthest:e} from the origin"),
+    )
+    .help(format!("choose units in which lengths lie between {SMALLEST:e} and {LARGEST:e}: their powers are no numbers otherwise")))
 }
 
 #[derive(Clone, Copy, PartialEq)]

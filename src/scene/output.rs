@@ -17,9 +17,13 @@ pub(super) fn output<const D: usize>(
     name: &str,
 ) -> Result<Output<D>, SceneError> {
     let o = &spec.output;
+    if let Some(name) = &o.name {
+        part_of_a_file_name("output.name", name)?;
+    }
     let mut lines = Vec::with_capacity(o.lines.len());
     for (key, line) in &o.lines {
         let place = format!("output.lines.{key}");
+        part_of_a_file_name(&place, key)?;
         let from = region::position::<D>(&format!("{place}.from"), &line.from)?;
         let to = region::position::<D>(&format!("{place}.to"), &line.to)?;
         let n = line.samples.value;
@@ -69,8 +73,23 @@ pub(super) fn output<const D: usize>(
     })
 }
 
+/// Refuses a name that would put a file into another folder.
+fn part_of_a_file_name(place: &str, name: &Text) -> Result<(), SceneError> {
+    let stray = |c: char| matches!(c, '/' | '\\') || c.is_control();
+    if !name.value.is_empty() && !name.value.contains(stray) {
+        return Ok(());
+    }
+    Err(SceneError::new(
+        SceneErrorKind::WrongValue,
+        format!("`{place}`: {:?} is no part of a file name", name.value),
+    )
+    .label(name.span.clone(), "names files")
+    .help("use letters, digits, `-`, `_`, `.`; folders belong into output.directory"))
+}
+
 fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip<D>, SceneError> {
     let place = format!("output.tips.{key}");
+    part_of_a_file_name(&place, key)?;
     let direction = region::position::<D>(&format!("{place}.direction"), &spec.direction)?;
     if direction.norm() <= 0.0 {
         return Err(SceneError::new(

@@ -89,9 +89,19 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     partial.iter().sum()
 }
 
-/// `‖a‖₂`.
+/// `‖a‖₂`, also of numbers whose squares are too large or too small for a number.
 pub(crate) fn norm(a: &[f64]) -> f64 {
-    dot(a, a).sqrt()
+    let squares = dot(a, a);
+    if squares > 1e-200 && squares < 1e300 {
+        return squares.sqrt();
+    }
+    let largest = a.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    if largest == 0.0 || !largest.is_finite() {
+        // a sum of squares that is no number stays none
+        return squares.sqrt();
+    }
+    let scaled: Vec<f64> = a.iter().map(|v| v / largest).collect();
+    largest * dot(&scaled, &scaled).sqrt()
 }
 
 /// `y ← y + s x`.

@@ -6,7 +6,7 @@ use std::process::Command;
 
 mod contact;
 mod driven;
-mod growth;
+mod faults;
 mod keys;
 mod load_steps;
 mod restarts;

@@ -1,0 +1,10 @@
+//! Mesh files.
+
+#![no_main]
+
+#[path = "../../tests/fuzz/entry/mod.rs"]
+mod entry;
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    entry::mesh_file(data);
+});

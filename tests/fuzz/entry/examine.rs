@@ -1,0 +1,165 @@
+//! A scene to its end: solved with finite numbers and a small residual, or refused by name.
+
+use std::path::Path;
+
+use bondline::scene::{
+    AnyScene, RunError, RunOptions, Scene, SceneError, SceneErrorKind, Solve, Solved, solve_with,
+    write,
+};
+use bondline::{RunSummary, Silent};
+
+use super::variant;
+
+/// The most steps in time that are run.
+const MOST_STEPS: u64 = 200;
+/// The most iterations that a load step is given.
+const MOST_ITERATIONS: usize = 3000;
+/// The relative residual above which a static scene does not count as solved. The solvers promise the scene's tolerance, 1e-10 by default.
+const RESIDUAL: f64 = 1e-8;
+
+/// How a case ended, if it ended as it should.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// It was solved.
+    Solved,
+    /// It was refused: the kind of the error.
+    Refused(String),
+    /// It was not tried: why.
+    Skipped(&'static str),
+}
+
+/// Checks that the error of a scene says what is wrong, where, and what to do.
+pub fn refused(error: &SceneError) -> Outcome {
+    let text = error.to_string();
+    assert!(!error.message().is_empty(), "no message: {text}");
+    // what the reader of TOML says of a syntax error leaves the remedy open; what a mesh says ends with it
+    let syntax = error.kind() == SceneErrorKind::Syntax;
+    let within = error.kind() == SceneErrorKind::Mesh
+        && [": ", "; "].iter().any(|c| error.message().contains(c));
+    assert!(
+        syntax || within || error.remedy().is_some(),
+        "no remedy: {text}"
+    );
+    assert!(
+        !error.underlined().is_empty() || error.message().contains('`') || syntax,
+        "no place: {text}"
+    );
+    // a terminal shows it without trouble
+    let _ = format!("{:?}", error.clone().report());
+    Outcome::Refused(format!("scene: {:?}", error.kind()))
+}
+
+fn failed(error: &RunError) -> Outcome {
+    let text = error.to_string();
+    assert!(
+        text.contains("; ") || text.contains(": "),
+        "no remedy: {text}"
+    );
+    let name = variant(error);
+    let inner = format!("{error:?}");
+    let inner = inner[name.len()..].trim_start_matches('(');
+    let inner: String = inner.chars().take_while(|c| c.is_alphanumeric()).collect();
+    Outcome::Refused(format!("run: {name} {inner}"))
+}
+
+/// Runs a scene that is small enough, whose files go into `folder`.
+pub fn examine(scene: AnyScene, folder: &Path) -> Outcome {
+    match scene {
+        AnyScene::Bar(s) => run(*s, AnyScene::Bar, folder),
+        AnyScene::Plane(s) => run(*s, AnyScene::Plane, folder),
+        AnyScene::Solid(s) => run(*s, AnyScene::Solid, folder),
+    }
+}
+
+fn run<const D: usize>(
+    mut scene: Scene<D>,
+    wrap: fn(Box<Scene<D>>) -> AnyScene,
+    folder: &Path,
+) -> Outcome {
+    if scene.mesh.cell_count() > 2 * super::size::MOST_CELLS {
+        return Outcome::Skipped("large");
+    }
+    scene.output.directory = folder.into();
+    scene.output.name = "fuzz".into();
+    let moves = scene.solve != Solve::Static;
+    match &mut scene.solve {
+        Solve::QuasiStatic(q) => q.max_iterations = q.max_iterations.min(MOST_ITERATIONS),
+        Solve::Explicit(e) => e.checkpoint_every = None,
+        Solve::Static => {}
+    }
+    let prediction = match wrap(Box::new(scene.clone())).predict(&Silent) {
+        Ok(prediction) => prediction,
+        // what `check` refuses a run refuses too, or else the check is wrong
+        Err(error) => {
+            let outcome = failed(&error);
+            let steps = matches!(&scene.solve, Solve::Explicit(e) if e.step.is_some());
+            if !steps && let Ok(summary) = solve(scene, wrap) {
+                panic!("check refuses ({error}) what a run solves: {summary}");
+            }
+            return outcome;
+        }
+    };
+    if prediction
+        .motion
+        .as_ref()
+        .is_some_and(|m| m.steps > MOST_STEPS)
+    {
+        return Outcome::Skipped("many steps");
+    }
+    let summary = match solve(scene, wrap) {
+        Ok(summary) => summary,
+        Err(error) => return failed(&error),
+    };
+    finite(&summary);
+    if moves {
+        numbers_in_tables_are_finite(folder);
+    } else {
+        assert!(summary.residual <= RESIDUAL, "{summary}");
+    }
+    Outcome::Solved
+}
+
+fn solve<const D: usize>(
+    scene: Scene<D>,
+    wrap: fn(Box<Scene<D>>) -> AnyScene,
+) -> Result<RunSummary, RunError> {
+    if scene.solve != Solve::Static {
+        return wrap(Box::new(scene)).run_with(&RunOptions::default(), &Silent);
+    }
+    solve_with(scene, &Silent, |output, solved: &Solved<'_, D>| {
+        let infinite = |v: &[f64]| v.iter().position(|x| !x.is_finite());
+        assert_eq!(infinite(solved.displacement), None, "displacement");
+        assert_eq!(infinite(solved.residual), None, "residual");
+        write(output, solved)
+    })
+}
+
+fn finite(summary: &RunSummary) {
+    let mut numbers = vec![summary.residual, summary.out_of_balance_relative];
+    numbers.extend(&summary.out_of_balance_force);
+    numbers.extend(summary.reactions.iter().flat_map(|r| &r.force));
+    numbers.extend(summary.energy);
+    if let Some(m) = &summary.motion {
+        numbers.extend([m.time, m.step, m.kinetic_energy, m.stored_energy]);
+        numbers.extend([m.external_work, m.missing_energy]);
+    }
+    assert!(numbers.iter().all(|v| v.is_finite()), "{summary}");
+}
+
+fn numbers_in_tables_are_finite(folder: &Path) {
+    let files = std::fs::read_dir(folder).expect("the run made it");
+    for file in files.flatten() {
+        let path = file.path();
+        if path.extension().is_none_or(|e| e != "csv") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).expect("tables are text");
+        for (row, line) in text.lines().enumerate().skip(1) {
+            let wrong = line.split(',').find(|w| {
+                let number = w.trim().parse::<f64>();
+                number.is_ok_and(|v| !v.is_finite())
+            });
+            assert_eq!(wrong, None, "{} row {row}: {line}", path.display());
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! What fuzzing has found, replayed, and random scenes; `docs/stability.md` says how more of both is run.
+
+mod entry;
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, LazyLock};
+use std::time::{Duration, Instant};
+
+use bondline::observe::summary::{bytes_text, peak_memory_bytes};
+use entry::Outcome;
+use proptest::prelude::Rng;
+use proptest::test_runner::{RngAlgorithm, TestRng};
+
+/// The longest that a case may take: far more than any does, also on a machine in use, so that only a hang exceeds it.
+const BUDGET: Duration = Duration::from_secs(300);
+/// The most memory that this process may ever hold.
+const MOST_MEMORY: u64 = 2 << 30;
+
+/// Every file that is kept for a target ends as it should.
+fn replay(target: &str, entry: fn(&[u8]) -> Outcome) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fuzz/corpus")
+        .join(target);
+    let mut cases = 0;
+    for file in std::fs::read_dir(&folder).expect("the corpus is in the repository") {
+        let path = file.expect("the corpus can be read").path();
+        let data = std::fs::read(&path).expect("the corpus can be read");
+        let begun = Instant::now();
+        let ended = catch_unwind(|| entry(&data));
+        assert!(ended.is_ok(), "{}", path.display());
+        assert!(begun.elapsed() < BUDGET, "{}", path.display());
+        cases += 1;
+    }
+    assert!(cases > 0, "{}", folder.display());
+}
+
+#[test]
+fn kept_scene_texts() {
+    replay("scene_text", entry::scene_text);
+}
+
+#[test]
+fn kept_mesh_files() {
+    replay("mesh_file", entry::mesh_file);
+}
+
+#[test]
+fn kept_random_scenes() {
+    replay("random_scene", entry::random_scene);
+}
+
+/// A number from the environment, or what a plain `cargo test` takes.
+fn from_environment(key: &str, plain: u64) -> u64 {
+    std::env::var(key).map_or(plain, |text| text.parse().expect("a whole number"))
+}
+
+/// Random scenes solve or are refused by name, and at least half of them solve.
+///
+/// `BONDLINE_RANDOM_SCENES` and `BONDLINE_RANDOM_FROM` say how many and from which number on; scene `n` is the same wherever it is made.
+#[test]
+fn random_scenes_solve_or_are_refused_by_name() {
+    let count = from_environment("BONDLINE_RANDOM_SCENES", 150);
+    let from = from_environment("BONDLINE_RANDOM_FROM", 0);
+    let mut ends: BTreeMap<String, usize> = BTreeMap::new();
+    let mut broken = Vec::new();
+    let (mut slowest, mut total) = ((Duration::ZERO, 0), Duration::ZERO);
+    let at = Arc::new(AtomicU64::new(from));
+    watch(&at);
+    for number in from..from + count {
+        at.store(number, Ordering::Relaxed);
+        let data = bytes(number);
+        let begun = processor_time();
+        let ended = catch_unwind(AssertUnwindSafe(|| entry::random_scene(&data)));
+        let took = processor_time().saturating_sub(begun);
+        total += took;
+        slowest = slowest.max((took, number));
+        // what the next ones run into says which one it was
+        assert!(
+            peak_memory_bytes().is_none_or(|b| b < MOST_MEMORY),
+            "scene {number}"
+        );
+        let end = match ended {
+            Ok(Outcome::Solved) => "solved".to_owned(),
+            Ok(Outcome::Refused(kind)) => format!("refused: {kind}"),
+            Ok(Outcome::Skipped(why)) => format!("not run: {why}"),
+            Err(_) => {
+                println!("scene {number}:\n{}", entry::random_text(&data));
+                broken.push(number);
+                "broken".to_owned()
+            }
+        };
+        *ends.entry(end).or_default() += 1;
+    }
+    for (end, times) in &ends {
+        println!("{times:7}  {end}");
+    }
+    println!(
+        "{count} scenes in {:.1} s of the processor, the slowest (number {}) {:.2} s, peak memory of all {}",
+        total.as_secs_f64(),
+        slowest.1,
+        slowest.0.as_secs_f64(),
+        peak_memory_bytes().map_or("unknown".to_owned(), bytes_text)
+    );
+    assert!(broken.is_empty(), "scenes {broken:?}");
+    let solved = ends.get("solved").copied().unwrap_or(0) as u64;
+    assert!(2 * solved >= count, "{solved} of {count} solve");
+}
+
+/// Time that the threads of this process have computed for; the time of day where the system does not tell.
+fn processor_time() -> Duration {
+    let of_all = || -> Option<f64> {
+        let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+        // after the name in brackets: state, ten numbers, then ticks in the program and in the system
+        let (_, numbers) = text.rsplit_once(')')?;
+        let ticks = numbers.split_whitespace().skip(11).take(2);
+        let ticks: Vec<f64> = ticks.filter_map(|t| t.parse().ok()).collect();
+        Some(ticks.iter().sum::<f64>() / 100.0)
+    };
+    static BEGUN: LazyLock<Instant> = LazyLock::new(Instant::now);
+    of_all().map_or_else(|| BEGUN.elapsed(), Duration::from_secs_f64)
+}
+
+/// Ends the process, with the scene at hand, where one takes longer than the budget: a scene that hangs cannot be unwound.
+fn watch(at: &Arc<AtomicU64>) {
+    let at = Arc::downgrade(at);
+    std::thread::spawn(move || {
+        let mut since = (u64::MAX, Instant::now());
+        while let Some(at) = at.upgrade() {
+            let number = at.load(Ordering::Relaxed);
+            if since.0 != number {
+                since = (number, Instant::now());
+            } else if since.1.elapsed() > BUDGET {
+                let text = entry::random_text(&bytes(number));
+                eprintln!("scene {number} takes longer than {BUDGET:?}:\n{text}");
+                std::process::abort();
+            }
+            drop(at);
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    });
+}
+
+/// The bytes of random scene `number`.
+fn bytes(number: u64) -> Vec<u8> {
+    let mut seed = [0; 32];
+    seed[..8].copy_from_slice(&number.to_le_bytes());
+    let mut rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    let mut data = vec![0; 200];
+    rng.fill_bytes(&mut data);
+    data
+}
