@@ -52,7 +52,7 @@ pub use problem::{Lattice, ModelError, Peridynamics, PointSource, Problem, Scala
 pub use sample::{Carrier, Sampler};
 pub use single::{Local, Nonlocal};
 pub use splice::Splice;
-pub use truncated::Truncated;
+pub use truncated::{SeamBonds, Truncated};
 
 use crate::{assembly::Row, mesh::Mesh, peridynamics::BondLaw, system::Symmetry};
 
@@ -150,6 +150,14 @@ pub trait Operator<const D: usize>: Sync {
     fn has_body_bonds(&self, _site: usize) -> bool {
         false
     }
+
+    /// The bonds of a seam that may be geometrically exact, and break, where the operator has such: a motion takes them over, and the rest of the rows from [`Operator::add_row_without_bonds`].
+    fn seam_bonds(&self) -> Option<SeamBonds<D>> {
+        None
+    }
+
+    /// Adds what is left of the row of a site without its bonds, for an operator that has [`Operator::seam_bonds`].
+    fn add_row_without_bonds(&self, _site: usize, _row: &mut Row<D>) {}
 
     /// Number of directed bonds that the method adds to those of the peridynamic body (Gauss points).
     fn additional_bonds(&self) -> usize {

@@ -2,28 +2,28 @@
 //!
 //! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`]) take their force from a pass over the bonds, which may be geometrically exact
 //! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
+//!
+//! A seam that has bonds of its own ([`Operator::seam_bonds`]) takes those that are exact or break out of the rows too: what is left are finite elements.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::PoisonError;
 
 use rayon::prelude::*;
 
-use self::{energy::ElementEnergy, rows::SiteRows};
+use self::{body::MovingBody, energy::ElementEnergy, rows::SiteRows};
 use crate::{
-    assembly::{self, Transfer},
-    coupling::{Model, Operator, SiteKind},
+    assembly,
+    coupling::{Model, Operator, SeamBonds, SiteKind},
     fem,
     peridynamics::{
-        BondEnergy, PdBody,
-        contact::{Contact, ContactError, ContactSetup, contact_stiffness},
-        kernel::{
-            BondForce, BondPass, BondSetup, CriticalStretch, Failure, KernelError, Kinematics,
-            Layout, Storage, bond_pass,
-        },
+        Families, PdBody,
+        contact::ContactError,
+        kernel::{BondPass, KernelError, Kinematics},
     },
     system::{BlockCsr, Breakage, Dynamic, Symmetry},
     tensor::Vector,
 };
 
+mod body;
 mod energy;
 mod rows;
 
@@ -86,28 +86,9 @@ pub struct Motion<'a, const D: usize> {
     /// Their products, kept between passes.
     products: Vec<f64>,
     body: Option<MovingBody<D>>,
+    /// Bonds of the seam, if they are exact or break; the rows are those of the finite elements alone then.
+    seam: Option<SeamBonds<D>>,
     energy: ElementEnergy,
-}
-
-/// The points and their bonds.
-struct MovingBody<const D: usize> {
-    pass: Box<dyn BondPass<D>>,
-    critical_stretch: Option<f64>,
-    /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
-    contact: Option<Mutex<Contact<D>>>,
-    /// The site of each point; `NONE` for a point that follows sites.
-    site_of_point: Vec<u32>,
-    /// All points follow this many sites later, if they do.
-    shift: Option<usize>,
-    transfer: Transfer,
-    /// For each site the point whose force from the bonds it takes; `NONE` for a site that takes none.
-    bonds_of_site: Vec<u32>,
-    /// Sites whose row is that of the body alone.
-    alone: usize,
-    /// Points at the edge of the region where bonds can break, none if nothing can.
-    edge: Vec<u32>,
-    displacement: Vec<f64>,
-    force: Vec<f64>,
 }
 
 impl<'a, const D: usize> Motion<'a, D> {
@@ -126,11 +107,31 @@ impl<'a, const D: usize> Motion<'a, D> {
         behaviour: &BondBehaviour<'_, D>,
     ) -> Result<Self, MotionError> {
         let sites = model.sites.len();
-        let body = MovingBody::new(model, operator, behaviour)?;
+        let is_linear =
+            behaviour.critical_stretch.is_none() && behaviour.kinematics == Kinematics::Linear;
+        let mut seam = if is_linear {
+            None
+        } else {
+            operator.seam_bonds()
+        };
+        let body = MovingBody::new(model, operator, behaviour, seam.as_ref())?;
+        if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
+            let x = &body.cloud.position;
+            seam.behave(behaviour.kinematics, behaviour.critical_stretch, |p| {
+                (behaviour.no_fail)(&x[p as usize])
+            });
+        }
         let linear = SiteRows::assemble(
             sites,
-            |site| !operator.is_body_row(site),
+            |site| match seam {
+                Some(_) => model.point_of(site).is_none(),
+                None => !operator.is_body_row(site),
+            },
             |site, row| {
+                if seam.is_some() {
+                    operator.add_row_without_bonds(site, row);
+                    return;
+                }
                 operator.add_row(site, row);
                 if let (true, Some((body, point))) =
                     (operator.has_body_bonds(site), model.point_of(site))
@@ -149,6 +150,7 @@ impl<'a, const D: usize> Motion<'a, D> {
             linear,
             products: Vec::new(),
             body,
+            seam,
             energy,
         })
     }
@@ -158,13 +160,40 @@ impl<'a, const D: usize> Motion<'a, D> {
         self.body.as_ref().map(|b| b.pass.as_ref())
     }
 
+    /// Whether the bonds that a seam cuts turn, stretch and break like others.
+    pub fn has_seam_bonds(&self) -> bool {
+        self.seam.is_some()
+    }
+
+    /// Energy of the bonds that the pass knows of, and of contact \[J\].
+    fn bond_energy(&self, u: &[f64]) -> f64 {
+        self.body.as_ref().map_or(0.0, |body| {
+            let mut points = vec![0.0; body.displacement.len()];
+            body.spread(u, &mut points);
+            let contact = body.contact.as_ref().map_or(0.0, |contact| {
+                contact
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .energy(&points, &|i, j| body.pass.bonded(i, j))
+            });
+            body.pass.stored_energy(&points) + contact
+        })
+    }
+
     /// Bytes held by rows and bonds.
     pub fn memory_bytes(&self) -> usize {
         self.linear.memory_bytes()
             + self.body.as_ref().map_or(0, |b| {
                 b.pass.memory_bytes() + (b.displacement.len() + b.force.len()) * 8
             })
+            + self.seam.as_ref().map_or(0, SeamBonds::memory_bytes)
     }
+}
+
+/// Volume that the bonds of a point reach.
+fn reached<const D: usize>(body: &PdBody<D>, families: &Families, point: u32) -> f64 {
+    let family = families.of(point as usize).iter();
+    family.map(|&j| body.cloud.volume[j as usize]).sum()
 }
 
 /// Lumped mass of every site \[kg\]: the integral of a node's shape function or the volume of a point, times the density.
@@ -179,145 +208,6 @@ pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) ->
             SiteKind::Point(_) => points * site.volume,
         })
         .collect()
-}
-
-impl<const D: usize> MovingBody<D> {
-    fn new(
-        model: &Model<D>,
-        operator: &dyn Operator<D>,
-        behaviour: &BondBehaviour<'_, D>,
-    ) -> Result<Option<Self>, MotionError> {
-        let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref()) else {
-            return Ok(None);
-        };
-        let points = body.cloud.position.len();
-        let mut site_of_point = vec![NONE; points];
-        let mut bonds_of_site = vec![NONE; model.sites.len()];
-        let mut own_row = vec![false; points];
-        for (site, s) in model.sites.iter().enumerate() {
-            if let SiteKind::Point(point) = s.kind {
-                site_of_point[point as usize] = site as u32;
-                if operator.is_body_row(site) {
-                    own_row[point as usize] = true;
-                }
-                if operator.is_body_row(site) || operator.has_body_bonds(site) {
-                    bonds_of_site[site] = point;
-                }
-            }
-        }
-        let is_site: Vec<bool> = site_of_point.iter().map(|&s| s != NONE).collect();
-        let no_fail: Vec<bool> = (0..points)
-            .into_par_iter()
-            .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
-            .collect();
-        let edge = if behaviour.critical_stretch.is_some() {
-            (0..points as u32)
-                .filter(|&i| {
-                    own_row[i as usize]
-                        && body
-                            .families
-                            .of(i as usize)
-                            .iter()
-                            .any(|&j| !own_row[j as usize])
-                })
-                .collect()
-        } else {
-            Vec::new()
-        };
-        let pair = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).0[k];
-        let omega = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).1[k];
-        let force = match p.law.bond_energy(body.cloud.horizon[0]) {
-            Some(BondEnergy::Pairwise { .. }) => BondForce::Pairwise { coefficient: &pair },
-            Some(BondEnergy::Lps { bulk, shear, .. }) => BondForce::Solid {
-                omega: &omega,
-                bulk,
-                shear,
-            },
-            None => return Err(MotionError::Law { law: p.law.name() }),
-        };
-        let pass = bond_pass(&BondSetup {
-            position: &body.cloud.position,
-            volume: &body.cloud.volume,
-            families: &body.families,
-            rows: &is_site,
-            force,
-            kinematics: behaviour.kinematics,
-            failure: behaviour.critical_stretch.map(|s| Failure {
-                critical: CriticalStretch::Uniform(s),
-                no_fail: &no_fail,
-            }),
-            precracked: None,
-            layout: Layout::Automatic,
-            storage: Storage::Double,
-        })?;
-        let contact = match behaviour.contact {
-            Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {
-                position: &body.cloud.position,
-                volume: &body.cloud.volume,
-                rows: &own_row,
-                spacing: model.spacing(),
-                approach: c.approach,
-                stiffness: c.stiffness / 15.0
-                    * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),
-                skin: 0.25 * model.spacing(),
-            })?)),
-            None => None,
-        };
-        let first = site_of_point.first().copied().unwrap_or(0);
-        let shift = site_of_point
-            .iter()
-            // in 64 bits, since a first point that is no site counts on beyond NONE
-            .zip(u64::from(first)..)
-            .all(|(&site, wanted)| u64::from(site) == wanted && site != NONE)
-            .then_some(first as usize);
-        Ok(Some(Self {
-            pass,
-            critical_stretch: behaviour.critical_stretch,
-            contact,
-            site_of_point,
-            shift,
-            transfer: body.cloud.transfer.clone(),
-            bonds_of_site,
-            alone: own_row.iter().filter(|own| **own).count(),
-            edge,
-            displacement: vec![0.0; points * D],
-            force: vec![0.0; points * D],
-        }))
-    }
-
-    /// The displacement of every point, from those of the sites.
-    fn spread(&self, u: &[f64], points: &mut [f64]) {
-        if let Some(shift) = self.shift {
-            points.copy_from_slice(&u[shift * D..][..points.len()]);
-            return;
-        }
-        points
-            .par_chunks_mut(CHUNK * D)
-            .enumerate()
-            .for_each(|(chunk, values)| {
-                for (k, value) in values.chunks_exact_mut(D).enumerate() {
-                    let point = chunk * CHUNK + k;
-                    match self.site_of_point[point] {
-                        NONE => {
-                            let x: Vector<D> = self.transfer.displacement(point, u);
-                            value.copy_from_slice(x.as_slice());
-                        }
-                        site => value.copy_from_slice(&u[site as usize * D..][..D]),
-                    }
-                }
-            });
-    }
-}
-
-/// `c` of `f = c s`, the largest of the bonds of the point with the most of them.
-fn bond_constant<const D: usize>(body: &PdBody<D>) -> f64 {
-    let fullest = (0..body.families.len()).max_by_key(|&i| body.families.of(i).len());
-    fullest.map_or(0.0, |i| {
-        let family = body.families.of(i).iter().zip(body.kernel(i).0);
-        family
-            .map(|(&j, p)| 2.0 * p * body.bond(i, j as usize).norm().powi(3))
-            .fold(0.0, f64::max)
-    })
 }
 
 impl<const D: usize> Dynamic for Motion<'_, D> {
@@ -349,7 +239,8 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
         self.linear
             .multiply_into::<D>(u, bonds, &mut self.products, force);
-        broken
+        let at_seam = self.seam.as_mut().map(|s| s.add_force(u, force, breakage));
+        broken + at_seam.unwrap_or(0)
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
@@ -363,6 +254,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         body.pass.tangent_into(&points, &mut force);
         let bonds = Some((&body.bonds_of_site[..], &force[..]));
         self.linear.multiply_into::<D>(x, bonds, &mut Vec::new(), y);
+        if let Some(seam) = &self.seam {
+            seam.add_tangent(x, y);
+        }
     }
 
     fn row_sums(&self) -> Vec<f64> {
@@ -387,6 +281,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 *sum += of_bonds * spread + touching;
             }
         }
+        if let Some(seam) = &self.seam {
+            seam.add_row_sums(&mut sums);
+        }
         sums
     }
 
@@ -409,8 +306,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             .body
             .as_ref()
             .is_some_and(|b| b.critical_stretch.is_some());
+        let at_seam = |site: usize| self.seam.as_ref().is_some_and(|s| s.touches(site));
         (0..self.mass.len())
-            .map(|site| !breaks || self.linear.has(site))
+            .map(|site| !breaks || (self.linear.has(site) && !at_seam(site)))
             .collect()
     }
 
@@ -425,7 +323,15 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 if let (Some(moving), Some(body)) = (&self.body, self.model.body())
                     && moving.bonds_of_site[site] != NONE
                 {
-                    body.add_force_row(moving.bonds_of_site[site] as usize, |_| 1.0, row);
+                    let point = moving.bonds_of_site[site] as usize;
+                    let weight = |j: usize| match &self.seam {
+                        Some(s) if !s.is_whole(point, j) => 0.0,
+                        _ => 1.0,
+                    };
+                    body.add_force_row(point, weight, row);
+                }
+                if let Some(seam) = &self.seam {
+                    seam.add_row(site, row);
                 }
             },
         )
@@ -436,6 +342,14 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     }
 
     fn stored_energy(&self, u: &[f64]) -> f64 {
+        if let Some(seam) = &self.seam {
+            let rows = |site: usize| self.linear.product::<D>(site, u);
+            let sites = (0..self.mass.len()).into_par_iter().with_min_len(CHUNK);
+            let elements: Vec<f64> = sites
+                .map(|s| 0.5 * rows(s).dot(&Vector::from_column_slice(&u[s * D..][..D])))
+                .collect();
+            return elements.iter().sum::<f64>() + self.bond_energy(u) + seam.energy(u);
+        }
         let is_body_alone = self
             .body
             .as_ref()
@@ -454,26 +368,16 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let elements = self
             .energy
             .of::<D>(&self.linear, &self.model.node_transfer, u);
-        let bonds = self.body.as_ref().map_or(0.0, |body| {
-            let mut points = vec![0.0; body.displacement.len()];
-            body.spread(u, &mut points);
-            let contact = body.contact.as_ref().map_or(0.0, |contact| {
-                contact
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .energy(&points, &|i, j| body.pass.bonded(i, j))
-            });
-            body.pass.stored_energy(&points) + contact
-        });
-        elements + bonds
+        elements + self.bond_energy(u)
     }
 
     fn dissipated_energy(&self) -> Option<f64> {
         let moving = self.body.as_ref()?;
         let s = moving.critical_stretch?;
         let body = self.model.body()?;
+        let at_seam = self.seam.as_ref().map_or(0.0, SeamBonds::dissipated);
         if moving.pass.broken() == 0 {
-            return Some(0.0);
+            return Some(at_seam);
         }
         let cloud = &body.cloud;
         let mut damage = vec![0.0; cloud.position.len()];
@@ -486,10 +390,11 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 if damage[i] == 0.0 || moving.site_of_point[i] == NONE {
                     return 0.0;
                 }
+                let is_here = |j: u32| self.seam.as_ref().is_none_or(|s| s.is_whole(i, j as usize));
                 let pair = body.kernel(i).0;
                 let family = body.families.of(i).iter().zip(pair);
                 family
-                    .filter(|&(&j, _)| !moving.pass.bonded(i, j as usize))
+                    .filter(|&(&j, _)| is_here(j) && !moving.pass.bonded(i, j as usize))
                     .map(|(&j, p)| {
                         let r2 = body.bond(i, j as usize).norm_squared();
                         0.5 * p * r2 * r2 * s * s * cloud.volume[i] * cloud.volume[j as usize]
@@ -497,13 +402,16 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                     .sum()
             })
             .collect();
-        Some(energies.iter().sum())
+        Some(energies.iter().sum::<f64>() + at_seam)
     }
 
     fn damage(&self) -> Option<Vec<f64>> {
         let body = self.body.as_ref()?;
         let mut points = vec![0.0; body.site_of_point.len()];
         body.pass.damage_into(&mut points);
+        if let (Some(seam), Some(pd)) = (&self.seam, self.model.body()) {
+            seam.add_damage(&mut points, |p| reached(pd, seam.families(), p));
+        }
         let mut damage = vec![0.0; self.mass.len()];
         for (point, &site) in body.site_of_point.iter().enumerate() {
             if site != NONE {
@@ -515,6 +423,10 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
 
     fn damage_at_edge(&self) -> Option<usize> {
         let body = self.body.as_ref()?;
+        if let Some(seam) = &self.seam {
+            let point = seam.damaged_at_face(body.pass.as_ref())?;
+            return Some(body.site_of_point[point as usize] as usize);
+        }
         // asked for after every pass that broke a bond: only the points at the edge are looked at
         body.edge
             .iter()
@@ -523,15 +435,36 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     }
 
     fn damage_state(&self) -> Vec<u64> {
-        self.body
+        let mut state = self
+            .body
             .as_ref()
-            .map_or_else(Vec::new, |b| b.pass.damage_state())
+            .map_or_else(Vec::new, |b| b.pass.damage_state());
+        if let Some(seam) = &self.seam {
+            state.extend(seam.damage_state());
+        }
+        state
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
-        match &mut self.body {
-            Some(body) => body.pass.restore_damage(state),
-            None => state.is_empty(),
+        let Some(body) = &mut self.body else {
+            return state.is_empty();
+        };
+        let Some(seam) = &mut self.seam else {
+            return body.pass.restore_damage(state);
+        };
+        let of_pass = body.pass.damage_state().len();
+        let Some((of_pass, of_seam)) = state.split_at_checked(of_pass) else {
+            return false;
+        };
+        let held = seam.damage_state();
+        if !seam.restore_damage(of_seam) {
+            return false;
         }
+        let fits = body.pass.restore_damage(of_pass);
+        if !fits {
+            // nothing is changed by a state that does not belong here
+            seam.restore_damage(&held);
+        }
+        fits
     }
 }

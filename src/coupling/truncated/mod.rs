@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `seam.rs` | the faces of the peridynamic zone, and the pieces of a bond inside of it |
 //! | `segments.rs` | pieces with their ends, and their springs |
+//! | `moving.rs` | pieces that turn, stretch and break |
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
 //! | `edges.rs` | strings along the edges of a zone in 3D |
 //! | `fit.rs`, `sparse_change.rs` | factors of pieces where faces cut the lattice anywhere, and their smallest change |
@@ -21,9 +22,14 @@
 mod dilatation;
 mod edges;
 mod fit;
+mod moving;
 mod seam;
 mod segments;
 mod sparse_change;
+
+use std::collections::HashSet;
+
+pub use self::moving::SeamBonds;
 
 use self::{
     dilatation::Dilatations,
@@ -96,6 +102,7 @@ impl<const D: usize> Coupling<D> for Truncated {
             dilatations,
             pairwise: passing.whole.iter().all(|w| w.state.is_none()),
             listed,
+            broken: segments.broken,
         }))
     }
 }
@@ -108,6 +115,8 @@ struct TruncatedRows<'a, const D: usize> {
     /// Points whose rows are sums of springs and dilatations, not rows of the body.
     listed: Vec<bool>,
     pairwise: bool,
+    /// Bonds between points of the zone that are not whole, lower number first.
+    broken: HashSet<(u32, u32)>,
 }
 
 impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
@@ -136,6 +145,23 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     fn has_body_bonds(&self, site: usize) -> bool {
         // the dilatations of an LPS differ from the body's, so that nothing cancels
         self.pairwise && self.model.point_of(site).is_some() && !self.is_body_row(site)
+    }
+
+    fn seam_bonds(&self) -> Option<SeamBonds<D>> {
+        let body = self.model.body().filter(|_| self.pairwise)?;
+        Some(SeamBonds::new(
+            self.model,
+            body,
+            &self.springs,
+            &self.broken,
+        ))
+    }
+
+    fn add_row_without_bonds(&self, site: usize, row: &mut Row<D>) {
+        if self.model.point_of(site).is_none() {
+            self.model.add_element_rows(site, row);
+            self.strings.add_row(site, row);
+        }
     }
 
     fn beta(&self, site: usize) -> f64 {

@@ -53,7 +53,7 @@ pub(super) struct Segments<'a, const D: usize> {
     /// Pieces of bonds that leave the zone or pass through it.
     pub cut: Vec<Segment>,
     /// Bonds between points of the zone that are not whole, lower number first.
-    broken: HashSet<(u32, u32)>,
+    pub broken: HashSet<(u32, u32)>,
     /// Whether a point has a bond that is not whole, or one that a fit has changed.
     pub at_seam: Vec<bool>,
     /// Whole bonds that a fit has changed, lower number first.
@@ -250,6 +250,29 @@ pub(super) struct Springs<const D: usize> {
     stiffness: Vec<f64>,
     difference: Transfer,
     of_site: BySite,
+    /// Of the first, which are pieces or changed by a fit; the rest are whole bonds of the body.
+    origin: Vec<Origin>,
+}
+
+/// Where a spring comes from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin {
+    /// The points of its bond.
+    pub bond: [u32; 2],
+    pub piece: Piece,
+    /// Those of the two points that are its ends.
+    pub at: [Option<u32>; 2],
+}
+
+/// A spring that is not a whole bond of the body as it is.
+pub(super) struct OwnSpring<const D: usize> {
+    /// ξ.
+    pub direction: Vector<D>,
+    /// k of `½ k (ξ·D)²`.
+    pub stiffness: f64,
+    /// Sites and weights of `D`.
+    pub difference: Vec<(u32, f64)>,
+    pub origin: Origin,
 }
 
 impl<const D: usize> Springs<D> {
@@ -262,6 +285,7 @@ impl<const D: usize> Springs<D> {
             stiffness: Vec::new(),
             difference: Transfer::new(),
             of_site: BySite::default(),
+            origin: Vec::new(),
         };
         let body = segments.body;
         for s in &segments.cut {
@@ -273,22 +297,34 @@ impl<const D: usize> Springs<D> {
                 .stiffness
                 .push(segments.stiffness(s.i, s.j) * s.piece.share * s.scale / length);
             springs.difference.push(&segments.difference(s));
+            springs.origin.push(Origin {
+                bond: [s.i, s.j],
+                piece: s.piece,
+                at: [&s.ends[0], &s.ends[1]].map(|end| match end {
+                    End::Point(p) => Some(*p),
+                    End::Face(_) => None,
+                }),
+            });
         }
-        for i in 0..segments.site.len() as u32 {
-            if segments.site[i as usize] == NONE {
-                continue;
-            }
-            for &j in body.families.of(i as usize) {
-                let wanted = listed[i as usize] || listed[j as usize];
-                if j > i && wanted && segments.is_whole(i, j) {
-                    springs.direction.push(body.bond(i as usize, j as usize));
-                    springs
-                        .stiffness
-                        .push(segments.stiffness(i, j) * segments.scale(i, j));
-                    springs.difference.push(&[
-                        (segments.site[i as usize], -1.0),
-                        (segments.site[j as usize], 1.0),
-                    ]);
+        let is_changed = |i: u32, j: u32| segments.changed.contains_key(&(i, j));
+        for changed in [true, false] {
+            for i in (0..segments.site.len() as u32).filter(|&i| segments.is_point(i)) {
+                for &j in body.families.of(i as usize) {
+                    let wanted = listed[i as usize] || listed[j as usize];
+                    if j > i && wanted && segments.is_whole(i, j) && is_changed(i, j) == changed {
+                        springs.push_whole(segments, i, j);
+                        if changed {
+                            springs.origin.push(Origin {
+                                bond: [i, j],
+                                piece: Piece {
+                                    from: 0.0,
+                                    to: 1.0,
+                                    share: 1.0,
+                                },
+                                at: [Some(i), Some(j)],
+                            });
+                        }
+                    }
                 }
             }
         }
@@ -298,6 +334,27 @@ impl<const D: usize> Springs<D> {
             difference.row(s).for_each(|(site, _)| visit(site));
         });
         springs
+    }
+
+    fn push_whole(&mut self, segments: &Segments<'_, D>, i: u32, j: u32) {
+        self.direction
+            .push(segments.body.bond(i as usize, j as usize));
+        self.stiffness
+            .push(segments.stiffness(i, j) * segments.scale(i, j));
+        self.difference.push(&[
+            (segments.site[i as usize], -1.0),
+            (segments.site[j as usize], 1.0),
+        ]);
+    }
+
+    /// The springs that are not whole bonds of the body as it is.
+    pub fn own(&self) -> impl Iterator<Item = OwnSpring<D>> + '_ {
+        self.origin.iter().enumerate().map(|(s, origin)| OwnSpring {
+            direction: self.direction[s],
+            stiffness: self.stiffness[s],
+            difference: self.difference.row(s).collect(),
+            origin: *origin,
+        })
     }
 
     /// Adds the row of a site.

@@ -73,23 +73,23 @@ pub(super) struct List<const D: usize> {
 }
 
 /// What one bond gives.
-struct Stretched<const D: usize> {
+pub(crate) struct Stretched<const D: usize> {
     /// `t r²` and `r²`: a bond beyond its limit is found without dividing.
-    excess: f64,
-    length: f64,
+    pub(crate) excess: f64,
+    pub(crate) length: f64,
     /// `ξ + η`, or ξ of a linear bond.
-    direction: [f64; D],
+    pub(crate) direction: [f64; D],
 }
 
 impl<const D: usize> Stretched<D> {
     #[inline(always)]
-    fn t(&self) -> f64 {
+    pub(crate) fn t(&self) -> f64 {
         self.excess / self.length
     }
 }
 
 #[inline(always)]
-fn stretched<const D: usize, const EXACT: bool>(
+pub(crate) fn stretched<const D: usize, const EXACT: bool>(
     xi: &[f64; D],
     here: &[f64; D],
     there: &[f64],
@@ -114,13 +114,13 @@ fn stretched<const D: usize, const EXACT: bool>(
 
 /// `1 − r/|ξ+η|`, linear: `ξ·η/r²`.
 #[inline(always)]
-fn shortening<const EXACT: bool>(t: f64) -> f64 {
+pub(crate) fn shortening<const EXACT: bool>(t: f64) -> f64 {
     if EXACT { t * psi(t) } else { 0.5 * t }
 }
 
 /// Extension over length, `(|ξ+η| − r)/r`, linear: `ξ·η/r²`.
 #[inline(always)]
-fn extension<const EXACT: bool>(t: f64) -> f64 {
+pub(crate) fn extension<const EXACT: bool>(t: f64) -> f64 {
     if EXACT {
         t * (1.0 - (1.0 + t) * psi(t))
     } else {

@@ -36,6 +36,8 @@ pub use setup::{
 
 pub use stencil::BlockSetup;
 
+pub(crate) use list::{extension, shortening, stretched};
+
 use crate::system::Breakage;
 
 /// One sweep over the bonds of a cloud.
@@ -126,7 +128,7 @@ pub fn instructions() -> &'static str {
 }
 
 /// Bits as words, with a last word by which [`unpack`] knows them.
-fn pack(bits: &[u8], reference: u64) -> Vec<u64> {
+pub(crate) fn pack(bits: &[u8], reference: u64) -> Vec<u64> {
     let word = |c: &[u8]| {
         let mut word = [0; 8];
         word[..c.len()].copy_from_slice(c);
@@ -136,7 +138,7 @@ fn pack(bits: &[u8], reference: u64) -> Vec<u64> {
 }
 
 /// Bits from words; false, and nothing changed, if they are not what [`pack`] gave for as many bits and bonds.
-fn unpack(state: &[u64], reference: u64, bits: &mut [u8]) -> bool {
+pub(crate) fn unpack(state: &[u64], reference: u64, bits: &mut [u8]) -> bool {
     let words = bits.len().div_ceil(8);
     if state.len() != words + 1 || state[words] != reference {
         return false;

@@ -13,6 +13,16 @@ pub enum Kinematics {
     Linear,
 }
 
+impl Kinematics {
+    /// The value of `t` at the critical stretch `s`.
+    pub(crate) fn limit(self, s: f64) -> f64 {
+        match self {
+            Self::Exact => s * (2.0 + s),
+            Self::Linear => 2.0 * s,
+        }
+    }
+}
+
 /// Which pass to build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
@@ -184,10 +194,7 @@ impl<const D: usize> BondSetup<'_, D> {
             CriticalStretch::Uniform(s) => s,
             CriticalStretch::PerBond(f) => f(i, k, xi),
         };
-        match self.kinematics {
-            Kinematics::Exact => s * (2.0 + s),
-            Kinematics::Linear => 2.0 * s,
-        }
+        self.kinematics.limit(s)
     }
 
     /// Whether bonds of point `i` never fail.

@@ -1,7 +1,7 @@
 //! The moving system of a scene: what moves, with what mass, from where.
 
 use crate::coupling::motion::{BondBehaviour, ContactBehaviour, Motion, MotionError, masses};
-use crate::coupling::{Coupling, Model, Operator};
+use crate::coupling::{Coupling, Interface, Model, Operator};
 use crate::observe::summary::Choice;
 use crate::peridynamics::kernel::Kinematics;
 use crate::progress::Progress;
@@ -70,9 +70,17 @@ pub(super) fn dynamic<'a, const D: usize>(
     match moving {
         Ok(motion) => {
             if model.body().is_some() {
+                let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
+                    _ if is_linear => "",
+                    (Interface::Faces, true) => "; those cut at the seam likewise",
+                    (Interface::Faces, false) => {
+                        "; within two horizons of the seam they are linear and do not break"
+                    }
+                    _ => "",
+                };
                 choices.push(Choice {
                     choice: bonds.to_owned(),
-                    why: breaks,
+                    why: breaks + at_seam,
                 });
             }
             Ok(Moving {

@@ -1,0 +1,190 @@
+//! The points of a moving model and their bonds.
+
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::{BondBehaviour, CHUNK, MotionError, NONE};
+use crate::{
+    assembly::Transfer,
+    coupling::{Model, Operator, SeamBonds, SiteKind},
+    peridynamics::{
+        BondEnergy, PdBody,
+        contact::{Contact, ContactSetup, contact_stiffness},
+        kernel::{
+            BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, Storage, bond_pass,
+        },
+    },
+    tensor::Vector,
+};
+
+/// The points and their bonds.
+pub(super) struct MovingBody<const D: usize> {
+    pub pass: Box<dyn BondPass<D>>,
+    pub critical_stretch: Option<f64>,
+    /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
+    pub contact: Option<Mutex<Contact<D>>>,
+    /// The site of each point; `NONE` for a point that follows sites.
+    pub site_of_point: Vec<u32>,
+    /// All points follow this many sites later, if they do.
+    pub shift: Option<usize>,
+    pub transfer: Transfer,
+    /// For each site the point whose force from the bonds it takes; `NONE` for a site that takes none.
+    pub bonds_of_site: Vec<u32>,
+    /// Sites whose row is that of the body alone.
+    pub alone: usize,
+    /// Points at the edge of the region where bonds can break, none if nothing can.
+    pub edge: Vec<u32>,
+    pub displacement: Vec<f64>,
+    pub force: Vec<f64>,
+}
+
+impl<const D: usize> MovingBody<D> {
+    pub fn new(
+        model: &Model<D>,
+        operator: &dyn Operator<D>,
+        behaviour: &BondBehaviour<'_, D>,
+        seam: Option<&SeamBonds<D>>,
+    ) -> Result<Option<Self>, MotionError> {
+        let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref()) else {
+            return Ok(None);
+        };
+        let points = body.cloud.position.len();
+        let mut site_of_point = vec![NONE; points];
+        let mut bonds_of_site = vec![NONE; model.sites.len()];
+        let mut own_row = vec![false; points];
+        for (site, s) in model.sites.iter().enumerate() {
+            if let SiteKind::Point(point) = s.kind {
+                site_of_point[point as usize] = site as u32;
+                let is_own = seam.is_some() || operator.is_body_row(site);
+                own_row[point as usize] = is_own;
+                if is_own || operator.has_body_bonds(site) {
+                    bonds_of_site[site] = point;
+                }
+            }
+        }
+        let is_site: Vec<bool> = site_of_point.iter().map(|&s| s != NONE).collect();
+        let no_fail: Vec<bool> = (0..points)
+            .into_par_iter()
+            .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
+            .collect();
+        let families = seam.map_or(&body.families, SeamBonds::families);
+        let edge = if behaviour.critical_stretch.is_some() && seam.is_none() {
+            (0..points as u32)
+                .filter(|&i| {
+                    own_row[i as usize]
+                        && body
+                            .families
+                            .of(i as usize)
+                            .iter()
+                            .any(|&j| !own_row[j as usize])
+                })
+                .collect()
+        } else {
+            Vec::new()
+        };
+        // a seam leaves some of the body's bonds out: those that stay keep their coefficients
+        let pair = |i: usize, k: usize, _: &Vector<D>| match seam {
+            None => body.kernel(i).0[k],
+            Some(_) => coefficient(body, i, families.of(i)[k]),
+        };
+        let omega = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).1[k];
+        let force = match p.law.bond_energy(body.cloud.horizon[0]) {
+            Some(BondEnergy::Pairwise { .. }) => BondForce::Pairwise { coefficient: &pair },
+            Some(BondEnergy::Lps { bulk, shear, .. }) => BondForce::Solid {
+                omega: &omega,
+                bulk,
+                shear,
+            },
+            None => return Err(MotionError::Law { law: p.law.name() }),
+        };
+        let pass = bond_pass(&BondSetup {
+            position: &body.cloud.position,
+            volume: &body.cloud.volume,
+            families,
+            rows: &is_site,
+            force,
+            kinematics: behaviour.kinematics,
+            failure: behaviour.critical_stretch.map(|s| Failure {
+                critical: CriticalStretch::Uniform(s),
+                no_fail: &no_fail,
+            }),
+            precracked: None,
+            layout: Layout::Automatic,
+            storage: Storage::Double,
+        })?;
+        let contact = match behaviour.contact {
+            Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {
+                position: &body.cloud.position,
+                volume: &body.cloud.volume,
+                rows: &own_row,
+                spacing: model.spacing(),
+                approach: c.approach,
+                stiffness: c.stiffness / 15.0
+                    * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),
+                skin: 0.25 * model.spacing(),
+            })?)),
+            None => None,
+        };
+        let first = site_of_point.first().copied().unwrap_or(0);
+        let shift = site_of_point
+            .iter()
+            // in 64 bits, since a first point that is no site counts on beyond NONE
+            .zip(u64::from(first)..)
+            .all(|(&site, wanted)| u64::from(site) == wanted && site != NONE)
+            .then_some(first as usize);
+        Ok(Some(Self {
+            pass,
+            critical_stretch: behaviour.critical_stretch,
+            contact,
+            site_of_point,
+            shift,
+            transfer: body.cloud.transfer.clone(),
+            bonds_of_site,
+            alone: own_row.iter().filter(|own| **own).count(),
+            edge,
+            displacement: vec![0.0; points * D],
+            force: vec![0.0; points * D],
+        }))
+    }
+
+    /// The displacement of every point, from those of the sites.
+    pub fn spread(&self, u: &[f64], points: &mut [f64]) {
+        if let Some(shift) = self.shift {
+            points.copy_from_slice(&u[shift * D..][..points.len()]);
+            return;
+        }
+        points
+            .par_chunks_mut(CHUNK * D)
+            .enumerate()
+            .for_each(|(chunk, values)| {
+                for (k, value) in values.chunks_exact_mut(D).enumerate() {
+                    let point = chunk * CHUNK + k;
+                    match self.site_of_point[point] {
+                        NONE => {
+                            let x: Vector<D> = self.transfer.displacement(point, u);
+                            value.copy_from_slice(x.as_slice());
+                        }
+                        site => value.copy_from_slice(&u[site as usize * D..][..D]),
+                    }
+                }
+            });
+    }
+}
+
+/// The pairwise coefficient of the bond from point `i` to point `j`; zero if there is none.
+fn coefficient<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
+    let place = body.families.of(i).binary_search(&j);
+    place.map_or(0.0, |k| body.kernel(i).0[k])
+}
+
+/// `c` of `f = c s`, the largest of the bonds of the point with the most of them.
+fn bond_constant<const D: usize>(body: &PdBody<D>) -> f64 {
+    let fullest = (0..body.families.len()).max_by_key(|&i| body.families.of(i).len());
+    fullest.map_or(0.0, |i| {
+        let family = body.families.of(i).iter().zip(body.kernel(i).0);
+        family
+            .map(|(&j, p)| 2.0 * p * body.bond(i, j as usize).norm().powi(3))
+            .fold(0.0, f64::max)
+    })
+}
