@@ -1,7 +1,10 @@
 //! Bond passes against the machine and against LAMMPS PERI: `cargo bench --bench bonds -- [roofline|passes|threads|lammps|memory|scaling …]` (all without a name).
 //!
+//! `scaling` also draws `docs/figures/bond_scaling.svg`.
+//!
 //! Times of one thread are CPU times, so that other programs on the machine do not count; times of two threads are wall-clock times, the least of many. Markdown comes out.
 
+use bondline::observe::figure::{LinePlot, Scale, Series, Stroke};
 use bondline::peridynamics::contact::{Contact, ContactSetup};
 use bondline::peridynamics::kernel::{
     BlockSetup, BondForce, BondPass, BondSetup, CriticalStretch, Failure, Kinematics, Layout,
@@ -547,16 +550,43 @@ fn scaling() {
     );
     println!("| bonds | PMB | LPS |");
     println!("|---|---|---|");
-    for n in [12, 23, 46, 94, 97] {
+    let laws = [Law::Pmb, Law::Lps];
+    let mut curves = laws.map(|_| Vec::new());
+    for n in [10, 12, 23, 46, 94, 97] {
         let mut cells = Vec::new();
         let mut bonds = 0.0;
-        for law in [Law::Pmb, Law::Lps] {
+        for (law, curve) in laws.into_iter().zip(&mut curves) {
             let mut pass = lattice([n; 3], 3.0, law, Some(0.01), Kinematics::Exact);
             bonds = pass.bonds() as f64;
-            cells.push(median(time(&mut *pass, if n < 50 { 25 } else { 7 })));
+            let nanoseconds = median(time(&mut *pass, if n < 50 { 25 } else { 7 }));
+            // a pass over all bonds, which is what a step waits for
+            curve.push((bonds, nanoseconds * bonds * 1e-9));
+            cells.push(nanoseconds);
         }
         println!("| {bonds:.2e} | {:.3} | {:.3} |", cells[0], cells[1]);
     }
+    let largest = curves.each_ref().map(|c| c[c.len() - 1]);
+    let mut series: Vec<Series> = laws
+        .iter()
+        .zip(&curves)
+        .map(|(law, curve)| Series::new(law.name(), Stroke::Line, curve.clone()))
+        .collect();
+    for (law, (bonds, seconds)) in laws.iter().zip(largest) {
+        let straight = [1e5, bonds].map(|b| (b, seconds * b / bonds));
+        let name = format!("{}, linear", law.name());
+        series.push(Series::new(name, Stroke::Dashed, straight.to_vec()));
+    }
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/figures/bond_scaling.svg");
+    let plot = LinePlot {
+        title: "One force pass, 3D, m = 3, damage on, one thread".into(),
+        x_label: "directed bonds".into(),
+        y_label: "seconds of CPU".into(),
+        x_scale: Scale::Log,
+        y_scale: Scale::Log,
+        series,
+    };
+    plot.write(&path).expect("a figure");
 }
 
 fn main() {

@@ -25,7 +25,8 @@ struct Crack {
     thickness: f64,
     dissipated: f64,
     broken: f64,
-    seconds: f64,
+    /// Of the whole run, and of its steps alone.
+    seconds: [f64; 2],
     points: usize,
     sites: usize,
     paths: [Vec<(f64, f64)>; 2],
@@ -67,7 +68,7 @@ fn crack(name: &str, overrides: &[&str], output: &std::path::Path) -> Result<Cra
         thickness: last(read("tip_over")?.column("y")?) - last(read("tip_under")?.column("y")?),
         dissipated: last(history.column("dissipated_energy")?),
         broken: last(history.column("broken_bonds")?),
-        seconds: summary.total_seconds,
+        seconds: [summary.total_seconds, summary.timings.seconds("steps")],
         points: summary.sizes.points,
         sites: summary.sizes.sites,
         paths,
@@ -79,9 +80,14 @@ fn tables() -> Result<Vec<Table>, Failure> {
     // in turn, so that what else the machine does meets both; the least disturbed run of each tells its time
     let (name, pure): (_, &[&str]) = ("truncated", &["coupling=nonlocal"]);
     let (mut full, mut coupled) = (crack("full", pure, &output)?, crack(name, &[], &output)?);
+    let fastest = |of: &mut Crack, again: Crack| {
+        for (known, seconds) in of.seconds.iter_mut().zip(again.seconds) {
+            *known = known.min(seconds);
+        }
+    };
     for _ in 1..TURNS {
-        full.seconds = full.seconds.min(crack("full", pure, &output)?.seconds);
-        coupled.seconds = coupled.seconds.min(crack(name, &[], &output)?.seconds);
+        fastest(&mut full, crack("full", pure, &output)?);
+        fastest(&mut coupled, crack(name, &[], &output)?);
     }
     let mut table = Table::new(
         "branching, coupled against full PD",
@@ -140,13 +146,16 @@ fn tables() -> Result<Vec<Table>, Failure> {
         2.0,
     ));
     // a time is no reason to fail, but a miss is not to be read as a pass
-    let ratio = full.seconds / coupled.seconds;
-    let time = Row::info(name, "total time of full PD over coupled", ratio);
-    table.push(if ratio < 1.8 {
-        time.differs("1.8 is wanted; docs/fracture.md says what it is lost to")
-    } else {
-        time
-    });
+    for (k, what) in ["total time", "time of the steps alone"].iter().enumerate() {
+        let ratio = full.seconds[k] / coupled.seconds[k];
+        let what = format!("{what}, full PD over coupled");
+        let row = Row::info(name, &what, ratio);
+        table.push(if ratio < 1.8 {
+            row.differs("1.8 is wanted; docs/fracture.md says what it is lost to")
+        } else {
+            row
+        });
+    }
     table.push(Row::info(
         name,
         "points over those of full PD",

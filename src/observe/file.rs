@@ -88,73 +88,6 @@ pub fn remove_parts(folder: &Path, name: &str) {
     }
 }
 
-/// Passes bytes on and replaces the first `old`, a tag that begins with `<`, by `new`.
-///
-/// vtkio writes no field data, where VTK looks for the time, and can write the numbers of points as `UInt64` only, of which meshio makes floats.
-pub(super) struct Replacing<'a, W> {
-    inner: W,
-    old: &'static [u8],
-    new: &'a [u8],
-    /// End of what was written so far, as far as it may be the beginning of `old`.
-    tail: Vec<u8>,
-    done: bool,
-}
-
-impl<'a, W> Replacing<'a, W> {
-    /// Wraps a writer.
-    pub(super) fn new(inner: W, old: &'static [u8], new: &'a [u8]) -> Self {
-        Self {
-            inner,
-            old,
-            new,
-            tail: Vec::new(),
-            done: false,
-        }
-    }
-
-    /// Where `old` begins, complete or cut off by the end of `text`.
-    fn find(&self, text: &[u8]) -> Option<usize> {
-        let mut from = 0;
-        while let Some(at) = text[from..].iter().position(|&b| b == b'<') {
-            let rest = &text[from + at..];
-            if self.old.starts_with(rest) || rest.starts_with(self.old) {
-                return Some(from + at);
-            }
-            from += at + 1;
-        }
-        None
-    }
-}
-
-impl<W: Write> Write for Replacing<'_, W> {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        if self.done {
-            return self.inner.write(bytes);
-        }
-        let mut text = std::mem::take(&mut self.tail);
-        text.extend_from_slice(bytes);
-        match self.find(&text) {
-            None => self.inner.write_all(&text)?,
-            Some(at) if text.len() - at < self.old.len() => {
-                self.inner.write_all(&text[..at])?;
-                self.tail = text.split_off(at);
-            }
-            Some(at) => {
-                self.inner.write_all(&text[..at])?;
-                self.inner.write_all(self.new)?;
-                self.inner.write_all(&text[at + self.old.len()..])?;
-                self.done = true;
-            }
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.inner.write_all(&std::mem::take(&mut self.tail))?;
-        self.inner.flush()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -194,27 +127,5 @@ mod tests {
         );
         let error = write_whole(folder.path(), |_| Ok(())).unwrap_err();
         assert!(matches!(error, ObserveError::Write { .. }), "{error:?}");
-    }
-
-    #[test]
-    fn a_tag_is_found_across_pieces_and_replaced_once() {
-        for pieces in [
-            &["<a><b>x<b><"][..],
-            &["<a", "><", "b", ">x<b", "><"],
-            &["<a>", "<b>", "x", "<b><"],
-        ] {
-            let mut out = Vec::new();
-            let mut writer = Replacing::new(&mut out, b"<b>", b"NEW");
-            for piece in pieces {
-                writer.write_all(piece.as_bytes()).unwrap();
-            }
-            writer.flush().unwrap();
-            assert_eq!(out, b"<a>NEWx<b><");
-        }
-        let mut out = Vec::new();
-        let mut writer = Replacing::new(&mut out, b"<b>", b"NEW");
-        writer.write_all(b"<a><b").unwrap();
-        writer.flush().unwrap();
-        assert_eq!(out, b"<a><b");
     }
 }

@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `vtu.rs` | FE cells and PD points in one VTU, and a PVD over several |
+//! | `data_array.rs` | numbers as text of a VTK XML file |
 //! | `series.rs` | VTU files over time and their PVD |
 //! | `history.rs` | tables that grow with a run, and are cut where it resumes |
 //! | `checkpoint.rs` | the state of a run, whole or not at all |
@@ -15,6 +16,7 @@
 
 pub mod checkpoint;
 pub mod csv;
+mod data_array;
 pub mod figure;
 pub mod file;
 pub mod history;

@@ -7,6 +7,7 @@ use std::process::Command;
 mod contact;
 mod driven;
 mod faults;
+mod growth;
 mod keys;
 mod load_steps;
 mod restarts;
