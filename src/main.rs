@@ -12,7 +12,8 @@ use bondline::observe::progress::TerminalProgress;
 use bondline::observe::report;
 use bondline::observe::summary::Ended;
 use bondline::scene::{
-    self, AnyScene, ConvergeError, ConvergeParams, Refinement, RunOptions, StartFrom, Template,
+    self, AnyScene, CheckError, ConvergeError, ConvergeParams, Refinement, RunOptions, StartFrom,
+    Template,
 };
 use bondline::trade::{self, CostBy, Reference, TradeEnd, TradeParams};
 use bondline::verify::page::{Outcome, page};
@@ -303,10 +304,12 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             return Ok(code);
         }
         Command::Check { scene, json } => {
-            let scene = load(&scene)?;
-            let prediction = scene
-                .predict(&TerminalProgress::on_stderr())
-                .map_err(|e| miette::miette!("{e}"))?;
+            let progress = TerminalProgress::on_stderr();
+            let found = scene::check(&scene.scene, &scene.overrides, &progress);
+            let prediction = found.map_err(|e| match e {
+                CheckError::Scene(e) => e.report(),
+                CheckError::Run(e) => miette::miette!("{e}"),
+            })?;
             if json {
                 let text = serde_json::to_string_pretty(&prediction);
                 print(text.map_err(|e| miette::miette!("{e}"))?)?;

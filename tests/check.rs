@@ -106,3 +106,23 @@ fn costs_are_warned_of() {
     );
     assert_eq!(warnings(&["coupling=splice"]), "[]");
 }
+
+/// An `accuracy` fills in the mesh, and `zones.auto` then finds that nothing needs peridynamics: both are told, by `check` and by `run`.
+#[test]
+fn an_accuracy_beside_a_zone_that_is_placed() {
+    let scene = "examples/choices/zone_block.toml";
+    let overrides = ["accuracy=0.05", "zones=auto"];
+    let folder = tempfile::tempdir().unwrap();
+    let predicted = json("check", scene, &overrides, folder.path());
+    let error = predicted["error"]["error"].as_f64().unwrap();
+    assert!(error > 0.0 && error <= 0.05, "{error}");
+    let measured = json("run", scene, &overrides, folder.path());
+    for told in [&predicted, &measured] {
+        let list = told["choices"].as_array().unwrap();
+        for wanted in ["cells", "zones.auto: no peridynamics", "coupling local"] {
+            let said = |c: &Value| c["choice"].as_str().unwrap().contains(wanted);
+            assert!(list.iter().any(said), "{wanted}: {list:?}");
+        }
+    }
+    assert_eq!(measured["sizes"]["points"].as_u64(), Some(0));
+}

@@ -15,10 +15,12 @@
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
 //! | `predict.rs`, `cost.rs` | what a run will need, without solving; what its outputs will cost |
+//! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
 //! | `converge.rs` | one scene at several refinements |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy |
 
+pub mod accuracy;
 mod automatic;
 #[cfg(test)]
 mod automatic_tests;
@@ -52,6 +54,7 @@ mod value;
 mod write;
 mod zones;
 
+pub use accuracy::{CheckError, ErrorPrediction, check};
 pub use breaking::{Breaking, Contact};
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use converge::{ConvergeError, ConvergeParams, Converged, Level, Refinement, converge};
@@ -73,5 +76,19 @@ pub use write::write;
 
 /// The JSON Schema of scene files, for editors.
 pub fn schema() -> schemars::Schema {
-    schemars::schema_for!(SceneSpec)
+    let mut schema = schemars::schema_for!(SceneSpec);
+    // what a scene with an `accuracy` may leave out
+    for (table, keys) in [
+        ("LineMeshSpec", &["x", "y", "z"]),
+        ("RectangleMeshSpec", &["x", "y", "z"]),
+        ("BoxMeshSpec", &["x", "y", "z"]),
+        ("PeridynamicsSpec", &["horizon", "points", ""]),
+    ] {
+        if let Some(serde_json::Value::Array(required)) =
+            schema.pointer_mut(&format!("/$defs/{table}/required"))
+        {
+            required.retain(|key| !keys.iter().any(|k| key == k));
+        }
+    }
+    schema
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::accuracy::ErrorPrediction;
 use super::cost::{made_up, output_seconds};
 use super::loads;
 use super::motion;
@@ -78,6 +79,8 @@ pub struct Prediction {
     pub choices: Vec<Choice>,
     /// What will be costly or inaccurate.
     pub warnings: Vec<String>,
+    /// How far results will be from those of a finer model, where coarser ones tell; see [`check`](fn@super::check).
+    pub error: Option<ErrorPrediction>,
     /// The steps of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionPrediction>,
@@ -157,7 +160,8 @@ pub(crate) fn predict<const D: usize>(
     loads::loads(&model, &rest.conditions, 0.0)?;
     let (prescribed, _) = loads::supports(&model, &rest.conditions, 0.0)?;
     let free = FreeDofs::from_prescribed(&prescribed, D);
-    let mut choices: Vec<Choice> = rest.placed.iter().cloned().collect();
+    let mut choices = rest.choices.clone();
+    choices.extend(rest.placed.iter().cloned());
     choices.push(rest.coupling(joining));
     let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
@@ -274,6 +278,7 @@ pub(crate) fn predict<const D: usize>(
         timings,
         choices,
         warnings: Vec::new(),
+        error: None,
         motion: None,
     };
     prediction.warnings = warnings(&model, joining, &prediction);
@@ -465,6 +470,24 @@ impl fmt::Display for Prediction {
             self.total_seconds,
             rayon::current_num_threads()
         )?;
+        if let Some(e) = &self.error {
+            writeln!(
+                f,
+                "error                  about {} of {}, within a factor of {} in {} that were measured (order {:.1}, from {} coarser runs of {:.2} s)",
+                number(e.error),
+                e.quantities.join(", "),
+                e.spread,
+                e.share,
+                e.order,
+                e.pilots,
+                e.seconds
+            )?;
+        } else {
+            writeln!(
+                f,
+                "error                  not predicted: it takes two coarser versions of the scene that run in a second or 0.15 of the run"
+            )?;
+        }
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }

@@ -184,7 +184,7 @@ pub fn solve_with<const D: usize>(
     let (symmetry, applied) = (*symmetry, *applied);
     let info = &solution.info;
     watch = Stopwatch::start();
-    let mut choices: Vec<Choice> = rest.placed.iter().chain(&rest.chosen).cloned().collect();
+    let mut choices: Vec<Choice> = rest.made().cloned().collect();
     choices.extend(equilibrium.choices.iter().cloned());
     choices.push(Choice {
         choice: info.method.name().to_owned(),
@@ -351,9 +351,16 @@ pub(super) struct Rest<const D: usize> {
     pub chosen: Option<Choice>,
     /// How the zone was placed, where the scene draws none.
     pub placed: Option<Choice>,
+    /// What was chosen for the accuracy that the scene wants.
+    pub choices: Vec<Choice>,
 }
 
 impl<const D: usize> Rest<D> {
+    /// What was chosen for the accuracy, the zone and the coupling, in this order.
+    pub fn made(&self) -> impl Iterator<Item = &Choice> {
+        self.choices.iter().chain(&self.placed).chain(&self.chosen)
+    }
+
     /// The coupling as a choice: why it was made, or what it does if the scene names it.
     pub fn coupling(&self, joining: Joining) -> Choice {
         self.chosen.clone().unwrap_or_else(|| Choice {
@@ -442,6 +449,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             density,
             chosen,
             placed: scene.placement.map(|p| p.choice),
+            choices: scene.choices,
         },
     )
 }

@@ -138,12 +138,20 @@ impl Source {
         Ok(print)
     }
 
+    /// The scene with all overrides applied, without places.
+    ///
+    /// # Errors
+    /// As [`Source::merged`].
+    pub(crate) fn table(&self) -> Result<toml::Table, SceneError> {
+        Ok(plain_table(self.merged()?.get_ref()))
+    }
+
     /// The scene as one TOML text with all overrides applied; a mesh file is looked for from `folder`, wherever the text will lie.
     ///
     /// # Errors
     /// [`SceneErrorKind::Syntax`], [`SceneErrorKind::Choice`] where the scene is none.
     pub fn text(&self, folder: &std::path::Path) -> Result<String, SceneError> {
-        let mut table = plain_table(self.merged()?.get_ref());
+        let mut table = self.table()?;
         let path = table
             .get_mut("mesh")
             .and_then(|m| m.get_mut("file"))

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::accuracy;
 use super::automatic::{Placement, Unplaced};
 use super::breaking::Breaking;
 use super::check;
@@ -22,7 +23,7 @@ use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
-use crate::observe::summary::RunSummary;
+use crate::observe::summary::{Choice, RunSummary};
 use crate::peridynamics::Influence;
 use crate::progress::Progress;
 use crate::shape::{Barrier, Shape};
@@ -52,6 +53,8 @@ pub struct Scene<const D: usize> {
     pub coupling_why: Option<String>,
     /// How the nonlocal zone came about; none if the scene draws it.
     pub(crate) placement: Option<Placement<D>>,
+    /// What was chosen for the accuracy that the scene wants.
+    pub choices: Vec<Choice>,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
     /// Empty regions: no point lies inside.
@@ -132,29 +135,39 @@ impl AnyScene {
     /// # Errors
     /// A [`SceneError`] with place, value and remedy.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            SceneError::new(
-                SceneErrorKind::File,
-                format!("cannot read the scene {}: {error}", path.display()),
-            )
-            .help("check the path; `bondline new scene.toml` writes a template")
-        })?;
-        let mut source = Source::new(path.display().to_string(), text);
-        for text in overrides {
-            source.push_override(text)?;
-        }
-        let directory = path.parent().unwrap_or(Path::new(""));
-        let name = path
-            .file_stem()
-            .map_or("scene".into(), |s| s.to_string_lossy().into_owned());
+        let (source, directory, name) = read(path, overrides)?;
         Self::from_source(&source, directory, &name)
     }
 
-    /// Validates a scene whose relative paths start in `directory` and whose files are named `name` by default.
+    /// Validates a scene whose relative paths start in `directory` and whose files are named `name` by default. What a scene with an
+    /// `accuracy` leaves open is chosen, by small runs of it.
     ///
     /// # Errors
     /// A [`SceneError`] with place, value and remedy.
     pub fn from_source(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
+        let Some((complete, chosen)) = accuracy::completed(source, directory)? else {
+            return Self::complete(source, directory, name);
+        };
+        let mut scene = Self::complete(&complete, directory, name)?;
+        scene.chose(chosen.choices);
+        Ok(scene)
+    }
+
+    /// Keeps what was chosen for an accuracy, to be told with the results.
+    pub(super) fn chose(&mut self, choices: Vec<Choice>) {
+        match self {
+            Self::Bar(s) => s.choices = choices,
+            Self::Plane(s) => s.choices = choices,
+            Self::Solid(s) => s.choices = choices,
+        }
+    }
+
+    /// Validates a scene that leaves nothing open.
+    pub(super) fn complete(
+        source: &Source,
+        directory: &Path,
+        name: &str,
+    ) -> Result<Self, SceneError> {
         let spec = SceneSpec::parse(source)?;
         let print = source.fingerprint()?;
         let found = match spec.kinematics.get_ref() {
@@ -242,6 +255,32 @@ impl AnyScene {
     }
 }
 
+/// The source of a scene file with overrides, the folder that its paths are relative to, and the name of its files.
+///
+/// # Errors
+/// A [`SceneError`] for a file that cannot be read or an override without `=`.
+pub(super) fn read<'p>(
+    path: &'p Path,
+    overrides: &[String],
+) -> Result<(Source, &'p Path, String), SceneError> {
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        SceneError::new(
+            SceneErrorKind::File,
+            format!("cannot read the scene {}: {error}", path.display()),
+        )
+        .help("check the path; `bondline new scene.toml` writes a template")
+    })?;
+    let mut source = Source::new(path.display().to_string(), text);
+    for text in overrides {
+        source.push_override(text)?;
+    }
+    let directory = path.parent().unwrap_or(Path::new(""));
+    let name = path
+        .file_stem()
+        .map_or("scene".into(), |s| s.to_string_lossy().into_owned());
+    Ok((source, directory, name))
+}
+
 fn scene<const D: usize>(
     spec: &SceneSpec,
     kinematics: Kinematics,
@@ -321,6 +360,7 @@ fn scene<const D: usize>(
         coupling: joined.coupling,
         coupling_why: joined.why,
         placement: placed.map(|p| p.placement),
+        choices: Vec::new(),
         conditions,
         voids,
         barriers,

@@ -16,7 +16,7 @@ pub struct Setting {
 
 /// What a setting does to a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Change {
+pub(crate) enum Change {
     /// Another coupling.
     Coupling(String),
     /// The horizon times this factor, m kept; elements follow where points lie in them.
@@ -31,7 +31,7 @@ pub(super) enum Change {
     Keys(Vec<String>),
 }
 
-/// A choice with its settings; that of the scene itself is not among them.
+/// A choice with its settings, but that of the scene itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Knob {
     /// Its name: `coupling`, `horizon`, `m`, `elements`, `padding`, `step-fraction`, or a key of the scene.
@@ -52,7 +52,7 @@ pub const KNOBS: [&str; 6] = [
 
 /// The numbers of a scene that knobs change.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Base {
+pub(crate) struct Base {
     joining: Joining,
     /// δ, where it is one number.
     horizon: Option<f64>,
@@ -64,6 +64,8 @@ pub(super) struct Base {
     has_transition: bool,
     /// Cracks or voids that elements do not see, or bonds that may break: δ is a length of the material, and elements alone are no model.
     pub breaks: bool,
+    /// Bonds that may break.
+    pub can_break: bool,
     pub moves: bool,
 }
 
@@ -91,7 +93,7 @@ enum Grown {
 }
 
 impl Base {
-    pub(super) fn of(spec: &SceneSpec) -> Self {
+    pub(crate) fn of(spec: &SceneSpec) -> Self {
         let pd = spec.peridynamics.as_ref();
         let lattice = pd.and_then(|p| match &p.points {
             PointsSpec::Lattice(l) => {
@@ -143,11 +145,13 @@ impl Base {
             breaks: !spec.cracks.is_empty()
                 || !spec.voids.is_empty()
                 || spec.materials.values().any(breaks),
+            can_break: spec.materials.values().any(breaks),
             moves,
         }
     }
 
-    fn cell(&self) -> Option<f64> {
+    /// Edge of the first cells along the first axis.
+    pub(crate) fn cell(&self) -> Option<f64> {
         let mesh = self.mesh.as_ref()?;
         let length = mesh.max.first()? - mesh.min.first()?;
         Some(match mesh.axes.first()?.1 {
@@ -222,16 +226,53 @@ impl Base {
 
     /// What a reference is made of: twice as fine in horizon (unless it is a length of the material), points and elements.
     pub(super) fn finer(&self) -> Vec<Change> {
-        let points = match self.ratio() {
-            Some(_) if !self.breaks => Change::Horizon(0.5),
-            Some(m) => Change::Ratio(2.0 * m),
-            None => return vec![Change::Elements(0.5)],
+        self.scaled(0.5)
+    }
+
+    /// Factors by which the scene can be coarser and still be one.
+    pub(crate) fn coarser(&self) -> Vec<f64> {
+        let mut fewest = self.mesh.as_ref().map_or(0.0, |_| f64::INFINITY);
+        if let Some(mesh) = &self.mesh {
+            for (k, (_, axis)) in mesh.axes.iter().enumerate() {
+                let length = mesh.max[k] - mesh.min[k];
+                fewest = fewest.min(match axis {
+                    Axis::Cells(n) => *n as f64,
+                    Axis::Spacing(s) | Axis::Graded { spacing: s, .. } => length / s,
+                });
+            }
+        }
+        // families of two spacings are the smallest that are any good
+        let (factors, least) = match self.ratio() {
+            Some(m) if self.breaks => ([1.5, 2.0, 3.0], m / 1.99),
+            _ => ([2.0, 4.0, 8.0], f64::INFINITY),
         };
-        vec![points, Change::Elements(0.5)]
+        // coarser ones say nothing of an order
+        let fits = |f: &f64| *f <= least && fewest / f >= 4.0;
+        factors.into_iter().filter(fits).collect()
+    }
+
+    /// The factor that a whole number of cells leaves of one.
+    pub(crate) fn coarsened(&self, factor: f64) -> f64 {
+        match self.mesh.as_ref().and_then(|m| m.axes.first()) {
+            Some((_, Axis::Cells(n))) => *n as f64 / (*n as f64 / factor).round().max(1.0),
+            _ => factor,
+        }
+    }
+
+    /// The scene with all spacings `factor` times as large, and the horizon too unless it is a length of the material.
+    pub(crate) fn scaled(&self, factor: f64) -> Vec<Change> {
+        let points = self.ratio().map(|m| match self.breaks {
+            false => Change::Horizon(factor),
+            true => Change::Ratio(m / factor),
+        });
+        points
+            .into_iter()
+            .chain([Change::Elements(factor)])
+            .collect()
     }
 
     /// The overrides of several settings together.
-    pub(super) fn overrides<'a>(
+    pub(crate) fn overrides<'a>(
         &self,
         changes: impl IntoIterator<Item = &'a Change>,
     ) -> Vec<String> {
@@ -383,7 +424,7 @@ fn zone_overrides(key: &str, zone: Option<&Grown>, grown: f64, list: &mut Vec<St
 }
 
 /// Coordinates as a scene has them: a list, in one dimension a number.
-pub(super) fn coordinates(x: &[f64]) -> String {
+pub(crate) fn coordinates(x: &[f64]) -> String {
     match x {
         [x] => format!("{x:e}"),
         _ => {
@@ -429,8 +470,22 @@ fn generated(mesh: &MeshSpec) -> Option<Generated> {
     })
 }
 
+/// Corners of the cut-outs of a generated mesh.
+pub(crate) fn cutouts(spec: &SceneSpec) -> Vec<(Vec<f64>, Vec<f64>)> {
+    let cutouts = match &spec.mesh {
+        MeshSpec::Line(m) => &m.cutouts,
+        MeshSpec::Rectangle(m) => &m.cutouts,
+        MeshSpec::Box(m) => &m.cutouts,
+        MeshSpec::File(_) => return Vec::new(),
+    };
+    let corners = cutouts.values();
+    corners
+        .map(|c| (c.min.values.clone(), c.max.values.clone()))
+        .collect()
+}
+
 /// Corners of a generated mesh.
-pub(super) fn corners(spec: &SceneSpec) -> Option<(Vec<f64>, Vec<f64>)> {
+pub(crate) fn corners(spec: &SceneSpec) -> Option<(Vec<f64>, Vec<f64>)> {
     generated(&spec.mesh).map(|m| (m.min, m.max))
 }
 
@@ -472,95 +527,5 @@ pub fn typed(text: &str) -> Result<Knob, String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{AnyScene, Source};
-
-    const PLATE: &str = r#"
-kinematics = "plane-stress"
-coupling = "splice"
-mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 40 }, y = { cells = 20 } }
-[materials.plate.bond-based]
-youngs-modulus = 1
-[peridynamics]
-horizon = 0.15
-points.lattice = { spacing = 0.05, origin = [0, 0] }
-[zones.nonlocal]
-box = { min = [0.7, 0.3], max = [1.3, 0.7] }
-[conditions.left.displacement]
-on = "left"
-x = 0
-y = 0
-[conditions.right.displacement]
-on = "right"
-x = 0.01
-"#;
-
-    fn base() -> Base {
-        let source = Source::new("plate", PLATE);
-        Base::of(&SceneSpec::parse(&source).unwrap())
-    }
-
-    fn admitted(overrides: &[String]) {
-        let mut source = Source::new("plate", PLATE);
-        for o in overrides {
-            source.push_override(o).unwrap();
-        }
-        if let Err(e) = AnyScene::from_source(&source, std::path::Path::new(""), "plate") {
-            panic!("{overrides:?}: {}", e.message());
-        }
-    }
-
-    #[test]
-    fn every_setting_makes_a_scene() {
-        let base = base();
-        let knobs = base.knobs();
-        let names: Vec<&str> = knobs.iter().map(|k| k.name.as_str()).collect();
-        assert_eq!(names, ["coupling", "horizon", "m", "elements", "padding"]);
-        for setting in knobs.iter().flat_map(|k| &k.settings) {
-            let overrides = base.overrides([&setting.change]);
-            assert!(!overrides.is_empty(), "{}", setting.label);
-            admitted(&overrides);
-        }
-    }
-
-    #[test]
-    fn settings_combine() {
-        let base = base();
-        let all = [
-            Change::Coupling("truncated".to_owned()),
-            Change::Horizon(2.0),
-            Change::Ratio(6.0),
-            Change::Elements(2.0),
-            Change::Padding(1.0),
-        ];
-        let overrides = base.overrides(&all);
-        // δ = 0.3, h = 0.05 as before, elements twice as large
-        for wanted in [
-            "coupling=truncated",
-            "peridynamics.horizon=3e-1",
-            "mesh.rectangle.x.cells=20",
-            "mesh.rectangle.y.cells=10",
-        ] {
-            assert!(overrides.iter().any(|o| o == wanted), "{overrides:?}");
-        }
-        assert!(
-            overrides
-                .iter()
-                .any(|o| o.starts_with("peridynamics.points.lattice.origin=[2.5e-2")),
-            "{overrides:?}"
-        );
-        assert!(!overrides.iter().any(|o| o.contains("lattice.spacing")));
-        admitted(&overrides);
-    }
-
-    #[test]
-    fn a_typed_knob_is_a_list() {
-        let knob = typed("solver.tolerance=[1e-4, 1e-8]").unwrap();
-        assert_eq!(knob.settings.len(), 2);
-        assert_eq!(knob.settings[0].label, "tolerance = 0.0001");
-        assert!(typed("solver.tolerance").unwrap_err().contains("no `=`"));
-        assert!(typed("a=3").unwrap_err().contains("no list"));
-        assert!(typed("a=[]").unwrap_err().contains("no values"));
-    }
-}
+#[path = "knobs_tests.rs"]
+mod tests;

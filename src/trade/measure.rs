@@ -64,7 +64,7 @@ impl Quantity {
 
 /// A table of numbers with named columns.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Columns {
+pub(crate) struct Columns {
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
 }
@@ -106,7 +106,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Everything of a run that can be compared.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Measured {
+pub(crate) struct Measured {
     /// Tables along lines and at probes of a scene at rest.
     samples: Vec<Columns>,
     history: Option<Columns>,
@@ -117,7 +117,7 @@ pub(super) struct Measured {
 
 impl Measured {
     /// Reads what a run left in its folder, and its summary.
-    pub(super) fn read(folder: &Path, summary: &serde_json::Value) -> std::io::Result<Self> {
+    pub(crate) fn read(folder: &Path, summary: &serde_json::Value) -> std::io::Result<Self> {
         let mut found = Self {
             energy: summary["energy"].as_f64(),
             ..Self::default()
@@ -153,7 +153,7 @@ impl Measured {
     }
 
     /// What suits the outputs: paths of tips, else the probes of the history, else displacements (and forces of conditions).
-    pub(super) fn quantities(&self) -> Vec<Quantity> {
+    pub(crate) fn quantities(&self) -> Vec<Quantity> {
         if !self.tips.is_empty() {
             return self.tips.keys().cloned().map(Quantity::Path).collect();
         }
@@ -179,7 +179,7 @@ impl Measured {
     }
 
     /// Relative difference from a reference; `None` where one of the two does not have the quantity.
-    pub(super) fn error(&self, reference: &Self, quantity: &Quantity) -> Option<f64> {
+    pub(crate) fn error(&self, reference: &Self, quantity: &Quantity) -> Option<f64> {
         let error = match quantity {
             Quantity::Displacement => {
                 sampled(&self.samples, &reference.samples, |n| is_component(n, 'u'))

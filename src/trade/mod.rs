@@ -33,11 +33,14 @@ pub use effects::front;
 pub use knobs::{KNOBS, Knob, Setting, typed};
 pub use measure::Quantity;
 
+pub(crate) use knobs::{Base, coordinates, corners, cutouts};
+pub(crate) use measure::Measured;
+
 use crate::observe::ObserveError;
 use crate::progress::Progress;
-use crate::scene::{SceneError, SceneSpec, Source};
+use crate::scene::spec::SolveSpec;
+use crate::scene::{SceneError, SceneSpec, Source, accuracy};
 use case::{Attempt, Runner};
-use knobs::{Base, coordinates};
 use record::{Head, kept, new_record, read_record};
 use study::Study;
 
@@ -267,17 +270,15 @@ pub fn trade(
     for o in &params.overrides {
         source.push_override(o).map_err(scene_error)?;
     }
-    let spec = SceneSpec::parse(&source).map_err(scene_error)?;
+    let directory = params.scene.parent().unwrap_or(Path::new(""));
+    let chosen = accuracy::completed(&source, directory).map_err(scene_error)?;
+    let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
+    let spec = SceneSpec::parse(complete).map_err(scene_error)?;
     let base = Base::of(&spec);
     let knobs = chosen_knobs(&base, params)?;
     let mut common = params.overrides.clone();
-    if !base.moves && spec.output.lines.is_empty() && spec.output.probes.is_empty() {
-        common.extend(lines(&spec));
-    }
-    if base.moves {
-        // pictures cost more than the motion
-        common.push("solve.explicit.outputs=1".to_owned());
-    }
+    common.extend(chosen.into_iter().flat_map(|c| c.1.overrides));
+    common.extend(measured_keys(&spec));
     let keys = match &params.reference {
         Reference::Auto if base.breaks && base.moves => vec!["coupling=nonlocal".to_owned()],
         Reference::FullPd => vec!["coupling=nonlocal".to_owned()],
@@ -417,6 +418,32 @@ fn chosen_knobs(base: &Base, params: &TradeParams) -> Result<Vec<Knob>, TradeErr
     };
     chosen.extend(params.vary.iter().cloned());
     Ok(chosen)
+}
+
+/// Keys that make a run comparable: samples where a scene asks for none, and as few pictures as may be, which cost more than a motion.
+fn measured_keys(spec: &SceneSpec) -> Vec<String> {
+    let mut keys = Vec::new();
+    match spec.solve.as_ref().map(|s| s.get_ref()) {
+        None | Some(SolveSpec::Static(_)) => {
+            if spec.output.lines.is_empty() && spec.output.probes.is_empty() {
+                keys.extend(lines(spec));
+            }
+        }
+        Some(SolveSpec::Explicit(e)) => {
+            if e.output_interval.is_none() {
+                keys.push("solve.explicit.outputs=1".to_owned());
+            }
+        }
+        Some(SolveSpec::QuasiStatic(_)) => keys.push("solve.quasi-static.outputs=1".to_owned()),
+    }
+    keys
+}
+
+/// Keys of a run that is compared and leaves no pictures.
+pub(crate) fn quiet(spec: &SceneSpec) -> Vec<String> {
+    let mut keys = measured_keys(spec);
+    keys.push("output.vtu=false".to_owned());
+    keys
 }
 
 /// Lines of samples through a generated mesh, for a scene that asks for none: at a third and two thirds of each width.

@@ -14,6 +14,7 @@
 //! | `convergence` | the studies of [SAND2015-7998] chapter 5 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
 //! | `horizons` | ways to change the horizon: ghost force, pairs, reflection, eight passes |
+//! | `choices` | what `accuracy` chooses in small scenes, against finer runs |
 //! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
@@ -28,6 +29,7 @@
 pub mod balance;
 pub mod bar;
 pub mod bobaru;
+pub mod choices;
 pub mod convergence;
 pub mod emmrich_weckner;
 pub mod enclosed;
@@ -178,6 +180,11 @@ pub const SUITES: &[Suite] = &[
 
 /// Suites that take minutes to an hour, or gigabytes: `verify` runs them only by name.
 pub const LONG_SUITES: &[Suite] = &[
+    Suite {
+        name: "choices",
+        about: "what `accuracy` chooses in 25 small scenes: error, cost, and both against their predictions; minutes, only if named",
+        run: choices::run,
+    },
     Suite {
         name: "convergence-3d",
         about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about an hour on two cores, only if named",

@@ -45,7 +45,7 @@ pub(super) fn laid_out<const D: usize, S, T>(
         timings.add("placing the zone", placement.seconds);
     }
     let (problem, rest) = run::problem(scene);
-    let mut choices: Vec<Choice> = rest.placed.iter().chain(&rest.chosen).cloned().collect();
+    let mut choices: Vec<Choice> = rest.made().cloned().collect();
     let begun = first(&rest, &mut choices)?;
     let (model, coupling) = Model::new(problem, progress)?;
     choices.extend(run::volumes_choice(&model));

@@ -88,6 +88,7 @@ fn prediction<const D: usize>(
         timings: laid_out.timings.clone(),
         choices,
         warnings: Vec::new(),
+        error: None,
         motion: None,
     }
 }

@@ -42,7 +42,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::value::Text;
+use super::value::{Number, Text};
 
 /// A scene of bondline: a body that is finite elements here and peridynamics there, at rest or in motion.
 ///
@@ -55,6 +55,9 @@ pub struct SceneSpec {
     /// A line that says what the scene is; appears in reports.
     #[serde(default)]
     pub title: Option<String>,
+    /// The relative error that is wanted, 0.01 for 1 %: coupling, mesh, horizon, points and zone, as far as the scene leaves them out, are chosen for it.
+    #[serde(default)]
+    pub accuracy: Option<Number>,
     /// How the body stands for a three-dimensional solid; fixes the dimension.
     #[schemars(with = "KinematicsSpec")]
     pub kinematics: Spanned<KinematicsSpec>,
@@ -101,6 +104,17 @@ pub struct SceneSpec {
     /// What is written, and where.
     #[serde(default)]
     pub output: OutputSpec,
+}
+
+impl SceneSpec {
+    /// Space dimension.
+    pub fn dimension(&self) -> usize {
+        match self.kinematics.get_ref() {
+            KinematicsSpec::Bar => 1,
+            KinematicsSpec::PlaneStress | KinematicsSpec::PlaneStrain => 2,
+            KinematicsSpec::Solid => 3,
+        }
+    }
 }
 
 /// A table with options, or the name alone.

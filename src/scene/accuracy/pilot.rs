@@ -1,0 +1,98 @@
+//! Small runs of a scene.
+
+use std::path::{Path, PathBuf};
+
+use super::super::cost::TrialFolder;
+use super::super::source::Source;
+use super::super::spec::SceneSpec;
+use super::super::validate::AnyScene;
+use crate::progress::Silent;
+use crate::trade::{self, Measured, Quantity};
+
+/// A run, as far as it is compared.
+#[derive(Clone, Debug)]
+pub(crate) struct Pilot {
+    pub measured: Measured,
+    /// Seconds of all stages but output.
+    pub seconds: f64,
+}
+
+/// Where pilots of one scene run.
+pub(crate) struct Bench {
+    source: Source,
+    directory: PathBuf,
+    folder: TrialFolder,
+    common: Vec<String>,
+    /// What is compared; known after the first run.
+    pub quantities: Vec<Quantity>,
+    /// Seconds of all pilots.
+    pub seconds: f64,
+    /// Why the last pilot did not run.
+    pub refusal: Option<String>,
+}
+
+/// Runs below this are repeated once, and the faster one counts.
+const SHORT: f64 = 0.2;
+
+impl Bench {
+    /// Pilots of `source`, of which `spec` is a complete version.
+    pub fn new(source: &Source, directory: &Path, spec: &SceneSpec) -> Self {
+        Self {
+            source: source.clone(),
+            directory: directory.to_path_buf(),
+            folder: TrialFolder::new(directory),
+            common: trade::quiet(spec),
+            quantities: Vec::new(),
+            seconds: 0.0,
+            refusal: None,
+        }
+    }
+
+    /// Runs the scene with these keys; `None` if it does not run. Runs shorter than `repeat` and [`SHORT`] are repeated.
+    pub fn run(&mut self, overrides: &[String], repeat: f64) -> Option<Pilot> {
+        let mut best: Option<Pilot> = None;
+        for _ in 0..2 {
+            match self.once(overrides) {
+                Ok(pilot) => {
+                    self.seconds += pilot.seconds;
+                    let short = pilot.seconds < SHORT.min(repeat);
+                    if best.as_ref().is_none_or(|b| pilot.seconds < b.seconds) {
+                        best = Some(pilot);
+                    }
+                    if !short {
+                        break;
+                    }
+                }
+                Err(why) => {
+                    self.refusal = Some(why);
+                    return None;
+                }
+            }
+        }
+        if self.quantities.is_empty()
+            && let Some(pilot) = &best
+        {
+            self.quantities = pilot.measured.quantities();
+        }
+        best
+    }
+
+    fn once(&self, overrides: &[String]) -> Result<Pilot, String> {
+        let mut source = self.source.clone();
+        for o in self.common.iter().chain(overrides) {
+            source
+                .push_override(o)
+                .map_err(|e| e.message().to_owned())?;
+        }
+        let mut scene = AnyScene::complete(&source, &self.directory, "pilot")
+            .map_err(|e| e.message().to_owned())?;
+        // what an earlier pilot left
+        let _ = std::fs::remove_dir_all(self.folder.path());
+        scene.set_output_directory(self.folder.path().to_path_buf());
+        let summary = scene.run(&Silent).map_err(|e| e.to_string())?;
+        let seconds = summary.total_seconds - summary.timings.seconds("output");
+        let json = serde_json::to_value(&summary).map_err(|e| e.to_string())?;
+        let measured = Measured::read(self.folder.path(), &json).map_err(|e| e.to_string())?;
+        Ok(Pilot { measured, seconds })
+    }
+}

@@ -1,0 +1,92 @@
+//! Settings of a plate, and what they combine to.
+
+use super::*;
+use crate::scene::{AnyScene, Source};
+
+const PLATE: &str = r#"
+kinematics = "plane-stress"
+coupling = "splice"
+mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 40 }, y = { cells = 20 } }
+[materials.plate.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = 0.15
+points.lattice = { spacing = 0.05, origin = [0, 0] }
+[zones.nonlocal]
+box = { min = [0.7, 0.3], max = [1.3, 0.7] }
+[conditions.left.displacement]
+on = "left"
+x = 0
+y = 0
+[conditions.right.displacement]
+on = "right"
+x = 0.01
+"#;
+
+fn base() -> Base {
+    let source = Source::new("plate", PLATE);
+    Base::of(&SceneSpec::parse(&source).unwrap())
+}
+
+fn admitted(overrides: &[String]) {
+    let mut source = Source::new("plate", PLATE);
+    for o in overrides {
+        source.push_override(o).unwrap();
+    }
+    if let Err(e) = AnyScene::from_source(&source, std::path::Path::new(""), "plate") {
+        panic!("{overrides:?}: {}", e.message());
+    }
+}
+
+#[test]
+fn every_setting_makes_a_scene() {
+    let base = base();
+    let knobs = base.knobs();
+    let names: Vec<&str> = knobs.iter().map(|k| k.name.as_str()).collect();
+    assert_eq!(names, ["coupling", "horizon", "m", "elements", "padding"]);
+    for setting in knobs.iter().flat_map(|k| &k.settings) {
+        let overrides = base.overrides([&setting.change]);
+        assert!(!overrides.is_empty(), "{}", setting.label);
+        admitted(&overrides);
+    }
+}
+
+#[test]
+fn settings_combine() {
+    let base = base();
+    let all = [
+        Change::Coupling("truncated".to_owned()),
+        Change::Horizon(2.0),
+        Change::Ratio(6.0),
+        Change::Elements(2.0),
+        Change::Padding(1.0),
+    ];
+    let overrides = base.overrides(&all);
+    // δ = 0.3, h = 0.05 as before, elements twice as large
+    for wanted in [
+        "coupling=truncated",
+        "peridynamics.horizon=3e-1",
+        "mesh.rectangle.x.cells=20",
+        "mesh.rectangle.y.cells=10",
+    ] {
+        assert!(overrides.iter().any(|o| o == wanted), "{overrides:?}");
+    }
+    assert!(
+        overrides
+            .iter()
+            .any(|o| o.starts_with("peridynamics.points.lattice.origin=[2.5e-2")),
+        "{overrides:?}"
+    );
+    assert!(!overrides.iter().any(|o| o.contains("lattice.spacing")));
+    admitted(&overrides);
+}
+
+#[test]
+fn a_typed_knob_is_a_list() {
+    let knob = typed("solver.tolerance=[1e-4, 1e-8]").unwrap();
+    assert_eq!(knob.settings.len(), 2);
+    assert_eq!(knob.settings[0].label, "tolerance = 0.0001");
+    assert!(typed("solver.tolerance").unwrap_err().contains("no `=`"));
+    assert!(typed("a=3").unwrap_err().contains("no list"));
+    assert!(typed("a=[]").unwrap_err().contains("no values"));
+}
