@@ -83,7 +83,7 @@ fn a_study_finds_a_front_goes_on_and_writes_the_scene_for_a_wanted_error() {
     );
     // nothing on the front is beaten
     let front = found["front"].as_array().unwrap();
-    assert!(!front.is_empty() && out.join("trade.svg").exists());
+    assert!(!front.is_empty() && out.join("trade.svg").exists() && out.join("trade.png").exists());
     // a second call has nothing left to run
     let record = std::fs::read(out.join("cases.jsonl")).unwrap();
     let second = bondline(folder.path(), &study);

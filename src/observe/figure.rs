@@ -1,15 +1,20 @@
-//! Line plots as SVG.
+//! Line plots as SVG and PNG.
 //!
-//! SVG only: text in a bitmap needs a font of the system, and a program that fails for want of a font is no use.
+//! Text in a bitmap needs a font. It is part of the program: one that fails for want of a font of the system is no use.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
-use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
-use plotters::prelude::{
-    ChartBuilder, Circle, DashedLineSeries, EmptyElement, IntoDrawingArea, IntoLogRange,
-    LineSeries, PathElement, RGBColor, SVGBackend, SeriesLabelPosition, WHITE,
+use plotters::coord::{
+    Shift,
+    ranged1d::{AsRangedCoord, Ranged, ValueFormatter},
 };
-use plotters::style::{Color, ShapeStyle};
+use plotters::prelude::{
+    BitMapBackend, ChartBuilder, Circle, DashedLineSeries, DrawingArea, DrawingBackend,
+    EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor, SVGBackend,
+    SeriesLabelPosition, WHITE,
+};
+use plotters::style::{Color, FontStyle, ShapeStyle, register_font};
 
 use super::ObserveError;
 use super::file::write_whole;
@@ -88,19 +93,36 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(60, 60, 60),
 ];
 
-/// Width and height in pixels.
+/// Width and height in pixels, of an SVG at its natural size.
 const SIZE: (u32, u32) = (800, 500);
 
+/// Pixels of a PNG per pixel of an SVG, so that it can be printed.
+const PNG_SCALE: u32 = 3;
+
+/// The family of all text: a font of the system in an SVG, DejaVu Sans in a PNG.
+const FONT: &str = "sans-serif";
+
+/// Registers the font of bitmaps, once; whether it can be read.
+static FONT_READ: LazyLock<bool> =
+    LazyLock::new(|| register_font(FONT, FontStyle::Normal, dejavu::sans::regular()).is_ok());
+
 impl LinePlot {
-    /// Writes the plot; makes the folder if it is missing.
+    /// Writes the plot, as PNG if the path ends so, else as SVG; makes the folder if it is missing.
     ///
     /// Points that are not finite, or not positive on a logarithmic axis, are left out and break their line.
     ///
     /// # Errors
     /// [`ObserveError::Empty`] if no point is left, [`ObserveError::Folder`], [`ObserveError::Write`].
     pub fn write(&self, path: &Path) -> Result<(), ObserveError> {
-        let svg = self.svg(path)?;
-        write_whole(path, |out| std::io::Write::write_all(out, svg.as_bytes()))
+        let bytes = if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("png"))
+        {
+            self.png(path)?
+        } else {
+            self.svg(path)?.into_bytes()
+        };
+        write_whole(path, |out| std::io::Write::write_all(out, &bytes))
     }
 
     fn drawable(&self, (x, y): (f64, f64)) -> bool {
@@ -166,6 +188,49 @@ impl LinePlot {
     }
 
     fn svg(&self, path: &Path) -> Result<String, ObserveError> {
+        let mut svg = String::new();
+        self.drawn(
+            path,
+            SVGBackend::with_string(&mut svg, SIZE).into_drawing_area(),
+            1,
+        )?;
+        Ok(svg)
+    }
+
+    fn png(&self, path: &Path) -> Result<Vec<u8>, ObserveError> {
+        let encode = |message: String| ObserveError::Encode {
+            path: path.to_path_buf(),
+            format: "PNG",
+            message,
+        };
+        if !*FONT_READ {
+            return Err(encode("the font cannot be read".to_owned()));
+        }
+        let (width, height) = (PNG_SCALE * SIZE.0, PNG_SCALE * SIZE.1);
+        let mut pixels = vec![0; 3 * width as usize * height as usize];
+        self.drawn(
+            path,
+            BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area(),
+            PNG_SCALE,
+        )?;
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let written = encoder
+            .write_header()
+            .and_then(|mut out| out.write_image_data(&pixels));
+        written.map_err(|e| encode(e.to_string()))?;
+        Ok(bytes)
+    }
+
+    /// Draws the plot on an area of `scale` times [`SIZE`].
+    fn drawn<B: DrawingBackend>(
+        &self,
+        path: &Path,
+        root: DrawingArea<B, Shift>,
+        scale: u32,
+    ) -> Result<(), ObserveError> {
         let points = || {
             self.series
                 .iter()
@@ -184,111 +249,120 @@ impl LinePlot {
         };
         let (lx, ly) = (x.start..x.end, y.start..y.end);
         match (self.x_scale, self.y_scale) {
-            (Scale::Linear, Scale::Linear) => self.draw(x, y),
-            (Scale::Log, Scale::Linear) => self.draw(lx.log_scale(), y),
-            (Scale::Linear, Scale::Log) => self.draw(x, ly.log_scale()),
-            (Scale::Log, Scale::Log) => self.draw(lx.log_scale(), ly.log_scale()),
+            (Scale::Linear, Scale::Linear) => self.draw(&root, scale, x, y),
+            (Scale::Log, Scale::Linear) => self.draw(&root, scale, lx.log_scale(), y),
+            (Scale::Linear, Scale::Log) => self.draw(&root, scale, x, ly.log_scale()),
+            (Scale::Log, Scale::Log) => self.draw(&root, scale, lx.log_scale(), ly.log_scale()),
         }
         .map_err(|message| ObserveError::Encode {
             path: path.to_path_buf(),
+            format: "a plot",
             message,
         })
     }
 
-    fn draw<X, Y>(&self, x: X, y: Y) -> Result<String, String>
+    fn draw<B: DrawingBackend, X, Y>(
+        &self,
+        root: &DrawingArea<B, Shift>,
+        scale: u32,
+        x: X,
+        y: Y,
+    ) -> Result<(), String>
     where
         X: AsRangedCoord<Value = f64>,
         Y: AsRangedCoord<Value = f64>,
         X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
         Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
-        let mut svg = String::new();
         let rounded = |v: f64, zero: f64| if v.abs() < zero { 0.0 } else { v };
-        {
-            let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-            root.fill(&WHITE).map_err(|e| e.to_string())?;
-            let mut chart = ChartBuilder::on(&root)
-                .margin(14)
-                .caption(&self.title, ("sans-serif", 20))
-                .x_label_area_size(46)
-                .y_label_area_size(74)
-                .build_cartesian_2d(x, y)
-                .map_err(|e| e.to_string())?;
-            // a tick at zero comes out of the axis's arithmetic as round-off
-            let zero = |scale: Scale, range: std::ops::Range<f64>| match scale {
-                Scale::Linear => 1e-10 * (range.end - range.start).abs(),
-                Scale::Log => 0.0,
-            };
-            let (zero_x, zero_y) = (
-                zero(self.x_scale, chart.x_range()),
-                zero(self.y_scale, chart.y_range()),
-            );
-            chart
-                .configure_mesh()
-                .max_light_lines(0)
-                .x_desc(&self.x_label)
-                .y_desc(&self.y_label)
-                .axis_desc_style(("sans-serif", 15))
-                .label_style(("sans-serif", 13))
-                .light_line_style(RGBColor(244, 244, 244))
-                .bold_line_style(RGBColor(225, 225, 225))
-                .x_label_formatter(&|v| tick(rounded(*v, zero_x)))
-                .y_label_formatter(&|v| tick(rounded(*v, zero_y)))
-                .draw()
-                .map_err(|e| e.to_string())?;
-            for (i, series) in self.series.iter().enumerate() {
-                let colour = COLOURS[i % COLOURS.len()];
-                let line = colour.stroke_width(2);
-                let mut named = false;
-                let runs = series.points.split(|&p: &(f64, f64)| !self.drawable(p));
-                for run in runs.filter(|run| !run.is_empty()) {
-                    let run = run.to_vec();
-                    let entry = match series.stroke {
-                        Stroke::Line => chart.draw_series(LineSeries::new(run, line)),
-                        Stroke::Dashed => chart.draw_series(DashedLineSeries::new(run, 7, 5, line)),
-                        Stroke::Dots | Stroke::LineAndDots => {
-                            let dots: Vec<_> = run
-                                .iter()
-                                .map(|&p| Circle::new(p, 3, colour.filled()))
-                                .collect();
-                            if series.stroke == Stroke::LineAndDots {
-                                chart
-                                    .draw_series(LineSeries::new(run, line))
-                                    .map_err(|e| e.to_string())?;
-                            }
-                            chart.draw_series(dots)
-                        }
+        let pixels = |n: u32| n * scale;
+        let text = |size: u32| (FONT, pixels(size));
+        root.fill(&WHITE).map_err(|e| e.to_string())?;
+        let mut chart = ChartBuilder::on(root)
+            .margin(pixels(14))
+            .caption(&self.title, text(20))
+            .x_label_area_size(pixels(46))
+            .y_label_area_size(pixels(74))
+            .build_cartesian_2d(x, y)
+            .map_err(|e| e.to_string())?;
+        // a tick at zero comes out of the axis's arithmetic as round-off
+        let zero = |scale: Scale, range: std::ops::Range<f64>| match scale {
+            Scale::Linear => 1e-10 * (range.end - range.start).abs(),
+            Scale::Log => 0.0,
+        };
+        let (zero_x, zero_y) = (
+            zero(self.x_scale, chart.x_range()),
+            zero(self.y_scale, chart.y_range()),
+        );
+        chart
+            .configure_mesh()
+            .max_light_lines(0)
+            .x_desc(&self.x_label)
+            .y_desc(&self.y_label)
+            .axis_desc_style(text(15))
+            .label_style(text(13))
+            .light_line_style(RGBColor(244, 244, 244))
+            .bold_line_style(RGBColor(225, 225, 225))
+            .x_label_formatter(&|v| tick(rounded(*v, zero_x)))
+            .y_label_formatter(&|v| tick(rounded(*v, zero_y)))
+            .draw()
+            .map_err(|e| e.to_string())?;
+        for (i, series) in self.series.iter().enumerate() {
+            let colour = COLOURS[i % COLOURS.len()];
+            let line = colour.stroke_width(pixels(2));
+            let mut named = false;
+            let runs = series.points.split(|&p: &(f64, f64)| !self.drawable(p));
+            for run in runs.filter(|run| !run.is_empty()) {
+                let run = run.to_vec();
+                let entry = match series.stroke {
+                    Stroke::Line => chart.draw_series(LineSeries::new(run, line)),
+                    Stroke::Dashed => {
+                        chart.draw_series(DashedLineSeries::new(run, pixels(7), pixels(5), line))
                     }
-                    .map_err(|e| e.to_string())?;
-                    if !named {
-                        named = true;
-                        let stroke = series.stroke;
-                        entry
-                            .label(&series.name)
-                            .legend(move |at| legend(at, stroke, line));
+                    Stroke::Dots | Stroke::LineAndDots => {
+                        let dots: Vec<_> = run
+                            .iter()
+                            .map(|&p| Circle::new(p, pixels(3), colour.filled()))
+                            .collect();
+                        if series.stroke == Stroke::LineAndDots {
+                            chart
+                                .draw_series(LineSeries::new(run, line))
+                                .map_err(|e| e.to_string())?;
+                        }
+                        chart.draw_series(dots)
                     }
                 }
-            }
-            chart
-                .configure_series_labels()
-                .position(self.emptiest_corner())
-                .background_style(WHITE.mix(0.85))
-                .border_style(RGBColor(200, 200, 200))
-                .label_font(("sans-serif", 14))
-                .draw()
                 .map_err(|e| e.to_string())?;
-            root.present().map_err(|e| e.to_string())?;
+                if !named {
+                    named = true;
+                    let stroke = series.stroke;
+                    entry
+                        .label(&series.name)
+                        .legend(move |at| legend(at, stroke, line, scale));
+                }
+            }
         }
-        Ok(svg)
+        chart
+            .configure_series_labels()
+            .position(self.emptiest_corner())
+            .legend_area_size(pixels(30))
+            .margin(pixels(10))
+            .background_style(WHITE.mix(0.85))
+            .border_style(RGBColor(200, 200, 200))
+            .label_font(text(14))
+            .draw()
+            .map_err(|e| e.to_string())?;
+        root.present().map_err(|e| e.to_string())
     }
 }
 
 /// The sample of a stroke in the legend: two dashes and a dot, of which a stroke shows what it has.
-fn legend<'e, 'b: 'e>(
+fn legend<'e, B: DrawingBackend + 'e>(
     at: (i32, i32),
     stroke: Stroke,
     line: ShapeStyle,
-) -> impl plotters::element::IntoDynElement<'e, SVGBackend<'b>, (i32, i32)> {
+    scale: u32,
+) -> impl plotters::element::IntoDynElement<'e, B, (i32, i32)> {
     let (first, second) = match stroke {
         Stroke::Line | Stroke::LineAndDots => (0..10, 10..20),
         Stroke::Dashed => (0..8, 12..20),
@@ -296,13 +370,14 @@ fn legend<'e, 'b: 'e>(
     };
     let radius = match stroke {
         Stroke::Line | Stroke::Dashed => 0,
-        Stroke::Dots | Stroke::LineAndDots => 3,
+        Stroke::Dots | Stroke::LineAndDots => 3 * scale,
     };
-    let dash = |r: std::ops::Range<i32>| PathElement::new(vec![(r.start, 0), (r.end, 0)], line);
+    let along = |x: i32| (x * scale as i32, 0);
+    let dash = |r: std::ops::Range<i32>| PathElement::new(vec![along(r.start), along(r.end)], line);
     EmptyElement::at(at)
         + dash(first)
         + dash(second)
-        + Circle::new((10, 0), radius, line.color.filled())
+        + Circle::new(along(10), radius, line.color.filled())
 }
 
 /// The range of an axis with a margin; none without values.
@@ -397,6 +472,29 @@ mod tests {
                 assert_eq!(dots, if x == Scale::Log { 8 } else { 10 });
             }
         }
+    }
+
+    #[test]
+    fn a_png_holds_what_an_svg_holds() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/plot.PNG");
+        let p = plot(Scale::Linear, Scale::Log);
+        p.write(&path).unwrap();
+        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let frame = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((frame.width, frame.height), (2400, 1500));
+        let count = |colour: RGBColor| {
+            let (r, g, b) = (colour.0, colour.1, colour.2);
+            pixels.chunks(3).filter(|p| *p == [r, g, b]).count()
+        };
+        // every series in its colour; black text of title, axes, ticks and legend, which without its font is not there
+        for colour in &COLOURS[..4] {
+            assert!(count(*colour) > 500);
+        }
+        assert!(count(RGBColor(0, 0, 0)) > 10_000);
+        assert!(count(WHITE) > 2400 * 1500 / 2);
     }
 
     #[test]

@@ -49,10 +49,12 @@ pub enum ObserveError {
         source: std::io::Error,
     },
     /// The encoder refused the data.
-    #[error("cannot encode {} as VTU: {message}; please report this with the scene", path.display())]
+    #[error("cannot encode {} as {format}: {message}; please report this with the scene", path.display())]
     Encode {
         /// The file.
         path: PathBuf,
+        /// What it was to be.
+        format: &'static str,
         /// What the encoder said.
         message: String,
     },

@@ -60,16 +60,18 @@ impl Trade {
         })
     }
 
-    /// Writes `trade.csv`, `trade.json`, `trade.svg` and a scene for each wanted error that a case meets; returns the files.
+    /// Writes `trade.csv`, `trade.json`, `trade.svg`, `trade.png` and a scene for each wanted error that a case meets; returns the files.
     ///
     /// # Errors
     /// [`TradeError`].
     pub fn write(&self, params: &TradeParams) -> Result<Vec<PathBuf>, TradeError> {
         let mut files = vec![self.csv(&params.output)?, self.json(&params.output)?];
         if self.points().iter().any(|(_, p)| p.1 > 0.0) {
-            let path = params.output.join("trade.svg");
-            self.plot().write(&path)?;
-            files.push(path);
+            for name in ["trade.svg", "trade.png"] {
+                let path = params.output.join(name);
+                self.plot().write(&path)?;
+                files.push(path);
+            }
         }
         for &wanted in &params.wanted {
             if let Some(case) = self.cheapest(wanted) {
