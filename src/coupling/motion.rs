@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use self::{body::MovingBody, energy::ElementEnergy, rows::SiteRows};
 use crate::{
     assembly,
-    coupling::{Model, Operator, SeamBonds, SiteKind},
+    coupling::{Interface, Model, Operator, SeamBonds, SiteKind},
     fem,
     peridynamics::{
         Families, PdBody,
@@ -197,9 +197,34 @@ fn reached<const D: usize>(body: &PdBody<D>, families: &Families, point: u32) ->
 }
 
 /// Lumped mass of every site \[kg\]: the integral of a node's shape function or the volume of a point, times the density.
+///
+/// Where elements overlap into the peridynamic zone a node has the mass of all cells around it, as its row has their stiffness. At the faces of [`Interface::Faces`] nothing overlaps: a node there has the mass of its elements. What
+/// of the zone no point carries, half of the cells of points that lie on a face, is shared by the nodes of the faces, so that all masses add up to that of the body.
 pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) -> Vec<f64> {
-    let nodes = fem::lumped_mass(&model.mesh, |c| density(model.material_of_cell(c)));
+    let mut nodes = fem::lumped_mass(&model.mesh, |c| match model.node_takes(c) {
+        true => density(model.material_of_cell(c)),
+        false => 0.0,
+    });
     let points = density(model.peridynamic_material());
+    if model.interface == Interface::Faces {
+        let zone = (0..model.mesh.cell_count()).filter(|&c| !model.node_takes(c));
+        let behind = fem::nodal_volumes(&model.mesh, zone);
+        let (mut at_faces, mut carried) = (0.0, 0.0);
+        for site in &model.sites {
+            match site.kind {
+                SiteKind::Node(n) => at_faces += behind[n as usize],
+                SiteKind::Point(_) => carried += site.volume,
+            }
+        }
+        // a point whose cell reaches out of the zone, at faces that cut the lattice anywhere, takes nothing from the nodes
+        let left = model.volumes().points - carried;
+        if left > 1e-9 * carried && at_faces > 0.0 {
+            let scale = points * left / at_faces;
+            for (mass, volume) in nodes.iter_mut().zip(&behind) {
+                *mass += scale * volume;
+            }
+        }
+    }
     model
         .sites
         .iter()

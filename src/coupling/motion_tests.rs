@@ -231,6 +231,23 @@ fn masses_add_up_to_the_body() {
     assert!(elements < whole);
 }
 
+/// Bonds that end on faces leave nothing to count twice; points that lie on them: `tests/motion/driven.rs`.
+#[test]
+fn masses_of_truncated_bonds_are_those_of_the_body() {
+    fn check<const D: usize>() {
+        let law = Law::BondBased(Micromodulus::InverseDistance);
+        let case = case(Method::Truncated, law);
+        let enclosed = Enclosed::<D>::new(&case).unwrap();
+        let mass = masses(&enclosed.model, |_| DENSITY);
+        let whole = DENSITY * (2.0 * enclosed.half).powi(D as i32);
+        let total: f64 = mass.iter().sum();
+        assert!((total / whole - 1.0).abs() < 1e-12, "{D}D: {total} {whole}");
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
 #[test]
 fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
     for case in cases() {

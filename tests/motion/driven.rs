@@ -159,3 +159,37 @@ fn check_predicts_the_steps_of_a_run() {
     let ratio = bytes(&predicted) / bytes(&measured);
     assert!((0.7..=1.4).contains(&ratio), "{ratio}");
 }
+
+/// Every mass counts once at faces where bonds end, whether points lie halfway inside of them (the default with this coupling), on them, or a void takes some away.
+#[test]
+fn a_truncated_plate_has_the_momentum_of_its_mass() {
+    let scene = |rest: &str, points: &str| {
+        format!(
+            "kinematics = \"plane-stress\"\n{rest}
+            mesh.rectangle = {{ min = [0, 0], max = [2, 1], x = {{ cells = 20 }}, y = {{ cells = 10 }} }}
+            materials.glass.bond-based = {{ youngs-modulus = 1, density = 3 }}
+            peridynamics = {{ horizon = 0.1, points.lattice = {{ spacing = 0.05{points} }} }}
+            zones.nonlocal.box = {{ min = [0.5, 0.3], max = [1.5, 0.7] }}
+            coupling = \"truncated\"
+            solve.explicit = {{ duration = 0.05, outputs = 0 }}
+            initial.all.velocity.x = 1
+            output.directory = \"out\"\n"
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let void = "voids.hole.inside.box = { min = [0.9, 0.4], max = [1.1, 0.6] }\n";
+    for (name, rest, points, area) in [
+        ("inside", "", "", 2.0),
+        ("on", "", ", origin = [0, 0]", 2.0),
+        ("void", void, "", 1.96),
+    ] {
+        write(folder.path(), &format!("{name}.toml"), &scene(rest, points));
+        run(folder.path(), &[&format!("{name}.toml")]);
+        let history = folder.path().join(format!("out/{name}_history.csv"));
+        let momentum = column(&history, "momentum_x")[0];
+        assert!(
+            (momentum / (3.0 * area) - 1.0).abs() < 1e-12,
+            "{name}: {momentum}"
+        );
+    }
+}
