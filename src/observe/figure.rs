@@ -203,9 +203,6 @@ impl LinePlot {
             format: "PNG",
             message,
         };
-        if !*FONT_READ {
-            return Err(encode("the font cannot be read".to_owned()));
-        }
         let (width, height) = (PNG_SCALE * SIZE.0, PNG_SCALE * SIZE.1);
         let mut pixels = vec![0; 3 * width as usize * height as usize];
         self.drawn(
@@ -248,6 +245,8 @@ impl LinePlot {
             });
         };
         let (lx, ly) = (x.start..x.end, y.start..y.end);
+        // without it the size of a text is not known, in an SVG neither
+        LazyLock::force(&FONT_READ);
         match (self.x_scale, self.y_scale) {
             (Scale::Linear, Scale::Linear) => self.draw(&root, scale, x, y),
             (Scale::Log, Scale::Linear) => self.draw(&root, scale, lx.log_scale(), y),
