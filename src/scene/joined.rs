@@ -5,7 +5,8 @@ use super::error::SceneError;
 use super::materials::{Law, Material, Points};
 use super::source::Span;
 use super::spec::{
-    CouplingSpec, Joining, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, WeightsSpec,
+    CouplingSpec, Joining, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, TruncatedSpec,
+    WeightsSpec,
 };
 use super::{materials, zones};
 use crate::coupling::Zone;
@@ -60,7 +61,7 @@ pub(super) fn joined<const D: usize>(
         return Ok(of(CouplingSpec::Local(NoOptionsSpec {}), span, Some(why)));
     };
     let truncated = of(
-        CouplingSpec::Truncated(NoOptionsSpec {}),
+        CouplingSpec::Truncated(TruncatedSpec::default()),
         span.clone(),
         Some(
             "the scene names none; symmetric and in exact equilibrium, and its faces follow the lattice"

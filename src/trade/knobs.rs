@@ -2,8 +2,8 @@
 
 use crate::scene::SceneSpec;
 use crate::scene::spec::{
-    AxisSpec, CouplingSpec, Joining, LatticeStart, MaterialSpec, MeshSpec, NoOptionsSpec,
-    PointsSpec, ShapeSpec, SolveSpec, TransitionSpec, ZonesNeeded,
+    AxisSpec, CouplingSpec, Joining, LatticeStart, MaterialSpec, MeshSpec, PointsSpec, ShapeSpec,
+    SolveSpec, TransitionSpec, TruncatedSpec, ZonesNeeded,
 };
 
 /// One setting of a knob: how it is called in tables, and what it does.
@@ -114,12 +114,10 @@ impl Base {
         );
         let transition = spec.zones.transition.as_ref().map(|t| t.get_ref());
         Self {
-            joining: spec
-                .coupling
-                .as_ref()
-                .map_or(CouplingSpec::Truncated(NoOptionsSpec {}).joining(), |c| {
-                    c.get_ref().joining()
-                }),
+            joining: spec.coupling.as_ref().map_or(
+                CouplingSpec::Truncated(TruncatedSpec::default()).joining(),
+                |c| c.get_ref().joining(),
+            ),
             horizon: pd.and_then(|p| p.horizon.as_constant()),
             lattice,
             mesh: generated(&spec.mesh),

@@ -106,7 +106,7 @@ impl Method {
             }),
             Self::Meshfree(influence) => Box::new(PartialStressMeshfree { influence }),
             Self::Elements(fit) => Box::new(PartialStressElements { fit }),
-            Self::Truncated => Box::new(Truncated),
+            Self::Truncated => Box::new(Truncated::default()),
         }
     }
 }

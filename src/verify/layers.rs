@@ -82,7 +82,7 @@ fn bodies<const D: usize>(law: Law, ratio: u32) -> Result<Enclosed<D>, String> {
             voids: Vec::new(),
             surfaces: Surfaces::Cut,
         }),
-        coupling: Box::new(Truncated),
+        coupling: Box::new(Truncated::default()),
     };
     let (model, coupling) = Model::new(problem, &Silent).map_err(|e| e.to_string())?;
     let stiffness = {
@@ -232,7 +232,7 @@ fn bar(meeting: Meeting, half: u32, ratio: u32) -> Result<(LinearMotion, Vec<f64
     };
     let law = crate::peridynamics::BondBased::<1>::new(Micromodulus::InverseDistance, 1.0 / 3.0);
     let coupling: Box<dyn Coupling<1>> = match meeting {
-        Meeting::Layer(_) => Box::new(Truncated),
+        Meeting::Layer(_) => Box::new(Truncated::default()),
         Meeting::Bridge => Box::new(PartialStressMeshfree {
             influence: INFLUENCE,
         }),

@@ -173,7 +173,7 @@ pub fn table(progress: &dyn Progress) -> Table {
         Columns::ByQuantity,
     );
     let bars: [(&str, Make, bool); 2] = [
-        ("skin of elements", || Box::new(Truncated), true),
+        ("skin of elements", || Box::new(Truncated::default()), true),
         ("peridynamics alone", || Box::new(Nonlocal), false),
     ];
     // with m = 3 bonds leave the body through the skin

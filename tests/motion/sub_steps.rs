@@ -5,7 +5,10 @@ use crate::{BREAKING, bondline, column, run, same, write};
 /// Elements twice as long as the spacing: the seam limits the step.
 fn truncated() -> String {
     BREAKING
-        .replace("[coupling.splice]", "[coupling.truncated]")
+        .replace(
+            "[coupling.splice]",
+            "[coupling.truncated]\ncut-bonds = \"linear\"",
+        )
         .replace("cells = 12", "cells = 6")
         .replace("cells = 24", "cells = 12")
 }

@@ -48,7 +48,20 @@ use crate::{
 ///
 /// Source: none; derived in `docs/truncated.md`. A transition zone, if the scene has one, is local. Pairwise laws and LPS on a regular lattice with one horizon.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Truncated;
+pub struct Truncated {
+    /// What becomes in motion of the bonds that the seam cuts.
+    pub cut_bonds: CutBonds,
+}
+
+/// What becomes in motion of bonds that the seam cuts, where bonds are exact or break.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CutBonds {
+    /// They turn, stretch and break like others; pairwise laws only.
+    #[default]
+    Breaking,
+    /// They are rows of a matrix, which is cheaper. Damage that comes within two horizons of the seam is told.
+    Linear,
+}
 
 impl<const D: usize> Coupling<D> for Truncated {
     fn name(&self) -> &'static str {
@@ -97,6 +110,7 @@ impl<const D: usize> Coupling<D> for Truncated {
         let dilatations = Dilatations::new(&segments, &listed)?;
         Ok(Box::new(TruncatedRows {
             model,
+            cut_bonds: self.cut_bonds,
             strings,
             springs,
             dilatations,
@@ -109,6 +123,7 @@ impl<const D: usize> Coupling<D> for Truncated {
 
 struct TruncatedRows<'a, const D: usize> {
     model: &'a Model<D>,
+    cut_bonds: CutBonds,
     springs: Springs<D>,
     dilatations: Dilatations<D>,
     strings: Strings<D>,
@@ -148,7 +163,8 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     }
 
     fn seam_bonds(&self) -> Option<SeamBonds<D>> {
-        let body = self.model.body().filter(|_| self.pairwise)?;
+        let breaking = self.pairwise && self.cut_bonds == CutBonds::Breaking;
+        let body = self.model.body().filter(|_| breaking)?;
         Some(SeamBonds::new(
             self.model,
             body,

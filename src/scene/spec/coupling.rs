@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use crate::coupling::{
     Balanced, Blending, BlendingFunction, Coupling, FitDegree, Local, Nonlocal,
-    PartialStressElements, PartialStressMeshfree, Splice, Truncated, Zone,
+    PartialStressElements, PartialStressMeshfree, Splice, Truncated, Zone, truncated::CutBonds,
 };
 use crate::peridynamics::Influence;
 
@@ -27,7 +27,7 @@ pub enum CouplingSpec {
     /// Partial stress in the transition zone (eq. 2.19 to 2.29).
     PartialStress(PartialStressSpec),
     /// Bonds that end on the faces of elements: symmetric, in exact equilibrium.
-    Truncated(NoOptionsSpec),
+    Truncated(TruncatedSpec),
     /// Finite elements everywhere.
     Local(NoOptionsSpec),
     /// Peridynamics everywhere.
@@ -159,7 +159,12 @@ impl CouplingSpec {
                 }),
                 FormSpec::Meshfree => Box::new(PartialStressMeshfree { influence }),
             },
-            Self::Truncated(_) => Box::new(Truncated),
+            Self::Truncated(t) => Box::new(Truncated {
+                cut_bonds: match t.cut_bonds {
+                    CutBondsSpec::Breaking => CutBonds::Breaking,
+                    CutBondsSpec::Linear => CutBonds::Linear,
+                },
+            }),
             Self::Local(_) => Box::new(Local),
             Self::Nonlocal(_) => Box::new(Nonlocal),
         }
@@ -237,6 +242,26 @@ impl BetaSpec {
             Self::Smooth => BlendingFunction::Smooth,
         }
     }
+}
+
+/// Bonds that end on the faces of elements.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct TruncatedSpec {
+    /// What becomes of cut bonds where bonds are exact or break.
+    #[serde(default)]
+    pub cut_bonds: CutBondsSpec,
+}
+
+/// What becomes of bonds that the seam cuts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CutBondsSpec {
+    /// They turn, stretch and break like others (bond-based laws).
+    #[default]
+    Breaking,
+    /// They are linear and do not break: cheaper, where damage stays two horizons away from the seam.
+    Linear,
 }
 
 /// Partial stress.

@@ -16,7 +16,7 @@ pub use condition::{
 pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec};
 pub use coupling::{
     BetaSpec, BlendingSpec, CouplingSpec, FormSpec, InterfaceSpec, Joining, LatticeStart,
-    NoOptionsSpec, PartialStressSpec, ZonesNeeded,
+    NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use material::{
     BondBasedSpec, CorrespondenceSpec, InfluenceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec,

@@ -168,7 +168,7 @@ fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
             voids: Vec::new(),
             surfaces: Surfaces::Uncut,
         }),
-        coupling: Box::new(Truncated),
+        coupling: Box::new(Truncated::default()),
     };
     let (model, coupling) = Model::new(problem, &Silent)?;
     let stiffness = {

@@ -158,7 +158,7 @@ impl Plate {
                 };
                 (
                     cells.iter().map(zone).collect(),
-                    Box::new(Truncated),
+                    Box::new(Truncated::default()),
                     points,
                 )
             }
