@@ -473,12 +473,15 @@ fn held<const D: usize>(scene: &Unplaced<'_, D>, horizon: &[f64]) -> Vec<bool> {
     mesh.grown(&touching(mesh, nodes), |c| horizon[c])
 }
 
-/// The micromodulus of the bonds of a material, up to a factor.
+/// The micromodulus of the bonds of a material, up to a factor; of a law that is not named here, that of ω = 1.
 fn micromodulus<const D: usize>(material: &Material<D>, r: f64, horizon: f64) -> f64 {
-    match material.law {
-        Law::BondBased(m) => m.shape(r, horizon),
-        Law::Lps(omega) | Law::Correspondence(omega, _) => omega.value(r, horizon) / (r * r),
+    let mut influence = 1.0;
+    if let Law::BondBased(m) = material.law {
+        return m.shape(r, horizon);
+    } else if let Law::Lps(omega) | Law::Correspondence(omega, _) = material.law {
+        influence = omega.value(r, horizon);
     }
+    influence / (r * r)
 }
 
 /// The stretch at which bonds of a material break. A fracture energy that gives none is the run's to complain of.
