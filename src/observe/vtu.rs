@@ -255,8 +255,13 @@ fn array<T: Number>(
 ) -> std::io::Result<String> {
     let text = encoded(numbers, compression)?;
     let (kind, name) = (T::TYPE, escape(name));
+    // meshio takes one component that is named for a matrix of one column
+    let columns = match components {
+        1 => String::new(),
+        n => format!(" NumberOfComponents=\"{n}\""),
+    };
     Ok(format!(
-        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">{text}</DataArray>\n"
+        "<DataArray type=\"{kind}\" Name=\"{name}\"{columns} format=\"binary\">{text}</DataArray>\n"
     ))
 }
 
