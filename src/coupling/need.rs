@@ -61,7 +61,7 @@ pub struct Criteria<'a, const D: usize> {
 }
 
 /// Where peridynamics is needed, one entry per cell.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Need {
     /// The local model errs too much.
     pub error: Vec<bool>,
@@ -73,23 +73,6 @@ pub struct Need {
     pub remaining: f64,
     /// The largest principal strain.
     pub largest_strain: f64,
-}
-
-impl Need {
-    /// What this state and another one need: the union of the cells, the larger of the numbers.
-    ///
-    /// Precondition: both are of one mesh.
-    pub fn and(mut self, other: &Self) -> Self {
-        let both = |mine: &mut Vec<bool>, theirs: &[bool]| {
-            mine.iter_mut().zip(theirs).for_each(|(m, t)| *m |= t);
-        };
-        both(&mut self.error, &other.error);
-        both(&mut self.stretch, &other.stretch);
-        self.all_local = self.all_local.max(other.all_local);
-        self.remaining = self.remaining.max(other.remaining);
-        self.largest_strain = self.largest_strain.max(other.largest_strain);
-        self
-    }
 }
 
 /// `ℓ²/δ²` of bonds with the micromodulus `lambda(r)` \[any unit\] and the horizon `horizon` \[m\].

@@ -4,7 +4,7 @@ use super::breaking::Breaking;
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::{Peridynamics, Points};
+use super::peridynamics::{Peridynamics, Points};
 use super::region;
 use super::spec::{Joining, LatticeStart, SceneSpec};
 use crate::coupling::{Lattice, Zone};

@@ -1,6 +1,7 @@
-//! Checks of single numbers.
+//! Checks of single numbers and expressions.
 
 use super::error::{SceneError, SceneErrorKind};
+use super::expression::Expression;
 use super::value::Number;
 
 /// The value, if it is positive.
@@ -42,4 +43,26 @@ pub(crate) fn within(
     )
     .label(number.span.clone(), must)
     .help(help))
+}
+
+/// Refuses an expression in `y` or `z` where the scene has no such axis.
+pub(crate) fn no_further_axes<const D: usize>(
+    place: &str,
+    expression: &Expression,
+) -> Result<(), SceneError> {
+    match (D..3).find(|&k| expression.depends_on(k)) {
+        None => Ok(()),
+        Some(k) => Err(SceneError::new(
+            SceneErrorKind::Dimension,
+            format!(
+                "`{place}` uses {} in a scene of dimension {D}",
+                ["x", "y", "z"][k]
+            ),
+        )
+        .label(expression.span.clone(), "no such axis")
+        .help(format!(
+            "use {} only",
+            ["x", "x and y", "x, y and z"][D - 1]
+        ))),
+    }
 }

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::check;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
-use super::materials::no_further_axes;
 use super::region::{Region, region, unknown_set};
 use super::solve::{Clock, Pacing};
 use super::source::Span;
@@ -324,7 +324,7 @@ pub(crate) fn components<const D: usize>(
     }
     for (axis, expression) in axes.iter().zip(given) {
         if let Some(e) = expression {
-            no_further_axes::<D>(&format!("{place}.{axis}"), e)?;
+            check::no_further_axes::<D>(&format!("{place}.{axis}"), e)?;
         }
     }
     if given.iter().all(|e| e.is_none()) {

@@ -2,13 +2,14 @@
 
 use super::automatic::Placed;
 use super::error::SceneError;
-use super::materials::{Law, Material, Points};
+use super::materials::{Law, Material};
+use super::peridynamics::{self, Points};
 use super::source::Span;
 use super::spec::{
     CouplingSpec, Joining, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, TruncatedSpec,
     WeightsSpec,
 };
-use super::{materials, zones};
+use super::zones;
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::tensor::Vector;
@@ -117,7 +118,7 @@ fn obstacle<const D: usize>(
     if p.horizon.as_constant().is_none() {
         return Ok(Some("a horizon that varies".to_owned()));
     }
-    let lattice = materials::peridynamics(p, truncated.joining.lattice, mesh)?;
+    let lattice = peridynamics::peridynamics(p, truncated.joining.lattice, mesh)?;
     let Points::Lattice { spacing, origin } = lattice.points else {
         return Ok(Some("points that are no lattice".to_owned()));
     };

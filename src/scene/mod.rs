@@ -8,8 +8,8 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `output.rs` | its parts |
-//! | `automatic.rs` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `output.rs` | its parts |
+//! | `automatic/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
@@ -22,8 +22,6 @@
 
 pub mod accuracy;
 mod automatic;
-#[cfg(test)]
-mod automatic_tests;
 mod bodies;
 mod breaking;
 mod check;
@@ -42,6 +40,7 @@ mod motion;
 mod obstacles;
 mod output;
 mod parse;
+mod peridynamics;
 mod predict;
 mod region;
 mod run;
@@ -61,8 +60,9 @@ pub use converge::{ConvergeError, ConvergeParams, Converged, Level, Refinement, 
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use initial::{Initial, InitialKind};
-pub use materials::{Fracture, Law, Material, Peridynamics, Points};
+pub use materials::{Fracture, Law, Material};
 pub use motion::{RunOptions, StartFrom};
+pub use peridynamics::{Peridynamics, Points};
 pub use predict::{MotionPrediction, Prediction, Share};
 pub use region::Region;
 pub use run::{RunError, Solved, solve_with};

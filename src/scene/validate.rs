@@ -9,9 +9,10 @@ use super::check;
 use super::conditions::{self, Condition};
 use super::error::{SceneError, SceneErrorKind};
 use super::initial::Initial;
-use super::materials::{self, Material, Peridynamics, Points};
+use super::materials::{self, Material};
 use super::meshing;
 use super::motion::RunOptions;
+use super::peridynamics::{self, Peridynamics, Points};
 use super::predict::{self, Prediction};
 use super::region::Region;
 use super::run::{self, RunError};
@@ -295,7 +296,7 @@ fn scene<const D: usize>(
         .as_ref()
         .and_then(|p| p.influence.as_ref())
     {
-        Some(i) => materials::influence("peridynamics.influence", i)?,
+        Some(i) => peridynamics::influence("peridynamics.influence", i)?,
         None => default_influence()?,
     };
     let (found, cell_material) =
@@ -317,7 +318,7 @@ fn scene<const D: usize>(
     let joined = joined::joined(spec, &found, &mesh, placed.as_ref())?;
     let joining = joined.joining;
     let peridynamics = match (&spec.peridynamics, joining.zones) {
-        (Some(p), _) => Some(materials::peridynamics(p, joining.lattice, &mesh)?),
+        (Some(p), _) => Some(peridynamics::peridynamics(p, joining.lattice, &mesh)?),
         (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
         (None, _) => {
             return Err(SceneError::new(
@@ -401,7 +402,7 @@ fn densities<const D: usize>(spec: &SceneSpec, found: &[Material<D>]) -> Result<
 }
 
 fn default_influence() -> Result<Influence, SceneError> {
-    materials::influence(
+    peridynamics::influence(
         "peridynamics.influence",
         &InfluenceSpec::Polynomial(super::spec::PolynomialSpec {
             degree: super::Count {

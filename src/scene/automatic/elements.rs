@@ -1,0 +1,128 @@
+//! The displacement that a scene has with elements alone.
+
+use std::fmt;
+
+use super::Unplaced;
+use crate::coupling::{Coupling, Local, Model, Problem, SiteKind, Zone};
+use crate::observe::summary::{Stopwatch, Timings};
+use crate::progress::Silent;
+use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::initial::InitialKind;
+use crate::scene::materials::Material;
+use crate::scene::run::{self, Equilibrium, RunError};
+use crate::scene::solve::Solve;
+use crate::scene::source::Span;
+use crate::tensor::{Tensor4, Vector};
+
+/// Stiffness of cells that a crack or a void passes through, over that of their material: a crack opens as if it were a slot one to two cells wide.
+const CUT: f64 = 1e-6;
+
+/// A local scene that is solved already.
+pub(crate) struct Kept<const D: usize> {
+    pub model: Model<D>,
+    pub coupling: Box<dyn Coupling<D>>,
+    pub equilibrium: Equilibrium,
+}
+
+impl<const D: usize> fmt::Debug for Kept<D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} sites solved", self.model.sites.len())
+    }
+}
+
+/// Displacement at the nodes of the mesh by elements alone, where bonds are pulled the most that can be known without bonds: at the end of a load, at the start of a motion. With the solution, if that is the static scene's own.
+pub(super) fn state<const D: usize>(
+    scene: &Unplaced<'_, D>,
+    cut: &[bool],
+    span: &Span,
+) -> Result<(Vec<Vector<D>>, Option<Kept<D>>), SceneError> {
+    let time = match scene.solve {
+        Solve::Static => 0.0,
+        Solve::QuasiStatic(q) => q.duration,
+        Solve::Explicit(_) => return Ok((initial(scene), None)),
+    };
+    let kept = elements(scene, cut, time).map_err(|error| {
+        SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`zones.auto` could not solve the scene with elements alone: {error}"),
+        )
+        .label(span.clone(), "needs that solution")
+        .help("hold and load the body so that `coupling = \"local\"` runs, or draw the zone: [zones.nonlocal]")
+    })?;
+    // all nodes of elements are sites, in their order; others have no displacement
+    let mut u = vec![Vector::zeros(); scene.mesh.nodes.len()];
+    for (site, s) in kept.model.sites.iter().enumerate() {
+        if let SiteKind::Node(n) = s.kind {
+            let values = &kept.equilibrium.solution.displacement[site * D..][..D];
+            u[n as usize] = Vector::from_column_slice(values);
+        }
+    }
+    let own = *scene.solve == Solve::Static && !cut.contains(&true);
+    Ok((u, own.then_some(kept)))
+}
+
+/// The displacement at time zero.
+fn initial<const D: usize>(scene: &Unplaced<'_, D>) -> Vec<Vector<D>> {
+    let mut u = vec![Vector::zeros(); scene.mesh.nodes.len()];
+    for field in scene.initial {
+        if field.kind != InitialKind::Displacement {
+            continue;
+        }
+        for (x, u) in scene.mesh.nodes.iter().zip(&mut u) {
+            if field.region.contains(x, 0.0) {
+                for k in 0..D {
+                    u[k] = field.components.at(k, x).unwrap_or(u[k]);
+                }
+            }
+        }
+    }
+    u
+}
+
+/// Solves the scene with elements alone, under what holds and loads it at time `t`.
+fn elements<const D: usize>(
+    scene: &Unplaced<'_, D>,
+    cut: &[bool],
+    t: f64,
+) -> Result<Kept<D>, RunError> {
+    let whole: Vec<Tensor4<D>> = scene.materials.iter().map(Material::stiffness).collect();
+    let soft = whole.iter().map(|c| c.scaled(CUT));
+    let shift = whole.len() as u16;
+    let problem = Problem {
+        mesh: scene.mesh.clone(),
+        zones: vec![Zone::Local; scene.mesh.cell_count()],
+        tensors: whole.iter().cloned().chain(soft).collect(),
+        cell_material: scene
+            .cell_material
+            .iter()
+            .zip(cut)
+            .map(|(m, cut)| if *cut { m + shift } else { *m })
+            .collect(),
+        peridynamic_material: 0,
+        peridynamics: None,
+        coupling: Box::new(Local),
+    };
+    let mut timings = Timings::default();
+    let mut watch = Stopwatch::start();
+    let (model, coupling) = Model::new(problem, &Silent)?;
+    watch.lap(&mut timings, "sites and bonds");
+    let operator = coupling.operator(&model)?;
+    let equilibrium = run::equilibrium(
+        &run::At {
+            model: &model,
+            coupling: coupling.as_ref(),
+            operator: operator.as_ref(),
+            conditions: scene.conditions,
+            solver: scene.solver,
+            time: t,
+        },
+        timings,
+        &Silent,
+    )?;
+    drop(operator);
+    Ok(Kept {
+        model,
+        coupling,
+        equilibrium,
+    })
+}

@@ -1,0 +1,377 @@
+//! The peridynamic choices of a validated scene: horizon, points, weights, influence function, partial volumes.
+
+use super::check;
+use super::error::{SceneError, SceneErrorKind};
+use super::expression::Expression;
+use super::region::position;
+use super::solve;
+use super::spec::{
+    InfluenceSpec, LatticeStart, PeridynamicsSpec, PointsSpec, SurfacesSpec, VolumesSpec,
+    WeightsSpec,
+};
+use super::value::Number;
+use crate::coupling::Lattice;
+use crate::mesh::Mesh;
+use crate::peridynamics::{Influence, PartialVolume};
+use crate::tensor::Vector;
+
+/// Where the peridynamic points are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Points<const D: usize> {
+    /// At the centroids of cells.
+    Cells,
+    /// On a lattice of this spacing through this point.
+    Lattice {
+        /// Distance of neighbours.
+        spacing: f64,
+        /// Any point of the lattice.
+        origin: Vector<D>,
+    },
+    /// On several lattices, each with its horizon.
+    Lattices {
+        /// The lattices; the first one is that of the scene's `[peridynamics]`.
+        lattices: Vec<Lattice<D>>,
+        /// The lattice of each cell.
+        of_cell: Vec<u16>,
+    },
+}
+
+/// The peridynamic choices of a scene.
+#[derive(Clone, Debug)]
+pub struct Peridynamics<const D: usize> {
+    /// Horizon δ as a field.
+    pub horizon: Expression,
+    /// Where the points are.
+    pub points: Points<D>,
+    /// Bond weights.
+    pub weights: WeightsSpec,
+    /// Shares of the cells that the horizon cuts.
+    pub volumes: PartialVolume,
+    /// Whether the mesh's boundary cuts bonds.
+    pub surfaces: SurfacesSpec,
+}
+
+impl<const D: usize> Peridynamics<D> {
+    /// The horizon at a position.
+    pub fn horizon_at(&self, x: &Vector<D>) -> f64 {
+        self.horizon.eval(&crate::tensor::padded(x))
+    }
+}
+
+/// The influence function typed at `place`.
+pub(crate) fn influence(place: &str, spec: &InfluenceSpec) -> Result<Influence, SceneError> {
+    let InfluenceSpec::Polynomial(p) = spec else {
+        return Ok(Influence::Gaussian);
+    };
+    let small = |v: usize| u32::try_from(v).unwrap_or(u32::MAX);
+    Influence::polynomial(small(p.degree.value), small(p.alpha.value)).map_err(|error| {
+        let degree_is_wrong = Influence::polynomial(small(p.degree.value), 0).is_err();
+        let span = if degree_is_wrong {
+            &p.degree.span
+        } else {
+            &p.alpha.span
+        };
+        SceneError::new(SceneErrorKind::WrongValue, format!("`{place}`: {error}"))
+            .label(span.clone(), "not offered")
+            .help("degree is 0, 1, 3, 5 or 7; alpha is 0 or 1")
+    })
+}
+
+/// What `[peridynamics]` says; a lattice starts at a corner of the mesh, or half a spacing inside.
+pub(crate) fn peridynamics<const D: usize>(
+    spec: &PeridynamicsSpec,
+    start: LatticeStart,
+    mesh: &Mesh<D>,
+) -> Result<Peridynamics<D>, SceneError> {
+    check::no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
+    solve::still("peridynamics.horizon", &spec.horizon)?;
+    if let Some(value) = spec.horizon.as_constant() {
+        let number = Number {
+            value,
+            span: spec.horizon.span.clone(),
+        };
+        check::positive("peridynamics.horizon", &number)?;
+    }
+    let points = match &spec.points {
+        PointsSpec::Cells => Points::Cells,
+        PointsSpec::Lattice(lattice) => {
+            let spacing = check::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
+            let (lo, hi) = mesh.bounds();
+            let count: f64 = (hi - lo).iter().map(|l| l / spacing).product();
+            if count > 1e9 {
+                return Err(SceneError::new(
+                    SceneErrorKind::WrongValue,
+                    format!(
+                        "`peridynamics.points.lattice.spacing` is {spacing}: {count:.1e} points would fill the mesh"
+                    ),
+                )
+                .label(lattice.spacing.span.clone(), "too fine")
+                .help("use a larger spacing"));
+            }
+            let origin = match &lattice.origin {
+                Some(o) => position("peridynamics.points.lattice.origin", o)?,
+                None => match start {
+                    // where the mesh follows the lattice, points and nodes coincide: the seam then interpolates nothing
+                    LatticeStart::OnCorner => lo,
+                    LatticeStart::Halfway => lo.add_scalar(0.5 * spacing),
+                },
+            };
+            Points::Lattice { spacing, origin }
+        }
+    };
+    Ok(Peridynamics {
+        horizon: spec.horizon.clone(),
+        points,
+        weights: spec.weights,
+        volumes: volumes(spec)?,
+        surfaces: spec.surfaces,
+    })
+}
+
+/// The partial volumes typed; they need to know the cells of a lattice.
+fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
+    let Some(typed) = &spec.volumes else {
+        return Ok(PartialVolume::Full);
+    };
+    let volumes = match typed.get_ref() {
+        VolumesSpec::Full => return Ok(PartialVolume::Full),
+        VolumesSpec::Pdlammps => PartialVolume::PdLammps,
+        VolumesSpec::Hhb => PartialVolume::Hhb,
+        VolumesSpec::Exact => PartialVolume::Exact,
+    };
+    let conflict = |message: &str, help: &str| {
+        Err(SceneError::new(SceneErrorKind::Conflict, message)
+            .label(typed.span(), "needs a lattice of points")
+            .help(help))
+    };
+    if matches!(spec.points, PointsSpec::Cells) {
+        return conflict(
+            "`peridynamics.volumes` is partial, and the points are those of the mesh's cells",
+            "give peridynamics.points.lattice a spacing, or use volumes = \"full\"",
+        );
+    }
+    if spec.weights == WeightsSpec::Fitted {
+        return conflict(
+            "`peridynamics.volumes` is partial, and the weights are fitted to full volumes",
+            "use weights = \"isotropic\" or \"plain\", or volumes = \"full\"",
+        );
+    }
+    Ok(volumes)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::coupling::{Motion, Sampler, motion::BondBehaviour};
+    use crate::peridynamics::kernel::Kinematics as BondKinematics;
+    use crate::progress::Silent;
+    use crate::scene::{AnyScene, Solved, Source, solve_with};
+    use crate::system::{Breakage, Dynamic, Symmetry};
+    use crate::tensor::Tensor4;
+
+    /// A plate whose edge moves as `u = G x`; a lattice with δ/h = 3.3 in its middle.
+    const PLATE: &str = r#"
+kinematics = "plane-stress"
+coupling.splice = {}
+[mesh.rectangle]
+min = [0, 0]
+max = [1, 1]
+x = { cells = 40 }
+y = { cells = 40 }
+[materials.plate.lps]
+youngs-modulus = 2
+poisson-ratio = 0.25
+[peridynamics]
+horizon = "3.3/40"
+points.lattice = { spacing = "1/40" }
+[zones.nonlocal]
+box = { min = [0.4, 0.4], max = [0.6, 0.6] }
+[zones.transition]
+box = { min = [0.25, 0.25], max = [0.75, 0.75] }
+[conditions.left.displacement]
+on = "left"
+x = "2e-3*x+1e-3*y"
+y = "-5e-4*x+1e-3*y"
+[conditions.right.displacement]
+on = "right"
+x = "2e-3*x+1e-3*y"
+y = "-5e-4*x+1e-3*y"
+"#;
+
+    fn plate(overrides: &[&str]) -> Result<Scene2, SceneError> {
+        plate_of(PLATE, overrides)
+    }
+
+    fn plate_of(text: &str, overrides: &[&str]) -> Result<Scene2, SceneError> {
+        let mut source = Source::new("plate.toml", text);
+        for o in overrides {
+            source.push_override(o)?;
+        }
+        match AnyScene::from_source(&source, Path::new(""), "plate")? {
+            AnyScene::Plane(scene) => Ok(*scene),
+            _ => unreachable!("a plate is plane"),
+        }
+    }
+
+    type Scene2 = crate::scene::Scene<2>;
+
+    /// Largest distance from `u = G x` over the displacement, the material's `C_1111` and `C_1122` in the middle, the elements', and the bonds.
+    fn pulled(overrides: &[&str]) -> (f64, [f64; 2], [f64; 2], usize, Vec<String>) {
+        let mut found = (f64::NAN, [0.0; 2], [0.0; 2]);
+        let summary = solve_with(
+            plate(overrides).unwrap(),
+            &Silent,
+            |_, solved: &Solved<'_, 2>| {
+                let sampler = Sampler::new(solved.model);
+                let mut miss: f64 = 0.0;
+                for site in &solved.model.sites {
+                    let x = site.position;
+                    let u = sampler.displacement(&x, solved.displacement).unwrap();
+                    let wanted =
+                        Vector::<2>::new(2e-3 * x[0] + 1e-3 * x[1], -5e-4 * x[0] + 1e-3 * x[1]);
+                    miss = miss.max((u - wanted).norm() / 2e-3);
+                }
+                let body = solved.model.body().unwrap();
+                let middle = Vector::<2>::new(0.5, 0.5);
+                let nearest = (0..body.cloud.position.len())
+                    .min_by(|&a, &b| {
+                        let distance = |i: usize| (body.cloud.position[i] - middle).norm();
+                        distance(a).total_cmp(&distance(b))
+                    })
+                    .unwrap();
+                let two = |c: &Tensor4<2>| [c.get(0, 0, 0, 0), c.get(0, 0, 1, 1)];
+                found = (
+                    miss,
+                    two(&body.collapsed_tensor(nearest)),
+                    two(solved.model.tensor_of_cell(0)),
+                );
+                Ok(Vec::new())
+            },
+        )
+        .unwrap();
+        let choices = summary.choices.into_iter().map(|c| c.choice).collect();
+        (found.0, found.1, found.2, summary.sizes.bonds, choices)
+    }
+
+    #[test]
+    fn partial_volumes_reach_scenes_and_the_seam_stays_exact() {
+        // plane stress, E = 2 and nu = 1/4
+        let typed = [2.0 / (1.0 - 0.0625), 0.5 / (1.0 - 0.0625)];
+        let all_free = [
+            "conditions.bottom.displacement={on=\"bottom\",x=\"2e-3*x+1e-3*y\",y=\"-5e-4*x+1e-3*y\"}",
+            "conditions.top.displacement={on=\"top\",x=\"2e-3*x+1e-3*y\",y=\"-5e-4*x+1e-3*y\"}",
+        ];
+        let mut bonds = Vec::new();
+        for volumes in ["full", "pdlammps", "hhb", "exact"] {
+            for coupling in ["splice", "blending", "partial-stress"] {
+                for weights in ["isotropic", "plain"] {
+                    // Gauss points of elements have families fitted to the typed constants, not to a plain lattice
+                    if (coupling, weights) == ("partial-stress", "plain") {
+                        continue;
+                    }
+                    let set = [
+                        all_free[0].to_owned(),
+                        all_free[1].to_owned(),
+                        format!("peridynamics.volumes={volumes}"),
+                        format!("peridynamics.weights={weights}"),
+                        format!("coupling={coupling}"),
+                    ];
+                    let set: Vec<&str> = set.iter().map(String::as_str).collect();
+                    let (miss, points, elements, count, choices) = pulled(&set);
+                    let case = format!("{volumes}, {coupling}, {weights}");
+                    assert!(miss < 1e-10, "{case}: {miss:e}");
+                    let both = points.iter().zip(&elements);
+                    assert!(
+                        both.clone().all(|(p, e)| (p - e).abs() < 1e-11),
+                        "{case}: {points:?} {elements:?}"
+                    );
+                    let off = points[0] - typed[0];
+                    assert_eq!(off.abs() < 1e-11, weights == "isotropic", "{case}: {off:e}");
+                    let said = choices.iter().any(|c| c.contains("partial volumes"));
+                    assert_eq!(said, volumes != "full", "{choices:?}");
+                    if (coupling, weights) == ("splice", "plain") {
+                        bonds.push((count, off.abs()));
+                    }
+                }
+            }
+        }
+        // the ramp of PDLAMMPS is zero for no point of the family, HHB and exact areas count cells beyond it
+        assert_eq!(bonds[0].0, bonds[1].0);
+        assert!(
+            bonds[2].0 > bonds[0].0 && bonds[3].0 > bonds[0].0,
+            "{bonds:?}"
+        );
+    }
+
+    /// Largest difference between the force of a model that moves and its assembled rows, over the largest force; the stretch of bonds is small enough for both kinematics.
+    fn moving_off(text: &str, overrides: &[&str], kinematics: BondKinematics) -> f64 {
+        let mut found = f64::NAN;
+        solve_with(
+            plate_of(text, overrides).unwrap(),
+            &Silent,
+            |_, solved: &Solved<'_, 2>| {
+                let model = solved.model;
+                let behaviour = BondBehaviour {
+                    kinematics,
+                    critical_stretch: Some(1.0),
+                    no_fail: &|_| false,
+                    contact: None,
+                };
+                let operator = solved.operator;
+                let mut motion =
+                    Motion::new(model, operator, Symmetry::Unsymmetric, |_| 1.0, &behaviour)
+                        .unwrap();
+                let wave = |s: &crate::coupling::Site<2>| {
+                    let x = s.position;
+                    [1e-9 * (7.0 * x[0] + x[1]).sin(), 1e-9 * (9.0 * x[1]).cos()]
+                };
+                let u: Vec<f64> = model.sites.iter().flat_map(wave).collect();
+                let mut force = vec![0.0; u.len()];
+                motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+                let wanted = model.assemble(operator, &Silent).multiply(&u);
+                let largest =
+                    |v: &mut dyn Iterator<Item = f64>| v.fold(0.0, |m: f64, v| m.max(v.abs()));
+                found = largest(&mut force.iter().zip(&wanted).map(|(a, b)| a - b))
+                    / largest(&mut wanted.iter().copied());
+                Ok(Vec::new())
+            },
+        )
+        .unwrap();
+        found
+    }
+
+    #[test]
+    fn partial_volumes_move_as_they_rest() {
+        let bond_based = PLATE
+            .replace("plate.lps", "plate.bond-based")
+            .replace("poisson-ratio = 0.25\n", "");
+        for volumes in ["full", "pdlammps", "hhb", "exact"] {
+            for text in [PLATE, &bond_based] {
+                for weights in ["isotropic", "plain"] {
+                    let set = [
+                        format!("peridynamics.volumes={volumes}"),
+                        format!("peridynamics.weights={weights}"),
+                    ];
+                    let set: Vec<&str> = set.iter().map(String::as_str).collect();
+                    let linear = moving_off(text, &set, BondKinematics::Linear);
+                    assert!(linear < 1e-12, "{set:?}: {linear:e}");
+                    let exact = moving_off(text, &set, BondKinematics::Exact);
+                    assert!(exact < 1e-5, "{set:?}: {exact:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn partial_volumes_without_their_lattice_are_refused() {
+        for (set, word) in [
+            ("peridynamics.points=cells", "lattice"),
+            ("peridynamics.weights=fitted", "fitted"),
+        ] {
+            let error = plate(&["peridynamics.volumes=hhb", set]).err().unwrap();
+            assert!(error.to_string().contains(word), "{set}: {error}");
+        }
+    }
+}
