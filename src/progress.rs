@@ -17,6 +17,9 @@ pub trait Progress: Sync {
     /// Says how the current stage stands, in a few words; for whoever watches.
     fn tell(&self, _text: &str) {}
 
+    /// A result on the way that stays to be read, also where nobody watches: hours of work should not be lost with their last line.
+    fn note(&self, _line: &str) {}
+
     /// Ends the last stage.
     fn finish(&self);
 }

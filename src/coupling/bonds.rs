@@ -211,8 +211,8 @@ impl<const D: usize> LatticeFactors<D> {
             .law
             .coefficients(&family, &mut pair, &mut omega)
             .map_err(|source| ModelError::Family {
-                what: "the full lattice",
-                position: vec![],
+                what: "a point of the full lattice",
+                position: vec![0.0; D],
                 bonds: bonds.len(),
                 source,
             })?;

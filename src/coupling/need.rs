@@ -33,6 +33,9 @@ const AVERAGED_OVER: f64 = 2.5;
 /// And at least over so many, or a cell has no neighbour.
 const AT_LEAST: f64 = 1.5;
 
+/// No cell.
+const NONE: u32 = u32::MAX;
+
 /// What decides where peridynamics is needed.
 #[derive(Clone, Copy, Debug)]
 pub struct Criteria<'a, const D: usize> {
@@ -71,7 +74,7 @@ pub struct Need {
     pub all_local: f64,
     /// What remains of it outside of the cells of `error`.
     pub remaining: f64,
-    /// The largest principal strain.
+    /// The largest principal strain; zero if no bond breaks.
     pub largest_strain: f64,
 }
 
@@ -97,8 +100,12 @@ impl<const D: usize> Criteria<'_, D> {
         let count = mesh.cell_count();
         let node_cells = mesh.node_cells();
         let strains = self.strains(&node_cells, &displacement);
+        let neighbours = self.neighbours(&node_cells);
         let centre: Vec<Vector<D>> = (0..count).map(|c| mesh.centroid(c)).collect();
-        let volume: Vec<f64> = (0..count).map(|c| mesh.cell_volume(c).abs()).collect();
+        let volume: Vec<f64> = (0..count)
+            .into_par_iter()
+            .map(|c| mesh.cell_volume(c).abs())
+            .collect();
         let energy = |c: usize, e: &Tensor<D>| {
             let tensor = &self.tensors[self.cell_material[c] as usize];
             volume[c] * tensor.contract(e).dot(e)
@@ -112,7 +119,7 @@ impl<const D: usize> Criteria<'_, D> {
             .collect();
         let around = Around {
             criteria: self,
-            node_cells: &node_cells,
+            neighbours: &neighbours,
             strains: &strains,
             centre: &centre,
             volume: &volume,
@@ -139,7 +146,7 @@ impl<const D: usize> Criteria<'_, D> {
             });
         let largest: Vec<f64> = (0..count)
             .into_par_iter()
-            .map(|c| match self.is_candidate(c) {
+            .map(|c| match self.stretch.is_some() && self.is_candidate(c) {
                 true => largest_strain(mesh, c, &displacement),
                 false => 0.0,
             })
@@ -202,6 +209,31 @@ impl<const D: usize> Criteria<'_, D> {
                     (mesh.centroid(k) - x, mesh.cell_volume(k).abs(), raw[k])
                 });
                 level(data).unwrap_or(raw[c])
+            })
+            .collect()
+    }
+
+    /// The candidates that share a facet with each candidate; `NONE` fills the rest.
+    fn neighbours(&self, node_cells: &(Vec<u32>, Vec<u32>)) -> Vec<[u32; 6]> {
+        let mesh = self.mesh;
+        (0..mesh.cell_count())
+            .into_par_iter()
+            .map(|c| {
+                let mut found = [NONE; 6];
+                if !self.is_candidate(c) {
+                    return found;
+                }
+                let nodes = mesh.cell(c);
+                for (slot, facet) in found.iter_mut().zip(mesh.shapes[c].facets()) {
+                    let other = cells_of(node_cells, nodes[facet[0]]).iter().find(|&&k| {
+                        let theirs = mesh.cell(k as usize);
+                        k as usize != c
+                            && self.is_candidate(k as usize)
+                            && facet[1..].iter().all(|&i| theirs.contains(&nodes[i]))
+                    });
+                    *slot = other.copied().unwrap_or(NONE);
+                }
+                found
             })
             .collect()
     }
@@ -277,7 +309,7 @@ fn largest_eigenvalue<const D: usize>(e: &Tensor<D>) -> f64 {
 /// The strains around a cell.
 struct Around<'a, const D: usize> {
     criteria: &'a Criteria<'a, D>,
-    node_cells: &'a (Vec<u32>, Vec<u32>),
+    neighbours: &'a [[u32; 6]],
     strains: &'a [Tensor<D>],
     centre: &'a [Vector<D>],
     volume: &'a [f64],
@@ -304,9 +336,8 @@ impl<const D: usize> Around<'_, D> {
         let mut next = 0;
         while let Some(&at) = reached.cells.get(next) {
             next += 1;
-            for k in self.facet_neighbours(at as usize) {
+            for &k in self.neighbours[at as usize].iter().filter(|k| **k != NONE) {
                 if reached.stamp[k as usize] != c as u32
-                    && self.criteria.is_candidate(k as usize)
                     && (self.centre[k as usize] - x).norm() <= radius
                 {
                     reached.stamp[k as usize] = c as u32;
@@ -333,24 +364,6 @@ impl<const D: usize> Around<'_, D> {
             Some(difference) if second > 0.0 => difference * (2.0 * D as f64 * weight / second),
             _ => Tensor::zeros(),
         }
-    }
-
-    /// Cells that share a facet with `c`.
-    fn facet_neighbours(&self, c: usize) -> impl Iterator<Item = u32> + '_ {
-        let mesh = self.criteria.mesh;
-        let nodes = mesh.cell(c);
-        mesh.shapes[c].facets().iter().flat_map(move |facet| {
-            let first = nodes[facet[0]];
-            cells_of(self.node_cells, first)
-                .iter()
-                .copied()
-                .filter(move |&k| {
-                    k as usize != c
-                        && facet[1..]
-                            .iter()
-                            .all(|&i| mesh.cell(k as usize).contains(&nodes[i]))
-                })
-        })
     }
 }
 

@@ -136,6 +136,15 @@ impl Progress for TerminalProgress {
         }
     }
 
+    fn note(&self, line: &str) {
+        let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
+        match &*bar {
+            Some(bar) => bar.suspend(|| self.write_line(line)),
+            // a log file wants it too; one that is full is no reason to stop
+            None => drop(writeln!(std::io::stderr(), "{line}")),
+        }
+    }
+
     fn finish(&self) {
         self.replace(|| None);
     }

@@ -180,6 +180,8 @@ pub struct RunSummary {
     pub peak_memory_bytes: Option<u64>,
     /// Krylov iterations, or refinement steps after a factorisation.
     pub iterations: usize,
+    /// Scalars stored in the factors; zero without a factorisation.
+    pub factor_nonzeros: u64,
     /// Norm of the residual on free unknowns over that of the applied (or reaction) forces.
     pub residual: f64,
     /// Sum of all internal forces, one component per dimension; zero in a model without ghost forces at rest.

@@ -34,7 +34,7 @@ pub(super) fn joined<const D: usize>(
     spec: &SceneSpec,
     found: &[Material<D>],
     mesh: &Mesh<D>,
-    placed: Option<&Placed<D>>,
+    placed: Option<&Placed>,
 ) -> Result<Joined, SceneError> {
     let of = |coupling: CouplingSpec, span: Span, why: Option<String>| Joined {
         joining: coupling.joining(),
@@ -92,7 +92,7 @@ fn obstacle<const D: usize>(
     found: &[Material<D>],
     mesh: &Mesh<D>,
     truncated: &Joined,
-    placed: Option<&Placed<D>>,
+    placed: Option<&Placed>,
 ) -> Result<Option<String>, SceneError> {
     for m in found {
         let (lambda, mu) = m.lame;

@@ -149,6 +149,7 @@ pub fn solve_with<const D: usize>(
     };
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(model)?;
+    watch.lap(&mut timings, "assembly");
     let computed;
     let equilibrium = match &kept {
         Some(k) => {
@@ -156,7 +157,6 @@ pub fn solve_with<const D: usize>(
             &k.equilibrium
         }
         None => {
-            watch.lap(&mut timings, "assembly");
             computed = equilibrium(
                 &At {
                     model,
@@ -241,6 +241,7 @@ pub fn solve_with<const D: usize>(
         timings,
         peak_memory_bytes: peak_memory_bytes(),
         iterations: info.iterations,
+        factor_nonzeros: info.factor_nnz,
         residual: info.relative_residual,
         out_of_balance_force: balance.iter().copied().collect(),
         out_of_balance_relative: if scale > 0.0 {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::accuracy;
-use super::automatic::{Placement, Unplaced};
+use super::automatic::{Placed, Placement, Unplaced};
 use super::breaking::Breaking;
 use super::check;
 use super::conditions::{self, Condition};
@@ -305,7 +305,66 @@ fn scene<const D: usize>(
     let clock = solve.clock();
     let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
     let initial = initial::initial(&spec.initial, &mesh, clock)?;
-    let placed = automatic::placed(&Unplaced {
+    add_mesh(&mesh, &mut fingerprint);
+    let lay_out = |placed: Option<&Placed>| -> Result<Scene<D>, SceneError> {
+        let joined = joined::joined(spec, &found, &mesh, placed)?;
+        let joining = joined.joining;
+        let peridynamics = match (&spec.peridynamics, joining.zones) {
+            (Some(p), _) => Some(peridynamics::peridynamics(p, joining.lattice, &mesh)?),
+            (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
+            (None, _) => {
+                return Err(SceneError::new(
+                    SceneErrorKind::Missing,
+                    format!("coupling `{}` needs [peridynamics]", joining.name),
+                )
+                .label(joined.span.clone(), "has a peridynamic side")
+                .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
+            }
+        };
+        let mut zones = zones::zones(spec, &joined, &mesh, placed)?;
+        let peridynamics = peridynamics
+            .map(|p| bodies::bodies(spec, joining, p, &mesh, &mut zones))
+            .transpose()?;
+        one_peridynamic_material(spec, &found, &cell_material, &zones)?;
+        if let Some(p) = &peridynamics {
+            horizon(spec, p, &mesh, &zones)?;
+        }
+        let (voids, barriers) = obstacles::obstacles(spec, &mesh, &zones)?;
+        if matches!(solve, Solve::Explicit(_)) {
+            densities(spec, &found)?;
+        }
+        let peridynamic = cell_material
+            .iter()
+            .zip(&zones)
+            .find(|(_, zone)| **zone != Zone::Local)
+            .map_or(0, |(m, _)| *m);
+        let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
+        bodies::unbroken(spec, &breaking)?;
+        let output = output::output(spec, &mesh, name)?;
+        Ok(Scene {
+            title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
+            kinematics,
+            mesh: mesh.clone(),
+            zones,
+            materials: found.clone(),
+            cell_material: cell_material.clone(),
+            peridynamics,
+            coupling: joined.coupling,
+            coupling_why: joined.why,
+            placement: None,
+            choices: Vec::new(),
+            conditions: conditions.clone(),
+            voids,
+            barriers,
+            solve: solve.clone(),
+            initial: initial.clone(),
+            breaking,
+            solver,
+            output,
+            fingerprint,
+        })
+    };
+    let unplaced = Unplaced {
         spec,
         mesh: &mesh,
         materials: &found,
@@ -314,63 +373,13 @@ fn scene<const D: usize>(
         conditions: &conditions,
         initial: &initial,
         solver: &solver,
-    })?;
-    let joined = joined::joined(spec, &found, &mesh, placed.as_ref())?;
-    let joining = joined.joining;
-    let peridynamics = match (&spec.peridynamics, joining.zones) {
-        (Some(p), _) => Some(peridynamics::peridynamics(p, joining.lattice, &mesh)?),
-        (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
-        (None, _) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("coupling `{}` needs [peridynamics]", joining.name),
-            )
-            .label(joined.span.clone(), "has a peridynamic side")
-            .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
-        }
     };
-    let mut zones = zones::zones(spec, &joined, &mesh, placed.as_ref())?;
-    let peridynamics = peridynamics
-        .map(|p| bodies::bodies(spec, joining, p, &mesh, &mut zones))
-        .transpose()?;
-    one_peridynamic_material(spec, &found, &cell_material, &zones)?;
-    if let Some(p) = &peridynamics {
-        horizon(spec, p, &mesh, &zones)?;
-    }
-    let (voids, barriers) = obstacles::obstacles(spec, &mesh, &zones)?;
-    add_mesh(&mesh, &mut fingerprint);
-    if matches!(solve, Solve::Explicit(_)) {
-        densities(spec, &found)?;
-    }
-    let peridynamic = cell_material
-        .iter()
-        .zip(&zones)
-        .find(|(_, zone)| **zone != Zone::Local)
-        .map_or(0, |(m, _)| *m);
-    let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
-    bodies::unbroken(spec, &breaking)?;
-    let output = output::output(spec, &mesh, name)?;
+    let Some((placed, placement)) = automatic::placed(&unplaced, &lay_out)? else {
+        return lay_out(None);
+    };
     Ok(Scene {
-        title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
-        kinematics,
-        mesh,
-        zones,
-        materials: found,
-        cell_material,
-        peridynamics,
-        coupling: joined.coupling,
-        coupling_why: joined.why,
-        placement: placed.map(|p| p.placement),
-        choices: Vec::new(),
-        conditions,
-        voids,
-        barriers,
-        solve,
-        initial,
-        breaking,
-        solver,
-        output,
-        fingerprint,
+        placement: Some(placement),
+        ..lay_out(Some(&placed))?
     })
 }
 

@@ -19,7 +19,7 @@ pub(crate) fn zones<const D: usize>(
     spec: &SceneSpec,
     joined: &Joined,
     mesh: &Mesh<D>,
-    placed: Option<&Placed<D>>,
+    placed: Option<&Placed>,
 ) -> Result<Vec<Zone>, SceneError> {
     let joining = joined.joining;
     let count = mesh.cell_count();

@@ -115,7 +115,12 @@ fn source(case: &Case, wanted: f64) -> Result<Source, String> {
     Ok(source)
 }
 
-fn measured(case: &Case, outcomes: &mut Vec<Outcome>, table: &mut Table) -> Result<(), String> {
+fn measured(
+    case: &Case,
+    outcomes: &mut Vec<Outcome>,
+    table: &mut Table,
+    progress: &dyn Progress,
+) -> Result<(), String> {
     let here = Path::new("");
     let mut found: Vec<(f64, Source, Chosen)> = Vec::new();
     for &wanted in case.wanted {
@@ -172,6 +177,13 @@ fn measured(case: &Case, outcomes: &mut Vec<Outcome>, table: &mut Table) -> Resu
             Row::info(&label, "error over wanted", error / wanted)
                 .because(what.collect::<Vec<_>>().join("; ")),
         );
+        progress.note(&format!(
+            "{label}: error {:.2} of it, predicted {:.2}; cost {:.2} of the cheapest; time predicted {:.2}",
+            error / wanted,
+            outcome.predicted / wanted,
+            outcome.cost,
+            outcome.time
+        ));
         table.push(Row::info(
             &label,
             "predicted error over measured",
@@ -232,7 +244,8 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     progress.stage("choices", Some(cases.len() as u64));
     for case in cases {
         progress.tell(case.name);
-        if let Err(why) = measured(case, &mut outcomes, &mut table) {
+        if let Err(why) = measured(case, &mut outcomes, &mut table, progress) {
+            progress.note(&format!("{}: {why}", case.name));
             // counts as missed
             for &wanted in case.wanted {
                 outcomes.push(Outcome {

@@ -86,13 +86,13 @@ impl Ladder {
             .map_or(f64::INFINITY, |n| (n - 1e-9).ceil().max(FEWEST))
     }
 
-    /// Seconds of the candidate, from the finest pilot by the usual growth with the number of cells.
+    /// Work of the candidate, from that of the finest pilot by the usual growth with the number of cells.
     fn cost(&self, accuracy: f64, dimension: usize) -> f64 {
         let Some((n, pilot)) = self.levels.last() else {
             return f64::INFINITY;
         };
         let growth = [1.0, 2.4, 4.5][dimension - 1];
-        pilot.seconds * (self.cells(accuracy) / n).powf(growth)
+        pilot.work * (self.cells(accuracy) / n).powf(growth)
     }
 }
 
@@ -179,7 +179,7 @@ pub(super) fn choose(
             choices.push(Choice {
                 choice: asked.words(&ladder.family, n),
                 why: format!(
-                    "error {:.1e} predicted, within a factor of {SPREAD} in {CHOICES} that were measured (order {:.1}), for {:.1e} wanted; the cheapest of {} kinds, from pilots of {:.2} s{}",
+                    "error {:.1e} predicted, within a factor of {SPREAD} in {CHOICES} that were measured (order {:.1}), for {:.1e} wanted; the least work of {} kinds, counted in pilots of {:.2} s{}",
                     ladder.fit.error(n as f64),
                     ladder.fit.order,
                     asked.accuracy,
@@ -200,7 +200,7 @@ pub(super) fn choose(
             return Ok(done(&ladder.family, n, choices, prediction, bench.seconds));
         }
         let n = asked.fitting(2 * *finest as usize);
-        let ran = bench.run(&asked.overrides(&ladder.family, n), f64::INFINITY);
+        let ran = bench.run(&asked.overrides(&ladder.family, n), 0.0);
         let fitted = ran.and_then(|pilot| {
             ladder.levels.push((n as f64, pilot));
             let rest = ladder.fit.rest;
@@ -219,10 +219,7 @@ fn climb(asked: &Asked, family: &Family, bench: &mut Bench) -> Option<Ladder> {
     let mut levels = Vec::new();
     for rung in 0..FIRST {
         let n = asked.fitting(first << rung);
-        levels.push((
-            n as f64,
-            bench.run(&asked.overrides(family, n), f64::INFINITY)?,
-        ));
+        levels.push((n as f64, bench.run(&asked.overrides(family, n), 0.0)?));
     }
     let mut fit = estimate::fit(&levels, &bench.quantities)?;
     if let Some(padding) = family.padding {

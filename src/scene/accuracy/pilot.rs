@@ -6,6 +6,7 @@ use super::super::cost::TrialFolder;
 use super::super::source::Source;
 use super::super::spec::SceneSpec;
 use super::super::validate::AnyScene;
+use crate::observe::summary::RunSummary;
 use crate::progress::Silent;
 use crate::trade::{self, Measured, Quantity};
 
@@ -15,6 +16,37 @@ pub(crate) struct Pilot {
     pub measured: Measured,
     /// Seconds of all stages but output.
     pub seconds: f64,
+    /// Seconds that it would take by counting, [`work`].
+    pub work: f64,
+}
+
+/// Seconds of a run but for its output, by its counts and the rates of one machine: a choice between candidates is the same whatever else a
+/// machine does. Rates are those of `bondline run examples/slit_plate.toml` (blended, spliced, truncated; two cores), per bond, cell, stored
+/// scalar, operation and scalar of the factors, and of `cargo bench --bench bonds -- passes`; only their ratios count.
+fn work(summary: &RunSummary) -> f64 {
+    let [bonds, cells, dofs, nonzeros] = [
+        summary.sizes.bonds,
+        summary.sizes.cells,
+        summary.sizes.dofs,
+        summary.sizes.nonzeros,
+    ]
+    .map(|n| n as f64);
+    let layout = 1.1e-6 * bonds + 4e-6 * cells;
+    let iterations = summary.iterations as f64;
+    let solved = match (&summary.motion, summary.factor_nonzeros as f64) {
+        (Some(motion), _) => {
+            let passes = (motion.steps as f64).max(iterations);
+            passes * (1.5e-9 * bonds + 20e-9 * cells + 5e-9 * dofs)
+        }
+        (None, 0.0) => nonzeros * (1e-7 + 8e-9 * iterations),
+        (None, factor) => {
+            // the mean row of the factors squared, times rows: the operations of the slit plate to a fifth; L alone has half of the scalars
+            let half = if summary.energy.is_some() { 2.0 } else { 1.0 };
+            let operations = 1.2 * half * factor * factor / dofs;
+            35e-9 * nonzeros + operations / 7e9 + 2e-9 * factor * (1.0 + iterations)
+        }
+    };
+    layout + solved
 }
 
 /// Where pilots of one scene run.
@@ -91,8 +123,13 @@ impl Bench {
         scene.set_output_directory(self.folder.path().to_path_buf());
         let summary = scene.run(&Silent).map_err(|e| e.to_string())?;
         let seconds = summary.total_seconds - summary.timings.seconds("output");
+        let work = work(&summary);
         let json = serde_json::to_value(&summary).map_err(|e| e.to_string())?;
         let measured = Measured::read(self.folder.path(), &json).map_err(|e| e.to_string())?;
-        Ok(Pilot { measured, seconds })
+        Ok(Pilot {
+            measured,
+            seconds,
+            work,
+        })
     }
 }

@@ -1,18 +1,20 @@
-//! `zones = "auto"`: the finite-element solution of the scene, and the nonlocal zone that follows from it.
+//! `zones = "auto"`: the nonlocal zone that follows from a scene's shapes, and from its displacement in elements.
 //!
-//! 1. The scene is solved with elements alone; cells through which a crack or a void passes carry next to nothing.
-//! 2. Cells at cracks, at voids and, where bonds break, at notches are marked; so are those in which [`Criteria`] finds the local model wrong or a bond near its end.
-//! 3. What is marked is padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled. Where nothing is marked, elements are the whole model, and their solution is kept: the run writes it without solving again.
+//! 1. Cells at cracks, at voids and at notches are marked, the last for good only where bonds break. What is marked is padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled.
+//! 2. A static scene is solved with that zone, with elements alone where it is empty. Elements in which [`Criteria`](crate::coupling::need::Criteria) finds the local model wrong or a bond near its end are marked too.
+//! 3. Where they lie outside, or ask for much less than a zone around notches, the zone is theirs and the scene is solved again. Else the solution is that of the scene, and is kept: the run writes it without solving again. A look costs its search only.
+//!
+//! A load that grows is looked at once, at its end, with elements alone in which cells at cracks and voids carry next to nothing; a motion at its start.
 //!
 //! | file | what |
 //! |---|---|
 //! | `shapes.rs` | cells at cracks, voids and notches |
-//! | `elements.rs` | the displacement by elements alone |
+//! | `solutions.rs` | the displacement by elements alone, or with a zone so far |
 //! | `criteria.rs` | what that displacement needs |
 
 mod criteria;
-mod elements;
 mod shapes;
+mod solutions;
 #[cfg(test)]
 mod tests;
 
@@ -20,8 +22,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use self::criteria::Asked;
-pub(crate) use self::elements::Kept;
 use self::shapes::Marked;
+pub(crate) use self::solutions::Kept;
 use super::check;
 use super::conditions::Condition;
 use super::error::{SceneError, SceneErrorKind};
@@ -31,11 +33,13 @@ use super::peridynamics;
 use super::solve::Solve;
 use super::source::Span;
 use super::spec::{AutoSpec, LatticeStart, SceneSpec, ZonesNeeded};
-use super::validate::Solver;
+use super::validate::{Scene, Solver};
+use crate::coupling::Zone;
 use crate::coupling::need::Need;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::observe::summary::Choice;
+use crate::tensor::Vector;
 
 /// Horizons by which cracks, voids and notches are padded at least: bonds are cut within one, and points feel it within two.
 const AROUND_CRACKS: f64 = 2.0;
@@ -54,13 +58,16 @@ pub(super) struct Unplaced<'a, const D: usize> {
 
 /// The nonlocal zone that a scene needs.
 #[derive(Clone, Debug)]
-pub(super) struct Placed<const D: usize> {
+pub(super) struct Placed {
     /// One entry per cell.
     pub nonlocal: Vec<bool>,
     /// Where the scene asks for it.
     pub span: Span,
-    pub placement: Placement<D>,
 }
+
+/// Makes the scene with a zone.
+pub(super) type LayOut<'a, const D: usize> =
+    &'a dyn Fn(Option<&Placed>) -> Result<Scene<D>, SceneError>;
 
 /// How a zone came about.
 #[derive(Clone, Debug)]
@@ -69,7 +76,7 @@ pub(crate) struct Placement<const D: usize> {
     pub choice: Choice,
     /// Seconds of all but the solution that is kept.
     pub seconds: f64,
-    /// The solution of elements alone, where it is that of the scene.
+    /// The solution that the last look was taken at, where it is that of the scene.
     pub kept: Option<Arc<Kept<D>>>,
 }
 
@@ -83,10 +90,11 @@ struct Options {
 /// The zone of a scene that asks for one; none if it draws its own, or needs none.
 ///
 /// # Errors
-/// What the scene lacks, and what its solution with elements alone complains of.
+/// What the scene lacks, and what its solutions complain of.
 pub(super) fn placed<const D: usize>(
     scene: &Unplaced<'_, D>,
-) -> Result<Option<Placed<D>>, SceneError> {
+    lay_out: LayOut<'_, D>,
+) -> Result<Option<(Placed, Placement<D>)>, SceneError> {
     let (spec, mesh) = (scene.spec, scene.mesh);
     let Some(auto) = &spec.zones.auto else {
         return Ok(None);
@@ -127,34 +135,159 @@ pub(super) fn placed<const D: usize>(
     }
     let marked = shapes::marked(scene)?;
     let shapes = marked.shapes();
-    let (displacement, solved) = elements::state(scene, &marked.cut, &span)?;
     let material = material(scene, &shapes, &span)?;
-    let asked = Asked {
+    let search = Search {
+        scene,
+        options,
+        horizon,
+        shapes,
+        marked,
         material,
-        horizon: &horizon,
-        tolerance: options.tolerance,
-        stretch: options.stretch,
-    };
-    let need = criteria::need(scene, &asked, &marked.cut, &displacement)?;
-    let criteria: Vec<bool> = need
-        .error
-        .iter()
-        .zip(&need.stretch)
-        .map(|(e, s)| *e || *s)
-        .collect();
-    let nonlocal = zone(scene, &options, &horizon, material, &shapes, &criteria);
-    let choice = told(scene, &options, &marked, &need, &nonlocal);
-    let kept = solved.filter(|_| !nonlocal.contains(&true));
-    let reused = kept.as_ref().map_or(0.0, |k| k.equilibrium.timings.total());
-    Ok(Some(Placed {
-        nonlocal,
         span,
-        placement: Placement {
+        start,
+    };
+    match scene.solve {
+        Solve::Static if search.begins() => search.by_rounds(lay_out).map(Some),
+        _ => search.at_once().map(Some),
+    }
+}
+
+/// A zone on its way.
+struct Search<'a, const D: usize> {
+    scene: &'a Unplaced<'a, D>,
+    options: Options,
+    /// At the centre of each cell.
+    horizon: Vec<f64>,
+    marked: Marked,
+    /// What of `marked` is padded as shapes are.
+    shapes: Vec<bool>,
+    /// The material of the points.
+    material: u16,
+    /// Where the scene asks.
+    span: Span,
+    start: Instant,
+}
+
+/// Solutions before a zone that still wants to grow is taken as it is: each adds what lies at the edge of the last.
+const ROUNDS: usize = 4;
+
+/// Horizons around a notch that its strains are taken to ask for, before they are known; the slit plate asks for a sixth to a third.
+const GUESS: f64 = 0.34;
+
+/// A zone around notches is kept if the solution with it asks for no more cells, and for this share of them: smaller ones cost as much, and another solution besides.
+const SPARE: usize = 2;
+
+impl<const D: usize> Search<'_, D> {
+    /// Whether there is a zone to begin with.
+    fn begins(&self) -> bool {
+        self.shapes.contains(&true) || self.marked.notches.contains(&true)
+    }
+
+    /// From elements alone.
+    fn at_once(self) -> Result<(Placed, Placement<D>), SceneError> {
+        let cut = &self.marked.cut;
+        let (displacement, solved) = solutions::state(self.scene, cut, &self.span)?;
+        let need = self.need(cut, &displacement)?;
+        let nonlocal = self.zone(&either(&need.error, &need.stretch));
+        let kept = solved.filter(|_| !nonlocal.contains(&true));
+        Ok(self.placed(nonlocal, &need, kept))
+    }
+
+    /// From solutions with the zone so far, at first that around shapes, or where there are none around notches.
+    fn by_rounds(self, lay_out: LayOut<'_, D>) -> Result<(Placed, Placement<D>), SceneError> {
+        let shaped = self.shapes.contains(&true);
+        let mut criteria = match shaped {
+            true => vec![false; self.shapes.len()],
+            false => self
+                .scene
+                .mesh
+                .grown(&self.marked.notches, |c| GUESS * self.horizon[c]),
+        };
+        let mut placed = Placed {
+            nonlocal: self.zone(&criteria),
+            span: self.span.clone(),
+        };
+        let mut round = 1;
+        loop {
+            let solved = lay_out(Some(&placed)).and_then(|scene| {
+                let elements: Vec<bool> = scene.zones.iter().map(|z| *z == Zone::Local).collect();
+                Ok((elements, solutions::coupled(scene, &self.span)?))
+            });
+            let (elements, kept) = match solved {
+                // a guess that does not run is none
+                Err(_) if !shaped => return self.at_once(),
+                other => other?,
+            };
+            if shaped {
+                // points on both sides of a crack give no strain
+                let bonds: Vec<bool> = elements.iter().map(|e| !e).collect();
+                let need = self.need(&bonds, &kept.at_nodes())?;
+                criteria = either(&criteria, &either(&need.error, &need.stretch));
+                let grown = self.zone(&criteria);
+                if grown == placed.nonlocal || round == ROUNDS {
+                    return Ok(self.placed(placed.nonlocal, &need, Some(kept)));
+                }
+                placed.nonlocal = grown;
+            } else {
+                let need = self.need(&self.marked.cut, &kept.everywhere())?;
+                let asked = self.zone(&either(&need.error, &need.stretch));
+                if !asked.contains(&true) {
+                    return self.at_once();
+                }
+                let count = |cells: &[bool]| cells.iter().filter(|c| **c).count();
+                let holds = asked.iter().zip(&placed.nonlocal).all(|(a, p)| *p || !a);
+                let spare = count(&placed.nonlocal) <= SPARE * count(&asked);
+                if (holds && spare) || round == ROUNDS {
+                    return Ok(self.placed(placed.nonlocal, &need, Some(kept)));
+                }
+                placed.nonlocal = asked;
+            }
+            round += 1;
+        }
+    }
+
+    fn need(&self, cut: &[bool], displacement: &[Vector<D>]) -> Result<Need, SceneError> {
+        let asked = Asked {
+            material: self.material,
+            horizon: &self.horizon,
+            tolerance: self.options.tolerance,
+            stretch: self.options.stretch,
+        };
+        criteria::need(self.scene, &asked, cut, displacement)
+    }
+
+    fn placed(
+        &self,
+        nonlocal: Vec<bool>,
+        need: &Need,
+        kept: Option<Kept<D>>,
+    ) -> (Placed, Placement<D>) {
+        let choice = told(self.scene, &self.options, &self.marked, need, &nonlocal);
+        let reused = kept.as_ref().map_or(0.0, |k| k.equilibrium.timings.total());
+        let placement = Placement {
             choice,
-            seconds: start.elapsed().as_secs_f64() - reused,
+            seconds: self.start.elapsed().as_secs_f64() - reused,
             kept: kept.map(Arc::new),
-        },
-    }))
+        };
+        let span = self.span.clone();
+        (Placed { nonlocal, span }, placement)
+    }
+
+    /// The zone around what is marked.
+    fn zone(&self, criteria: &[bool]) -> Vec<bool> {
+        zone(
+            self.scene,
+            &self.options,
+            &self.horizon,
+            self.material,
+            &self.shapes,
+            criteria,
+        )
+    }
+}
+
+fn either(a: &[bool], b: &[bool]) -> Vec<bool> {
+    a.iter().zip(b).map(|(a, b)| *a || *b).collect()
 }
 
 /// Refuses zones that are drawn beside the one that is not.
@@ -250,6 +383,9 @@ fn zone<const D: usize>(
     criteria: &[bool],
 ) -> Vec<bool> {
     let mesh = scene.mesh;
+    if !(shapes.contains(&true) || criteria.contains(&true)) {
+        return vec![false; mesh.cell_count()];
+    }
     let far = options.padding.max(AROUND_CRACKS);
     let within = |mut cells: Vec<bool>| {
         for (cell, m) in cells.iter_mut().zip(scene.cell_material) {
@@ -294,11 +430,13 @@ fn told<const D: usize>(
         ("voids", &marked.voids),
         ("notches", &marked.notches),
     ] {
-        if count(cells) > 0 {
+        if count(cells) > 0 && (name != "notches" || marked.breaks) {
             why.push(format!("{name} mark {} cells", count(cells)));
         }
     }
+    let shapes = marked.shapes().contains(&true);
     let looked = match scene.solve {
+        Solve::Static if shapes => " outside of the zone",
         Solve::Static => "",
         Solve::QuasiStatic(_) => " at the end of the load",
         Solve::Explicit(_) => " at time zero",

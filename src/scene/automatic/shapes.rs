@@ -12,16 +12,20 @@ const CUT_WITHIN: f64 = 0.71;
 pub(super) struct Marked {
     pub cracks: Vec<bool>,
     pub voids: Vec<bool>,
+    /// At notches of the mesh.
     pub notches: Vec<bool>,
+    /// Whether bonds break, so that notches are nonlocal whatever the displacement.
+    pub breaks: bool,
     /// Cells that carry next to nothing in the finite-element solution.
     pub cut: Vec<bool>,
 }
 
 impl Marked {
-    /// Cells at any of them.
+    /// Cells that are nonlocal whatever the displacement.
     pub(super) fn shapes(&self) -> Vec<bool> {
         let all = self.cracks.iter().zip(&self.voids).zip(&self.notches);
-        all.map(|((c, v), n)| *c || *v || *n).collect()
+        all.map(|((c, v), n)| *c || *v || (*n && self.breaks))
+            .collect()
     }
 }
 
@@ -42,14 +46,15 @@ pub(super) fn touching<const D: usize>(
         .collect()
 }
 
-/// Cells at cracks and voids, and at notches of the mesh where bonds break.
+/// Cells at cracks, voids and notches of the mesh.
 pub(super) fn marked<const D: usize>(scene: &Unplaced<'_, D>) -> Result<Marked, SceneError> {
     let (spec, mesh) = (scene.spec, scene.mesh);
     let count = mesh.cell_count();
     let mut marked = Marked {
         cracks: vec![false; count],
         voids: vec![false; count],
-        notches: vec![false; count],
+        notches: touching(mesh, mesh.notches()),
+        breaks: scene.materials.iter().any(|m| m.fracture.is_some()),
         cut: vec![false; count],
     };
     for (name, c) in &spec.cracks {
@@ -69,9 +74,6 @@ pub(super) fn marked<const D: usize>(scene: &Unplaced<'_, D>) -> Result<Marked, 
             marked.voids[c] |= distance <= CUT_WITHIN * size(mesh, c);
             marked.cut[c] |= distance <= 0.0;
         }
-    }
-    if scene.materials.iter().any(|m| m.fracture.is_some()) {
-        marked.notches = touching(mesh, mesh.notches());
     }
     Ok(marked)
 }

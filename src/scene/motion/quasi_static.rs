@@ -229,6 +229,7 @@ fn load_steps<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
+        iterations: info.iterations,
         motion: Some(MotionSummary {
             ended,
             steps: state.step,

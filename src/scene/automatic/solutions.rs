@@ -1,27 +1,52 @@
-//! The displacement that a scene has with elements alone.
+//! The displacement that a scene has with elements alone, and with the zone that it has so far.
 
 use std::fmt;
 
 use super::Unplaced;
-use crate::coupling::{Coupling, Local, Model, Problem, SiteKind, Zone};
+use crate::coupling::{Coupling, Local, Model, Problem, Sampler, SiteKind, Zone};
 use crate::observe::summary::{Stopwatch, Timings};
 use crate::progress::Silent;
+use crate::scene::conditions::Condition;
 use crate::scene::error::{SceneError, SceneErrorKind};
 use crate::scene::initial::InitialKind;
 use crate::scene::materials::Material;
 use crate::scene::run::{self, Equilibrium, RunError};
 use crate::scene::solve::Solve;
 use crate::scene::source::Span;
+use crate::scene::validate::{Scene, Solver};
 use crate::tensor::{Tensor4, Vector};
 
 /// Stiffness of cells that a crack or a void passes through, over that of their material: a crack opens as if it were a slot one to two cells wide.
 const CUT: f64 = 1e-6;
 
-/// A local scene that is solved already.
+/// A scene that is solved already.
 pub(crate) struct Kept<const D: usize> {
     pub model: Model<D>,
     pub coupling: Box<dyn Coupling<D>>,
     pub equilibrium: Equilibrium,
+}
+
+impl<const D: usize> Kept<D> {
+    /// Displacement at the nodes of the mesh. Nodes of elements are sites; others, inside of a zone, have none.
+    pub(super) fn at_nodes(&self) -> Vec<Vector<D>> {
+        let displacement = &self.equilibrium.solution.displacement;
+        let mut u = vec![Vector::zeros(); self.model.mesh.nodes.len()];
+        for (site, s) in self.model.sites.iter().enumerate() {
+            if let SiteKind::Node(n) = s.kind {
+                u[n as usize] = Vector::from_column_slice(&displacement[site * D..][..D]);
+            }
+        }
+        u
+    }
+
+    /// The same, with what points around give at the nodes inside of a zone.
+    pub(super) fn everywhere(&self) -> Vec<Vector<D>> {
+        let sampler = Sampler::new(&self.model);
+        let displacement = &self.equilibrium.solution.displacement;
+        let at = |x| sampler.displacement(x, displacement);
+        let nodes = self.model.mesh.nodes.iter();
+        nodes.map(|x| at(x).unwrap_or_else(Vector::zeros)).collect()
+    }
 }
 
 impl<const D: usize> fmt::Debug for Kept<D> {
@@ -42,23 +67,32 @@ pub(super) fn state<const D: usize>(
         Solve::Explicit(_) => return Ok((initial(scene), None)),
     };
     let kept = elements(scene, cut, time).map_err(|error| {
-        SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`zones.auto` could not solve the scene with elements alone: {error}"),
-        )
-        .label(span.clone(), "needs that solution")
-        .help("hold and load the body so that `coupling = \"local\"` runs, or draw the zone: [zones.nonlocal]")
+        unsolved(&error, "with elements alone", span)
+            .help("hold and load the body so that `coupling = \"local\"` runs, or draw the zone: [zones.nonlocal]")
     })?;
-    // all nodes of elements are sites, in their order; others have no displacement
-    let mut u = vec![Vector::zeros(); scene.mesh.nodes.len()];
-    for (site, s) in kept.model.sites.iter().enumerate() {
-        if let SiteKind::Node(n) = s.kind {
-            let values = &kept.equilibrium.solution.displacement[site * D..][..D];
-            u[n as usize] = Vector::from_column_slice(values);
-        }
-    }
+    let u = kept.at_nodes();
     let own = *scene.solve == Solve::Static && !cut.contains(&true);
     Ok((u, own.then_some(kept)))
+}
+
+/// The solution of a static scene with the zone that it has so far.
+///
+/// # Errors
+/// What the solution complains of.
+pub(super) fn coupled<const D: usize>(scene: Scene<D>, span: &Span) -> Result<Kept<D>, SceneError> {
+    let (problem, rest) = run::problem(scene);
+    solved(problem, &rest.conditions, &rest.solver, 0.0).map_err(|error| {
+        unsolved(&error, "with a zone around cracks and voids", span)
+            .help("draw the zone, [zones.nonlocal], to see what the scene lacks")
+    })
+}
+
+fn unsolved(error: &RunError, how: &str, span: &Span) -> SceneError {
+    SceneError::new(
+        SceneErrorKind::Conflict,
+        format!("`zones.auto` could not solve the scene {how}: {error}"),
+    )
+    .label(span.clone(), "needs that solution")
 }
 
 /// The displacement at time zero.
@@ -102,18 +136,29 @@ fn elements<const D: usize>(
         peridynamics: None,
         coupling: Box::new(Local),
     };
+    solved(problem, scene.conditions, scene.solver, t)
+}
+
+/// Lays out and solves a problem under what holds and loads it at time `t`.
+fn solved<const D: usize>(
+    problem: Problem<D>,
+    conditions: &[Condition<D>],
+    solver: &Solver,
+    t: f64,
+) -> Result<Kept<D>, RunError> {
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
     let (model, coupling) = Model::new(problem, &Silent)?;
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(&model)?;
+    watch.lap(&mut timings, "assembly");
     let equilibrium = run::equilibrium(
         &run::At {
             model: &model,
             coupling: coupling.as_ref(),
             operator: operator.as_ref(),
-            conditions: scene.conditions,
-            solver: scene.solver,
+            conditions,
+            solver,
             time: t,
         },
         timings,
