@@ -5,6 +5,7 @@
 //! | `patch` | affine fields through the seam: residual, solution, out-of-balance force |
 //! | `balance` | the out-of-balance force of a seam against its leading term |
 //! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, what symmetry saves |
+//! | `seams` | cracks and waves in the plane beside every method, conditions of seams that do not follow the lattice |
 //! | `skin` | bars with free sides, with a skin of elements and without |
 //! | `layers` | two lattices of different horizons with a layer of elements between |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
@@ -189,6 +190,11 @@ pub const LONG_SUITES: &[Suite] = &[
         name: "convergence-3d",
         about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about an hour on two cores, only if named",
         run: convergence::run_solid,
+    },
+    Suite {
+        name: "seams",
+        about: "cracks at rest and in motion, waves onto faces and corners, by every method; seams that do not follow the lattice: only if named",
+        run: truncated::seams,
     },
     Suite {
         name: "scale",

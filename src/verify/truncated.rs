@@ -1,5 +1,6 @@
 //! Truncated bonds, measured: symmetry, definiteness, affine fields, equilibrium, order in the horizon, and what a symmetric matrix saves.
 
+mod compared;
 mod zones;
 
 use std::time::Instant;
@@ -501,6 +502,15 @@ pub fn savings(progress: &dyn Progress) -> Table {
     saving_rows::<2>(&mut table, 120, 3);
     saving_rows::<3>(&mut table, 15, 2);
     table
+}
+
+/// The suite `seams`: truncated bonds beside the other methods, and where they cannot be.
+pub fn seams(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let mut tables = compared::cracks(progress);
+    tables.push(compared::waves(effort, progress));
+    tables.push(zones::obstructions(effort, progress));
+    progress.finish();
+    tables
 }
 
 /// The suite `truncated`.

@@ -112,24 +112,48 @@ impl Part {
     }
 }
 
-/// Fits the seam unless it follows the lattice; returns whether it did.
-///
-/// # Errors
-/// [`ModelError::Seam`] with what is left if no positive factors meet the conditions.
-pub(super) fn fit<const D: usize>(
-    segments: &mut Segments<'_, D>,
-    strings: &Strings<D>,
-) -> Result<bool, ModelError> {
+/// The conditions of a seam whose faces cut the lattice anywhere, for an affine field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeamConditions {
+    /// Number of conditions.
+    pub conditions: usize,
+    /// How many are independent.
+    pub rank: usize,
+    /// Number of energies that may change: pieces, and whole bonds between points at the seam and their neighbours.
+    pub unknowns: usize,
+    /// What no change of them can meet, relative to what is missing: zero if there are factors, of any sign, that meet all conditions.
+    pub unreachable: f64,
+}
+
+/// Looks at the conditions of the pairwise part.
+pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> SeamConditions {
+    let Missing { missing, .. } = missing(segments);
+    segments.widen();
+    let parts = parts(segments);
+    let (conditions, target) = pair_conditions(segments, &parts, &missing);
+    let (rank, unreachable) = conditions.rank(&target);
+    SeamConditions {
+        conditions: target.len(),
+        rank,
+        unknowns: parts.len(),
+        unreachable,
+    }
+}
+
+/// What is missing before a fit.
+struct Missing<const D: usize> {
+    /// Integrals of gradients by site, as [`loaded_nodes`] gives them.
+    nodes: HashMap<u32, Vector<D>>,
+    /// Conditions by site.
+    missing: HashMap<u32, Vec<f64>>,
+    /// The largest traction of a face.
+    scale: f64,
+}
+
+fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
     let nodes = loaded_nodes(segments);
     let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
     let tensor = pair_tensor(segments);
-    let scale = largest * tensor.amax();
-    let rounding = rounding(segments);
-    let follows = |missing: &HashMap<u32, Vec<f64>>| {
-        missing.iter().all(|(site, m)| {
-            strings.holds(*site) || m.iter().all(|m| m.abs() <= (FOLLOWS + rounding) * scale)
-        })
-    };
     let mut missing = HashMap::new();
     for (&site, b) in &nodes {
         let mut row = third(b, &tensor);
@@ -146,6 +170,32 @@ pub(super) fn fit<const D: usize>(
             }
         }
     }
+    Missing {
+        nodes,
+        missing,
+        scale: largest * tensor.amax(),
+    }
+}
+
+/// Fits the seam unless it follows the lattice; returns whether it did.
+///
+/// # Errors
+/// [`ModelError::Seam`] with what is left if no positive factors meet the conditions.
+pub(super) fn fit<const D: usize>(
+    segments: &mut Segments<'_, D>,
+    strings: &Strings<D>,
+) -> Result<bool, ModelError> {
+    let Missing {
+        nodes,
+        missing,
+        scale,
+    } = missing(segments);
+    let rounding = rounding(segments);
+    let follows = |missing: &HashMap<u32, Vec<f64>>| {
+        missing.iter().all(|(site, m)| {
+            strings.holds(*site) || m.iter().all(|m| m.abs() <= (FOLLOWS + rounding) * scale)
+        })
+    };
     if follows(&missing) {
         return Ok(false);
     }

@@ -68,6 +68,48 @@ impl Conditions {
         sum
     }
 
+    /// The rank of the conditions, and the part of `target` that no change at all can reach: the norm of what is left, over that of the target. Rows are scaled to the same size.
+    ///
+    /// From all eigenvectors of `A Aᵀ`, so for some thousand conditions at most; singular values below 3e-7 of the largest count as zero.
+    pub fn rank(&self, target: &[f64]) -> (usize, f64) {
+        let mut size = vec![0.0f64; self.count];
+        for (&r, v) in self.rows.iter().zip(&self.values) {
+            size[r as usize] += v * v;
+        }
+        let scale: Vec<f64> = size
+            .iter()
+            .map(|&s| if s > 0.0 { 1.0 / s.sqrt() } else { 0.0 })
+            .collect();
+        let mut square = faer::Mat::<f64>::zeros(self.count, self.count);
+        for k in 0..self.changes() {
+            for (r, v) in self.column(k) {
+                for (s, w) in self.column(k) {
+                    square[(r, s)] += scale[r] * v * scale[s] * w;
+                }
+            }
+        }
+        // an eigenvalue problem that does not converge has no rank
+        let Ok(of) = square.self_adjoint_eigen(faer::Side::Lower) else {
+            return (0, f64::NAN);
+        };
+        let values: Vec<f64> = of.S().column_vector().iter().copied().collect();
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let target: Vec<f64> = target.iter().zip(&scale).map(|(t, s)| t * s).collect();
+        let mut rank = 0;
+        let mut left = 0.0;
+        for (k, value) in values.iter().enumerate() {
+            if *value > 1e-13 * largest {
+                rank += 1;
+            } else {
+                let vector = of.U().col(k);
+                let along: f64 = vector.iter().zip(&target).map(|(v, t)| v * t).sum();
+                left += along * along;
+            }
+        }
+        let norm: f64 = target.iter().map(|t| t * t).sum();
+        (rank, (left / norm.max(f64::MIN_POSITIVE)).sqrt())
+    }
+
     fn transposed(&self, multiplier: &[f64]) -> Vec<f64> {
         (0..self.changes())
             .into_par_iter()

@@ -6,13 +6,16 @@ use rayon::prelude::*;
 
 use super::{AFFINE_LIMIT, Material, rows_of};
 use crate::{
-    coupling::{Model, ModelError, Peridynamics, PointSource, Problem, Surfaces, Truncated, Zone},
+    coupling::{
+        Coupling, Model, ModelError, Peridynamics, PointSource, Problem, Surfaces, Truncated, Zone,
+        truncated::seam_conditions,
+    },
     mesh::generate::{Axis, Grid},
     observe::report::{Columns, Row, Table},
     peridynamics::{BondWeights, Micromodulus, PartialVolume},
     progress::{Progress, Silent},
     shape::{Barrier, Shape},
-    tensor::Vector,
+    tensor::{Tensor4, Vector},
     verify::{
         Effort,
         enclosed::{Enclosed, EnclosedError, SPACING},
@@ -23,6 +26,8 @@ use crate::{
 /// The shape of a zone; lengths are in cells, the zone reaches from −`half` to `half` where nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Form {
+    /// All of it.
+    Block,
     /// Without its corner of positive coordinates: re-entrant corners and edges.
     Reentrant,
     /// With elements in its middle.
@@ -40,6 +45,7 @@ enum Form {
 impl Form {
     fn name(self) -> &'static str {
         match self {
+            Self::Block => "block",
             Self::Reentrant => "re-entrant corner",
             Self::Hole => "elements inside",
             Self::Two => "two zones",
@@ -57,7 +63,7 @@ impl Form {
             Self::Hole => block && s.amax() > (half / 2.0).floor(),
             Self::Two => across && s[0].abs() < half && !(0.0..1.0).contains(&s[0]),
             Self::Boundary => across && s[0] < half,
-            Self::Cracked => block,
+            Self::Block | Self::Cracked => block,
             Self::Ball => s.norm() < half,
         }
     }
@@ -99,8 +105,11 @@ struct Case {
 }
 
 /// Half widths of the zone and of the block, in cells.
-fn halves<const D: usize>(size: u32) -> (u32, u32) {
+fn halves<const D: usize>(form: Form, size: u32) -> (u32, u32) {
     match (D, size) {
+        // small enough for all eigenvalues of its conditions
+        (3, _) if form == Form::Block => (1, 3),
+        (_, _) if form == Form::Block => (3, 5),
         (3, 1) => (4, 6),
         (3, _) => (2, 4),
         (_, 1) => (6, 10),
@@ -109,8 +118,9 @@ fn halves<const D: usize>(size: u32) -> (u32, u32) {
     }
 }
 
-fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
-    let (zone, total) = halves::<D>(case.grain.size());
+/// The model of a case, half the width of its block, and its tensor.
+fn model<const D: usize>(case: &Case) -> Result<Placed<D>, EnclosedError> {
+    let (zone, total) = halves::<D>(case.form, case.grain.size());
     let cell = f64::from(case.grain.size()) * SPACING;
     let half = f64::from(total) * cell;
     let mut grid = Grid::<D>::new(std::array::from_fn(|_| Axis::Uniform {
@@ -171,6 +181,28 @@ fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
         coupling: Box::new(Truncated::default()),
     };
     let (model, coupling) = Model::new(problem, &Silent)?;
+    Ok(Placed {
+        model,
+        coupling,
+        half,
+        tensor,
+    })
+}
+
+struct Placed<const D: usize> {
+    model: Model<D>,
+    coupling: Box<dyn Coupling<D>>,
+    half: f64,
+    tensor: Tensor4<D>,
+}
+
+fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
+    let Placed {
+        model,
+        coupling,
+        half,
+        tensor,
+    } = model::<D>(case)?;
     let stiffness = {
         let operator = coupling.operator(&model)?;
         model.assemble(operator.as_ref(), &Silent)
@@ -181,6 +213,61 @@ fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
         half,
         tensor,
     })
+}
+
+/// What stands in the way of a seam that does not follow the lattice, and whether it could be fitted.
+fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<Row> {
+    let case = Case {
+        form: Form::Block,
+        grain,
+        material: Material::Pairwise(Micromodulus::InverseDistance),
+        ratio,
+    };
+    let name = format!("{D}D, m = {ratio}, {}", grain.name());
+    let placed = match model::<D>(&case) {
+        Ok(placed) => placed,
+        Err(e) => return vec![Row::refused(name, "conditions", e.to_string())],
+    };
+    let mut rows = Vec::new();
+    if let Some(found) = seam_conditions(&placed.model) {
+        rows.push(Row::info(&name, "conditions", found.conditions as f64));
+        rows.push(Row::info(&name, "rank", found.rank as f64));
+        rows.push(Row::info(&name, "unknowns", found.unknowns as f64));
+        rows.push(Row::info(&name, "unreachable", found.unreachable));
+    }
+    rows.push(match placed.coupling.operator(&placed.model) {
+        Ok(_) => Row::info(&name, "left after the fit", 0.0),
+        Err(ModelError::Seam { residual, .. }) => Row::info(&name, "left after the fit", residual)
+            .because("refused when the model is made"),
+        Err(e) => Row::refused(&name, "left after the fit", e.to_string()),
+    });
+    rows
+}
+
+/// The table of seams that do not follow the lattice.
+pub(super) fn obstructions(effort: Effort, progress: &dyn Progress) -> Table {
+    progress.stage("conditions of seams", None);
+    let mut table = Table::new(
+        "Seams that do not follow the lattice, a block of 12 h in 2D and of 4 h in 3D: conditions for affine fields (pairwise part), how many are independent, energies that may change, the part of what is missing that no \
+         change of any sign can reach, and what the fit with factors of at least 0.1 leaves, relative to the largest traction of a face",
+        Columns::ByQuantity,
+    );
+    let grains = [Grain::Jittered, Grain::Simplices];
+    let mut rows: Vec<Row> = Vec::new();
+    for grain in grains {
+        for ratio in [2, 3] {
+            rows.extend(obstruction::<2>(grain, ratio));
+        }
+    }
+    if effort == Effort::Full {
+        for grain in grains {
+            for ratio in [2, 3] {
+                rows.extend(obstruction::<3>(grain, ratio));
+            }
+        }
+    }
+    rows.into_iter().for_each(|row| table.push(row));
+    table
 }
 
 /// The half plane `y = 0`, `x > 0` up to `end`: a segment in 2D, a rectangle through the block in 3D.
@@ -227,7 +314,8 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
     };
     // where bonds are missing the body is softer, whatever the seam is: within the families of an LPS, and a cell
     let reach = (2.0 * f64::from(case.ratio) + f64::from(case.grain.size())) * SPACING;
-    let end = f64::from(halves::<D>(case.grain.size()).0 * case.grain.size() + 1) * SPACING;
+    let end =
+        f64::from(halves::<D>(case.form, case.grain.size()).0 * case.grain.size() + 1) * SPACING;
     rows_of(&name, &e, case.material, limit, |x| match case.form {
         Form::Boundary => x[0] > -e.half + reach,
         Form::Cracked => x[0] < -reach || x[0] > end + reach || (D > 1 && x[1].abs() > reach),
