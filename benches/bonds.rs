@@ -146,6 +146,7 @@ fn list<const D: usize>(
         volume: &vec![H.powi(D as i32); n],
         families: &families,
         rows: &[],
+        idle: &[],
         force: law.force(),
         kinematics: Kinematics::Exact,
         failure: critical.map(|s| Failure {

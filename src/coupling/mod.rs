@@ -159,6 +159,11 @@ pub trait Operator<const D: usize>: Sync {
     /// Adds what is left of the row of a site without its bonds, for an operator that has [`Operator::seam_bonds`].
     fn add_row_without_bonds(&self, _site: usize, _row: &mut Row<D>) {}
 
+    /// Whether the energy behind the rows is bounded below whatever the model; where it is not, a run factorises the matrix before it trusts it.
+    fn is_sum_of_squares(&self) -> bool {
+        true
+    }
+
     /// Number of directed bonds that the method adds to those of the peridynamic body (Gauss points).
     fn additional_bonds(&self) -> usize {
         0

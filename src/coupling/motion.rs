@@ -31,6 +31,10 @@ mod rows;
 #[path = "motion_tests.rs"]
 mod tests;
 
+#[cfg(test)]
+#[path = "motion_seam_tests.rs"]
+mod seam_tests;
+
 const NONE: u32 = u32::MAX;
 
 /// Points per task of the copies between sites and points.
@@ -41,11 +45,33 @@ pub struct BondBehaviour<'a, const D: usize> {
     /// Whether bonds turn with the body, or are linear in the displacement.
     pub kinematics: Kinematics,
     /// Critical stretch s_c; none if nothing breaks.
-    pub critical_stretch: Option<f64>,
+    pub critical_stretch: Option<Critical>,
     /// Where bonds never break.
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
     /// Contact of points that no bond joins; none if they may pass through each other.
     pub contact: Option<ContactBehaviour>,
+}
+
+/// The stretch at which bonds break.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Critical {
+    /// The same everywhere.
+    Uniform(f64),
+    /// One for each horizon of the model, \[m\] and \[1\]: the same fracture energy takes a larger stretch where the horizon is smaller.
+    ByHorizon(Vec<(f64, f64)>),
+}
+
+impl Critical {
+    /// That of bonds of a horizon; infinite for one that is not listed.
+    pub fn at(&self, horizon: f64) -> f64 {
+        match self {
+            Self::Uniform(s) => *s,
+            Self::ByHorizon(list) => {
+                let found = list.iter().find(|(of, _)| *of == horizon);
+                found.map_or(f64::INFINITY, |(_, s)| *s)
+            }
+        }
+    }
 }
 
 /// How points that no bond joins keep their distance.
@@ -116,9 +142,11 @@ impl<'a, const D: usize> Motion<'a, D> {
         };
         let body = MovingBody::new(model, operator, behaviour, seam.as_ref())?;
         if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
-            let x = &body.cloud.position;
-            seam.behave(behaviour.kinematics, behaviour.critical_stretch, |p| {
-                (behaviour.no_fail)(&x[p as usize])
+            let cloud = &body.cloud;
+            let critical = behaviour.critical_stretch.as_ref();
+            let critical = critical.map(|c| |p: u32| c.at(cloud.horizon[p as usize]));
+            seam.behave(behaviour.kinematics, critical, |p| {
+                (behaviour.no_fail)(&cloud.position[p as usize])
             });
         }
         let linear = SiteRows::assemble(
@@ -264,8 +292,13 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
         self.linear
             .multiply_into::<D>(u, bonds, &mut self.products, force);
-        let at_seam = self.seam.as_mut().map(|s| s.add_force(u, force, breakage));
-        broken + at_seam.unwrap_or(0)
+        let Some(seam) = &mut self.seam else {
+            return broken;
+        };
+        if broken > 0 {
+            seam.follow(body.pass.as_ref());
+        }
+        broken + seam.add_force(u, force, breakage)
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
@@ -349,11 +382,17 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                     && moving.bonds_of_site[site] != NONE
                 {
                     let point = moving.bonds_of_site[site] as usize;
-                    let weight = |j: usize| match &self.seam {
-                        Some(s) if !s.is_whole(point, j) => 0.0,
-                        _ => 1.0,
-                    };
-                    body.add_force_row(point, weight, row);
+                    let idle = self.seam.as_ref().map_or(&[][..], SeamBonds::idle);
+                    if idle.is_empty() {
+                        let weight = |j: usize| match &self.seam {
+                            Some(s) if !s.is_whole(point, j) => 0.0,
+                            _ => 1.0,
+                        };
+                        body.add_force_row(point, weight, row);
+                    } else {
+                        // a point with an energy in the body's pass has whole bonds only
+                        body.add_force_row_of_energies(point, |_| [1.0; 2], |j| !idle[j], row);
+                    }
                 }
                 if let Some(seam) = &self.seam {
                     seam.add_row(site, row);
@@ -398,7 +437,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
 
     fn dissipated_energy(&self) -> Option<f64> {
         let moving = self.body.as_ref()?;
-        let s = moving.critical_stretch?;
+        let critical = moving.critical_stretch.as_ref()?;
         let body = self.model.body()?;
         let at_seam = self.seam.as_ref().map_or(0.0, SeamBonds::dissipated);
         if moving.pass.broken() == 0 {
@@ -417,6 +456,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 }
                 let is_here = |j: u32| self.seam.as_ref().is_none_or(|s| s.is_whole(i, j as usize));
                 let pair = body.kernel(i).0;
+                let s = critical.at(cloud.horizon[i]);
                 let family = body.families.of(i).iter().zip(pair);
                 family
                     .filter(|&(&j, _)| is_here(j) && !moving.pass.bonded(i, j as usize))

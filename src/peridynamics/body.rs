@@ -214,6 +214,17 @@ impl<const D: usize> PdBody<D> {
         weights: impl Fn(usize) -> [f64; 2],
         row: &mut Row<D>,
     ) {
+        self.add_force_row_of_energies(i, weights, |_| true, row);
+    }
+
+    /// As [`PdBody::add_force_row_of_parts`], of a law with a state: what the energies of the points that `counts` names make of it.
+    pub fn add_force_row_of_energies(
+        &self,
+        i: usize,
+        weights: impl Fn(usize) -> [f64; 2],
+        counts: impl Fn(usize) -> bool,
+        row: &mut Row<D>,
+    ) {
         let transfer = &self.cloud.transfer;
         let volume = self.cloud.volume[i];
         let (pair, omega) = self.kernel(i);
@@ -221,7 +232,8 @@ impl<const D: usize> PdBody<D> {
         let q = self.state(i).map_or(0.0, |s| s.stabilisation);
         let mut own = Tensor::zeros();
         let mut first = Vector::<D>::zeros();
-        for (k, &j) in self.families.of(i).iter().enumerate() {
+        let family = if counts(i) { self.families.of(i) } else { &[] };
+        for (k, &j) in family.iter().enumerate() {
             let j = j as usize;
             let xi = self.bond(i, j);
             let [vv, of_state] = weights(j).map(|w| volume * self.cloud.volume[j] * w);
@@ -240,7 +252,7 @@ impl<const D: usize> PdBody<D> {
             }
         }
         if let Some(reversed) = &self.reversed {
-            for (j, bond) in reversed.of(i) {
+            for (j, bond) in reversed.of(i).filter(|(j, _)| counts(*j as usize)) {
                 let j = j as usize;
                 let xi = self.bond(j, i);
                 let [vv, of_state] = weights(j).map(|w| volume * self.cloud.volume[j] * w);

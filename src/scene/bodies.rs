@@ -1,6 +1,5 @@
 //! Parts of the nonlocal zone with a horizon and a lattice of their own, and the layers of elements between them.
 
-use super::breaking::Breaking;
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
@@ -103,25 +102,6 @@ pub(super) fn bodies<const D: usize>(
         points: Points::Lattices { lattices, of_cell },
         ..p
     })
-}
-
-/// Refuses bodies of their own horizon whose bonds break: the critical stretch of a model is one.
-pub(super) fn unbroken<const D: usize>(
-    spec: &SceneSpec,
-    breaking: &Breaking<D>,
-) -> Result<(), SceneError> {
-    match (breaking.fracture, spec.zones.bodies.keys().next()) {
-        (Some(_), Some(name)) => Err(SceneError::new(
-            SceneErrorKind::Later,
-            format!("`zones.bodies.{name}` has a horizon of its own, and bonds break"),
-        )
-        .label(
-            name.span.clone(),
-            "would need a critical stretch of its own",
-        )
-        .help("leave fracture-energy and critical-stretch out, or use one horizon")),
-        _ => Ok(()),
-    }
 }
 
 /// Makes elements of nonlocal cells that share a node with a body named later.

@@ -10,6 +10,7 @@
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `output.rs` | its parts |
 //! | `automatic/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
+//! | `definite.rs` | whether a seam that may be unstable is |
 //! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
@@ -29,6 +30,7 @@ mod choice;
 mod conditions;
 mod converge;
 mod cost;
+mod definite;
 mod error;
 mod expression;
 mod initial;

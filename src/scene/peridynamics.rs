@@ -164,7 +164,10 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::coupling::{Motion, Sampler, motion::BondBehaviour};
+    use crate::coupling::{
+        Motion, Sampler,
+        motion::{BondBehaviour, Critical},
+    };
     use crate::peridynamics::kernel::Kinematics as BondKinematics;
     use crate::progress::Silent;
     use crate::scene::{AnyScene, Solved, Source, solve_with};
@@ -315,7 +318,7 @@ y = "-5e-4*x+1e-3*y"
                 let model = solved.model;
                 let behaviour = BondBehaviour {
                     kinematics,
-                    critical_stretch: Some(1.0),
+                    critical_stretch: Some(Critical::Uniform(1.0)),
                     no_fail: &|_| false,
                     contact: None,
                 };

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::breaking::Breaking;
 use super::conditions::Condition;
+use super::definite::{self, Ratio};
 use super::initial::Initial;
 use super::loads::{loads, supports};
 use super::materials::{Law, Material};
@@ -69,6 +70,18 @@ pub enum RunError {
     /// The fracture energy gives no critical stretch.
     #[error("the material of the points cannot break: {0}")]
     Fracture(#[from] FractureError),
+    /// The seam may have a negative stiffness, and nothing shows that it has none.
+    #[error(
+        "Poisson's ratio {typed:.4} is below {pairwise:.4}, that of bonds that act alone, and the seam of coupling `truncated` then has dilatations of a negative stiffness: {what}; couple by splice or blending, or take a larger poisson-ratio"
+    )]
+    Indefinite {
+        /// What was found.
+        what: String,
+        /// Poisson's ratio of the material.
+        typed: f64,
+        /// The ratio of a pairwise law.
+        pairwise: f64,
+    },
     /// Something that is planned and not there yet.
     #[error("{what}: {remedy}")]
     Later {
@@ -149,6 +162,8 @@ pub fn solve_with<const D: usize>(
     };
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(model)?;
+    let mut choices: Vec<Choice> = rest.made().cloned().collect();
+    definite::check(model, operator.as_ref(), rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
     let computed;
     let equilibrium = match &kept {
@@ -185,7 +200,6 @@ pub fn solve_with<const D: usize>(
     let (symmetry, applied) = (*symmetry, *applied);
     let info = &solution.info;
     watch = Stopwatch::start();
-    let mut choices: Vec<Choice> = rest.made().cloned().collect();
     choices.extend(equilibrium.choices.iter().cloned());
     choices.push(Choice {
         choice: info.method.name().to_owned(),
@@ -346,6 +360,8 @@ pub(super) struct Rest<const D: usize> {
     pub output: Output<D>,
     pub initial: Vec<Initial<D>>,
     pub breaking: Breaking<D>,
+    /// Poisson's ratio of the points.
+    pub ratio: Ratio,
     pub fingerprint: Fingerprint,
     /// Density of each material.
     pub density: Vec<f64>,
@@ -397,6 +413,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
         Law::BondBased(_) => Influence::Gaussian,
     };
     let law = law(stuff);
+    let ratio = Ratio::new(stuff.lame, scene.kinematics);
     let method = scene.coupling.build(influence);
     let chosen = scene.coupling_why.map(|why| Choice {
         choice: format!("coupling {}", scene.coupling.joining().name),
@@ -447,6 +464,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             output: scene.output,
             initial: scene.initial,
             breaking: scene.breaking,
+            ratio,
             fingerprint: scene.fingerprint,
             density,
             chosen,

@@ -339,7 +339,6 @@ fn scene<const D: usize>(
             .find(|(_, zone)| **zone != Zone::Local)
             .map_or(0, |(m, _)| *m);
         let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
-        bodies::unbroken(spec, &breaking)?;
         let output = output::output(spec, &mesh, name)?;
         Ok(Scene {
             title: spec.title.clone().unwrap_or_else(|| name.to_owned()),

@@ -18,6 +18,7 @@ use crate::{
         influence::{Alpha, Degree},
     },
     progress::Silent,
+    shape::Barrier,
     system::BlockCsr,
     tensor::{Tensor4, Vector},
 };
@@ -298,6 +299,19 @@ impl<const D: usize> Enclosed<D> {
         coupling: Box<dyn Coupling<D>>,
         law: Box<dyn BondLaw<D>>,
     ) -> Result<Self, EnclosedError> {
+        Self::with_barriers(case, coupling, law, Vec::new())
+    }
+
+    /// As [`Enclosed::with`], with cracks and slits.
+    ///
+    /// # Errors
+    /// As [`Enclosed::new`].
+    pub fn with_barriers(
+        case: &Case,
+        coupling: Box<dyn Coupling<D>>,
+        law: Box<dyn BondLaw<D>>,
+        barriers: Vec<Barrier<D>>,
+    ) -> Result<Self, EnclosedError> {
         let (mesh, zones) = blocks::<D>(case.cells, case.widths)?;
         let tensor = *law.tensor();
         let horizon = f64::from(case.ratio) * SPACING;
@@ -321,7 +335,7 @@ impl<const D: usize> Enclosed<D> {
                 },
                 weights: BondWeights::Isotropic,
                 volumes: PartialVolume::Full,
-                barriers: Vec::new(),
+                barriers,
                 voids: Vec::new(),
                 surfaces: Surfaces::Uncut,
             }),

@@ -37,7 +37,8 @@ pub const AFFINE_LIMIT: f64 = 1e-11;
 /// Larger horizon over the smaller one.
 pub const HORIZONS: u32 = 4;
 
-fn bodies<const D: usize>(law: Law, ratio: u32) -> Result<Enclosed<D>, String> {
+/// A block whose halves have lattices and horizons of their own, the larger ones where x is negative.
+pub(crate) fn bodies<const D: usize>(law: Law, ratio: u32) -> Result<Enclosed<D>, String> {
     // half of the block, of the peridynamic zone, in cells; the layer is the cell right of the middle
     let (half, zone): (u32, u32) = if D == 3 { (5, 3) } else { (11, 7) };
     let grid = Grid::<D>::new(std::array::from_fn(|_| Axis::Uniform {

@@ -8,6 +8,7 @@ mod contact;
 mod driven;
 mod faults;
 mod growth;
+mod indefinite;
 mod keys;
 mod load_steps;
 mod restarts;

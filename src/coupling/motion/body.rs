@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use super::{BondBehaviour, CHUNK, MotionError, NONE};
+use super::{BondBehaviour, CHUNK, Critical, MotionError, NONE};
 use crate::{
     assembly::Transfer,
     coupling::{Model, Operator, SeamBonds, SiteKind},
@@ -21,7 +21,7 @@ use crate::{
 /// The points and their bonds.
 pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
-    pub critical_stretch: Option<f64>,
+    pub critical_stretch: Option<Critical>,
     /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
     pub contact: Option<Mutex<Contact<D>>>,
     /// The site of each point; `NONE` for a point that follows sites.
@@ -88,7 +88,10 @@ impl<const D: usize> MovingBody<D> {
             None => body.kernel(i).0[k],
             Some(_) => coefficient(body, i, families.of(i)[k]),
         };
-        let omega = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).1[k];
+        let omega = |i: usize, k: usize, _: &Vector<D>| match seam {
+            None => body.kernel(i).1[k],
+            Some(_) => omega_of(body, i, families.of(i)[k]),
+        };
         let force = match p.law.bond_energy(body.cloud.horizon[0]) {
             Some(BondEnergy::Pairwise { .. }) => BondForce::Pairwise { coefficient: &pair },
             Some(BondEnergy::Lps { bulk, shear, .. }) => BondForce::Solid {
@@ -98,15 +101,23 @@ impl<const D: usize> MovingBody<D> {
             },
             None => return Err(MotionError::Law { law: p.law.name() }),
         };
+        let by_bond = |i: usize, _: usize, _: &Vector<D>| {
+            let critical = behaviour.critical_stretch.as_ref();
+            critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon[i]))
+        };
         let pass = bond_pass(&BondSetup {
             position: &body.cloud.position,
             volume: &body.cloud.volume,
             families,
             rows: &is_site,
+            idle: seam.map_or(&[], SeamBonds::idle),
             force,
             kinematics: behaviour.kinematics,
-            failure: behaviour.critical_stretch.map(|s| Failure {
-                critical: CriticalStretch::Uniform(s),
+            failure: behaviour.critical_stretch.as_ref().map(|s| Failure {
+                critical: match s {
+                    Critical::Uniform(s) => CriticalStretch::Uniform(*s),
+                    Critical::ByHorizon(_) => CriticalStretch::PerBond(&by_bond),
+                },
                 no_fail: &no_fail,
             }),
             precracked: None,
@@ -135,7 +146,7 @@ impl<const D: usize> MovingBody<D> {
             .then_some(first as usize);
         Ok(Some(Self {
             pass,
-            critical_stretch: behaviour.critical_stretch,
+            critical_stretch: behaviour.critical_stretch.clone(),
             contact,
             site_of_point,
             shift,
@@ -176,6 +187,12 @@ impl<const D: usize> MovingBody<D> {
 fn coefficient<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
     let place = body.families.of(i).binary_search(&j);
     place.map_or(0.0, |k| body.kernel(i).0[k])
+}
+
+/// The influence function of the bond from point `i` to point `j`, factors of the lattice included; zero if there is none.
+fn omega_of<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
+    let place = body.families.of(i).binary_search(&j);
+    place.map_or(0.0, |k| body.kernel(i).1[k])
 }
 
 /// `c` of `f = c s`, the largest of the bonds of the point with the most of them.

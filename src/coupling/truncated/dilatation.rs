@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::segments::{BySite, End, Segments};
+use super::segments::{BySite, End, Segment, Segments};
 use crate::{
     assembly::Row,
     coupling::ModelError,
@@ -16,18 +16,109 @@ pub(super) struct Dilatations<const D: usize> {
     stiffness: Vec<f64>,
     offsets: Vec<usize>,
     entries: Vec<(u32, Vector<D>)>,
+    /// Those that only take back what an element's own energy has already.
+    taken_back: Vec<bool>,
     of_site: BySite,
 }
 
 /// Whose dilatation a piece changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Carrier {
+pub(super) enum Carrier {
     Point(u32),
     Cell(u32),
 }
 
 /// A functional as it grows: entries by site.
-type Functional<const D: usize> = BTreeMap<u32, Vector<D>>;
+pub(super) type Functional<const D: usize> = BTreeMap<u32, Vector<D>>;
+
+/// What all dilatations of a model have in common.
+pub(super) struct Common {
+    /// `D/m` of each lattice.
+    over_m: Vec<f64>,
+    /// K′ of the material, the same for all lattices.
+    pub bulk: f64,
+}
+
+impl Common {
+    /// That of a model; none of a pairwise law.
+    ///
+    /// # Errors
+    /// [`ModelError::Unsupported`] for a law whose state is more than a dilatation.
+    pub fn new<const D: usize>(segments: &Segments<'_, D>) -> Result<Option<Self>, ModelError> {
+        let Some(reference) = state_of(segments)? else {
+            return Ok(None);
+        };
+        let whole = segments.passing.whole.iter();
+        let over_m: Vec<f64> = whole
+            .map(|w| D as f64 / w.state.as_ref().map_or(f64::NAN, |s| s.shape.trace()))
+            .collect();
+        let bulk = reference.modulus.get(0, 0, 0, 0) / (over_m[0] * over_m[0]);
+        Ok(Some(Self { over_m, bulk }))
+    }
+
+    /// Visits the dilatations at the ends of a piece, each with the factor of the piece's elongation `ξ·D` that it gets.
+    pub fn shares<const D: usize>(
+        &self,
+        segments: &Segments<'_, D>,
+        s: &Segment,
+        mut visit: impl FnMut(Carrier, f64),
+    ) {
+        let body = segments.body;
+        let volume = &body.cloud.volume;
+        let (i, j) = (s.i as usize, s.j as usize);
+        for (side, (end, weight)) in s.ends.iter().zip(s.hands).enumerate() {
+            let weight = weight * s.piece.share;
+            let (own, other) = if side == 0 { (s.i, s.j) } else { (s.j, s.i) };
+            match end {
+                End::Point(p) => {
+                    let omega = segments.coefficients(own, other).1;
+                    visit(Carrier::Point(*p), weight * omega * volume[other as usize]);
+                }
+                End::Face(foot) => {
+                    let omega = segments.passing.whole_of(s.i).of(&body.bond(i, j)).1;
+                    let over_m = self.over_m[usize::from(segments.passing.of_point[i])];
+                    let share =
+                        weight * over_m * omega * volume[i] * volume[j] / foot.cells.len() as f64;
+                    for &cell in &foot.cells {
+                        visit(Carrier::Cell(cell), share);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What a share of a piece's elongation adds to the volume that an element counts as its own: points on a face have half of their cells in the zone, the element carries their dilatation too.
+pub(super) fn carried<const D: usize>(segments: &Segments<'_, D>, s: &Segment, share: f64) -> f64 {
+    let xi = segments.body.bond(s.i as usize, s.j as usize);
+    share * xi.norm_squared() * (s.piece.to - s.piece.from) / D as f64
+}
+
+/// `∫ div u` over an element, and its size.
+pub(super) fn divergence<const D: usize>(
+    segments: &Segments<'_, D>,
+    cell: u32,
+) -> (Functional<D>, f64) {
+    let mut own = Functional::new();
+    let mut size = 0.0;
+    let mesh = &segments.model.mesh;
+    fem::for_each_point(mesh, cell as usize, fem::Rule::Stiffness, |p| {
+        size += p.weight;
+        for (&n, g) in mesh.cell(cell as usize).iter().zip(&p.gradient) {
+            for (site, w) in segments.model.node_transfer.row(n as usize) {
+                *own.entry(site).or_insert_with(Vector::zeros) += g * (w * p.weight);
+            }
+        }
+    });
+    (own, size)
+}
+
+/// κ of the dilatation of a point, of the sum that its bonds hand over.
+pub(super) fn stiffness_of_point<const D: usize>(segments: &Segments<'_, D>, i: u32) -> f64 {
+    let body = segments.body;
+    let state = body.state(i as usize);
+    state.map_or(0.0, |s| s.modulus.get(0, 0, 0, 0)) * body.cloud.volume[i as usize]
+}
 
 impl<const D: usize> Dilatations<D> {
     /// Without any.
@@ -36,6 +127,7 @@ impl<const D: usize> Dilatations<D> {
             stiffness: Vec::new(),
             offsets: vec![0],
             entries: Vec::new(),
+            taken_back: Vec::new(),
             of_site: BySite::new(sites, 0, |_, _| ()),
         }
     }
@@ -43,57 +135,24 @@ impl<const D: usize> Dilatations<D> {
     /// The dilatations of the elements behind faces, and of all points that `listed` or whose neighbours it names.
     ///
     /// Each piece hands its share, `Segment::hands`, of its elongation to the dilatations at its ends.
-    ///
-    /// # Errors
-    /// [`ModelError::Unsupported`] for a law whose state is more than a dilatation.
-    pub fn new(segments: &Segments<'_, D>, listed: &[bool]) -> Result<Self, ModelError> {
+    pub fn new(segments: &Segments<'_, D>, common: &Common, listed: &[bool]) -> Self {
         let body = segments.body;
         let volume = &body.cloud.volume;
-        let passing = segments.passing;
-        let Some(reference) = state_of(segments)? else {
-            return Ok(Self::none(segments.model.sites.len()));
-        };
         let mut functionals: BTreeMap<Carrier, Functional<D>> = BTreeMap::new();
-        let mut carried: BTreeMap<u32, f64> = BTreeMap::new();
-        let d = D as f64;
-        let over_m: Vec<f64> = passing
-            .whole
-            .iter()
-            .map(|w| d / w.state.as_ref().map_or(f64::NAN, |s| s.shape.trace()))
-            .collect();
+        let mut volumes: BTreeMap<u32, f64> = BTreeMap::new();
         // what pieces hand over
         for s in &segments.cut {
-            let (i, j) = (s.i as usize, s.j as usize);
-            let xi = body.bond(i, j);
-            let (from, to) = (s.piece.from, s.piece.to);
+            let xi = body.bond(s.i as usize, s.j as usize);
             let difference = segments.difference(s);
-            for (side, (end, weight)) in s.ends.iter().zip(s.hands).enumerate() {
-                let weight = weight * s.piece.share;
-                let (own, other) = if side == 0 { (s.i, s.j) } else { (s.j, s.i) };
-                let mut add = |carrier: Carrier, factor: f64| {
-                    let functional = functionals.entry(carrier).or_default();
-                    for &(site, w) in &difference {
-                        *functional.entry(site).or_insert_with(Vector::zeros) += xi * (factor * w);
-                    }
-                };
-                match end {
-                    End::Point(p) => {
-                        let omega = segments.coefficients(own, other).1;
-                        add(Carrier::Point(*p), weight * omega * volume[other as usize]);
-                    }
-                    End::Face(foot) => {
-                        let omega = passing.whole_of(s.i).of(&xi).1;
-                        let over_m = over_m[usize::from(passing.of_point[i])];
-                        let share = weight * over_m * omega * volume[i] * volume[j]
-                            / foot.cells.len() as f64;
-                        for &cell in &foot.cells {
-                            add(Carrier::Cell(cell), share);
-                            *carried.entry(cell).or_default() +=
-                                share * xi.norm_squared() * (to - from) / d;
-                        }
-                    }
+            common.shares(segments, s, |carrier, factor| {
+                let functional = functionals.entry(carrier).or_default();
+                for &(site, w) in &difference {
+                    *functional.entry(site).or_insert_with(Vector::zeros) += xi * (factor * w);
                 }
-            }
+                if let Carrier::Cell(cell) = carrier {
+                    *volumes.entry(cell).or_default() += carried(segments, s, factor);
+                }
+            });
         }
         // whole bonds of the points around
         let mut needed = vec![false; segments.site.len()];
@@ -120,37 +179,17 @@ impl<const D: usize> Dilatations<D> {
             }
         }
         let mut found = Self::none(0);
-        // K′ of the material, the same for all lattices
-        let bulk = reference.modulus.get(0, 0, 0, 0) / (over_m[0] * over_m[0]);
         for (carrier, handed) in functionals {
             match carrier {
-                Carrier::Point(i) => {
-                    let factor = body
-                        .state(i as usize)
-                        .map_or(0.0, |state| state.modulus.get(0, 0, 0, 0));
-                    found.push(factor * volume[i as usize], &handed);
-                }
+                Carrier::Point(i) => found.push(stiffness_of_point(segments, i), &handed, false),
                 Carrier::Cell(cell) => {
-                    let mut own = Functional::new();
-                    let mut size = 0.0;
-                    let mesh = &segments.model.mesh;
-                    fem::for_each_point(mesh, cell as usize, fem::Rule::Stiffness, |p| {
-                        size += p.weight;
-                        for (&n, g) in mesh.cell(cell as usize).iter().zip(&p.gradient) {
-                            for (site, w) in segments.model.node_transfer.row(n as usize) {
-                                *own.entry(site).or_insert_with(Vector::zeros) +=
-                                    g * (w * p.weight);
-                            }
-                        }
-                    });
-                    // the element's own energy has this part already
-                    found.push(-bulk / size, &own);
+                    let (mut own, mut size) = divergence(segments, cell);
+                    found.push(-common.bulk / size, &own, true);
                     for (site, b) in handed {
                         *own.entry(site).or_insert_with(Vector::zeros) += b;
                     }
-                    // points on a face have half of their cells in the zone: the element carries their dilatation too
-                    size += carried.get(&cell).copied().unwrap_or(0.0);
-                    found.push(bulk / size, &own);
+                    size += volumes.get(&cell).copied().unwrap_or(0.0);
+                    found.push(common.bulk / size, &own, false);
                 }
             }
         }
@@ -164,11 +203,12 @@ impl<const D: usize> Dilatations<D> {
                     .for_each(|e| visit(e.0));
             },
         );
-        Ok(found)
+        found
     }
 
-    fn push(&mut self, stiffness: f64, functional: &Functional<D>) {
+    fn push(&mut self, stiffness: f64, functional: &Functional<D>, taken_back: bool) {
         self.stiffness.push(stiffness);
+        self.taken_back.push(taken_back);
         self.entries
             .extend(functional.iter().map(|(&site, &b)| (site, b)));
         self.offsets.push(self.entries.len());
@@ -176,8 +216,17 @@ impl<const D: usize> Dilatations<D> {
 
     /// Adds the row of a site.
     pub fn add_row(&self, site: usize, row: &mut Row<D>) {
-        for &f in self.of_site.of(site) {
-            let f = f as usize;
+        self.add_row_of(site, |_| true, row);
+    }
+
+    /// Adds to the row of a site what takes back the elements' own dilatations, and no more.
+    pub fn take_back(&self, site: usize, row: &mut Row<D>) {
+        self.add_row_of(site, |f| self.taken_back[f], row);
+    }
+
+    fn add_row_of(&self, site: usize, counts: impl Fn(usize) -> bool, row: &mut Row<D>) {
+        let own = self.of_site.of(site).iter().map(|&f| f as usize);
+        for f in own.filter(|&f| counts(f)) {
             let entries = &self.entries[self.offsets[f]..self.offsets[f + 1]];
             let Ok(own) = entries.binary_search_by_key(&(site as u32), |e| e.0) else {
                 continue;

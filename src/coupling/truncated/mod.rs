@@ -4,8 +4,9 @@
 //! |---|---|
 //! | `seam.rs` | the faces of the peridynamic zone, and the pieces of a bond inside of it |
 //! | `segments.rs` | pieces with their ends, and their springs |
-//! | `moving.rs` | pieces that turn, stretch and break |
+//! | `moving.rs`, `parts.rs` | pieces that turn, stretch and break |
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
+//! | `states.rs` | those dilatations where pieces turn, stretch and break |
 //! | `edges.rs` | strings along the edges of a zone in 3D |
 //! | `fit.rs`, `sparse_change.rs` | factors of pieces where faces cut the lattice anywhere, and their smallest change |
 //!
@@ -23,16 +24,18 @@ mod dilatation;
 mod edges;
 mod fit;
 mod moving;
+mod parts;
 mod seam;
 mod segments;
 mod sparse_change;
+mod states;
 
 use std::collections::HashSet;
 
-pub use self::moving::SeamBonds;
+pub use self::{fit::SeamConditions, moving::SeamBonds};
 
 use self::{
-    dilatation::Dilatations,
+    dilatation::{Common, Dilatations},
     edges::Strings,
     segments::{Segments, Springs},
 };
@@ -56,7 +59,7 @@ pub struct Truncated {
 /// What becomes in motion of bonds that the seam cuts, where bonds are exact or break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CutBonds {
-    /// They turn, stretch and break like others; pairwise laws only.
+    /// They turn, stretch and break like others.
     #[default]
     Breaking,
     /// They are rows of a matrix, which is cheaper. Damage that comes within two horizons of the seam is told.
@@ -107,31 +110,60 @@ impl<const D: usize> Coupling<D> for Truncated {
             segments.at_seam.clone()
         };
         let springs = Springs::new(&segments, &listed);
-        let dilatations = Dilatations::new(&segments, &listed)?;
+        let common = Common::new(&segments)?;
+        let dilatations = match &common {
+            Some(common) => Dilatations::new(&segments, common, &listed),
+            None => Dilatations::none(model.sites.len()),
+        };
+        let squares = common.as_ref().is_none_or(|c| c.bulk >= 0.0);
+        let breaking = match (self.cut_bonds, common) {
+            (CutBonds::Linear, _) => Breaking::Nothing,
+            (CutBonds::Breaking, None) => Breaking::Alone(segments.broken),
+            (CutBonds::Breaking, Some(common)) => Breaking::States(Box::new(segments), common),
+        };
         Ok(Box::new(TruncatedRows {
             model,
-            cut_bonds: self.cut_bonds,
+            breaking,
+            squares,
             strings,
             springs,
             dilatations,
             pairwise: passing.whole.iter().all(|w| w.state.is_none()),
             listed,
-            broken: segments.broken,
         }))
     }
 }
 
+/// Looks at what a seam needs whose faces cut the lattice anywhere, without building it; none if the model has no seam.
+///
+/// It takes all eigenvalues of a dense matrix of the conditions, some ten for each site at the seam.
+pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamConditions> {
+    let (body, passing) = (model.body()?, model.passing()?);
+    let mut segments = Segments::new(model, body, passing);
+    Some(fit::conditions(&mut segments))
+}
+
 struct TruncatedRows<'a, const D: usize> {
     model: &'a Model<D>,
-    cut_bonds: CutBonds,
+    breaking: Breaking<'a, D>,
     springs: Springs<D>,
     dilatations: Dilatations<D>,
     strings: Strings<D>,
     /// Points whose rows are sums of springs and dilatations, not rows of the body.
     listed: Vec<bool>,
     pairwise: bool,
-    /// Bonds between points of the zone that are not whole, lower number first.
-    broken: HashSet<(u32, u32)>,
+    /// Whether dilatations have a stiffness that is not negative.
+    squares: bool,
+}
+
+/// What a motion needs where the bonds of the seam turn, stretch and break.
+enum Breaking<'a, const D: usize> {
+    /// They do not.
+    Nothing,
+    /// Bonds of a pairwise law: those between points of the zone that are not whole, lower number first.
+    Alone(HashSet<(u32, u32)>),
+    /// Bonds that share dilatations.
+    States(Box<Segments<'a, D>>, Common),
 }
 
 impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
@@ -162,14 +194,25 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         self.pairwise && self.model.point_of(site).is_some() && !self.is_body_row(site)
     }
 
+    fn is_sum_of_squares(&self) -> bool {
+        self.squares
+    }
+
     fn seam_bonds(&self) -> Option<SeamBonds<D>> {
-        let breaking = self.pairwise && self.cut_bonds == CutBonds::Breaking;
-        let body = self.model.body().filter(|_| breaking)?;
+        let (broken, states) = match &self.breaking {
+            Breaking::Nothing => return None,
+            Breaking::Alone(broken) => (broken, None),
+            Breaking::States(segments, common) => {
+                (&segments.broken, Some((segments.as_ref(), common)))
+            }
+        };
+        let body = self.model.body()?;
         Some(SeamBonds::new(
             self.model,
             body,
             &self.springs,
-            &self.broken,
+            broken,
+            states,
         ))
     }
 
@@ -177,6 +220,8 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         if self.model.point_of(site).is_none() {
             self.model.add_element_rows(site, row);
             self.strings.add_row(site, row);
+            // the elements behind the seam have other dilatations, with the bonds
+            self.dilatations.take_back(site, row);
         }
     }
 

@@ -1,19 +1,27 @@
-//! Bonds at a seam that turn, stretch and break: pieces one by one; whole bonds are left to the pass over the body.
+//! Bonds at a seam that turn, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
 //!
 //! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, D/s)`: it is stretched by `|ξ + D/s|/|ξ| − 1`, like the whole bond would be. The pieces of a bond break together, when one of them passes the critical
 //! stretch, and take `s w` each. The elements behind the face keep their classical energy: a crack cannot go on into them.
+//!
+//! Of an LPS a piece also hands its elongation to dilatations (`states.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
+//! whole bonds break there, and are told here.
 
 use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::segments::Springs;
+use super::{
+    dilatation::{Common, Functional},
+    parts::{Part, whole_bonds},
+    segments::{Segments, Springs},
+    states::States,
+};
 use crate::{
     assembly::{Row, Transfer},
     coupling::Model,
     peridynamics::{
         Families, PdBody,
-        kernel::{BondPass, Kinematics, extension, pack, shortening, stretched, unpack},
+        kernel::{BondPass, Kinematics, pack, unpack},
     },
     system::Breakage,
     tensor::{Tensor, Vector},
@@ -22,29 +30,23 @@ use crate::{
 /// Pieces per task.
 const CHUNK: usize = 1024;
 
-/// A piece of a bond.
-#[derive(Clone, Copy, Debug)]
-struct Part<const D: usize> {
-    xi: [f64; D],
-    /// `k/s`, of the energy `½ (k/s) (ξ·D)²` at rest.
-    stiffness: f64,
-    /// s.
-    length: f64,
-    bond: u32,
-}
-
 /// The bonds of a seam, apart from the whole ones of the body.
 ///
 /// Source: none; `docs/truncated.md`. Shapes: displacements and forces have `D` numbers per site.
 pub struct SeamBonds<const D: usize> {
     /// The families of the body without bonds that are not whole, or that a fit has changed.
     families: Families,
+    /// Points whose energy is here and not in the body's pass; empty for a pairwise law.
+    idle: Vec<bool>,
+    states: Option<States<D>>,
     parts: Vec<Part<D>>,
     /// Difference of displacement over each part.
     difference: Transfer,
     /// The points of each bond, ends or not, and the first of its parts.
     bonds: Vec<[u32; 2]>,
     first: Vec<u32>,
+    /// The first bonds break here, the others in the body's pass.
+    own: usize,
     intact: Vec<u8>,
     breaks: Option<Breaking>,
     kinematics: Kinematics,
@@ -59,6 +61,7 @@ pub struct SeamBonds<const D: usize> {
     /// Whole bonds between two points next to a face.
     along_face: Vec<[u32; 2]>,
     pulls: Vec<[f64; D]>,
+    elongation: Vec<f64>,
     /// Of each of `sites`, kept between passes.
     sums: Vec<[f64; D]>,
     over: Vec<bool>,
@@ -66,24 +69,32 @@ pub struct SeamBonds<const D: usize> {
 
 /// When bonds break.
 struct Breaking {
-    critical: f64,
-    limit: f64,
+    /// Critical stretch of each bond.
+    critical: Vec<f64>,
+    /// What that is for t.
+    limit: Vec<f64>,
     never: Vec<bool>,
 }
 
 impl<const D: usize> SeamBonds<D> {
+    /// Of a law with dilatations `states` gives them.
     pub(super) fn new(
         model: &Model<D>,
         body: &PdBody<D>,
         springs: &Springs<D>,
         broken: &HashSet<(u32, u32)>,
+        states: Option<(&Segments<'_, D>, &Common)>,
     ) -> Self {
+        let segments = states.map(|s| s.0);
         let mut seam = Self {
             families: body.families.clone(),
+            idle: segments.map_or(Vec::new(), |s| s.at_seam.clone()),
+            states: None,
             parts: Vec::new(),
             difference: Transfer::new(),
             bonds: Vec::new(),
             first: Vec::new(),
+            own: 0,
             intact: Vec::new(),
             breaks: None,
             kinematics: Kinematics::Linear,
@@ -94,34 +105,32 @@ impl<const D: usize> SeamBonds<D> {
             next_to_face: Vec::new(),
             along_face: Vec::new(),
             pulls: Vec::new(),
+            elongation: Vec::new(),
             sums: Vec::new(),
             over: Vec::new(),
         };
         let mut taken = broken.clone();
         let mut of_site: Vec<(u32, u32, f64)> = Vec::new();
-        for spring in springs.own() {
+        // whole bonds that a fit has changed follow the pieces; with dilatations they are among the whole ones below
+        let pieces = segments.map_or(usize::MAX, |s| s.cut.len());
+        for spring in springs.own().take(pieces) {
             let (xi, origin) = (spring.direction, spring.origin);
-            if seam.bonds.last() != Some(&origin.bond) {
-                seam.bonds.push(origin.bond);
-                seam.first.push(seam.parts.len() as u32);
-            }
-            let bond = seam.bonds.len() as u32 - 1;
-            let part = seam.parts.len() as u32;
-            let row = &spring.difference;
-            of_site.extend(row.iter().map(|&(site, w)| (site, part, w)));
-            seam.difference.push(row);
             let length = origin.piece.to - origin.piece.from;
-            seam.parts.push(Part {
+            let part = Part {
                 xi: xi.into(),
                 stiffness: spring.stiffness,
+                taken: spring.stiffness,
                 length,
-                bond,
-            });
+                bond: 0,
+            };
+            let bond = seam.push(part, origin.bond, &spring.difference, &mut of_site);
             for (end, point) in origin.at.into_iter().enumerate() {
                 let Some(point) = point else { continue };
                 let far = body.cloud.volume[origin.bond[1 - end] as usize] * origin.piece.share;
                 seam.lost.push((point, bond, far));
-                let is_near = length * xi.norm() <= model.spacing() * (1.0 + 1e-6);
+                let own = model.passing().map(|p| p.whole_of(point).spacing);
+                let spacing = own.unwrap_or(model.spacing());
+                let is_near = length * xi.norm() <= spacing * (1.0 + 1e-6);
                 if origin.at[1 - end].is_none() && is_near {
                     seam.next_to_face.push((bond, point));
                 }
@@ -129,6 +138,30 @@ impl<const D: usize> SeamBonds<D> {
             if let [Some(i), Some(j)] = origin.at {
                 taken.insert((i.min(j), i.max(j)));
             }
+        }
+        seam.own = seam.bonds.len();
+        if let Some((segments, common)) = states {
+            let whole = whole_bonds(segments);
+            for &[i, j] in &whole {
+                let volume = body.cloud.volume[i as usize] * body.cloud.volume[j as usize];
+                let half = |own: u32, other: u32| match segments.at_seam[own as usize] {
+                    true => segments.coefficients(own, other).0 * volume,
+                    false => 0.0,
+                };
+                let (plain, scale) = (half(i, j) + half(j, i), segments.scale(i, j));
+                let part = Part {
+                    xi: body.bond(i as usize, j as usize).into(),
+                    stiffness: plain * scale,
+                    // the body's pass tells of the plain bond
+                    taken: plain * (scale - 1.0),
+                    length: 1.0,
+                    bond: 0,
+                };
+                let site = |p: u32| segments.site[p as usize];
+                let difference = [(site(i), -1.0), (site(j), 1.0)];
+                seam.push(part, [i, j], &difference, &mut of_site);
+            }
+            seam.states = Some(States::new(segments, common, &whole));
         }
         seam.first.push(seam.parts.len() as u32);
         let whole = |i: u32, j: u32| !taken.contains(&(i.min(j), i.max(j)));
@@ -153,21 +186,43 @@ impl<const D: usize> SeamBonds<D> {
         }
         seam.intact = vec![0xff; seam.bonds.len().div_ceil(8)];
         seam.pulls = vec![[0.0; D]; seam.parts.len()];
+        seam.elongation = vec![0.0; seam.parts.len()];
         seam.over = vec![false; seam.parts.len()];
         seam
     }
 
-    /// How bonds follow the motion, at which stretch they break if at all, and by the number of a point whether its bonds never do.
+    /// Takes in a part of a bond, the last one or the next; returns the bond.
+    fn push(
+        &mut self,
+        part: Part<D>,
+        bond: [u32; 2],
+        difference: &[(u32, f64)],
+        of_site: &mut Vec<(u32, u32, f64)>,
+    ) -> u32 {
+        let number = self.parts.len() as u32;
+        if self.bonds.last() != Some(&bond) {
+            self.bonds.push(bond);
+            self.first.push(number);
+        }
+        let bond = self.bonds.len() as u32 - 1;
+        of_site.extend(difference.iter().map(|&(site, w)| (site, number, w)));
+        self.difference.push(difference);
+        self.parts.push(Part { bond, ..part });
+        bond
+    }
+
+    /// How bonds follow the motion, and by the number of a point at which stretch its bonds break, if any do, and whether they never do.
     pub(in crate::coupling) fn behave(
         &mut self,
         kinematics: Kinematics,
-        critical: Option<f64>,
+        critical: Option<impl Fn(u32) -> f64>,
         never: impl Fn(u32) -> bool,
     ) {
         self.kinematics = kinematics;
+        let critical = critical.map(|of| self.bonds.iter().map(|b| of(b[0])).collect::<Vec<_>>());
         self.breaks = critical.map(|critical| Breaking {
+            limit: critical.iter().map(|&s| kinematics.limit(s)).collect(),
             critical,
-            limit: kinematics.limit(critical),
             never: self
                 .bonds
                 .iter()
@@ -186,36 +241,85 @@ impl<const D: usize> SeamBonds<D> {
         self.families.of(i).binary_search(&(j as u32)).is_ok()
     }
 
+    /// Points whose energy is not for the body's pass; empty for none.
+    pub(in crate::coupling) fn idle(&self) -> &[bool] {
+        &self.idle
+    }
+
+    /// Learns from the body's pass which of its bonds stand.
+    pub(in crate::coupling) fn follow(&mut self, pass: &dyn BondPass<D>) {
+        for (bond, [i, j]) in self.bonds.iter().enumerate().skip(self.own) {
+            if !pass.bonded(*i as usize, *j as usize) {
+                self.intact[bond / 8] &= !(1 << (bond % 8));
+            }
+        }
+    }
+
     fn stands(&self, bond: u32) -> bool {
         self.intact[bond as usize / 8] >> (bond % 8) & 1 == 1
     }
 
-    fn stretch<const EXACT: bool>(&mut self, u: &[f64]) {
-        let (mut pulls, mut over) = (
-            std::mem::take(&mut self.pulls),
-            std::mem::take(&mut self.over),
-        );
-        let limit = self.breaks.as_ref().map_or(f64::INFINITY, |b| b.limit);
+    /// Directions in `pulls`, elongations, and which parts that may break here are over the limit; zero for those that do not stand.
+    fn stretch<const EXACT: bool>(
+        &self,
+        u: &[f64],
+        pulls: &mut [[f64; D]],
+        elongation: &mut [f64],
+        over: &mut [bool],
+    ) {
+        let limit = |bond: usize| match &self.breaks {
+            Some(breaks) if bond < self.own => breaks.limit[bond],
+            _ => f64::INFINITY,
+        };
         pulls
             .par_chunks_mut(CHUNK)
+            .zip(elongation.par_chunks_mut(CHUNK))
             .zip(over.par_chunks_mut(CHUNK))
             .enumerate()
-            .for_each(|(chunk, (pulls, over))| {
-                for (k, (pull, over)) in pulls.iter_mut().zip(over).enumerate() {
+            .for_each(|(chunk, ((pulls, elongation), over))| {
+                let parts = pulls.iter_mut().zip(elongation).zip(over);
+                for (k, ((pull, elongation), over)) in parts.enumerate() {
                     let p = chunk * CHUNK + k;
                     let part = &self.parts[p];
-                    (*pull, *over) = ([0.0; D], false);
+                    (*pull, *elongation, *over) = ([0.0; D], 0.0, false);
                     if self.stands(part.bond) {
-                        let d: Vector<D> = self.difference.displacement(p, u) / part.length;
-                        let s = stretched::<D, EXACT>(&part.xi, &[0.0; D], d.as_slice());
-                        let f =
-                            part.stiffness * part.length * s.length * shortening::<EXACT>(s.t());
-                        *pull = s.direction.map(|x| f * x);
-                        *over = s.excess > limit * s.length;
+                        let s = part.strained::<EXACT>(&self.difference.displacement(p, u));
+                        (*pull, *elongation) = (s.direction, s.elongation);
+                        *over = s.excess > limit(part.bond as usize) * s.square;
                     }
                 }
             });
-        (self.pulls, self.over) = (pulls, over);
+    }
+
+    /// Makes pulls of directions; returns what the dilatations press with.
+    fn pull(&self, u: &[f64], elongation: &[f64], pulls: &mut [[f64; D]]) -> Vec<f64> {
+        let states = self.states.as_ref();
+        let pressures = states.map_or(Vec::new(), |s| s.pressures(u, elongation));
+        pulls
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(chunk, pulls)| {
+                for (k, pull) in pulls.iter_mut().enumerate() {
+                    let p = chunk * CHUNK + k;
+                    let f = self.parts[p].stiffness * elongation[p]
+                        + states.map_or(0.0, |s| s.tension(p, &pressures));
+                    *pull = pull.map(|x| f * x);
+                }
+            });
+        pressures
+    }
+
+    fn add_forces(
+        &self,
+        pulls: &[[f64; D]],
+        pressures: &[f64],
+        sums: &mut Vec<[f64; D]>,
+        force: &mut [f64],
+    ) {
+        self.scatter(pulls, sums, force);
+        if let Some(states) = &self.states {
+            states.add_own_force(pressures, force);
+        }
     }
 
     /// Adds the internal force; returns how many bonds broke, each counted once for each direction.
@@ -225,31 +329,43 @@ impl<const D: usize> SeamBonds<D> {
         force: &mut [f64],
         breakage: Breakage,
     ) -> u64 {
+        let (mut pulls, mut elongation, mut over, mut sums) = (
+            std::mem::take(&mut self.pulls),
+            std::mem::take(&mut self.elongation),
+            std::mem::take(&mut self.over),
+            std::mem::take(&mut self.sums),
+        );
         match self.kinematics {
-            Kinematics::Exact => self.stretch::<true>(u),
-            Kinematics::Linear => self.stretch::<false>(u),
+            Kinematics::Exact => self.stretch::<true>(u, &mut pulls, &mut elongation, &mut over),
+            Kinematics::Linear => self.stretch::<false>(u, &mut pulls, &mut elongation, &mut over),
         }
         let broken = match breakage {
-            Breakage::Allowed => self.break_bonds(),
+            Breakage::Allowed => self.break_bonds(&over, &mut pulls, &mut elongation),
             Breakage::Held => 0,
         };
-        let mut sums = std::mem::take(&mut self.sums);
-        self.scatter(&self.pulls, &mut sums, force);
-        self.sums = sums;
+        let pressures = self.pull(u, &elongation, &mut pulls);
+        self.add_forces(&pulls, &pressures, &mut sums, force);
+        (self.pulls, self.elongation, self.over, self.sums) = (pulls, elongation, over, sums);
         broken
     }
 
-    fn break_bonds(&mut self) -> u64 {
+    fn break_bonds(
+        &mut self,
+        over: &[bool],
+        pulls: &mut [[f64; D]],
+        elongation: &mut [f64],
+    ) -> u64 {
         let Some(breaks) = &self.breaks else { return 0 };
-        if !self.over.contains(&true) {
+        if !over.contains(&true) {
             return 0;
         }
         let mut broken = 0;
-        for bond in 0..self.bonds.len() {
+        for bond in 0..self.own {
             let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
-            if self.over[parts.clone()].contains(&true) && !breaks.never[bond] {
+            if over[parts.clone()].contains(&true) && !breaks.never[bond] {
                 self.intact[bond / 8] &= !(1 << (bond % 8));
-                self.pulls[parts].fill([0.0; D]);
+                pulls[parts.clone()].fill([0.0; D]);
+                elongation[parts].fill(0.0);
                 broken += 2;
             }
         }
@@ -278,21 +394,23 @@ impl<const D: usize> SeamBonds<D> {
 
     /// Adds the product with the tangent at rest.
     pub(in crate::coupling) fn add_tangent(&self, x: &[f64], y: &mut [f64]) {
-        let pulls: Vec<[f64; D]> = self
-            .parts
-            .par_iter()
-            .with_min_len(CHUNK)
-            .enumerate()
-            .map(|(p, part)| {
-                if !self.stands(part.bond) {
-                    return [0.0; D];
+        let parts = self.parts.len();
+        let (mut pulls, mut elongation) = (vec![[0.0; D]; parts], vec![0.0; parts]);
+        self.stretch::<false>(x, &mut pulls, &mut elongation, &mut vec![false; parts]);
+        let pressures = self.pull(x, &elongation, &mut pulls);
+        self.add_forces(&pulls, &pressures, &mut Vec::new(), y);
+    }
+
+    /// κ of a dilatation, and its derivative by the displacement of each site, at rest.
+    fn functional(&self, states: &States<D>, f: usize) -> (f64, Functional<D>) {
+        states.at_rest(f, |p, c, b| {
+            let part = &self.parts[p];
+            if self.stands(part.bond) {
+                for (site, w) in self.difference.row(p) {
+                    *b.entry(site).or_insert_with(Vector::zeros) += Vector::from(part.xi) * (c * w);
                 }
-                let d: Vector<D> = self.difference.displacement(p, x);
-                let f = part.stiffness * Vector::from(part.xi).dot(&d);
-                part.xi.map(|x| f * x)
-            })
-            .collect();
-        self.scatter(&pulls, &mut Vec::new(), y);
+            }
+        })
     }
 
     /// Adds per unknown a bound of the sum of the sizes of its row.
@@ -310,64 +428,93 @@ impl<const D: usize> SeamBonds<D> {
                 }
             }
         }
+        let Some(states) = &self.states else { return };
+        for f in 0..states.count() {
+            let (stiffness, b) = self.functional(states, f);
+            let all: f64 = b.values().map(|b| b.abs().sum()).sum();
+            for (site, b) in b {
+                for (sum, b) in sums[site as usize * D..].iter_mut().zip(b.iter()) {
+                    *sum += stiffness.abs() * all * b.abs();
+                }
+            }
+        }
+    }
+
+    /// The parts that end at a site, with their weights there.
+    fn ends_at(&self, site: usize) -> &[(u32, f64)] {
+        match self.sites.binary_search(&(site as u32)) {
+            Ok(s) => &self.ends[self.offsets[s]..self.offsets[s + 1]],
+            Err(_) => &[],
+        }
     }
 
     /// Adds the row of a site in the tangent at rest.
     pub(in crate::coupling) fn add_row(&self, site: usize, row: &mut Row<D>) {
-        let Ok(s) = self.sites.binary_search(&(site as u32)) else {
-            return;
-        };
-        for &(p, w) in &self.ends[self.offsets[s]..self.offsets[s + 1]] {
+        let mut of = Vec::new();
+        for &(p, w) in self.ends_at(site) {
             let part = &self.parts[p as usize];
             if self.stands(part.bond) {
                 let xi = Vector::from(part.xi);
                 let block: Tensor<D> = xi * xi.transpose() * (part.stiffness * w);
                 row.add(&self.difference, p as usize, &block);
+                let states = self.states.iter();
+                of.extend(states.flat_map(|s| s.of_part(p as usize).iter().map(|e| e.0)));
+            }
+        }
+        let Some(states) = &self.states else { return };
+        of.extend(states.of_site(site));
+        of.sort_unstable();
+        of.dedup();
+        for f in of {
+            let (stiffness, b) = self.functional(states, f as usize);
+            let Some(own) = b.get(&(site as u32)).map(|b| b * stiffness) else {
+                continue;
+            };
+            for (other, b) in b {
+                row.add_site(other, &(own * b.transpose()));
             }
         }
     }
 
-    /// Whether a bond of the seam ends at a site.
+    /// Whether a bond of the seam ends at a site, or changes a dilatation that knows of it.
     pub(in crate::coupling) fn touches(&self, site: usize) -> bool {
-        self.sites.binary_search(&(site as u32)).is_ok()
+        let states = self.states.as_ref();
+        !self.ends_at(site).is_empty() || states.is_some_and(|s| !s.of_site(site).is_empty())
     }
 
-    /// Energy of the parts that stand \[J\].
+    /// Energy of the parts that stand, and of the dilatations of the seam \[J\].
     pub(in crate::coupling) fn energy(&self, u: &[f64]) -> f64 {
-        let of = |p: usize| {
-            let part = &self.parts[p];
-            if !self.stands(part.bond) {
-                return 0.0;
-            }
-            let d: Vector<D> = self.difference.displacement(p, u) / part.length;
-            let (t, r2) = match self.kinematics {
-                Kinematics::Exact => {
-                    let s = stretched::<D, true>(&part.xi, &[0.0; D], d.as_slice());
-                    (extension::<true>(s.t()), s.length)
-                }
-                Kinematics::Linear => {
-                    let s = stretched::<D, false>(&part.xi, &[0.0; D], d.as_slice());
-                    (extension::<false>(s.t()), s.length)
-                }
-            };
-            0.5 * part.stiffness * (part.length * t * r2).powi(2)
-        };
-        let parts: Vec<f64> = (0..self.parts.len())
+        let elongation: Vec<f64> = (0..self.parts.len())
             .into_par_iter()
             .with_min_len(CHUNK)
-            .map(of)
+            .map(|p| {
+                let part = &self.parts[p];
+                if !self.stands(part.bond) {
+                    return 0.0;
+                }
+                let d: Vector<D> = self.difference.displacement(p, u);
+                match self.kinematics {
+                    Kinematics::Exact => part.strained::<true>(&d).elongation,
+                    Kinematics::Linear => part.strained::<false>(&d).elongation,
+                }
+            })
             .collect();
-        parts.iter().sum()
+        let parts = self.parts.iter().zip(&elongation);
+        let parts: f64 = parts.map(|(part, q)| 0.5 * part.stiffness * q * q).sum();
+        let states = self.states.as_ref();
+        parts + states.map_or(0.0, |s| s.energy(&s.pressures(u, &elongation)))
     }
 
     /// What the broken parts took, each `s w` at the critical stretch \[J\].
     pub(in crate::coupling) fn dissipated(&self) -> f64 {
-        let critical = self.breaks.as_ref().map_or(0.0, |b| b.critical);
+        let Some(breaks) = &self.breaks else {
+            return 0.0;
+        };
         let broken = self.parts.iter().filter(|p| !self.stands(p.bond));
         broken
             .map(|p| {
                 let r2 = Vector::from(p.xi).norm_squared();
-                0.5 * p.stiffness * (p.length * critical * r2).powi(2)
+                0.5 * p.taken * (p.length * breaks.critical[p.bond as usize] * r2).powi(2)
             })
             .sum()
     }
@@ -417,7 +564,8 @@ impl<const D: usize> SeamBonds<D> {
 
     /// Bytes held.
     pub(in crate::coupling) fn memory_bytes(&self) -> usize {
-        self.parts.len() * (size_of::<Part<D>>() + D * 8 + 1)
+        self.parts.len() * (size_of::<Part<D>>() + D * 8 + 9)
+            + self.states.as_ref().map_or(0, States::memory_bytes)
             + self.difference.weight_count() * 28
             + self.families.neighbours.len() * 4
     }

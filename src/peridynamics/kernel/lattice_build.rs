@@ -23,6 +23,8 @@ struct Filled {
     volume: Vec<f64>,
     no_fail: Vec<bool>,
     scale: Vec<f64>,
+    /// Without an energy of their own; empty for none.
+    idle: Vec<bool>,
 }
 
 impl<const D: usize> Lattice<D> {
@@ -50,6 +52,14 @@ impl<const D: usize> Lattice<D> {
         } else {
             Vec::new()
         };
+        let idle = if (0..points).any(|p| setup.is_idle(p)) {
+            let points = stencil.point_of.iter();
+            points
+                .map(|&p| p != NONE && setup.is_idle(p as usize))
+                .collect()
+        } else {
+            Vec::new()
+        };
         let scale = if alike && (0..points).all(|p| setup.row(p)) {
             Vec::new()
         } else {
@@ -62,6 +72,7 @@ impl<const D: usize> Lattice<D> {
             volume,
             no_fail,
             scale,
+            idle,
         };
         Self::finish(stencil, filled, points, setup.kinematics, &setup.force)
     }
@@ -94,6 +105,7 @@ impl<const D: usize> Lattice<D> {
             volume,
             no_fail: Vec::new(),
             scale: Vec::new(),
+            idle: Vec::new(),
         };
         Self::finish(stencil, filled, points, setup.kinematics, &setup.force)
     }
@@ -111,6 +123,7 @@ impl<const D: usize> Lattice<D> {
             volume,
             no_fail,
             scale,
+            idle,
         } = filled;
         let groups = stencil.groups.len();
         let cells = stencil.point_of.len();
@@ -147,7 +160,8 @@ impl<const D: usize> Lattice<D> {
                                 o.moment * relative(((cell + lane) as isize + o.delta) as usize);
                         }
                     }
-                    for lane in (0..LANES).filter(|&l| m[l] > 0.0) {
+                    let own = |lane: &usize| !idle.get(cell + lane).copied().unwrap_or(false);
+                    for lane in (0..LANES).filter(|&l| m[l] > 0.0).filter(own) {
                         solid.dilatation[g][lane] = d / m[lane];
                         solid.volumetric[g][lane] = (d * bulk - (d + 2.0) * shear) / m[lane];
                         solid.deviatoric[cell + lane] = d * (d + 2.0) * shear / m[lane];

@@ -114,7 +114,7 @@ pub(crate) fn stretched<const D: usize, const EXACT: bool>(
 
 /// `1 − r/|ξ+η|`, linear: `ξ·η/r²`.
 #[inline(always)]
-pub(crate) fn shortening<const EXACT: bool>(t: f64) -> f64 {
+fn shortening<const EXACT: bool>(t: f64) -> f64 {
     if EXACT { t * psi(t) } else { 0.5 * t }
 }
 
@@ -130,7 +130,7 @@ pub(crate) fn extension<const EXACT: bool>(t: f64) -> f64 {
 
 /// `r/|ξ+η|`, linear: 1.
 #[inline(always)]
-fn ratio<const EXACT: bool>(t: f64) -> f64 {
+pub(crate) fn ratio<const EXACT: bool>(t: f64) -> f64 {
     if EXACT { 1.0 - t * psi(t) } else { 1.0 }
 }
 

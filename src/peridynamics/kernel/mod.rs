@@ -36,7 +36,7 @@ pub use setup::{
 
 pub use stencil::BlockSetup;
 
-pub(crate) use list::{extension, shortening, stretched};
+pub(crate) use list::{extension, ratio, stretched};
 
 use crate::system::Breakage;
 

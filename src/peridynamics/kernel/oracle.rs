@@ -104,6 +104,7 @@ pub(super) fn with<const D: usize, T>(
         volume: &case.volume,
         families: &case.families,
         rows: &case.rows,
+        idle: &[],
         force: match law {
             Law::Pmb => BondForce::Pairwise {
                 coefficient: &coefficient,

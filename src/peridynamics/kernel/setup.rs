@@ -95,6 +95,8 @@ pub struct BondSetup<'a, const D: usize> {
     pub families: &'a Families,
     /// Which points want a force; the rest of the points with families only pass on their dilatation. Empty: all points with a family.
     pub rows: &'a [bool],
+    /// Points of a state-based law without an energy of their own: of their force only what their neighbours' energies make is computed, the rest is someone else's. Empty: none.
+    pub idle: &'a [bool],
     /// The law.
     pub force: BondForce<'a, D>,
     /// How bonds follow the motion.
@@ -203,8 +205,16 @@ impl<const D: usize> BondSetup<'_, D> {
             .is_some_and(|f| f.no_fail.get(i).copied().unwrap_or(false))
     }
 
-    /// `m = Σ w |ξ|² V` of the reference family of point `i`.
+    /// Whether point `i` has no energy of its own.
+    pub(super) fn is_idle(&self, i: usize) -> bool {
+        self.idle.get(i).copied().unwrap_or(false)
+    }
+
+    /// `m = Σ w |ξ|² V` of the reference family of point `i`; zero, which stands for no energy, if it is idle.
     pub(super) fn weighted_volume(&self, i: usize) -> f64 {
+        if self.is_idle(i) {
+            return 0.0;
+        }
         let family = self.families.of(i).iter().enumerate();
         family
             .map(|(k, &j)| {
@@ -222,6 +232,7 @@ impl<const D: usize> BondSetup<'_, D> {
             ("volume", self.volume.len(), false),
             ("families", self.families.len(), false),
             ("rows", self.rows.len(), true),
+            ("idle", self.idle.len(), true),
             ("no_fail", no_fail.len(), true),
         ] {
             if length != points && !(may_be_empty && length == 0) {
@@ -243,6 +254,7 @@ impl<const D: usize> BondSetup<'_, D> {
             for point in 0..points {
                 let weighted_volume = self.weighted_volume(point);
                 if !self.families.of(point).is_empty()
+                    && !self.is_idle(point)
                     && (weighted_volume.is_nan() || weighted_volume <= 0.0)
                 {
                     return Err(KernelError::Family {

@@ -344,6 +344,7 @@ fn precracks_count_as_damage_and_single_weights_err_by_little() {
         volume: &case.volume,
         families: &case.families,
         rows: &[],
+        idle: &[],
         force: BondForce::Solid {
             omega: &omega,
             bulk: BULK,
@@ -381,6 +382,7 @@ fn what_cannot_be_is_refused() {
             volume: &case.volume,
             families: &case.families,
             rows: &[],
+            idle: &[],
             force: BondForce::Pairwise { coefficient: f },
             kinematics: Kinematics::Exact,
             failure: None,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::coupling::motion::BondBehaviour;
+use crate::coupling::motion::{BondBehaviour, Critical};
 use crate::coupling::{Model, Motion, Zone};
 use crate::peridynamics::kernel::Kinematics;
 use crate::progress::Silent;
@@ -267,10 +267,10 @@ fn a_scene_allocates_what_it_needs() {
     let (problem, _) = run::problem(plate(&[crack, LENIENT]));
     let (model, coupling) = Model::new(problem, &Silent).expect("a model");
     let operator = coupling.operator(&model).expect("rows");
-    let bits = |critical_stretch| {
+    let bits = |critical_stretch: Option<f64>| {
         let behaviour = BondBehaviour {
             kinematics: Kinematics::Linear,
-            critical_stretch,
+            critical_stretch: critical_stretch.map(Critical::Uniform),
             no_fail: &|_| false,
             contact: None,
         };

@@ -1,10 +1,13 @@
 //! The moving system of a scene: what moves, with what mass, from where.
 
-use crate::coupling::motion::{BondBehaviour, ContactBehaviour, Motion, MotionError, masses};
-use crate::coupling::{Coupling, Interface, Model, Operator};
+use crate::coupling::motion::{
+    BondBehaviour, ContactBehaviour, Critical, Motion, MotionError, masses,
+};
+use crate::coupling::{Coupling, Interface, Model, Operator, PointSource};
 use crate::observe::summary::Choice;
 use crate::peridynamics::kernel::Kinematics;
 use crate::progress::Progress;
+use crate::scene::definite;
 use crate::scene::initial::{Initial, InitialKind};
 use crate::scene::materials::Fracture;
 use crate::scene::run::{self, Rest, RunError};
@@ -40,11 +43,17 @@ pub(super) fn dynamic<'a, const D: usize>(
         BondsSpec::Exact => ("geometrically exact bonds", Kinematics::Exact),
         BondsSpec::Linear => ("bonds linear in the displacement", Kinematics::Linear),
     };
-    let breaks = match (critical_stretch, breaking.fracture) {
-        (Some(s), Some(Fracture::Energy(g))) => {
-            format!("bonds break at the stretch {s:.3e}, the fracture energy is {g:e}")
+    let stretches = critical_stretch.as_ref().map(|critical| match critical {
+        Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
+        Critical::ByHorizon(list) => {
+            let each = list.iter().map(|(d, s)| format!("{s:.3e} (horizon {d})"));
+            let each: Vec<String> = each.collect();
+            format!("bonds break at the stretch {}", each.join(", "))
         }
-        (Some(s), _) => format!("bonds break at the stretch {s:.3e}"),
+    });
+    let breaks = match (stretches, breaking.fracture) {
+        (Some(s), Some(Fracture::Energy(g))) => format!("{s}, the fracture energy is {g:e}"),
+        (Some(s), _) => s,
         (None, _) => "no bond breaks: no fracture-energy, no critical-stretch".to_owned(),
     };
     let density = |material: u16| rest.density[material as usize];
@@ -52,6 +61,7 @@ pub(super) fn dynamic<'a, const D: usize>(
     let is_linear = critical_stretch.is_none()
         && breaking.contact.is_none()
         && breaking.bonds == BondsSpec::Linear;
+    definite::check(model, operator, rest.ratio, choices, progress)?;
     let moving = Motion::new(
         model,
         operator,
@@ -59,7 +69,7 @@ pub(super) fn dynamic<'a, const D: usize>(
         density,
         &BondBehaviour {
             kinematics,
-            critical_stretch,
+            critical_stretch: critical_stretch.clone(),
             no_fail: &can_fail_nowhere,
             contact: breaking.contact.map(|c| ContactBehaviour {
                 approach: c.radius_factor,
@@ -69,6 +79,16 @@ pub(super) fn dynamic<'a, const D: usize>(
     );
     match moving {
         Ok(motion) => {
+            if critical_stretch.is_some()
+                && motion.has_seam_bonds()
+                && !operator.is_sum_of_squares()
+            {
+                return Err(RunError::Indefinite {
+                    what: "bonds that break at the seam may bring that forth at any time; cut-bonds = \"linear\" in [coupling.truncated] keeps them whole".to_owned(),
+                    typed: rest.ratio.typed,
+                    pairwise: rest.ratio.pairwise,
+                });
+            }
             if model.body().is_some() {
                 let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
                     _ if is_linear => "",
@@ -121,21 +141,31 @@ fn reason(error: &MotionError) -> String {
 fn critical_stretch<const D: usize>(
     model: &Model<D>,
     rest: &Rest<D>,
-) -> Result<Option<f64>, RunError> {
+) -> Result<Option<Critical>, RunError> {
     let (Some(fracture), Some(body), Some(p)) =
         (rest.breaking.fracture, model.body(), &model.peridynamics)
     else {
         return Ok(None);
     };
     let energy = match fracture {
-        Fracture::Stretch(s) => return Ok(Some(s)),
+        Fracture::Stretch(s) => return Ok(Some(Critical::Uniform(s))),
         Fracture::Energy(energy) => energy,
     };
-    let horizon = body.cloud.horizon[0];
-    match p.law.bond_energy(horizon) {
-        Some(bonds) => Ok(Some(bonds.critical_stretch::<D>(energy, horizon)?)),
-        None => Err(MotionError::Law { law: p.law.name() }.into()),
+    let horizons = match &p.points {
+        PointSource::Lattices { lattices, .. } => lattices.iter().map(|l| l.horizon).collect(),
+        _ => vec![body.cloud.horizon[0]],
+    };
+    let mut list = Vec::with_capacity(horizons.len());
+    for horizon in horizons {
+        let Some(bonds) = p.law.bond_energy(horizon) else {
+            return Err(MotionError::Law { law: p.law.name() }.into());
+        };
+        list.push((horizon, bonds.critical_stretch::<D>(energy, horizon)?));
     }
+    Ok(Some(match list[..] {
+        [(_, s)] => Critical::Uniform(s),
+        _ => Critical::ByHorizon(list),
+    }))
 }
 
 /// Displacement and velocity at time zero.

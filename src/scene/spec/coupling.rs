@@ -257,7 +257,7 @@ pub struct TruncatedSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutBondsSpec {
-    /// They turn, stretch and break like others (bond-based laws).
+    /// They turn, stretch and break like others.
     #[default]
     Breaking,
     /// They are linear and do not break: cheaper, where damage stays two horizons away from the seam.
