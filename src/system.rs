@@ -95,6 +95,16 @@ pub trait Dynamic: Send + Sync {
         None
     }
 
+    /// Sites with a broken bond, ascending in the order of their points.
+    fn damaged_sites(&self) -> Vec<u32> {
+        Vec::new()
+    }
+
+    /// Broken bonds by the sites of their ends, each once for each direction; without those that a seam cuts.
+    fn broken_bonds(&self) -> Vec<(u32, u32)> {
+        Vec::new()
+    }
+
     /// What breaking changes (one bit per bond, and what cannot be recomputed from it), for a checkpoint; empty without damage.
     fn damage_state(&self) -> Vec<u64> {
         Vec::new()

@@ -15,6 +15,7 @@
 //! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `need.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `motion.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
+//! | `carry.rs` | a motion handed from one layout of zones to another | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
 //! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
@@ -25,6 +26,7 @@
 pub mod balanced;
 pub mod blending;
 mod bonds;
+pub mod carry;
 pub mod derivative;
 pub mod edge;
 mod fit;
@@ -43,6 +45,7 @@ pub mod truncated;
 
 pub use balanced::Balanced;
 pub use blending::{Blending, BlendingFunction};
+pub use carry::{BrokenBonds, Carried, CarryError, Carrying};
 pub use derivative::FitDegree;
 pub(crate) use fit::Bins;
 pub use model::{Model, Site, SiteKind};

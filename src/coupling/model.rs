@@ -150,6 +150,24 @@ impl<const D: usize> Model<D> {
         Ok((model, coupling))
     }
 
+    /// The problem that the model was laid out from, to lay it out anew with other zones.
+    pub fn into_problem(self, coupling: Box<dyn Coupling<D>>) -> Problem<D> {
+        Problem {
+            mesh: self.mesh,
+            zones: self.zones,
+            tensors: self.tensors,
+            cell_material: self.cell_material,
+            peridynamic_material: self.peridynamic_material,
+            peridynamics: self.peridynamics,
+            coupling,
+        }
+    }
+
+    /// The cells around every node: where those of each begin, and their numbers.
+    pub(super) fn node_cells(&self) -> (&[u32], &[u32]) {
+        (&self.node_cells.0, &self.node_cells.1)
+    }
+
     /// Makes sites of the nodes of finite elements; returns the site of each node.
     fn place_nodes(&mut self, interface: Interface) -> Vec<u32> {
         let mut element = vec![false; self.mesh.nodes.len()];

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use self::{body::MovingBody, energy::ElementEnergy, rows::SiteRows};
 use crate::{
     assembly,
-    coupling::{Interface, Model, Operator, SeamBonds, SiteKind},
+    coupling::{BrokenBonds, Interface, Model, Operator, SeamBonds, SiteKind},
     fem,
     peridynamics::{
         Families, PdBody,
@@ -50,6 +50,8 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
     /// Contact of points that no bond joins; none if they may pass through each other.
     pub contact: Option<ContactBehaviour>,
+    /// Bonds that are broken from the start, in a motion that goes on from another layout.
+    pub broken: Option<&'a BrokenBonds<D>>,
 }
 
 /// The stretch at which bonds break.
@@ -497,6 +499,38 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             .iter()
             .find(|&&p| body.pass.is_damaged(p as usize))
             .map(|&p| body.site_of_point[p as usize] as usize)
+    }
+
+    fn damaged_sites(&self) -> Vec<u32> {
+        let Some(body) = self.body.as_ref() else {
+            return Vec::new();
+        };
+        let points = body.site_of_point.iter().enumerate();
+        points
+            .filter(|&(p, &site)| site != NONE && body.pass.is_damaged(p))
+            .map(|(_, &site)| site)
+            .collect()
+    }
+
+    fn broken_bonds(&self) -> Vec<(u32, u32)> {
+        let (Some(moving), Some(body)) = (self.body.as_ref(), self.model.body()) else {
+            return Vec::new();
+        };
+        let site = |p: usize| moving.site_of_point[p];
+        (0..moving.site_of_point.len())
+            .into_par_iter()
+            .filter(|&i| site(i) != NONE && moving.pass.is_damaged(i))
+            .flat_map_iter(|i| {
+                let family = body.families.of(i).iter();
+                family
+                    .filter(move |&&j| {
+                        let is_here =
+                            (self.seam.as_ref()).is_none_or(|s| s.is_whole(i, j as usize));
+                        is_here && site(j as usize) != NONE && !moving.pass.bonded(i, j as usize)
+                    })
+                    .map(move |&j| (site(i), site(j as usize)))
+            })
+            .collect()
     }
 
     fn damage_state(&self) -> Vec<u64> {

@@ -240,6 +240,7 @@ fn crack_beside_the_seam(coupling: Box<dyn crate::coupling::Coupling<2>>) -> Run
         critical_stretch: Some(Critical::Uniform(critical)),
         no_fail: &outside,
         contact: None,
+        broken: None,
     };
     let mut motion = Motion::new(
         &e.model,

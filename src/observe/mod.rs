@@ -10,6 +10,7 @@
 //! | `csv.rs` | values along a line or at probes, row by row |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs` | what one run did: sizes, choices, timings, balance |
+//! | `switch.rs` | changes of the nonlocal zone during a run |
 //! | `progress.rs` | a bar on standard error, if that is a terminal |
 //! | `figure.rs`, `map.rs` | line plots and coloured fields as SVG |
 //! | `file.rs` | whole files or none: written beside, then renamed |
@@ -25,6 +26,7 @@ pub mod progress;
 pub mod report;
 pub mod series;
 pub mod summary;
+pub mod switch;
 pub mod vtu;
 
 use std::path::PathBuf;

@@ -7,6 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::report::{aligned, number};
+use super::switch::{self, Switch};
 
 /// Seconds of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -240,6 +241,10 @@ pub struct MotionSummary {
     pub edge_reached: Option<(f64, Vec<f64>)>,
     /// Steps per second of this run, writing included.
     pub steps_per_second: f64,
+    /// When the nonlocal zone changed, and what that cost, of a zone that follows the crack.
+    pub switches: Vec<Switch>,
+    /// What the nonlocal zone has of the body's volume at the start, the most that it had, and at the end.
+    pub nonlocal_share: [f64; 3],
 }
 
 impl MotionSummary {
@@ -275,6 +280,7 @@ impl MotionSummary {
                 grouped(self.broken_bonds as usize)
             )?;
         }
+        switch::write(&self.switches, self.nonlocal_share, f)?;
         if let Some((time, place)) = &self.edge_reached {
             writeln!(
                 f,

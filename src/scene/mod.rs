@@ -8,7 +8,7 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `output.rs` | its parts |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `follow.rs`, `output.rs` | its parts |
 //! | `automatic/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `definite.rs` | whether a seam that may be unstable is |
 //! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
@@ -33,6 +33,7 @@ mod cost;
 mod definite;
 mod error;
 mod expression;
+mod follow;
 mod initial;
 mod joined;
 mod loads;
@@ -61,6 +62,7 @@ pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use converge::{ConvergeError, ConvergeParams, Converged, Level, Refinement, converge};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
+pub use follow::Follow;
 pub use initial::{Initial, InitialKind};
 pub use materials::{Fracture, Law, Material};
 pub use motion::{RunOptions, StartFrom};

@@ -321,6 +321,7 @@ y = "-5e-4*x+1e-3*y"
                     critical_stretch: Some(Critical::Uniform(1.0)),
                     no_fail: &|_| false,
                     contact: None,
+                    broken: None,
                 };
                 let operator = solved.operator;
                 let mut motion =

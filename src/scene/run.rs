@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::breaking::Breaking;
 use super::conditions::Condition;
 use super::definite::{self, Ratio};
+use super::follow::Follow;
 use super::initial::Initial;
 use super::loads::{loads, supports};
 use super::materials::{Law, Material};
@@ -16,7 +17,7 @@ use super::validate::{Output, Scene, Solver};
 use crate::coupling::Surfaces;
 use crate::coupling::motion::MotionError;
 use crate::coupling::{
-    self, Coupling, Model, ModelError, Operator, PointSource, Problem, SiteKind, Zone,
+    self, CarryError, Coupling, Model, ModelError, Operator, PointSource, Problem, SiteKind, Zone,
 };
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointError, Fingerprint};
@@ -82,6 +83,9 @@ pub enum RunError {
         /// The ratio of a pairwise law.
         pairwise: f64,
     },
+    /// The state cannot be carried over to other zones.
+    #[error(transparent)]
+    Carry(#[from] CarryError),
     /// Something that is planned and not there yet.
     #[error("{what}: {remedy}")]
     Later {
@@ -362,6 +366,7 @@ pub(super) struct Rest<const D: usize> {
     pub breaking: Breaking<D>,
     /// Poisson's ratio of the points.
     pub ratio: Ratio,
+    pub follow: Option<Follow>,
     pub fingerprint: Fingerprint,
     /// Density of each material.
     pub density: Vec<f64>,
@@ -465,6 +470,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
             initial: scene.initial,
             breaking: scene.breaking,
             ratio,
+            follow: scene.follow,
             fingerprint: scene.fingerprint,
             density,
             chosen,

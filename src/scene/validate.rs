@@ -8,6 +8,7 @@ use super::breaking::Breaking;
 use super::check;
 use super::conditions::{self, Condition};
 use super::error::{SceneError, SceneErrorKind};
+use super::follow::Follow;
 use super::initial::Initial;
 use super::materials::{self, Material};
 use super::meshing;
@@ -19,7 +20,9 @@ use super::run::{self, RunError};
 use super::solve::Solve;
 use super::source::{Source, Span};
 use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
-use super::{automatic, bodies, breaking, initial, joined, obstacles, output, solve, zones};
+use super::{
+    automatic, bodies, breaking, follow, initial, joined, obstacles, output, solve, zones,
+};
 use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -68,6 +71,8 @@ pub struct Scene<const D: usize> {
     pub initial: Vec<Initial<D>>,
     /// How bonds deform and break.
     pub breaking: Breaking<D>,
+    /// How the nonlocal zone follows the crack, if it does.
+    pub follow: Option<Follow>,
     /// The linear solver.
     pub solver: Solver,
     /// What is written.
@@ -307,7 +312,7 @@ fn scene<const D: usize>(
     let initial = initial::initial(&spec.initial, &mesh, clock)?;
     add_mesh(&mesh, &mut fingerprint);
     let lay_out = |placed: Option<&Placed>| -> Result<Scene<D>, SceneError> {
-        let joined = joined::joined(spec, &found, &mesh, placed)?;
+        let mut joined = joined::joined(spec, &found, &mesh, placed)?;
         let joining = joined.joining;
         let peridynamics = match (&spec.peridynamics, joining.zones) {
             (Some(p), _) => Some(peridynamics::peridynamics(p, joining.lattice, &mesh)?),
@@ -339,6 +344,16 @@ fn scene<const D: usize>(
             .find(|(_, zone)| **zone != Zone::Local)
             .map_or(0, |(m, _)| *m);
         let breaking = breaking::breaking(spec, &found[peridynamic as usize], &mesh)?;
+        let follow = follow::follow(
+            spec,
+            &mut joined,
+            &solve,
+            &breaking,
+            peridynamics.as_ref(),
+            &found[peridynamic as usize].law,
+            &mesh,
+            |c| cell_material[c] == peridynamic,
+        )?;
         let output = output::output(spec, &mesh, name)?;
         Ok(Scene {
             title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
@@ -358,6 +373,7 @@ fn scene<const D: usize>(
             solve: solve.clone(),
             initial: initial.clone(),
             breaking,
+            follow,
             solver,
             output,
             fingerprint,

@@ -396,6 +396,14 @@ impl Dynamic for SubCycled<'_> {
         self.system.damage_at_edge()
     }
 
+    fn damaged_sites(&self) -> Vec<u32> {
+        self.system.damaged_sites()
+    }
+
+    fn broken_bonds(&self) -> Vec<(u32, u32)> {
+        self.system.broken_bonds()
+    }
+
     fn damage_state(&self) -> Vec<u64> {
         self.system.damage_state()
     }

@@ -7,6 +7,7 @@ use std::process::Command;
 mod contact;
 mod driven;
 mod faults;
+mod follow;
 mod growth;
 mod indefinite;
 mod keys;

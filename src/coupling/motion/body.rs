@@ -105,6 +105,10 @@ impl<const D: usize> MovingBody<D> {
             let critical = behaviour.critical_stretch.as_ref();
             critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon[i]))
         };
+        let broken = behaviour
+            .broken
+            .filter(|b| !b.is_empty())
+            .map(|b| b.among(&body.cloud.position));
         let pass = bond_pass(&BondSetup {
             position: &body.cloud.position,
             volume: &body.cloud.volume,
@@ -120,7 +124,7 @@ impl<const D: usize> MovingBody<D> {
                 },
                 no_fail: &no_fail,
             }),
-            precracked: None,
+            precracked: broken.as_ref().map(|b| b as _),
             layout: Layout::Automatic,
             storage: Storage::Double,
         })?;

@@ -148,8 +148,15 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             .is_some_and(changes)
         {
             let table = &self.travelled[holder][dof % D];
-            let index = (time / self.step).round().max(0.0) as usize;
-            table[index.min(table.len() - 1)]
+            let index = (time / self.step + 1e-6).floor().max(0.0);
+            let known = table[(index as usize).min(table.len() - 1)];
+            // steps that have changed their size in between do not end where the table has its entries
+            let rest = time - index * self.step;
+            if rest > 1e-5 * self.step {
+                known + simpson(condition, dof % D, index * self.step, rest)
+            } else {
+                known
+            }
         } else {
             displacement(self.model, condition, dof, 0.0) * time
         };
@@ -167,16 +174,23 @@ fn travelled<const D: usize>(
     let mut table = vec![0.0];
     let expression = condition.components.0[axis].as_ref();
     let velocity = matches!(condition.prescribed, Prescribed::Velocity(_));
-    if let Some(e) = expression.filter(|e| velocity && e.depends_on_time()) {
-        let v = |t: f64| e.eval_at(&[0.0; 3], t);
+    if expression.is_some_and(|e| velocity && e.depends_on_time()) {
         let mut way = 0.0;
         for n in 0..steps + 2 {
-            let t = n as f64 * step;
-            way += step / 6.0 * (v(t) + 4.0 * v(t + 0.5 * step) + v(t + step));
+            way += simpson(condition, axis, n as f64 * step, step);
             table.push(way);
         }
     }
     table
+}
+
+/// The integral of a prescribed velocity over `step` from `t` on, by Simpson's rule.
+fn simpson<const D: usize>(condition: &Condition<D>, axis: usize, t: f64, step: f64) -> f64 {
+    let v = |t: f64| {
+        let e = condition.components.0[axis].as_ref();
+        e.map_or(0.0, |e| e.eval_at(&[0.0; 3], t))
+    };
+    step / 6.0 * (v(t) + 4.0 * v(t + 0.5 * step) + v(t + step))
 }
 
 impl<const D: usize> Drive for SceneDrive<'_, D> {

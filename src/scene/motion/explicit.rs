@@ -6,31 +6,34 @@ use std::time::{Duration, Instant};
 
 use super::RunOptions;
 use super::drive::SceneDrive;
-use super::laid_out::{LaidOut, breaks, laid_out, opened, restore};
-use super::pace::{held, paced};
-use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved};
-use super::system::start;
-use crate::coupling::{Model, Operator, Sampler, SiteKind};
+use super::laid_out::{Begun, LaidOut, begun, breaks, lay_out, opened, restore};
+use super::pace::{held, paced, repaced};
+use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice, Zone as ZoneState};
+use super::switching::{Leaving, share};
+use super::system::{Moving, critical_stretch, start};
+use super::watch::{Watch, fastest_crack};
+use crate::coupling::{BrokenBonds, Model, Operator, Sampler, SiteKind, Zone};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::summary::{
-    Choice, Ended, MotionSummary, RunSummary, Sizes, bytes_text, peak_memory_bytes,
+    Choice, Ended, MotionSummary, RunSummary, Sizes, Stopwatch, Timings, bytes_text,
+    peak_memory_bytes,
 };
 use crate::progress::Progress;
-use crate::scene::run::{self, RunError, Solved};
+use crate::scene::run::{self, Rest, RunError, Solved};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::scene::validate::Scene;
-use crate::solve::explicit::{Explicit, ExplicitParams};
+use crate::solve::explicit::{Explicit, ExplicitParams, State};
 
 /// How often whoever watches is told.
 const TOLD_EVERY: Duration = Duration::from_millis(200);
 
-/// Whether an instant of a regular sequence lies in the step that ends at `step · dt`.
-fn is_due(step: u64, dt: f64, interval: f64) -> bool {
+/// Whether an instant of a regular sequence lies in the step from `before` to `after`.
+fn is_due(before: f64, after: f64, interval: f64) -> bool {
     // an instant that falls on the end of a step belongs to it, whatever rounding says
-    let count = |n: u64| (n as f64 * dt / interval * (1.0 + 1e-12) + 1e-9).floor();
-    step > 0 && count(step) > count(step - 1)
+    let count = |t: f64| (t / interval * (1.0 + 1e-12) + 1e-9).floor();
+    count(after) > count(before)
 }
 
 /// The sizes of a model that moves.
@@ -56,6 +59,44 @@ enum Stop {
     Failed(ObserveError),
     /// For this reason.
     Ended(Ended),
+    /// The nonlocal zone has to change to these cells.
+    Switch(Vec<bool>),
+}
+
+/// Where a run with one layout of zones begins.
+enum From<'a, const D: usize> {
+    /// At time zero, or at a checkpoint.
+    Start(CheckpointFile, Option<Box<Saved>>),
+    /// Where the zones have changed.
+    Switch(Box<Between<'a, D>>),
+}
+
+/// How it ends.
+enum Leg<'a, const D: usize> {
+    /// With the run.
+    Ended(Box<RunSummary>),
+    /// In a change of the zones.
+    Switch(Begun, Box<Between<'a, D>>),
+}
+
+/// A run between two layouts of its zones.
+struct Between<'a, const D: usize> {
+    /// Choices before the change: all but those that every layout makes anew.
+    told: usize,
+    /// Stages before the change.
+    timings: Timings,
+    leaving: Leaving<D>,
+    broken: BrokenBonds<D>,
+    /// The cells that become nonlocal.
+    nonlocal: Vec<bool>,
+    recorder: Recorder<'a, D>,
+    /// Whether a checkpoint was due with the change.
+    due: bool,
+    pace: StepChoice,
+    edge: Option<EdgeReached>,
+    zone: Option<ZoneState>,
+    /// Steps taken by this program, and their seconds.
+    taken: (u64, f64),
 }
 
 /// Runs a scene in time.
@@ -65,72 +106,188 @@ pub(super) fn run<const D: usize>(
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    laid_out(
-        scene,
-        progress,
-        |rest, choices| opened(rest, options, choices),
-        |laid_out, (file, saved)| steps(laid_out, file, saved, spec, options, progress),
-    )
+    let (mut begun, mut problem, rest) = begun(scene);
+    let (file, saved) = opened(&rest, options, &mut begun.choices)?;
+    if let Some(zone) = saved.as_ref().and_then(|s| s.zone.as_ref()) {
+        problem.zones = zones_of(&zone.nonlocal);
+    }
+    let mut from = From::Start(file, saved.map(Box::new));
+    loop {
+        let (leg, back) = match from {
+            From::Start(..) => lay_out(begun, problem, &rest, None, progress, |laid_out| {
+                leg(laid_out, from, &rest, spec, options, progress)
+            })?,
+            From::Switch(mut between) => {
+                let bonds = std::mem::take(&mut between.broken);
+                let broken = Some(&bonds);
+                lay_out(begun, problem, &rest, broken, progress, |laid_out| {
+                    leg(
+                        laid_out,
+                        From::Switch(between),
+                        &rest,
+                        spec,
+                        options,
+                        progress,
+                    )
+                })?
+            }
+        };
+        problem = back;
+        match leg {
+            Leg::Ended(summary) => return Ok(*summary),
+            Leg::Switch(next, between) => {
+                problem.zones = zones_of(&between.nonlocal);
+                begun = next;
+                from = From::Switch(between);
+            }
+        }
+    }
 }
 
-/// Steps from the beginning or a checkpoint.
-fn steps<const D: usize>(
+/// Zones of cells that are nonlocal or local.
+fn zones_of(nonlocal: &[bool]) -> Vec<Zone> {
+    let zone = |n: &bool| if *n { Zone::Nonlocal } else { Zone::Local };
+    nonlocal.iter().map(zone).collect()
+}
+
+/// Steps with one layout of the zones, from the beginning, a checkpoint, or where the last one ended.
+fn leg<'r, const D: usize>(
     laid_out: LaidOut<'_, D>,
-    file: CheckpointFile,
-    saved: Option<Saved>,
+    from: From<'r, D>,
+    rest: &'r Rest<D>,
     spec: &Spec,
     options: &RunOptions<'_>,
     progress: &dyn Progress,
-) -> Result<RunSummary, RunError> {
+) -> Result<Leg<'r, D>, RunError> {
     let LaidOut {
         title,
         joining,
         growing,
         model,
         operator,
-        rest,
         moving,
         mut choices,
         mut timings,
         mut watch,
         ..
     } = laid_out;
-    choices.push(Choice {
-        choice: format!("{} in rows and bonds", bytes_text(moving.bytes as u64)),
-        why: "read once per step".to_owned(),
-    });
     progress.stage("stable step", None);
     let held = held(model, &rest.conditions)?;
-    let known = saved.as_ref().map(|saved| saved.pace);
-    let (mut moving, pace) = paced(spec, growing, moving, &held, known, &mut choices)?;
-    watch.lap(&mut timings, "stable step");
-
     let begin = start(model, &rest.initial);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
-    if drive.evaluates_everywhere() {
-        choices.push(Choice {
-            choice: "loads evaluated at every place and step".to_owned(),
-            why: "an expression holds both t and a coordinate; written as two conditions, each with one, it would cost nothing"
-                .to_owned(),
-        });
-    }
-    restore(moving.system.as_mut(), saved.as_ref(), &file)?;
-    let breaks = breaks(moving.system.as_ref(), rest);
     let sampler = Sampler::new(model);
-    let mut recorder = Recorder::new(
-        &rest.output,
-        &sampler,
-        breaks,
-        moving.is_linear,
-        file,
-        options.checkpoint_every.or(spec.checkpoint_every),
-        saved.as_ref().map(|s| &s.written),
-    )?;
+    let Ready {
+        mut moving,
+        mut recorder,
+        state,
+        pace,
+        drive,
+        mut edge,
+        mut zone,
+        told,
+        taken: (taken_before, seconds_before),
+        resumed,
+        due,
+    } = match from {
+        From::Start(file, saved) => {
+            let saved = saved.map(|saved| *saved);
+            choices.push(Choice {
+                choice: format!("{} in rows and bonds", bytes_text(moving.bytes as u64)),
+                why: "read once per step".to_owned(),
+            });
+            let known = saved.as_ref().map(|saved| saved.pace);
+            let (mut moving, pace) = paced(spec, growing, moving, &held, known, &mut choices)?;
+            watch.lap(&mut timings, "stable step");
+            let drive = driven(model, rest, &begin.u, &pace, spec)?;
+            if drive.evaluates_everywhere() {
+                choices.push(Choice {
+                    choice: "loads evaluated at every place and step".to_owned(),
+                    why: "an expression holds both t and a coordinate; written as two conditions, each with one, it would cost nothing"
+                        .to_owned(),
+                });
+            }
+            restore(moving.system.as_mut(), saved.as_ref(), &file)?;
+            let recorder = Recorder::new(
+                &rest.output,
+                &sampler,
+                breaks(moving.system.as_ref(), rest),
+                moving.is_linear,
+                file,
+                options.checkpoint_every.or(spec.checkpoint_every),
+                saved.as_ref().map(|s| &s.written),
+            )?;
+            let resumed = saved.is_some();
+            let edge = saved.as_ref().and_then(|s| s.edge);
+            let (state, zone) = match saved {
+                Some(saved) => (saved.state, saved.zone),
+                None => (begin, None),
+            };
+            Ready {
+                moving,
+                recorder,
+                state,
+                pace,
+                drive,
+                edge,
+                zone: zone.or_else(|| rest.follow.as_ref().map(|_| ZoneState::first(model))),
+                told: choices.len(),
+                taken: (0, 0.0),
+                resumed,
+                due: false,
+            }
+        }
+        From::Switch(between) => {
+            let Between {
+                told,
+                timings: before,
+                leaving,
+                mut recorder,
+                due,
+                pace,
+                edge,
+                zone,
+                taken,
+                ..
+            } = *between;
+            choices.truncate(told);
+            let pace = repaced(spec, moving.system.as_ref(), &held, pace, leaving.state())?;
+            watch.lap(&mut timings, "stable step");
+            let drive = driven(model, rest, &begin.u, &pace, spec)?;
+            let (state, switch) = leaving.arrive(model, moving.system.as_ref(), &drive)?;
+            recorder.move_to(&sampler);
+            recorder.energy_at_start += switch.left();
+            watch.lap(&mut timings, "state carried over");
+            let own = std::mem::replace(&mut timings, before);
+            for stage in &own.stages {
+                timings.add(&format!("zone changes: {}", stage.name), stage.seconds);
+            }
+            Ready {
+                moving,
+                recorder,
+                state,
+                pace,
+                drive,
+                edge,
+                zone: zone.map(|z| z.after(switch, model)),
+                told,
+                taken,
+                resumed: true,
+                due,
+            }
+        }
+    };
+    let breaks = breaks(moving.system.as_ref(), rest);
     let zones = run::zone_of_site(model);
     let is_linear = moving.is_linear;
-    let mut edge = saved.as_ref().and_then(|s| s.edge);
-    let resumed = saved.is_some();
-    let state = saved.map_or(begin, |s| s.state);
+    let eyes = match &rest.follow {
+        Some(follow) => critical_stretch(model, rest)?
+            .zip(model.body())
+            .map(|(critical, body)| {
+                let critical = critical.at(body.cloud.horizon[0]);
+                let speed = fastest_crack(model, |m| rest.density[m as usize]);
+                Watch::new(follow, model, critical, speed, pace.step)
+            }),
+        None => None,
+    };
     let mut motion = Explicit::new(
         moving.system.as_mut(),
         &drive,
@@ -155,21 +312,42 @@ fn steps<const D: usize>(
             recorder.row(&moment, place)?;
             solved(&moment.state.u, &mut |s| recorder.output(&moment, s))?;
         }
+        if due {
+            recorder.checkpoint(&moment, pace, edge, zone.clone())?;
+        }
     }
+    let looks_at = |step: u64| {
+        eyes.as_ref()
+            .is_some_and(|w| step.is_multiple_of(w.every()))
+    };
+    // a checkpoint that an interrupt left behind, in the step in which the zone was to be looked at
+    let mut stop = match (&eyes, &zone) {
+        (Some(eyes), Some(zone)) if !zone.looked => {
+            let arrived = || edge.is_none() && motion.system().damage_at_edge().is_some();
+            let is_due = looks_at(first) || arrived();
+            is_due
+                .then(|| eyes.look(&motion.state().u, motion.system()))
+                .flatten()
+                .map(Stop::Switch)
+        }
+        _ => None,
+    };
     watch.lap(&mut timings, "start");
     let written = recorder.seconds;
 
     progress.stage("steps", Some(pace.steps));
     progress.advance(first);
+    let must_switch = stop.is_some();
     let clock = Instant::now();
-    let mut told = Instant::now();
+    let mut looking = 0.0;
+    let mut told_at = Instant::now();
     let mut known_broken = u64::MAX;
-    let mut stop = None;
+    let mut is_late = false;
     let mut observe = |motion: &Explicit<'_>| -> ControlFlow<()> {
         let moment = moment(motion, is_linear);
         let state = moment.state;
         let last = state.step == pace.steps;
-        let mut ended = None;
+        let (mut ended, mut arrived) = (None, false);
         if breaks == Breaks::Possibly && state.broken != known_broken && edge.is_none() {
             known_broken = state.broken;
             edge = motion.system().damage_at_edge().map(|site| EdgeReached {
@@ -177,6 +355,20 @@ fn steps<const D: usize>(
                 time: state.time,
                 site: site as u64,
             });
+            arrived = edge.is_some();
+        }
+        let mut next = None;
+        if let (Some(eyes), Some(zone)) = (&eyes, &mut zone) {
+            // damage that has come to the edge between two looks is looked at too
+            zone.looked = !last && (looks_at(state.step) || arrived);
+            if zone.looked {
+                let begun = Instant::now();
+                next = eyes.look(&state.u, motion.system());
+                looking += begun.elapsed().as_secs_f64();
+            }
+            if next.is_some() {
+                edge = None;
+            }
         }
         if edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
             ended = Some(Ended::DamageAtEdge);
@@ -184,16 +376,27 @@ fn steps<const D: usize>(
             ended = Some(Ended::Interrupted);
         }
         let at_edge = ended == Some(Ended::DamageAtEdge);
+        if let (Some(_), Some(zone)) = (ended, &mut zone) {
+            // the run that goes on from here looks again
+            zone.looked = false;
+            next = None;
+        }
         let mut write = || -> Result<(), ObserveError> {
-            if last || at_edge || is_due(state.step, pace.step, spec.history_interval) {
+            let (before, after) = (pace.time(state.step - 1), pace.time(state.step));
+            if last || at_edge || is_due(before, after, spec.history_interval) {
                 recorder.row(&moment, place)?;
             }
-            if last || at_edge || is_due(state.step, pace.step, spec.output_interval) {
+            if last || at_edge || is_due(before, after, spec.output_interval) {
                 solved(&state.u, &mut |s| recorder.output(&moment, s))?;
             }
             let leave = ended.is_some() || (last && recorder.keeps_state());
             if leave || recorder.is_checkpoint_due(state.step) {
-                recorder.checkpoint(&moment, pace, edge)?;
+                if next.is_some() {
+                    // of the state in the next layout
+                    is_late = true;
+                } else {
+                    recorder.checkpoint(&moment, pace, edge, zone.clone())?;
+                }
             }
             Ok(())
         };
@@ -202,8 +405,8 @@ fn steps<const D: usize>(
             return ControlFlow::Break(());
         }
         progress.advance(1);
-        if told.elapsed() >= TOLD_EVERY {
-            told = Instant::now();
+        if told_at.elapsed() >= TOLD_EVERY {
+            told_at = Instant::now();
             let speed = (state.step - first) as f64 / clock.elapsed().as_secs_f64();
             let energy = recorder.last.kinetic + recorder.last.stored;
             let broken = match breaks {
@@ -215,30 +418,69 @@ fn steps<const D: usize>(
                 state.step, state.time
             ));
         }
-        match ended {
-            Some(why) => {
+        match (ended, next) {
+            (Some(why), _) => {
                 stop = Some(Stop::Ended(why));
                 ControlFlow::Break(())
             }
-            None => ControlFlow::Continue(()),
+            (None, Some(nonlocal)) => {
+                stop = Some(Stop::Switch(nonlocal));
+                ControlFlow::Break(())
+            }
+            (None, None) => ControlFlow::Continue(()),
         }
     };
-    motion.run(pace.steps, &mut observe)?;
+    if !must_switch {
+        motion.run(pace.steps, &mut observe)?;
+    }
+    let seconds = clock.elapsed().as_secs_f64();
+    timings.add("steps", seconds - (recorder.seconds - written) - looking);
+    timings.add("output", recorder.seconds - written);
+    if eyes.is_some() {
+        timings.add("looks at the zone", looking);
+    }
+    let taken = (
+        taken_before + motion.state().step - first,
+        seconds_before + seconds,
+    );
     let ended = match stop {
         Some(Stop::Failed(error)) => return Err(error.into()),
+        Some(Stop::Switch(nonlocal)) => {
+            let state = motion.into_state();
+            let system = moving.system.as_ref();
+            let next = Begun {
+                title,
+                joining,
+                growing,
+                choices,
+                timings: Timings::default(),
+                watch: Stopwatch::start(),
+            };
+            let between = Between {
+                told,
+                timings,
+                broken: BrokenBonds::of(model, &system.broken_bonds()),
+                leaving: Leaving::of(model, system, state),
+                nonlocal,
+                recorder,
+                due: is_late,
+                pace,
+                edge,
+                zone,
+                taken,
+            };
+            return Ok(Leg::Switch(next, Box::new(between)));
+        }
         Some(Stop::Ended(why)) => why,
         None => Ended::Finished,
     };
-    let seconds = clock.elapsed().as_secs_f64();
     progress.finish();
-    timings.add("steps", seconds - (recorder.seconds - written));
-    timings.add("output", recorder.seconds - written);
 
     let moment = moment(&motion, is_linear);
     let stored = moment.system.stored_energy(&moment.state.u);
     let state = moment.state;
-    let taken = state.step - first;
-    Ok(RunSummary {
+    let (switches, shares) = zone.map_or((Vec::new(), [0.0; 2]), |z| (z.switches, z.shares));
+    Ok(Leg::Ended(Box::new(RunSummary {
         scene: title,
         dimension: D,
         coupling: joining.name.to_owned(),
@@ -263,15 +505,48 @@ fn steps<const D: usize>(
                 let x = place(e.site as usize);
                 (e.time, x.iter().copied().collect())
             }),
-            steps_per_second: if taken > 0 {
-                taken as f64 / seconds
+            steps_per_second: if taken.0 > 0 {
+                taken.0 as f64 / taken.1
             } else {
                 0.0
             },
+            nonlocal_share: [shares[0], shares[1], share(model)],
+            switches,
         }),
         files: recorder.files(),
         ..RunSummary::default()
-    })
+    })))
+}
+
+/// What a run with one layout needs before its first step.
+struct Ready<'r, 'm, const D: usize> {
+    moving: Moving<'m>,
+    recorder: Recorder<'r, D>,
+    state: State,
+    pace: StepChoice,
+    drive: SceneDrive<'m, D>,
+    edge: Option<EdgeReached>,
+    zone: Option<ZoneState>,
+    told: usize,
+    taken: (u64, f64),
+    resumed: bool,
+    /// Whether a checkpoint is due before the first step.
+    due: bool,
+}
+
+/// The conditions of a scene, from time zero to its end.
+fn driven<'m, const D: usize>(
+    model: &'m Model<D>,
+    rest: &'m Rest<D>,
+    start: &[f64],
+    pace: &StepChoice,
+    spec: &Spec,
+) -> Result<SceneDrive<'m, D>, RunError> {
+    let steps = match pace.since {
+        (0, _) => pace.steps,
+        _ => (spec.duration / pace.step).ceil() as u64,
+    };
+    SceneDrive::new(model, &rest.conditions, start, pace.step, steps)
 }
 
 pub(super) fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
@@ -290,11 +565,13 @@ mod tests {
 
     #[test]
     fn instants_are_met_once_each_whatever_rounding_says() {
+        let due =
+            |n: u64, dt: f64, interval: f64| is_due((n - 1) as f64 * dt, n as f64 * dt, interval);
         for (steps, duration) in [(253u64, 60.0), (1000, 0.1), (7, 7.0), (30_000, 3e-5)] {
             let dt = duration / steps as f64;
             for count in [1u64, 3, 7] {
                 let interval = duration / count as f64;
-                let due: Vec<u64> = (0..=steps).filter(|&n| is_due(n, dt, interval)).collect();
+                let due: Vec<u64> = (1..=steps).filter(|&n| due(n, dt, interval)).collect();
                 assert_eq!(
                     due.len() as u64,
                     count,
@@ -312,6 +589,6 @@ mod tests {
             }
         }
         // more instants than steps: every step
-        assert_eq!((0..=5).filter(|&n| is_due(n, 1.0, 0.1)).count(), 5);
+        assert_eq!((1..=5).filter(|&n| due(n, 1.0, 0.1)).count(), 5);
     }
 }

@@ -4,7 +4,7 @@ use super::record::{Breaks, Saved};
 use super::stability::Growing;
 use super::system::{Moving, dynamic};
 use super::{RunOptions, StartFrom};
-use crate::coupling::{Model, Operator};
+use crate::coupling::{BrokenBonds, Model, Operator, Problem};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
 use crate::observe::summary::{Choice, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
@@ -29,24 +29,55 @@ pub(super) struct LaidOut<'a, const D: usize> {
     pub watch: Stopwatch,
 }
 
-/// Lays a scene out and hands it on; `first` has a say before anything is computed.
-pub(super) fn laid_out<const D: usize, S, T>(
-    scene: Scene<D>,
-    progress: &dyn Progress,
-    first: impl FnOnce(&Rest<D>, &mut Vec<Choice>) -> Result<S, RunError>,
-    then: impl FnOnce(LaidOut<'_, D>, S) -> Result<T, RunError>,
-) -> Result<T, RunError> {
-    let mut timings = Timings::default();
-    let mut watch = Stopwatch::start();
+/// A run before its zones are laid out: what stays when they change.
+pub(super) struct Begun {
+    pub title: String,
+    pub joining: Joining,
+    pub growing: Growing,
+    pub choices: Vec<Choice>,
+    pub timings: Timings,
+    pub watch: Stopwatch,
+}
+
+/// Takes a scene apart.
+pub(super) fn begun<const D: usize>(scene: Scene<D>) -> (Begun, Problem<D>, Rest<D>) {
+    let watch = Stopwatch::start();
     let title = scene.title.clone();
     let joining = scene.coupling.joining();
     let growing = Growing::of(&scene.coupling);
+    let mut timings = Timings::default();
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
     }
     let (problem, rest) = run::problem(scene);
-    let mut choices: Vec<Choice> = rest.made().cloned().collect();
-    let begun = first(&rest, &mut choices)?;
+    let begun = Begun {
+        title,
+        joining,
+        growing,
+        choices: rest.made().cloned().collect(),
+        timings,
+        watch,
+    };
+    (begun, problem, rest)
+}
+
+/// Lays a problem out and hands it on, and gives it back afterwards; `broken` bonds are broken from the start.
+pub(super) fn lay_out<const D: usize, T>(
+    begun: Begun,
+    problem: Problem<D>,
+    rest: &Rest<D>,
+    broken: Option<&BrokenBonds<D>>,
+    progress: &dyn Progress,
+    then: impl FnOnce(LaidOut<'_, D>) -> Result<T, RunError>,
+) -> Result<(T, Problem<D>), RunError> {
+    let Begun {
+        title,
+        joining,
+        growing,
+        mut choices,
+        mut timings,
+        mut watch,
+    } = begun;
     let (model, coupling) = Model::new(problem, progress)?;
     choices.extend(run::volumes_choice(&model));
     watch.lap(&mut timings, "sites and bonds");
@@ -56,27 +87,42 @@ pub(super) fn laid_out<const D: usize, S, T>(
         &model,
         coupling.as_ref(),
         operator.as_ref(),
-        &rest,
+        rest,
+        broken,
         &mut choices,
         progress,
     )?;
     watch.lap(&mut timings, "rows and bonds");
-    then(
-        LaidOut {
-            title,
-            joining,
-            growing,
-            model: &model,
-            operator: operator.as_ref(),
-            rest: &rest,
-            moving,
-            choices,
-            bytes,
-            timings,
-            watch,
-        },
-        begun,
-    )
+    let done = then(LaidOut {
+        title,
+        joining,
+        growing,
+        model: &model,
+        operator: operator.as_ref(),
+        rest,
+        moving,
+        choices,
+        bytes,
+        timings,
+        watch,
+    })?;
+    drop(operator);
+    Ok((done, model.into_problem(coupling)))
+}
+
+/// Lays a scene out and hands it on; `first` has a say before anything is computed.
+pub(super) fn laid_out<const D: usize, S, T>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+    first: impl FnOnce(&Rest<D>, &mut Vec<Choice>) -> Result<S, RunError>,
+    then: impl FnOnce(LaidOut<'_, D>, S) -> Result<T, RunError>,
+) -> Result<T, RunError> {
+    let (mut begun, problem, rest) = begun(scene);
+    let ready = first(&rest, &mut begun.choices)?;
+    let done = lay_out(begun, problem, &rest, None, progress, |laid_out| {
+        then(laid_out, ready)
+    })?;
+    Ok(done.0)
 }
 
 /// The checkpoint file of a run, and what it holds if the run goes on from it.

@@ -10,6 +10,8 @@
 //! | `pace.rs` | the time step, with sub-cycling |
 //! | `stability.rs` | whether the motion stays bounded |
 //! | `predict.rs` | what a run in time will need |
+//! | `watch.rs` | where a zone that follows the crack is wanted |
+//! | `switching.rs` | what a change of the zone carries over, and what it costs |
 //! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
 
 mod drive;
@@ -20,7 +22,9 @@ mod predict;
 mod quasi_static;
 mod record;
 mod stability;
+mod switching;
 mod system;
+mod watch;
 
 use std::sync::atomic::AtomicBool;
 

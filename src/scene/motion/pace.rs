@@ -10,6 +10,7 @@ use crate::scene::loads::holders;
 use crate::scene::run::RunError;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::BeyondLimitSpec;
+use crate::solve::explicit::State;
 use crate::solve::stable_step::{StepLimit, stable_step};
 use crate::solve::sub_cycling::{FineSites, SubCycled, SubCyclingError};
 use crate::system::Dynamic;
@@ -84,6 +85,41 @@ pub(super) fn paced<'a>(
     Ok((moving, pace))
 }
 
+/// The time step after a change of what moves: the one before, or a shorter one if that is beyond the fraction of the stable step now.
+///
+/// # Errors
+/// [`RunError::Step`] if no stable step is found.
+pub(super) fn repaced(
+    spec: &Spec,
+    system: &dyn Dynamic,
+    held: &[u32],
+    before: StepChoice,
+    state: &State,
+) -> Result<StepChoice, RunError> {
+    let limit = stable_step(system, held)?;
+    let choice = StepChoice {
+        stable: limit.stable,
+        certified: limit.certified,
+        site: limit.certified_site as u64,
+        ..before
+    };
+    // what was asked for may stay up to the limit itself
+    let largest = limit.stable * spec.step.map_or(spec.fraction, |_| 1.0);
+    if before.step <= largest * (1.0 + 1e-9) {
+        return Ok(choice);
+    }
+    let left = spec.duration - state.time;
+    let steps = (left / (spec.fraction * limit.stable) * (1.0 - 1e-12))
+        .ceil()
+        .max(1.0);
+    Ok(StepChoice {
+        step: left / steps,
+        steps: state.step + steps as u64,
+        since: (state.step, state.time),
+        ..choice
+    })
+}
+
 /// The time step of a run, such that a whole number of steps fills its duration.
 ///
 /// # Errors
@@ -117,6 +153,7 @@ fn choose_step(
         stable: limit.stable,
         certified: limit.certified,
         site: limit.certified_site as u64,
+        since: (0, 0.0),
     };
     choices.push(Choice {
         choice: format!("{} steps of {}", choice.steps, number(choice.step)),

@@ -67,6 +67,7 @@ fn load_steps<const D: usize>(
         stable: 0.0,
         certified: 0.0,
         site: 0,
+        since: (0, 0.0),
     };
     let params = QuasiStaticParams {
         equilibrium: match spec.method {
@@ -182,7 +183,7 @@ fn load_steps<const D: usize>(
                 solved(&state.u, &mut |s| recorder.output(&moment, s))?;
             }
             if leave || (!begins && recorder.is_checkpoint_due(state.step)) {
-                recorder.checkpoint(&moment, pace, edge)?;
+                recorder.checkpoint(&moment, pace, edge, None)?;
             }
             Ok(())
         };
@@ -244,6 +245,8 @@ fn load_steps<const D: usize>(
             broken_bonds: state.broken,
             edge_reached: edge.map(|e| (e.time, place(e.site as usize).iter().copied().collect())),
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),
+            switches: Vec::new(),
+            nonlocal_share: [0.0; 3],
         }),
         files: recorder.files(),
         ..RunSummary::default()

@@ -5,13 +5,15 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::coupling::Sampler;
+use super::switching::{nonlocal, share};
+use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
 use crate::observe::csv::Entry;
 use crate::observe::file::remove_parts;
 use crate::observe::history::History;
 use crate::observe::series::Series;
+use crate::observe::switch::Switch;
 use crate::scene::run::Solved;
 use crate::scene::validate::{Output, Tip};
 use crate::scene::write::{OverSites, Shown, snapshot};
@@ -34,6 +36,43 @@ pub(super) struct Saved {
     pub written: Written,
     /// When damage reached the edge of the nonlocal zone, if it did.
     pub edge: Option<EdgeReached>,
+    /// Where a zone that follows the crack stands; none of one that does not.
+    pub zone: Option<Zone>,
+}
+
+/// Where a zone that follows the crack stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Zone {
+    /// Whether each cell is nonlocal.
+    pub nonlocal: Vec<bool>,
+    /// Whether the state was looked at for a change already, where one is due.
+    pub looked: bool,
+    /// The changes so far.
+    pub switches: Vec<Switch>,
+    /// Its share of the volume at the start, and the most so far.
+    pub shares: [f64; 2],
+}
+
+impl Zone {
+    /// Of the layout that a run begins with.
+    pub fn first<const D: usize>(model: &Model<D>) -> Self {
+        let share = share(model);
+        Self {
+            nonlocal: nonlocal(model),
+            looked: true,
+            switches: Vec::new(),
+            shares: [share; 2],
+        }
+    }
+
+    /// After a change to another layout.
+    pub fn after<const D: usize>(mut self, switch: Switch, model: &Model<D>) -> Self {
+        self.nonlocal = nonlocal(model);
+        self.looked = true;
+        self.shares[1] = self.shares[1].max(switch.share);
+        self.switches.push(switch);
+        self
+    }
 }
 
 /// A time step, and the limits that it keeps.
@@ -49,6 +88,15 @@ pub(super) struct StepChoice {
     pub certified: f64,
     /// The site of the row that says so.
     pub site: u64,
+    /// The step and the time since when steps are of this size.
+    pub since: (u64, f64),
+}
+
+impl StepChoice {
+    /// The time after a step.
+    pub fn time(&self, step: u64) -> f64 {
+        self.since.1 + (step - self.since.0) as f64 * self.step
+    }
 }
 
 /// Damage at the edge of the nonlocal zone.
@@ -154,11 +202,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         written: Option<&Written>,
     ) -> Result<Self, ObserveError> {
         remove_parts(&output.directory, &output.name);
-        let probes: Vec<Vec<(u32, f64)>> = output
-            .probes
-            .iter()
-            .map(|(_, x)| sampler.weights(x).unwrap_or_default())
-            .collect();
+        let probes = probes(output, sampler);
         let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
         let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
         let history = History::resumed(
@@ -200,6 +244,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
             last: Row::default(),
             seconds: 0.0,
         })
+    }
+
+    /// Finds the probes in another layout of the same body.
+    pub fn move_to(&mut self, sampler: &Sampler<'_, D>) {
+        self.probes = probes(self.output, sampler);
     }
 
     /// Begins the account of energy.
@@ -330,6 +379,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         moment: &Moment<'_>,
         pace: StepChoice,
         edge: Option<EdgeReached>,
+        zone: Option<Zone>,
     ) -> Result<(), ObserveError> {
         let begun = Instant::now();
         let mut bytes = vec![self.history.mark()?];
@@ -346,6 +396,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 energy_at_start: self.energy_at_start,
             },
             edge,
+            zone,
         })?;
         self.last_checkpoint = Instant::now();
         self.seconds += begun.elapsed().as_secs_f64();
@@ -370,6 +421,14 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         files
     }
+}
+
+/// Sites and weights of each probe.
+fn probes<const D: usize>(output: &Output<D>, sampler: &Sampler<'_, D>) -> Vec<Vec<(u32, f64)>> {
+    let probes = output.probes.iter();
+    probes
+        .map(|(_, x)| sampler.weights(x).unwrap_or_default())
+        .collect()
 }
 
 fn history_header<const D: usize>(

@@ -3,7 +3,7 @@
 use crate::coupling::motion::{
     BondBehaviour, ContactBehaviour, Critical, Motion, MotionError, masses,
 };
-use crate::coupling::{Coupling, Interface, Model, Operator, PointSource};
+use crate::coupling::{BrokenBonds, Coupling, Interface, Model, Operator, PointSource};
 use crate::observe::summary::Choice;
 use crate::peridynamics::kernel::Kinematics;
 use crate::progress::Progress;
@@ -25,7 +25,7 @@ pub(super) struct Moving<'a> {
     pub is_linear: bool,
 }
 
-/// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks.
+/// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks; `broken` bonds are broken from the start.
 ///
 /// # Errors
 /// [`RunError::Motion`] for bonds that cannot stretch or break, [`RunError::Fracture`].
@@ -34,6 +34,7 @@ pub(super) fn dynamic<'a, const D: usize>(
     coupling: &dyn Coupling<D>,
     operator: &dyn Operator<D>,
     rest: &Rest<D>,
+    broken: Option<&BrokenBonds<D>>,
     choices: &mut Vec<Choice>,
     progress: &dyn Progress,
 ) -> Result<Moving<'a>, RunError> {
@@ -75,6 +76,7 @@ pub(super) fn dynamic<'a, const D: usize>(
                 approach: c.radius_factor,
                 stiffness: c.stiffness_factor,
             }),
+            broken,
         },
     );
     match moving {
@@ -138,7 +140,7 @@ fn reason(error: &MotionError) -> String {
 }
 
 /// The stretch at which bonds break, if any do.
-fn critical_stretch<const D: usize>(
+pub(super) fn critical_stretch<const D: usize>(
     model: &Model<D>,
     rest: &Rest<D>,
 ) -> Result<Option<Critical>, RunError> {

@@ -160,7 +160,7 @@ impl CouplingSpec {
                 FormSpec::Meshfree => Box::new(PartialStressMeshfree { influence }),
             },
             Self::Truncated(t) => Box::new(Truncated {
-                cut_bonds: match t.cut_bonds {
+                cut_bonds: match t.cut_bonds.unwrap_or_default() {
                     CutBondsSpec::Breaking => CutBonds::Breaking,
                     CutBondsSpec::Linear => CutBonds::Linear,
                 },
@@ -248,9 +248,9 @@ impl BetaSpec {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TruncatedSpec {
-    /// What becomes of cut bonds where bonds are exact or break.
+    /// What becomes of cut bonds where bonds are exact or break; `breaking` if left out, `linear` beside a zone that follows its crack.
     #[serde(default)]
-    pub cut_bonds: CutBondsSpec,
+    pub cut_bonds: Option<CutBondsSpec>,
 }
 
 /// What becomes of bonds that the seam cuts.

@@ -15,8 +15,8 @@ pub use condition::{
 };
 pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec};
 pub use coupling::{
-    BetaSpec, BlendingSpec, CouplingSpec, FormSpec, InterfaceSpec, Joining, LatticeStart,
-    NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
+    BetaSpec, BlendingSpec, CouplingSpec, CutBondsSpec, FormSpec, InterfaceSpec, Joining,
+    LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use material::{
     BondBasedSpec, CorrespondenceSpec, InfluenceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec,
@@ -32,7 +32,7 @@ pub use motion::{
     LoadStepSpec, QuasiStaticSpec, SolveSpec, TipSpec,
 };
 pub use region::{
-    AutoSpec, BallSpec, BodySpec, BoxSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec,
+    AutoSpec, BallSpec, BodySpec, BoxSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec,
     TransitionSpec, WithoutSpec, ZonesSpec,
 };
 

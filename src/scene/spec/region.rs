@@ -28,6 +28,10 @@ pub struct ZonesSpec {
     #[serde(default)]
     #[schemars(with = "Option<super::motion::EdgeSpec>")]
     pub damage_at_edge: Option<Spanned<super::motion::EdgeSpec>>,
+    /// The nonlocal zone follows the crack; `{}` for the defaults. Scenes in time only.
+    #[serde(default)]
+    #[schemars(with = "Option<FollowSpec>")]
+    pub follow: Option<Spanned<FollowSpec>>,
     /// Cells of the nonlocal zone that are elements all the same, so that no bond is missing there.
     #[serde(default)]
     pub skin: Option<SkinSpec>,
@@ -49,6 +53,18 @@ pub struct AutoSpec {
     /// Error of the local model that may remain, relative in the norm of energy; 0.05 if left out.
     #[serde(default)]
     pub tolerance: Option<Number>,
+}
+
+/// How the nonlocal zone follows the crack.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct FollowSpec {
+    /// Fraction of the critical stretch from which on a cell is wanted; 0.8 if left out.
+    #[serde(default)]
+    pub stretch: Option<Number>,
+    /// How far the zone reaches beyond such cells when it changes; six horizons if left out.
+    #[serde(default)]
+    pub padding: Option<Number>,
 }
 
 /// A part of the nonlocal zone with a horizon and a lattice of its own.

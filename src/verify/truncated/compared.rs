@@ -207,6 +207,7 @@ fn run_crack(
         critical_stretch: Some(Critical::Uniform(CRITICAL)),
         no_fail: &never,
         contact: None,
+        broken: None,
     };
     let mut motion = Motion::new(
         &e.model,

@@ -1,0 +1,155 @@
+//! A nonlocal zone that follows the crack: what the scene says of it.
+
+use super::breaking::Breaking;
+use super::check;
+use super::error::{SceneError, SceneErrorKind};
+use super::joined::Joined;
+use super::materials::Law;
+use super::peridynamics::{Peridynamics, Points};
+use super::solve::Solve;
+use super::spec::{CouplingSpec, CutBondsSpec, SceneSpec, SkinSpec, ZonesNeeded};
+use crate::mesh::Mesh;
+
+/// Horizons between damage and the edge of the zone: one in which bonds do not break, and one to the points whose bonds reach there.
+const REACH: f64 = 2.0;
+
+/// Horizons more with an LPS, whose bonds act through the dilatations of both ends.
+const DILATATION: f64 = 1.0;
+
+/// Padding in horizons, if the scene leaves it out: in `examples/branching_moving.toml` the path keeps within 0.8 mm of full peridynamics at 6, 1.3 at 7, 1.0 at 8 and 0.5 at 10; the zone ends with 36, 41, 43 and 50 % of the plate.
+const PADDING: f64 = 6.0;
+
+/// Fraction of the critical stretch from which a cell is wanted, if the scene leaves it out: from 0.5 on waves of the branching plate mark most of it at the end.
+const STRETCH: f64 = 0.8;
+
+/// How the nonlocal zone of a scene in time follows the crack.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Follow {
+    /// Fraction of the critical stretch from which a cell is wanted.
+    pub stretch: f64,
+    /// How far the zone reaches beyond such cells when it changes \[m\].
+    pub padding: f64,
+    /// How far it reaches beyond damage, cracks and voids, at all times \[m\].
+    pub reach: f64,
+    /// Cells that stay elements whatever happens, one entry per cell.
+    pub barred: Vec<bool>,
+}
+
+/// How the zone follows, if the scene wants it to.
+pub(crate) fn follow<const D: usize>(
+    spec: &SceneSpec,
+    joined: &mut Joined,
+    solve: &Solve,
+    breaking: &Breaking<D>,
+    peridynamics: Option<&Peridynamics<D>>,
+    law: &Law,
+    mesh: &Mesh<D>,
+    is_peridynamic: impl Fn(usize) -> bool,
+) -> Result<Option<Follow>, SceneError> {
+    let Some(typed) = &spec.zones.follow else {
+        return Ok(None);
+    };
+    if let ZonesNeeded::Everywhere(_) = joined.joining.zones {
+        // one zone ignores what is said of zones
+        return Ok(None);
+    }
+    let span = typed.span();
+    let refused = |message: String, label: &str, help: &str| {
+        SceneError::new(SceneErrorKind::Conflict, message)
+            .label(span.clone(), label)
+            .help(help)
+    };
+    let Solve::Explicit(explicit) = solve else {
+        return Err(refused(
+            "`zones.follow` needs a scene in time".to_owned(),
+            "follows a crack that runs",
+            "add [solve.explicit] with a duration, or remove it",
+        ));
+    };
+    if breaking.fracture.is_none() {
+        return Err(refused(
+            "`zones.follow` is set, but no bond breaks".to_owned(),
+            "needs a material that breaks",
+            "add fracture-energy or critical-stretch to the material, or remove it",
+        ));
+    }
+    if explicit.sub_steps.is_some() {
+        return Err(refused(
+            "`zones.follow` and `solve.explicit.sub-steps` are set".to_owned(),
+            "changes which sites are stiff",
+            "remove one of the two",
+        ));
+    }
+    let (ZonesNeeded::Nonlocal, Some(p)) = (joined.joining.zones, peridynamics) else {
+        return Err(refused(
+            format!(
+                "`zones.follow` is set, and coupling `{}` has a transition zone",
+                joined.joining.name
+            ),
+            "moves the border of two zones",
+            "use coupling.truncated, or remove it",
+        ));
+    };
+    if let CouplingSpec::Truncated(truncated) = &mut joined.coupling {
+        // the zone changes before damage comes near, and nothing that broke at the seam would be carried over
+        if truncated.cut_bonds == Some(CutBondsSpec::Breaking) {
+            return Err(refused(
+                "`zones.follow` is set, and `coupling.truncated.cut-bonds` is \"breaking\""
+                    .to_owned(),
+                "keeps damage two horizons away from the bonds that the seam cuts",
+                "write cut-bonds = \"linear\", or leave it out",
+            ));
+        }
+        truncated.cut_bonds = Some(CutBondsSpec::Linear);
+    }
+    if matches!(p.points, Points::Lattices { .. }) {
+        return Err(refused(
+            "`zones.follow` and `zones.bodies` are set".to_owned(),
+            "follows on one lattice",
+            "remove one of the two",
+        ));
+    }
+    let horizon = (0..mesh.cell_count())
+        .map(|c| p.horizon_at(&mesh.centroid(c)))
+        .fold(0.0, f64::max);
+    let follow = typed.get_ref();
+    let stretch = match &follow.stretch {
+        Some(s) => check::within(
+            "zones.follow.stretch",
+            s,
+            s.value > 0.0 && s.value < 1.0,
+            "must be between 0 and 1",
+            "0.8 suits most scenes: bonds break at 1",
+        )?,
+        None => STRETCH,
+    };
+    let reach = horizon
+        * match law {
+            Law::Lps(_) => REACH + DILATATION,
+            _ => REACH,
+        };
+    let padding = match &follow.padding {
+        Some(w) => check::within(
+            "zones.follow.padding",
+            w,
+            w.value > reach,
+            "must be more than two horizons, three with an lps material",
+            &format!(
+                "bonds break no nearer to elements; {} is the default",
+                PADDING * horizon
+            ),
+        )?,
+        None => PADDING * horizon,
+    };
+    let mut barred: Vec<bool> = (0..mesh.cell_count()).map(|c| !is_peridynamic(c)).collect();
+    if let Some(SkinSpec::FreeSurfaces) = spec.zones.skin {
+        let skin = mesh.cells_at_boundary();
+        barred.iter_mut().zip(skin).for_each(|(b, s)| *b |= s);
+    }
+    Ok(Some(Follow {
+        stretch,
+        padding,
+        reach,
+        barred,
+    }))
+}

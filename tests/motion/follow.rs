@@ -1,0 +1,211 @@
+//! A nonlocal zone that follows its crack: against full peridynamics, across interrupts, and where it cannot.
+
+use crate::{bondline, column, run, same, write};
+
+/// A notched plate pulled apart: the crack runs from a zone of a third of the plate's length through the rest. Where the loads act no bond breaks: in peridynamics alone they tear the edges off.
+const RUNNING: &str = r#"
+kinematics = "plane-stress"
+[mesh.rectangle]
+min = [0, 0]
+max = [36, 24]
+x = { cells = 36 }
+y = { cells = 24 }
+[materials.plate.bond-based]
+youngs-modulus = 1
+density = 1
+critical-stretch = 0.004
+[peridynamics]
+horizon = 1
+points.lattice = { spacing = 0.333333333333333333, origin = [0.166666666666666667, 0.166666666666666667] }
+[zones]
+nonlocal = { box = { min = [0, 8], max = [14, 16] } }
+follow = { padding = 5 }
+[coupling.truncated]
+[cracks.notch]
+segment = { from = [-1, 12], to = [10, 12] }
+[solve.explicit]
+duration = 48
+outputs = 2
+history-interval = 1
+[conditions.below.traction]
+on = "bottom"
+y = -1.3e-3
+[conditions.above.traction]
+on = "top"
+y = 1.3e-3
+[no-fail.below]
+box = { min = [0, 0], max = [36, 4] }
+[no-fail.above]
+box = { min = [0, 20], max = [36, 24] }
+[output]
+tips.front = { direction = [1, 0] }
+probes.above = { at = [20, 20] }
+"#;
+
+#[test]
+fn a_crack_that_leaves_its_first_zone_runs_as_in_full_peridynamics() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "plate.toml", RUNNING);
+    let said = run(
+        folder.path(),
+        &["plate.toml", "--output", "moving", "--json"],
+    );
+    let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let motion = &summary["motion"];
+    let text = |v: &serde_json::Value| v.to_string();
+    assert_eq!(motion["ended"], "finished", "{}", text(motion));
+    let switches = motion["switches"].as_array().unwrap();
+    assert!(switches.len() >= 2, "{}", text(motion));
+    for s in switches {
+        let of = |key: &str| s[key].as_f64().unwrap();
+        let jump = of("kinetic_jump") + of("stored_jump");
+        assert!(jump.abs() < 3e-3 * of("energy"), "{}", text(s));
+        assert!(
+            (jump + of("energy_restored")).abs() < 1e-9 * of("energy"),
+            "{}",
+            text(s)
+        );
+        assert!(
+            of("momentum_restored") < 1e-3 * of("momentum_scale"),
+            "{}",
+            text(s)
+        );
+    }
+    let most = motion["nonlocal_share"][1].as_f64().unwrap();
+    assert!(most < 0.45, "{most}");
+
+    run(
+        folder.path(),
+        &[
+            "plate.toml",
+            "--output",
+            "full",
+            "--set",
+            "coupling=nonlocal",
+        ],
+    );
+    let tip = |name: &str, key: &str| {
+        column(
+            &folder.path().join(format!("{name}/plate_tip_front.csv")),
+            key,
+        )
+    };
+    let end = |name: &str| {
+        (
+            *tip(name, "x").last().unwrap(),
+            *tip(name, "y").last().unwrap(),
+        )
+    };
+    let ((x, y), (full_x, full_y)) = (end("moving"), end("full"));
+    assert!(x > 16.0, "the crack ends at {x}, within its first zone");
+    assert!(
+        (x - full_x).abs() < 1.0 && (y - full_y).abs() < 1.0,
+        "{x} {y}, {full_x} {full_y}"
+    );
+    let at = |name: &str, key: &str| {
+        *column(
+            &folder.path().join(format!("{name}/plate_history.csv")),
+            key,
+        )
+        .last()
+        .unwrap()
+    };
+    for (key, within) in [
+        ("kinetic_energy", 0.02),
+        ("dissipated_energy", 0.06),
+        ("above_uy", 0.03),
+    ] {
+        let (moving, full) = (at("moving", key), at("full", key));
+        assert!(
+            (moving / full - 1.0).abs() < within,
+            "{key}: {moving} {full}"
+        );
+    }
+    // what the account misses is what broke, not what the changes of the zone took
+    let account = at("moving", "missing_energy") / at("full", "missing_energy");
+    assert!((account - 1.0).abs() < 0.1, "{account}");
+}
+
+#[test]
+fn a_run_that_is_cut_into_pieces_leaves_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "plate.toml", RUNNING);
+    let every = ["plate.toml", "--checkpoint-every", "5"];
+    let begun = std::time::Instant::now();
+    let said = run(
+        folder.path(),
+        &[&every[..], &["--output", "whole", "--threads", "1"]].concat(),
+    );
+    assert!(said.contains("changes of the zone"), "{said}");
+    let whole = begun.elapsed();
+    for part in [0.7, 0.5, 0.6, 0.4] {
+        let mut child = bondline(folder.path())
+            .arg("run")
+            .args(every)
+            .args(["--output", "pieces", "--resume", "--threads", "2"])
+            .stdout(std::process::Stdio::null())
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(whole.mul_f64(part));
+        let _ = child.kill();
+        child.wait().unwrap();
+    }
+    run(
+        folder.path(),
+        &[&every[..], &["--output", "pieces", "--resume"]].concat(),
+    );
+    same(&folder.path().join("whole"), &folder.path().join("pieces"));
+}
+
+#[test]
+fn what_cannot_follow_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (was, is, says) in [
+        (
+            "[solve.explicit]",
+            "[solve.explicit]\nsub-steps = 2",
+            "sub-steps",
+        ),
+        ("critical-stretch = 0.004", "", "no bond breaks"),
+        (
+            "follow = { padding = 5 }",
+            "follow = { padding = 1.5 }",
+            "two horizons",
+        ),
+        (
+            "follow = { padding = 5 }",
+            "follow = { stretch = 1.5 }",
+            "between 0 and 1",
+        ),
+        (
+            "[coupling.truncated]",
+            "[coupling.truncated]\ncut-bonds = \"breaking\"",
+            "cut-bonds",
+        ),
+        (
+            "follow = { padding = 5 }\n[coupling.truncated]",
+            "follow = {}\ntransition = { around = 4 }\n[coupling.blending]",
+            "transition zone",
+        ),
+    ] {
+        let mut scene = RUNNING.replace(was, is);
+        if says == "no bond breaks" {
+            scene = scene.replace("tips.front = { direction = [1, 0] }", "");
+            let (before, rest) = scene.split_once("[no-fail.below]").unwrap();
+            scene = format!("{before}[output]{}", rest.split_once("[output]").unwrap().1);
+        }
+        assert_ne!(scene, RUNNING, "{was}");
+        write(folder.path(), "plate.toml", &scene);
+        let output = bondline(folder.path())
+            .args(["run", "plate.toml"])
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).replace(['\n', '│'], " ");
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            !output.status.success() && said.contains(says),
+            "{says}: {said}"
+        );
+    }
+}
