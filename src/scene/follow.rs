@@ -41,8 +41,7 @@ pub(crate) fn follow<const D: usize>(
     joined: &mut Joined,
     solve: &Solve,
     breaking: &Breaking<D>,
-    peridynamics: Option<&Peridynamics<D>>,
-    law: &Law,
+    bonds: Option<(&Peridynamics<D>, &Law)>,
     mesh: &Mesh<D>,
     is_peridynamic: impl Fn(usize) -> bool,
 ) -> Result<Option<Follow>, SceneError> {
@@ -80,7 +79,7 @@ pub(crate) fn follow<const D: usize>(
             "remove one of the two",
         ));
     }
-    let (ZonesNeeded::Nonlocal, Some(p)) = (joined.joining.zones, peridynamics) else {
+    let (ZonesNeeded::Nonlocal, Some((p, law))) = (joined.joining.zones, bonds) else {
         return Err(refused(
             format!(
                 "`zones.follow` is set, and coupling `{}` has a transition zone",

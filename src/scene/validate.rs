@@ -349,8 +349,7 @@ fn scene<const D: usize>(
             &mut joined,
             &solve,
             &breaking,
-            peridynamics.as_ref(),
-            &found[peridynamic as usize].law,
+            (peridynamics.as_ref()).map(|p| (p, &found[peridynamic as usize].law)),
             &mesh,
             |c| cell_material[c] == peridynamic,
         )?;
