@@ -427,7 +427,8 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
             .enumerate()
             .for_each(|(p, damage)| {
                 *damage = 0.0;
-                if self.place[p] == NONE {
+                // most points are whole, which their group's words say at once
+                if !self.is_damaged(p) {
                     return;
                 }
                 let (g, lane) = (

@@ -518,17 +518,26 @@ impl<const D: usize> BondPass<D> for List<D> {
     }
 
     fn damage_into(&self, damage: &mut [f64]) {
-        for (i, damage) in damage.iter_mut().enumerate() {
-            let (mut all, mut lost) = (0.0, 0.0);
-            for bond in self.offsets[i]..self.offsets[i + 1] {
-                let v = self.volume[self.neighbours[bond] as usize];
-                all += v;
-                if !self.stands(i, bond - self.offsets[i]) {
-                    lost += v;
+        damage
+            .par_iter_mut()
+            .with_min_len(1024)
+            .enumerate()
+            .for_each(|(i, damage)| {
+                *damage = 0.0;
+                // most points are whole
+                if !self.is_damaged(i) {
+                    return;
                 }
-            }
-            *damage = if lost == 0.0 { 0.0 } else { lost / all };
-        }
+                let (mut all, mut lost) = (0.0, 0.0);
+                for bond in self.offsets[i]..self.offsets[i + 1] {
+                    let v = self.volume[self.neighbours[bond] as usize];
+                    all += v;
+                    if !self.stands(i, bond - self.offsets[i]) {
+                        lost += v;
+                    }
+                }
+                *damage = lost / all;
+            });
     }
 
     fn is_damaged(&self, i: usize) -> bool {
