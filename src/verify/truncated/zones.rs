@@ -259,11 +259,13 @@ pub(super) fn obstructions(effort: Effort, progress: &dyn Progress) -> Table {
             rows.extend(obstruction::<2>(grain, ratio));
         }
     }
-    if effort == Effort::Full {
-        for grain in grains {
-            for ratio in [2, 3] {
-                rows.extend(obstruction::<3>(grain, ratio));
-            }
+    let solid: &[u32] = match effort {
+        Effort::Quick => &[2],
+        Effort::Full => &[2, 3],
+    };
+    for grain in grains {
+        for &ratio in solid {
+            rows.extend(obstruction::<3>(grain, ratio));
         }
     }
     rows.into_iter().for_each(|row| table.push(row));
