@@ -441,6 +441,10 @@ fn sent_back(
             }
         }
     }
+    // more than came in
+    if largest > 1.0 {
+        return Err(format!("the motion grows, to {largest:.0} times the pulse"));
+    }
     Ok(largest)
 }
 
