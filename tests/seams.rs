@@ -100,10 +100,6 @@ fn bodies_that_cannot_be_are_refused() {
         ),
         (&["peridynamics.horizon=\"0.3+0.01*x\""][..], "one horizon"),
         (
-            &["materials.body.lps.critical-stretch=0.01"][..],
-            "bonds break",
-        ),
-        (
             &["zones.bodies.fine.inside={everywhere=true}"][..],
             "take every cell",
         ),
