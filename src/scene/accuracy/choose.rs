@@ -50,7 +50,10 @@ impl Chosen {
 
     /// The keys of a reference with so many times the cells.
     pub fn reference(&self, factor: f64) -> Vec<String> {
-        let n = (self.candidate.cells as f64 * factor).round() as usize;
+        // cut-outs of the body lie on its grid too
+        let n = self
+            .asked
+            .fitting((self.candidate.cells as f64 * factor).round() as usize);
         self.asked.reference(&self.candidate.family, n)
     }
 
