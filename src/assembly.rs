@@ -99,9 +99,6 @@ pub struct Row<const D: usize> {
 
 const EMPTY: u32 = u32::MAX;
 
-/// What a difference of equal blocks may leave, relative to the largest block of its row: sums of some hundred terms in another order.
-const CANCELLED: f64 = 1e-13;
-
 impl<const D: usize> Row<D> {
     /// An empty row of a system of `sites` sites.
     pub fn new(sites: usize) -> Self {
@@ -135,30 +132,6 @@ impl<const D: usize> Row<D> {
                 self.add_site(site, &(block * weight));
             }
         }
-    }
-
-    /// Takes out of the row what `add_negative` adds with the opposite sign; entries of which only rounding is left go.
-    pub fn subtract(&mut self, add_negative: impl FnOnce(&mut Self)) {
-        let largest = self.blocks.iter().map(|b| b.amax()).fold(0.0, f64::max);
-        add_negative(self);
-        let kept: Vec<bool> = self
-            .blocks
-            .iter()
-            .map(|b| b.amax() > CANCELLED * largest)
-            .collect();
-        let mut next = 0;
-        for (k, kept) in kept.into_iter().enumerate() {
-            let column = self.columns[k];
-            if kept {
-                self.slot[column as usize] = next as u32;
-                (self.columns[next], self.blocks[next]) = (column, self.blocks[k]);
-                next += 1;
-            } else {
-                self.slot[column as usize] = EMPTY;
-            }
-        }
-        self.columns.truncate(next);
-        self.blocks.truncate(next);
     }
 
     /// The row times each of `u` (`D` numbers per site), which empties it: for rows that are needed once, without a matrix.

@@ -1,16 +1,14 @@
 //! Bonds that voids, cracks and holes cut, and the weights of those of a lattice.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
-
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 use crate::{
     coupling::{ModelError, Peridynamics, PointSource, points::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, cutter::SegmentCutter},
     peridynamics::{
         BondWeights, Families, Family, PartialVolume, StatePart, TIE_TOLERANCE, collapsed_tensor,
-        isotropic_shell_factors,
-        partial_volume::{lattice_shells, orbit},
+        isotropic_shell_factors, partial_volume::lattice_shells,
     },
     shape::Barriers,
     tensor::{Tensor4, Vector},
@@ -51,12 +49,12 @@ pub(super) fn cut<const D: usize>(
 /// Bins of the size of a horizon in or beside which facets lie.
 struct NearBins<const D: usize> {
     size: f64,
-    bins: HashSet<[i64; D]>,
+    bins: FxHashSet<[i64; D]>,
 }
 
 impl<const D: usize> NearBins<D> {
     fn new(mesh: &Mesh<D>, facets: &[BoundaryFacet], size: f64) -> Self {
-        let mut bins = HashSet::new();
+        let mut bins = FxHashSet::default();
         for facet in facets {
             let (low, high) = mesh.bounds_of(&facet.nodes);
             let margin = Vector::repeat(size * (1.0 + 1e-6));
@@ -86,9 +84,49 @@ impl<const D: usize> NearBins<D> {
     }
 }
 
+/// A value for each bond of a lattice, by its integer offset.
+struct OffsetTable<T, const D: usize> {
+    reach: i32,
+    /// Of all offsets of at most `reach` along each axis, the last axis fastest.
+    values: Vec<Option<T>>,
+}
+
+impl<T: Copy, const D: usize> OffsetTable<T, D> {
+    fn new(known: &[([i32; D], T)]) -> Self {
+        let components = known.iter().flat_map(|(offset, _)| offset);
+        let reach = components.map(|k| k.abs()).max().unwrap_or(0);
+        let mut table = Self {
+            reach,
+            values: vec![None; (2 * reach as usize + 1).pow(D as u32)],
+        };
+        for (offset, value) in known {
+            if let Some(place) = table.place(offset) {
+                table.values[place] = Some(*value);
+            }
+        }
+        table
+    }
+
+    fn place(&self, offset: &[i32; D]) -> Option<usize> {
+        let mut place = 0;
+        for &k in offset {
+            if k.abs() > self.reach {
+                return None;
+            }
+            place = place * (2 * self.reach + 1) as usize + (k + self.reach) as usize;
+        }
+        Some(place)
+    }
+
+    fn of(&self, offset: &[i32; D]) -> Option<T> {
+        self.values[self.place(offset)?]
+    }
+}
+
 /// Bond factors of a lattice, shell by shell, for every horizon in use: the weight of the shell times the share of the far cell.
 pub(super) struct LatticeFactors<const D: usize> {
-    tables: HashMap<u64, HashMap<[u32; D], f64>>,
+    /// By the bits of the horizon, ascending.
+    tables: Vec<(u64, OffsetTable<f64, D>)>,
     spacing: f64,
     is_lattice: bool,
     volumes: PartialVolume,
@@ -98,7 +136,7 @@ impl<const D: usize> LatticeFactors<D> {
     /// Factors for the horizons of a cloud; without effect unless the points are a lattice's, and the weights isotropic or the volumes partial.
     pub fn new(p: &Peridynamics<D>, cloud: &PointCloud<D>) -> Result<Self, ModelError> {
         let mut factors = Self {
-            tables: HashMap::new(),
+            tables: Vec::new(),
             spacing: cloud.spacing,
             is_lattice: cloud.is_lattice,
             volumes: p.volumes,
@@ -115,10 +153,11 @@ impl<const D: usize> LatticeFactors<D> {
         } else if !cloud.is_lattice || !isotropic {
             return Ok(factors);
         }
-        for &horizon in &cloud.horizon {
-            if factors.tables.contains_key(&horizon.to_bits()) {
-                continue;
-            }
+        let mut horizons: Vec<u64> = cloud.horizon.iter().map(|d| d.to_bits()).collect();
+        horizons.sort_unstable();
+        horizons.dedup();
+        for bits in horizons {
+            let horizon = f64::from_bits(bits);
             let (lattice, shares) =
                 lattice_shells::<D>(p.volumes, horizon / cloud.spacing, TIE_TOLERANCE)?;
             let weights = match p.law.shell_target().filter(|_| isotropic) {
@@ -133,20 +172,13 @@ impl<const D: usize> LatticeFactors<D> {
                 }
                 None => vec![1.0; shares.len()],
             };
-            let mut table = HashMap::new();
+            let mut known = Vec::new();
             for ((shell, weight), share) in lattice.shells.iter().zip(weights).zip(shares) {
-                for offset in &shell.offsets {
-                    table.insert(orbit(offset), weight * share);
-                }
+                known.extend(shell.offsets.iter().map(|k| (*k, weight * share)));
             }
-            factors.tables.insert(horizon.to_bits(), table);
+            factors.tables.push((bits, OffsetTable::new(&known)));
         }
         Ok(factors)
-    }
-
-    /// Whether a bond of that horizon may have a factor here.
-    pub fn knows(&self, horizon: f64) -> bool {
-        self.tables.contains_key(&horizon.to_bits())
     }
 
     /// Whether the points are a lattice's.
@@ -163,19 +195,21 @@ impl<const D: usize> LatticeFactors<D> {
     pub fn drop_without_share(&self, cloud: &PointCloud<D>, families: &mut Families) {
         if self.has_partial_volumes() {
             let x = &cloud.position;
-            families.retain(|i, j| self.factor(cloud.horizon[i], &(x[j as usize] - x[i])) > 0.0);
+            families.retain(|i, j| {
+                self.factor(cloud.horizon[i], &(x[j as usize] - x[i]))
+                    .is_some_and(|factor| factor > 0.0)
+            });
         }
     }
 
-    /// The factor of a bond.
-    pub fn factor(&self, horizon: f64, xi: &Vector<D>) -> f64 {
+    /// The factor of a bond; none for a horizon that no point of the lattice has.
+    pub fn factor(&self, horizon: f64, xi: &Vector<D>) -> Option<f64> {
+        let bits = horizon.to_bits();
+        let place = self.tables.binary_search_by_key(&bits, |t| t.0).ok()?;
+        let known = self.tables[place].1.of(&offset_of(xi, self.spacing));
         // an isotropic table lacks no bond of its family; a table of shares lacks those to cells of which nothing counts
         let other = if self.has_partial_volumes() { 0.0 } else { 1.0 };
-        self.tables
-            .get(&horizon.to_bits())
-            .and_then(|table| table.get(&orbit(&offset_of(xi, self.spacing))))
-            .copied()
-            .unwrap_or(other)
+        Some(known.unwrap_or(other))
     }
 
     /// The whole family of a lattice point with the coefficients that the law gives it; none without a lattice.
@@ -199,7 +233,10 @@ impl<const D: usize> LatticeFactors<D> {
             })
             .collect();
         let volumes = vec![self.spacing.powi(D as i32); bonds.len()];
-        let factors: Vec<f64> = bonds.iter().map(|xi| self.factor(horizon, xi)).collect();
+        let factors: Vec<f64> = bonds
+            .iter()
+            .map(|xi| self.factor(horizon, xi).unwrap_or(1.0))
+            .collect();
         let family = Family {
             bonds: &bonds,
             volumes: &volumes,
@@ -217,14 +254,16 @@ impl<const D: usize> LatticeFactors<D> {
                 source,
             })?;
         let tensor = collapsed_tensor(&family, &pair, state.as_ref());
-        let coefficients = bonds
+        let mut bonds: Vec<_> = bonds
             .iter()
             .zip(pair.iter().zip(&omega))
             .map(|(xi, (&p, &w))| (offset_of(xi, self.spacing), (p, w)))
             .collect();
+        bonds.sort_unstable_by_key(|b| b.0);
         Ok(Some(WholeFamily {
             spacing: self.spacing,
-            coefficients,
+            coefficients: OffsetTable::new(&bonds),
+            bonds,
             state,
             tensor,
         }))
@@ -249,7 +288,8 @@ fn offset_of<const D: usize>(xi: &Vector<D>, spacing: f64) -> [i32; D] {
 pub(super) struct WholeFamily<const D: usize> {
     /// Spacing of the lattice.
     pub spacing: f64,
-    coefficients: BTreeMap<[i32; D], (f64, f64)>,
+    bonds: Vec<([i32; D], (f64, f64))>,
+    coefficients: OffsetTable<(f64, f64), D>,
     /// The state part of the law, if it has one.
     pub state: Option<StatePart<D>>,
     /// The classical tensor that the family carries.
@@ -259,14 +299,13 @@ pub(super) struct WholeFamily<const D: usize> {
 impl<const D: usize> WholeFamily<D> {
     /// All bonds by their integer offsets, in their order, with `p` and `ω`.
     pub fn bonds(&self) -> impl Iterator<Item = ([i32; D], (f64, f64))> + '_ {
-        self.coefficients.iter().map(|(&k, &c)| (k, c))
+        self.bonds.iter().copied()
     }
 
     /// The coefficients `p` and `ω` of a bond; zero for one that the lattice does not have.
     pub fn of(&self, xi: &Vector<D>) -> (f64, f64) {
         self.coefficients
-            .get(&offset_of(xi, self.spacing))
-            .copied()
+            .of(&offset_of(xi, self.spacing))
             .unwrap_or((0.0, 0.0))
     }
 }

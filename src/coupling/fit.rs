@@ -1,6 +1,6 @@
 //! Nodes at the seam that are no sites, expressed through the sites around them.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use rayon::prelude::*;
 
@@ -27,12 +27,12 @@ pub(super) struct Sites<'a, const D: usize> {
 /// Positions sorted into bins, to find those near a node without looking at all of them.
 pub(crate) struct Bins<const D: usize> {
     size: f64,
-    bins: HashMap<[i64; D], Vec<u32>>,
+    bins: FxHashMap<[i64; D], Vec<u32>>,
 }
 
 impl<const D: usize> Bins<D> {
     pub fn new(positions: &[Vector<D>], size: f64) -> Self {
-        let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
+        let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
         for (k, x) in positions.iter().enumerate() {
             bins.entry(Self::bin(x, size)).or_default().push(k as u32);
         }

@@ -154,6 +154,9 @@ pub trait Operator<const D: usize>: Sync {
         false
     }
 
+    /// Adds the row of a site that [`Operator::has_body_bonds`], less the bonds of the body.
+    fn add_row_beside_bonds(&self, _site: usize, _row: &mut Row<D>) {}
+
     /// The bonds of a seam that may be geometrically exact, and break, where the operator has such: a motion takes them over, and the rest of the rows from [`Operator::add_row_without_bonds`].
     fn seam_bonds(&self) -> Option<SeamBonds<D>> {
         None

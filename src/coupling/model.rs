@@ -354,8 +354,8 @@ impl<const D: usize> Model<D> {
         }
         progress.stage("bonds", None);
         let shells = |horizon: f64, xi: &Vector<D>| {
-            let own = factors.iter().find(|l| l.knows(horizon));
-            own.map_or(1.0, |l| l.factor(horizon, xi))
+            let mut known = factors.iter().filter_map(|l| l.factor(horizon, xi));
+            known.next().unwrap_or(1.0)
         };
         let weighting = match (p.weights, factors[0].is_lattice()) {
             (BondWeights::Isotropic, true) => Factors::Shells(&shells),

@@ -160,14 +160,11 @@ impl<'a, const D: usize> Motion<'a, D> {
             |site, row| {
                 if seam.is_some() {
                     operator.add_row_without_bonds(site, row);
-                    return;
-                }
-                operator.add_row(site, row);
-                if let (true, Some((body, point))) =
-                    (operator.has_body_bonds(site), model.point_of(site))
-                {
-                    // the bonds are passed over anyway
-                    row.subtract(|row| body.add_force_row(point, |_| -1.0, row));
+                } else if operator.has_body_bonds(site) {
+                    // the body's are passed over
+                    operator.add_row_beside_bonds(site, row);
+                } else {
+                    operator.add_row(site, row);
                 }
             },
         );

@@ -237,6 +237,9 @@ impl<const D: usize> PdBody<D> {
             let j = j as usize;
             let xi = self.bond(i, j);
             let [vv, of_state] = weights(j).map(|w| volume * self.cloud.volume[j] * w);
+            if vv == 0.0 && of_state == 0.0 {
+                continue;
+            }
             let mut block = xi * xi.transpose() * (both * vv * pair[k]);
             if !self.pairwise {
                 block += Tensor::identity() * (q * omega[k] * vv);
@@ -256,6 +259,9 @@ impl<const D: usize> PdBody<D> {
                 let j = j as usize;
                 let xi = self.bond(j, i);
                 let [vv, of_state] = weights(j).map(|w| volume * self.cloud.volume[j] * w);
+                if vv == 0.0 && of_state == 0.0 {
+                    continue;
+                }
                 let mut block = xi * xi.transpose() * (vv * self.pair[bond]);
                 if let Some(state) = self.state(j) {
                     let omega = self.omega[bond];

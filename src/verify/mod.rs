@@ -179,7 +179,7 @@ pub const SUITES: &[Suite] = &[
     },
 ];
 
-/// Suites that take minutes to an hour, or gigabytes: `verify` runs them only by name.
+/// Suites that take minutes, or gigabytes: `verify` runs them only by name.
 pub const LONG_SUITES: &[Suite] = &[
     Suite {
         name: "choices",
@@ -188,7 +188,7 @@ pub const LONG_SUITES: &[Suite] = &[
     },
     Suite {
         name: "convergence-3d",
-        about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about an hour on two cores, only if named",
+        about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about 20 minutes on two cores, only if named",
         run: convergence::run_solid,
     },
     Suite {

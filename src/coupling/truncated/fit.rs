@@ -8,7 +8,7 @@
 //!
 //! Where the seam follows the lattice nothing is missing, and nothing is changed.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::{
     dilatation::state_of,
@@ -143,9 +143,9 @@ pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> Seam
 /// What is missing before a fit.
 struct Missing<const D: usize> {
     /// Integrals of gradients by site, as [`loaded_nodes`] gives them.
-    nodes: HashMap<u32, Vector<D>>,
+    nodes: FxHashMap<u32, Vector<D>>,
     /// Conditions by site.
-    missing: HashMap<u32, Vec<f64>>,
+    missing: FxHashMap<u32, Vec<f64>>,
     /// The largest traction of a face.
     scale: f64,
 }
@@ -154,7 +154,7 @@ fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
     let nodes = loaded_nodes(segments);
     let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
     let tensor = pair_tensor(segments);
-    let mut missing = HashMap::new();
+    let mut missing = FxHashMap::default();
     for (&site, b) in &nodes {
         let mut row = third(b, &tensor);
         row.iter_mut().for_each(|v| *v = -*v);
@@ -191,7 +191,7 @@ pub(super) fn fit<const D: usize>(
         scale,
     } = missing(segments);
     let rounding = rounding(segments);
-    let follows = |missing: &HashMap<u32, Vec<f64>>| {
+    let follows = |missing: &FxHashMap<u32, Vec<f64>>| {
         missing.iter().all(|(site, m)| {
             strings.holds(*site) || m.iter().all(|m| m.abs() <= (FOLLOWS + rounding) * scale)
         })
@@ -243,10 +243,10 @@ pub(super) fn fit<const D: usize>(
 }
 
 /// Integrals of the gradient of the shape functions of the nodes at the seam over the elements around them, without nodes from whose faces bonds are missing.
-fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> HashMap<u32, Vector<D>> {
+fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> FxHashMap<u32, Vector<D>> {
     let model = segments.model;
     let full = segments.passing.whole[0].bonds().count();
-    let mut nodes = HashMap::new();
+    let mut nodes = FxHashMap::default();
     let mut dropped = Vec::new();
     for s in &segments.cut {
         let broken = [s.i, s.j]
@@ -325,10 +325,10 @@ fn parts<const D: usize>(segments: &Segments<'_, D>) -> Vec<Part> {
 fn pair_conditions<const D: usize>(
     segments: &Segments<'_, D>,
     parts: &[Part],
-    missing: &HashMap<u32, Vec<f64>>,
+    missing: &FxHashMap<u32, Vec<f64>>,
 ) -> (Conditions, Vec<f64>) {
     let count = triples::<D>().count();
-    let mut rows: HashMap<u32, usize> = HashMap::new();
+    let mut rows: FxHashMap<u32, usize> = FxHashMap::default();
     let mut sites: Vec<u32> = missing.keys().copied().collect();
     sites.extend(points_at_seam(segments).map(|p| segments.site[p as usize]));
     sites.sort_unstable();
@@ -382,7 +382,7 @@ fn points_at_seam<'b, const D: usize>(
 fn state_change<const D: usize>(
     segments: &mut Segments<'_, D>,
     parts: &[Part],
-    nodes: &HashMap<u32, Vector<D>>,
+    nodes: &FxHashMap<u32, Vector<D>>,
     reference: &StatePart<D>,
 ) -> f64 {
     let volume = segments.model.typical_volume();
@@ -394,8 +394,8 @@ fn state_change<const D: usize>(
         count - size
     };
     let moments = D * (D + 1) / 2;
-    let mut points: HashMap<u32, usize> = HashMap::new();
-    let mut sites: HashMap<u32, usize> = HashMap::new();
+    let mut points: FxHashMap<u32, usize> = FxHashMap::default();
+    let mut sites: FxHashMap<u32, usize> = FxHashMap::default();
     for p in points_at_seam(segments) {
         points.insert(p, rows(moments));
         sites.insert(segments.site[p as usize], rows(D));
@@ -406,7 +406,7 @@ fn state_change<const D: usize>(
     for &site in &order {
         sites.insert(site, rows(D));
     }
-    let mut cells: HashMap<u32, usize> = HashMap::new();
+    let mut cells: FxHashMap<u32, usize> = FxHashMap::default();
     for s in &segments.cut {
         for end in &s.ends {
             if let End::Face(foot) = end {

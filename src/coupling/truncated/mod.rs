@@ -30,14 +30,12 @@ mod segments;
 mod sparse_change;
 mod states;
 
-use std::collections::HashSet;
-
 pub use self::{fit::SeamConditions, moving::SeamBonds};
 
 use self::{
     dilatation::{Common, Dilatations},
     edges::Strings,
-    segments::{Segments, Springs},
+    segments::{Segments, Springs, WholeBonds},
 };
 use crate::{
     assembly::Row,
@@ -103,32 +101,31 @@ impl<const D: usize> Coupling<D> for Truncated {
             // the fit has balanced the corners too
             strings = Strings::none();
         }
-        // a state reaches one family farther than a bond
-        let listed = if passing.whole.iter().any(|w| w.state.is_some()) {
-            segments.with_neighbours()
-        } else {
-            segments.at_seam.clone()
-        };
-        let springs = Springs::new(&segments, &listed);
         let common = Common::new(&segments)?;
+        // a state reaches one family farther than a bond
+        let listed = match &common {
+            Some(_) => segments.with_neighbours(),
+            None => segments.at_seam.clone(),
+        };
+        // without states the whole bonds of the points at the seam are the body's
+        let springs = Springs::new(&segments, common.as_ref().map(|_| &listed[..]));
         let dilatations = match &common {
             Some(common) => Dilatations::new(&segments, common, &listed),
             None => Dilatations::none(model.sites.len()),
         };
         let squares = common.as_ref().is_none_or(|c| c.bulk >= 0.0);
-        let breaking = match (self.cut_bonds, common) {
-            (CutBonds::Linear, _) => Breaking::Nothing,
-            (CutBonds::Breaking, None) => Breaking::Alone(segments.broken),
-            (CutBonds::Breaking, Some(common)) => Breaking::States(Box::new(segments), common),
+        let bonds = match common {
+            None => Bonds::Alone(WholeBonds::of(segments)),
+            Some(common) => Bonds::States(Box::new(segments), common),
         };
         Ok(Box::new(TruncatedRows {
             model,
-            breaking,
+            bonds,
+            cut_bonds: self.cut_bonds,
             squares,
             strings,
             springs,
             dilatations,
-            pairwise: passing.whole.iter().all(|w| w.state.is_none()),
             listed,
         }))
     }
@@ -145,24 +142,22 @@ pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamCondition
 
 struct TruncatedRows<'a, const D: usize> {
     model: &'a Model<D>,
-    breaking: Breaking<'a, D>,
+    bonds: Bonds<'a, D>,
+    cut_bonds: CutBonds,
     springs: Springs<D>,
     dilatations: Dilatations<D>,
     strings: Strings<D>,
-    /// Points whose rows are sums of springs and dilatations, not rows of the body.
+    /// Points whose rows are not those of the body alone.
     listed: Vec<bool>,
-    pairwise: bool,
     /// Whether dilatations have a stiffness that is not negative.
     squares: bool,
 }
 
-/// What a motion needs where the bonds of the seam turn, stretch and break.
-enum Breaking<'a, const D: usize> {
-    /// They do not.
-    Nothing,
-    /// Bonds of a pairwise law: those between points of the zone that are not whole, lower number first.
-    Alone(HashSet<(u32, u32)>),
-    /// Bonds that share dilatations.
+/// The bonds of the points at the seam.
+enum Bonds<'a, const D: usize> {
+    /// Of a pairwise law: the whole ones are the body's, the others springs.
+    Alone(WholeBonds),
+    /// Of a law whose bonds share dilatations: all are springs.
     States(Box<Segments<'a, D>>, Common),
 }
 
@@ -173,7 +168,11 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
                 body.add_force_row(i, |_| 1.0, row);
                 return;
             }
-            Some(_) => {}
+            Some((body, i)) => {
+                if let Bonds::Alone(whole) = &self.bonds {
+                    body.add_force_row(i, |j| f64::from(whole.contains(i, j)), row);
+                }
+            }
             None => {
                 self.model.add_element_rows(site, row);
                 self.strings.add_row(site, row);
@@ -190,8 +189,17 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     }
 
     fn has_body_bonds(&self, site: usize) -> bool {
-        // the dilatations of an LPS differ from the body's, so that nothing cancels
-        self.pairwise && self.model.point_of(site).is_some() && !self.is_body_row(site)
+        // the dilatations of an LPS differ from the body's
+        let alone = matches!(self.bonds, Bonds::Alone(_));
+        alone && self.model.point_of(site).is_some() && !self.is_body_row(site)
+    }
+
+    fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>) {
+        if let (Bonds::Alone(whole), Some((body, i))) = (&self.bonds, self.model.point_of(site)) {
+            // the bonds that the body's pass is wrong about go
+            body.add_force_row(i, |j| f64::from(whole.contains(i, j)) - 1.0, row);
+            self.springs.add_row(site, row);
+        }
     }
 
     fn is_sum_of_squares(&self) -> bool {
@@ -199,10 +207,12 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     }
 
     fn seam_bonds(&self) -> Option<SeamBonds<D>> {
-        let (broken, states) = match &self.breaking {
-            Breaking::Nothing => return None,
-            Breaking::Alone(broken) => (broken, None),
-            Breaking::States(segments, common) => {
+        if self.cut_bonds == CutBonds::Linear {
+            return None;
+        }
+        let (broken, states) = match &self.bonds {
+            Bonds::Alone(whole) => (&whole.broken, None),
+            Bonds::States(segments, common) => {
                 (&segments.broken, Some((segments.as_ref(), common)))
             }
         };

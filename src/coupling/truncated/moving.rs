@@ -6,7 +6,7 @@
 //! Of an LPS a piece also hands its elongation to dilatations (`states.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
 //! whole bonds break there, and are told here.
 
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 use rayon::prelude::*;
 
@@ -82,7 +82,7 @@ impl<const D: usize> SeamBonds<D> {
         model: &Model<D>,
         body: &PdBody<D>,
         springs: &Springs<D>,
-        broken: &HashSet<(u32, u32)>,
+        broken: &FxHashSet<(u32, u32)>,
         states: Option<(&Segments<'_, D>, &Common)>,
     ) -> Self {
         let segments = states.map(|s| s.0);

@@ -1,6 +1,6 @@
 //! The faces at which the peridynamic zone ends, and the pieces of a bond that lie inside of it.
 
-use std::collections::HashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::{
     coupling::Model,
@@ -62,7 +62,9 @@ pub(super) fn sides<const D: usize>(model: &Model<D>, lattice: usize) -> Vec<Sid
 pub(super) struct Seam<'a, const D: usize> {
     model: &'a Model<D>,
     faces: Vec<Face<D>>,
-    bins: HashMap<[i64; D], Vec<u32>>,
+    bins: FxHashMap<[i64; D], Vec<u32>>,
+    /// Bins from which a bond reaches a face.
+    around: FxHashSet<[i64; D]>,
     size: f64,
     zone: Locator<D>,
 }
@@ -82,7 +84,8 @@ impl<'a, const D: usize> Seam<'a, D> {
         let mesh = &model.mesh;
         let side = sides(model, lattice);
         let mut faces = Vec::new();
-        let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
+        let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
+        let mut around = FxHashSet::default();
         for facet in mesh.interface_facets(&side, &Side::Points, &Side::Element) {
             let n = facet.first.nodes;
             let x = |i: usize| mesh.nodes[n[i.min(n.len() - 1)] as usize];
@@ -99,6 +102,14 @@ impl<'a, const D: usize> Seam<'a, D> {
                     bins.entry(key).or_default().push(faces.len() as u32);
                 },
             );
+            let reach = Vector::repeat(size * (1.0 + 1e-3));
+            for_box(
+                &bin(&(low - reach), size),
+                &bin(&(high + reach), size),
+                |key| {
+                    around.insert(key);
+                },
+            );
             faces.push(Face {
                 nodes: n,
                 simplices,
@@ -109,6 +120,7 @@ impl<'a, const D: usize> Seam<'a, D> {
             model,
             faces,
             bins,
+            around,
             size,
             zone: Locator::new(
                 mesh,
@@ -197,6 +209,11 @@ impl<'a, const D: usize> Seam<'a, D> {
             }
         }
         pieces.sort_unstable_by(|p, q| p.from.total_cmp(&q.from).then(p.to.total_cmp(&q.to)));
+    }
+
+    /// Whether a bond of a point can meet a face at all.
+    pub fn is_around(&self, x: &Vector<D>) -> bool {
+        self.around.contains(&bin(x, self.size))
     }
 
     /// Whether a bond can meet a face at all.

@@ -1,8 +1,7 @@
 //! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and what they hand to dilatations.
 
-use std::collections::{HashMap, HashSet};
-
 use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::seam::{Foot, Piece, Seam};
 use crate::{
@@ -53,11 +52,11 @@ pub(super) struct Segments<'a, const D: usize> {
     /// Pieces of bonds that leave the zone or pass through it.
     pub cut: Vec<Segment>,
     /// Bonds between points of the zone that are not whole, lower number first.
-    pub broken: HashSet<(u32, u32)>,
+    pub broken: FxHashSet<(u32, u32)>,
     /// Whether a point has a bond that is not whole, or one that a fit has changed.
     pub at_seam: Vec<bool>,
     /// Whole bonds that a fit has changed, lower number first.
-    pub changed: HashMap<(u32, u32), Changed>,
+    pub changed: FxHashMap<(u32, u32), Changed>,
 }
 
 impl<'a, const D: usize> Segments<'a, D> {
@@ -88,6 +87,9 @@ impl<'a, const D: usize> Segments<'a, D> {
                 };
                 let seam = &seams[usize::from(passing.of_point[i])];
                 let mut list = Vec::new();
+                if !seam.is_around(&cloud.position[i]) {
+                    return list;
+                }
                 let mut pieces = Vec::new();
                 for &j in family.iter().filter(|&&j| j as usize > i) {
                     let (a, b) = (&cloud.position[i], &cloud.position[j as usize]);
@@ -129,7 +131,7 @@ impl<'a, const D: usize> Segments<'a, D> {
             })
             .collect();
         let mut cut = Vec::new();
-        let mut broken = HashSet::new();
+        let mut broken = FxHashSet::default();
         let mut at_seam = vec![false; site.len()];
         for (i, j, segments) in found.into_iter().flatten() {
             for p in [i, j] {
@@ -148,7 +150,7 @@ impl<'a, const D: usize> Segments<'a, D> {
             cut,
             broken,
             at_seam,
-            changed: HashMap::new(),
+            changed: FxHashMap::default(),
         }
     }
 
@@ -176,9 +178,10 @@ impl<'a, const D: usize> Segments<'a, D> {
 
     /// Whether the bond between two points of the cloud lies in the zone as a whole.
     pub fn is_whole(&self, i: u32, j: u32) -> bool {
-        self.site[i as usize] != NONE
-            && self.site[j as usize] != NONE
-            && !self.broken.contains(&(i.min(j), i.max(j)))
+        let at_seam = self.at_seam[i as usize] && self.at_seam[j as usize];
+        self.is_point(i)
+            && self.is_point(j)
+            && !(at_seam && self.broken.contains(&(i.min(j), i.max(j))))
     }
 
     /// The coefficients `p` and `ω` that point `i` gives its bond to `j`; those of a whole family if it lies in an element.
@@ -244,6 +247,37 @@ fn hands_of(piece: &Piece) -> [f64; 2] {
     ]
 }
 
+/// Which bonds of the body lie in the zone as a whole, and are as the body has them.
+pub(super) struct WholeBonds {
+    site: Vec<u32>,
+    at_seam: Vec<bool>,
+    /// Bonds between points of the zone that are not whole, lower number first.
+    pub broken: FxHashSet<(u32, u32)>,
+    changed: FxHashMap<(u32, u32), Changed>,
+}
+
+impl WholeBonds {
+    /// Those of a seam.
+    pub fn of<const D: usize>(segments: Segments<'_, D>) -> Self {
+        Self {
+            site: segments.site,
+            at_seam: segments.at_seam,
+            broken: segments.broken,
+            changed: segments.changed,
+        }
+    }
+
+    /// Whether the bond from point `i` of the zone to point `j` is one of them.
+    pub fn contains(&self, i: usize, j: usize) -> bool {
+        if self.site[j] == NONE {
+            return false;
+        }
+        let bond = (i.min(j) as u32, i.max(j) as u32);
+        let at_seam = self.at_seam[i] && self.at_seam[j];
+        !(at_seam && (self.broken.contains(&bond) || self.changed.contains_key(&bond)))
+    }
+}
+
 /// Springs along bonds: the energy `½ k (ξ·D)²` of each, with `D = Σ w u`.
 pub(super) struct Springs<const D: usize> {
     direction: Vec<Vector<D>>,
@@ -276,10 +310,10 @@ pub(super) struct OwnSpring<const D: usize> {
 }
 
 impl<const D: usize> Springs<D> {
-    /// All pieces, and the whole bonds of the points that `listed` names.
+    /// All pieces, the whole bonds that a fit has changed, and the other whole bonds of the points that `listed` names.
     ///
     /// A piece of the length s, as a fraction of its bond, has the energy `s w(D/s)`, so the stiffness `k/s`.
-    pub fn new(segments: &Segments<'_, D>, listed: &[bool]) -> Self {
+    pub fn new(segments: &Segments<'_, D>, listed: Option<&[bool]>) -> Self {
         let mut springs = Self {
             direction: Vec::new(),
             stiffness: Vec::new(),
@@ -307,23 +341,26 @@ impl<const D: usize> Springs<D> {
             });
         }
         let is_changed = |i: u32, j: u32| segments.changed.contains_key(&(i, j));
-        for changed in [true, false] {
+        let mut changed: Vec<(u32, u32)> = segments.changed.keys().copied().collect();
+        changed.sort_unstable();
+        for (i, j) in changed {
+            springs.push_whole(segments, i, j);
+            springs.origin.push(Origin {
+                bond: [i, j],
+                piece: Piece {
+                    from: 0.0,
+                    to: 1.0,
+                    share: 1.0,
+                },
+                at: [Some(i), Some(j)],
+            });
+        }
+        if let Some(listed) = listed {
             for i in (0..segments.site.len() as u32).filter(|&i| segments.is_point(i)) {
                 for &j in body.families.of(i as usize) {
                     let wanted = listed[i as usize] || listed[j as usize];
-                    if j > i && wanted && segments.is_whole(i, j) && is_changed(i, j) == changed {
+                    if j > i && wanted && segments.is_whole(i, j) && !is_changed(i, j) {
                         springs.push_whole(segments, i, j);
-                        if changed {
-                            springs.origin.push(Origin {
-                                bond: [i, j],
-                                piece: Piece {
-                                    from: 0.0,
-                                    to: 1.0,
-                                    share: 1.0,
-                                },
-                                at: [Some(i), Some(j)],
-                            });
-                        }
                     }
                 }
             }

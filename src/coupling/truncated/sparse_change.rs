@@ -68,18 +68,21 @@ impl Conditions {
         sum
     }
 
-    /// The rank of the conditions, and the part of `target` that no change at all can reach: the norm of what is left, over that of the target. Rows are scaled to the same size.
-    ///
-    /// From all eigenvectors of `A Aᵀ`, so for some thousand conditions at most; singular values below 3e-7 of the largest count as zero.
-    pub fn rank(&self, target: &[f64]) -> (usize, f64) {
+    /// What brings every row to the norm 1; nothing to rows of zeros.
+    fn row_scale(&self) -> Vec<f64> {
         let mut size = vec![0.0f64; self.count];
         for (&r, v) in self.rows.iter().zip(&self.values) {
             size[r as usize] += v * v;
         }
-        let scale: Vec<f64> = size
-            .iter()
-            .map(|&s| if s > 0.0 { 1.0 / s.sqrt() } else { 0.0 })
-            .collect();
+        let scale = |&s: &f64| if s > 0.0 { 1.0 / s.sqrt() } else { 0.0 };
+        size.iter().map(scale).collect()
+    }
+
+    /// The rank of the conditions, and the part of `target` that no change at all can reach: the norm of what is left, over that of the target. Rows are scaled to the same size.
+    ///
+    /// From all eigenvectors of `A Aᵀ`, so for some thousand conditions at most; singular values below 3e-7 of the largest count as zero.
+    pub fn rank(&self, target: &[f64]) -> (usize, f64) {
+        let scale = self.row_scale();
         let mut square = faer::Mat::<f64>::zeros(self.count, self.count);
         for k in 0..self.changes() {
             for (r, v) in self.column(k) {
@@ -124,14 +127,7 @@ impl Conditions {
     /// the floor. Where the conditions contradict each other or the floor, the change that came nearest is returned: the caller looks at what is still missing.
     pub fn least_change(&self, missing: &[f64], floor: f64) -> Vec<f64> {
         // all rows to the same size, or conjugate gradients take ages
-        let mut size = vec![0.0f64; self.count];
-        for (&r, v) in self.rows.iter().zip(&self.values) {
-            size[r as usize] += v * v;
-        }
-        let scale: Vec<f64> = size
-            .iter()
-            .map(|&s| if s > 0.0 { 1.0 / s.sqrt() } else { 0.0 })
-            .collect();
+        let scale = self.row_scale();
         let mut scaled = self.clone();
         for (&r, v) in self.rows.iter().zip(scaled.values.iter_mut()) {
             *v *= scale[r as usize];

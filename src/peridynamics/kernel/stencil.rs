@@ -1,7 +1,7 @@
 //! A lattice of points in a padded box, and its families as one stencil.
 
 use rayon::prelude::*;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::{BondSetup, lanes::LANES};
 use crate::tensor::Vector;
@@ -208,7 +208,7 @@ impl<const D: usize> Stencil<D> {
             counts,
         } = sites(setup)?;
         // steps and numbers of each bond that occurs
-        let mut found: HashMap<[i32; D], (f64, f64)> = HashMap::new();
+        let mut found: FxHashMap<[i32; D], (f64, f64)> = FxHashMap::default();
         let step = |i: usize, j: u32| -> [i32; D] {
             std::array::from_fn(|a| site[j as usize][a] - site[i][a])
         };
@@ -256,7 +256,7 @@ impl<const D: usize> Stencil<D> {
                 Offset::new(*s, spacing, cells.delta(s), weight * volume, limit)
             })
             .collect();
-        let position: HashMap<[i32; D], usize> =
+        let position: FxHashMap<[i32; D], usize> =
             steps.iter().enumerate().map(|(o, s)| (*s, o)).collect();
         let mut point_of = vec![NONE; cells.cells];
         for (i, s) in site.iter().enumerate() {
