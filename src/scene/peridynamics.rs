@@ -259,6 +259,49 @@ y = "-5e-4*x+1e-3*y"
     }
 
     #[test]
+    fn nothing_is_interpolated_across_a_crack() {
+        // two halves of a plate that a crack parts, between two layers of points but not halfway, move as rigid bodies
+        let (crack, lift) = (0.5062, 0.01);
+        let text = r#"
+kinematics = "plane-stress"
+coupling = "nonlocal"
+[mesh.rectangle]
+min = [0, 0]
+max = [1, 1]
+x = { cells = 20 }
+y = { cells = 20 }
+[materials.plate.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = "3.2/20"
+points.lattice = { spacing = "1/20", origin = ["1/40", "1/40"] }
+[cracks.through]
+segment = { from = [-1, 0.5062], to = [2, 0.5062] }
+[conditions.bottom.displacement]
+on = "bottom"
+x = 0
+y = 0
+[conditions.top.displacement]
+on = "top"
+x = 0
+y = 0.01
+"#;
+        let mut worst: f64 = 0.0;
+        solve_with(plate_of(text, &[]).unwrap(), &Silent, |_, solved| {
+            let sampler = Sampler::new(solved.model);
+            for k in 1..400 {
+                let y = f64::from(k) / 400.0;
+                let u = sampler.displacement(&Vector::<2>::new(0.41, y), solved.displacement);
+                let wanted = if y < crack { 0.0 } else { lift };
+                worst = worst.max((u.unwrap() - Vector::<2>::new(0.0, wanted)).norm());
+            }
+            Ok(Vec::new())
+        })
+        .unwrap();
+        assert!(worst < 1e-11 * lift, "{worst:e}");
+    }
+
+    #[test]
     fn partial_volumes_reach_scenes_and_the_seam_stays_exact() {
         // plane stress, E = 2 and nu = 1/4
         let typed = [2.0 / (1.0 - 0.0625), 0.5 / (1.0 - 0.0625)];
