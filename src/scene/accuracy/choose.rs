@@ -68,6 +68,8 @@ struct Ladder {
     family: Family,
     levels: Vec<(f64, Pilot)>,
     fit: Fit,
+    /// Fewest cells along an edge.
+    fewest: f64,
 }
 
 /// Rungs before the first fit.
@@ -86,7 +88,7 @@ impl Ladder {
     fn cells(&self, accuracy: f64) -> f64 {
         self.fit
             .cells(accuracy / SAFETY)
-            .map_or(f64::INFINITY, |n| (n - 1e-9).ceil().max(FEWEST))
+            .map_or(f64::INFINITY, |n| (n - 1e-9).ceil().max(self.fewest))
     }
 
     /// Work of the candidate, from that of the finest pilot by the usual growth with the number of cells.
@@ -207,7 +209,8 @@ pub(super) fn choose(
         let fitted = ran.and_then(|pilot| {
             ladder.levels.push((n as f64, pilot));
             let rest = ladder.fit.rest;
-            estimate::fit(&ladder.levels, &bench.quantities).map(|f| f.with_rest(rest))
+            let fit = estimate::fit(&ladder.levels, &bench.quantities, asked.decay());
+            fit.map(|f| f.with_rest(rest))
         });
         match fitted {
             Some(fit) => ladder.fit = fit,
@@ -224,7 +227,7 @@ fn climb(asked: &Asked, family: &Family, bench: &mut Bench) -> Option<Ladder> {
         let n = asked.fitting(first << rung);
         levels.push((n as f64, bench.run(&asked.overrides(family, n), 0.0)?));
     }
-    let mut fit = estimate::fit(&levels, &bench.quantities)?;
+    let mut fit = estimate::fit(&levels, &bench.quantities, asked.decay())?;
     if let Some(padding) = family.padding {
         // what the edge of the zone does shows in one twice as far
         let wider = Family {
@@ -238,6 +241,11 @@ fn climb(asked: &Asked, family: &Family, bench: &mut Bench) -> Option<Ladder> {
         family: family.clone(),
         levels,
         fit,
+        fewest: match asked.horizon {
+            // coarser points would have no neighbours
+            Some(_) if asked.points() => first as f64,
+            _ => FEWEST,
+        },
     })
 }
 

@@ -25,6 +25,8 @@ pub use choose::{Candidate, Chosen};
 pub use open::Family;
 
 pub(crate) use estimate::{SPREAD, difference};
+
+use estimate::Decay;
 pub(crate) use pilot::Bench;
 
 use super::error::SceneError;
@@ -155,7 +157,11 @@ pub fn predicted_error(
             None => levels.clear(),
         }
     }
-    let Some(fit) = estimate::fit(&levels, &bench.quantities) else {
+    let decay = match base.breaks {
+        true => Decay::Cut,
+        false => Decay::Smooth,
+    };
+    let Some(fit) = estimate::fit(&levels, &bench.quantities, decay) else {
         return Ok(None);
     };
     Ok(Some(ErrorPrediction {
