@@ -147,15 +147,39 @@ struct Normal {
     least: f64,
 }
 
+/// Size from which the blocked eigenvalue solver is the faster one.
+const LARGE: usize = 64;
+
+/// `None` if the iteration does not converge.
+fn eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+    let n = matrix.nrows();
+    if n < LARGE {
+        return Some(SymmetricEigen::new(matrix));
+    }
+    let of = faer::Mat::from_fn(n, n, |r, c| matrix[(r, c)]);
+    let of = of.self_adjoint_eigen(faer::Side::Lower).ok()?;
+    let values = of.S().column_vector();
+    Some(SymmetricEigen {
+        eigenvalues: DVector::from_fn(n, |k, _| values[k]),
+        eigenvectors: DMatrix::from_fn(n, n, |r, c| of.U()[(r, c)]),
+    })
+}
+
 impl Normal {
-    /// `None` if a bond's share or row overflows.
+    /// `None` if a bond's share or row overflows, or eigenvalues cannot be found.
     fn new(rows: &DMatrix<f64>, shares: &[f64], off: &[bool]) -> Option<Self> {
         let n = rows.nrows();
-        let mut normal = DMatrix::zeros(n, n);
+        let mut normal = DMatrix::<f64>::zeros(n, n);
         for (k, &d) in shares.iter().enumerate() {
             if off[k] {
-                let b = rows.column(k);
-                normal.ger(d, &b, &b, 1.0);
+                // in large problems a bond takes part in few conditions
+                let terms = rows.column(k).into_iter().copied().enumerate();
+                let terms: Vec<(usize, f64)> = terms.filter(|t| t.1 != 0.0).collect();
+                for &(c, b) in &terms {
+                    for &(r, a) in &terms {
+                        normal[(r, c)] += a * b * d;
+                    }
+                }
             }
         }
         let scale = DVector::from_fn(n, |c, _| {
@@ -166,7 +190,7 @@ impl Normal {
         if !scaled.iter().all(|v| v.is_finite()) {
             return None;
         }
-        let eigen = SymmetricEigen::new(scaled);
+        let eigen = eigen(scaled)?;
         let least = RANK_TOLERANCE * eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
         Some(Self {
             scale,

@@ -366,8 +366,9 @@ fn state_based(effort: Effort) -> Table {
                     (2, 4, 2),
                     (2, 4, 3),
                     (3, 2, 2),
+                    (3, 4, 2),
                 ],
-                (Effort::Full, Solid::BondBased) => &[(2, 2, 2), (2, 4, 2), (3, 2, 2)],
+                (Effort::Full, Solid::BondBased) => &[(2, 2, 2), (2, 4, 2), (3, 2, 2), (3, 4, 2)],
             };
             for &(dimension, ratio, m) in sizes {
                 let meeting = Meeting {
