@@ -3,12 +3,17 @@
 //!     cargo run --release --example branching
 //!     cargo run --release --example branching -- --figures docs/figures
 //!     cargo run --release --example branching -- --output out/branching --json
+//!     cargo run --release --example branching -- --couplings                     every coupling instead, without times
 
 use std::{path::PathBuf, process::ExitCode};
 
-use bondline::observe::{
-    figure::{LinePlot, Series, Stroke},
-    report::{self, Row, Table},
+use bondline::{
+    observe::{
+        figure::{LinePlot, Series, Stroke},
+        report::{self, Row, Table},
+        summary::{Ended, MotionSummary},
+    },
+    trade::distance_from_path,
 };
 use shared::{Columns, Failure, argument, run};
 
@@ -16,6 +21,42 @@ mod shared;
 
 /// Runs of each model, of which the fastest counts.
 const TURNS: usize = 3;
+
+/// Mass of the plate, per thickness \[kg/m\].
+const MASS: f64 = 2440.0 * 0.1 * 0.04;
+
+/// Every coupling that joins the two, on the zone of the scene; a transition zone lies outside of it.
+const COUPLINGS: [(&str, &[&str]); 8] = [
+    ("truncated, cut bonds linear", &[]),
+    (
+        "truncated, cut bonds break",
+        &["coupling.truncated.cut-bonds=breaking"],
+    ),
+    ("splice", &["coupling=splice"]),
+    (
+        "blending, smooth",
+        &["coupling=blending", "zones.transition.around=3e-3"],
+    ),
+    ("balanced", &["coupling=balanced"]),
+    (
+        "balanced, smooth",
+        &[
+            "coupling.balanced.beta=smooth",
+            "zones.transition.around=3e-3",
+        ],
+    ),
+    (
+        "partial stress, elements",
+        &["coupling=partial-stress", "zones.transition.around=1e-3"],
+    ),
+    (
+        "partial stress, meshfree",
+        &[
+            "coupling.partial-stress.form=meshfree",
+            "zones.transition.around=1e-3",
+        ],
+    ),
+];
 
 /// What a run tells.
 struct Crack {
@@ -30,10 +71,58 @@ struct Crack {
     points: usize,
     sites: usize,
     paths: [Vec<(f64, f64)>; 2],
+    /// What the momentum came to at most, of that of the plate with its energy; loads give it none.
+    drift: f64,
+    motion: MotionSummary,
+}
+
+impl Crack {
+    /// Largest difference of the two tips at the end from mirror images \[m\].
+    fn asymmetry(&self) -> f64 {
+        let [upper, lower] = self.tips;
+        (upper.0 - lower.0)
+            .abs()
+            .max((upper.1 + lower.1 - 0.04).abs())
+    }
+
+    /// Largest distance of a point of this path from the paths of another run, half for half \[m\].
+    fn path_distance(&self, other: &Self) -> f64 {
+        let flat = |path: &[(f64, f64)]| path.iter().map(|p| [p.0, p.1]).collect::<Vec<_>>();
+        let halves = self.paths.iter().zip(&other.paths);
+        let distances = halves.flat_map(|(own, other)| {
+            let other = flat(other);
+            let own = flat(own).into_iter();
+            own.map(move |x| distance_from_path(&x, &other).unwrap_or(f64::NAN))
+        });
+        distances.fold(0.0, f64::max)
+    }
+
+    /// Energy that came from nowhere, over the work of the loads.
+    fn surplus(&self) -> f64 {
+        let m = &self.motion;
+        (self.dissipated - m.missing_energy) / m.external_work
+    }
+
+    /// Why the run ended before its time, if it did.
+    fn stopped(&self) -> Option<String> {
+        let m = &self.motion;
+        let (time, place) = m.edge_reached.as_ref()?;
+        (m.ended != Ended::Finished).then(|| {
+            format!(
+                "damage reaches the edge of the zone at {:.3} us, ({:.2}, {:.2}) mm; kinetic energy {:.3} J/m after work of {:.3}",
+                time * 1e6,
+                place[0] * 1e3,
+                place[1] * 1e3,
+                m.kinetic_energy,
+                m.external_work
+            )
+        })
+    }
 }
 
 fn main() -> ExitCode {
-    shared::printed(tables())
+    let every = std::env::args().any(|a| a == "--couplings");
+    shared::printed(if every { couplings() } else { tables() })
 }
 
 fn crack(name: &str, overrides: &[&str], output: &std::path::Path) -> Result<Crack, Failure> {
@@ -54,25 +143,102 @@ fn crack(name: &str, overrides: &[&str], output: &std::path::Path) -> Result<Cra
     let read = |end: &str| Columns::read(&output.join(name).join(format!("branching_{end}.csv")));
     let history = read("history")?;
     let last = |values: Vec<f64>| values.last().copied().unwrap_or(f64::NAN);
-    let (upper, lower, root) = (read("tip_upper")?, read("tip_lower")?, read("tip_root")?);
-    let path = |tip: &Columns| -> Result<Vec<(f64, f64)>, Failure> {
-        Ok(tip.column("x")?.into_iter().zip(tip.column("y")?).collect())
+    // where no bond is broken there is no file: of branches that a run which stopped early has not
+    let tip = |tip: &str| -> Result<Vec<[f64; 3]>, Failure> {
+        if !output
+            .join(name)
+            .join(format!("branching_tip_{tip}.csv"))
+            .exists()
+        {
+            return Ok(vec![]);
+        }
+        let tip = read(&format!("tip_{tip}"))?;
+        let place = tip.column("x")?.into_iter().zip(tip.column("y")?);
+        let rows = tip.column("time")?.into_iter().zip(place);
+        Ok(rows.map(|(t, (x, y))| [t, x, y]).collect())
     };
-    let paths = [path(&upper)?, path(&lower)?];
-    let end = |k: usize| paths[k].last().copied().unwrap_or((f64::NAN, f64::NAN));
+    let path = |name: &str| -> Result<Vec<(f64, f64)>, Failure> {
+        Ok(tip(name)?.into_iter().map(|[_, x, y]| (x, y)).collect())
+    };
+    let paths = [path("upper")?, path("lower")?];
+    let none = (f64::NAN, f64::NAN);
+    let end = |k: usize| paths[k].last().copied().unwrap_or(none);
+    let height = |name: &str| Ok::<_, Failure>(path(name)?.last().unwrap_or(&none).1);
+    let root = tip("root")?;
     let tips = [end(0), end(1)];
+    let motion = summary
+        .motion
+        .ok_or("a scene in time tells of its motion")?;
+    let momentum = [history.column("momentum_x")?, history.column("momentum_y")?];
+    let largest = momentum
+        .iter()
+        .flatten()
+        .fold(0.0, |m: f64, p| m.max(p.abs()));
     Ok(Crack {
-        time: root.column("time")?[0],
-        point: last(root.column("x")?),
+        time: root.first().map_or(f64::NAN, |r| r[0]),
+        point: root.last().map_or(f64::NAN, |r| r[1]),
         tips,
-        thickness: last(read("tip_over")?.column("y")?) - last(read("tip_under")?.column("y")?),
+        thickness: height("over")? - height("under")?,
         dissipated: last(history.column("dissipated_energy")?),
         broken: last(history.column("broken_bonds")?),
         seconds: [summary.total_seconds, summary.timings.seconds("steps")],
         points: summary.sizes.points,
         sites: summary.sizes.sites,
         paths,
+        drift: largest / (2.0 * MASS * motion.kinetic_energy).sqrt(),
+        motion,
     })
+}
+
+/// Every coupling beside full peridynamics.
+fn couplings() -> Result<Vec<Table>, Failure> {
+    let output = PathBuf::from(argument("--output").unwrap_or("out/branching".into()));
+    let full = crack("full", &["coupling=nonlocal"], &output)?;
+    let mut table = Table::new(
+        "branching, every coupling. off in path: largest distance from the path of full PD; asymmetry: of the tips at the end from mirror images; momentum: the most, of that of the plate with its kinetic energy; surplus: energy that \
+         came from nowhere, over the work of the loads",
+        report::Columns::ByQuantity,
+    );
+    let mut push = |name: &str, run: &Crack| {
+        let mut rows = vec![
+            ("branch point, mm", run.point * 1e3),
+            ("time, us", run.time * 1e6),
+        ];
+        if run.stopped().is_none() {
+            rows.extend([
+                ("dissipated, J/m", run.dissipated),
+                ("asymmetry, mm", run.asymmetry() * 1e3),
+                ("momentum", run.drift),
+                ("surplus", run.surplus()),
+            ]);
+            if name != "full PD" {
+                rows.push(("off in path, mm", run.path_distance(&full) * 1e3));
+            }
+        }
+        rows.extend([
+            ("steps", run.motion.of_steps as f64),
+            ("points", run.points as f64),
+        ]);
+        for (quantity, value) in rows {
+            // what stopped early may have no branches
+            if value.is_finite() {
+                table.push(Row::info(name, quantity, value));
+            }
+        }
+        if let Some(why) = run.stopped() {
+            table.push(Row::refused(name, "dissipated, J/m", why));
+        }
+    };
+    push("full PD", &full);
+    let mut refused = vec![];
+    for (number, (name, overrides)) in COUPLINGS.into_iter().enumerate() {
+        match crack(&format!("coupling-{number}"), overrides, &output) {
+            Ok(run) => push(name, &run),
+            Err(why) => refused.push(Row::refused(name, "dissipated, J/m", why.to_string())),
+        }
+    }
+    refused.into_iter().for_each(|row| table.push(row));
+    Ok(vec![table])
 }
 
 fn tables() -> Result<Vec<Table>, Failure> {
@@ -130,13 +296,10 @@ fn tables() -> Result<Vec<Table>, Failure> {
         "broken bonds against full PD, %",
         percent(coupled.broken, full.broken),
     ));
-    let [upper, lower] = coupled.tips;
     table.push(Row::at_most(
         name,
         "asymmetry of the two tips at the end, mm",
-        1e3 * (upper.0 - lower.0)
-            .abs()
-            .max((upper.1 + lower.1 - 0.04).abs()),
+        1e3 * coupled.asymmetry(),
         1.0,
     ));
     table.push(Row::at_most(

@@ -154,6 +154,11 @@ pub trait Operator<const D: usize>: Sync {
         false
     }
 
+    /// Whether a bond between two points of the body's cloud, the first with [`Operator::has_body_bonds`], is one of those. A bond that the seam cuts is not: passed over, it would pull at its point as it turns, and at the finite elements as if it did not.
+    fn is_body_bond(&self, _i: usize, _j: usize) -> bool {
+        true
+    }
+
     /// Adds the row of a site that [`Operator::has_body_bonds`], less the bonds of the body.
     fn add_row_beside_bonds(&self, _site: usize, _row: &mut Row<D>) {}
 

@@ -187,6 +187,15 @@ impl<'a, const D: usize> Motion<'a, D> {
         self.body.as_ref().map(|b| b.pass.as_ref())
     }
 
+    /// Whether the pass over the bonds knows of that between two points of the cloud, or knew of it before it broke.
+    fn is_passed_over(&self, i: usize, j: u32) -> bool {
+        match (&self.seam, &self.body) {
+            (Some(seam), _) => seam.is_whole(i, j as usize),
+            (None, Some(body)) => body.is_passed_over(i, j),
+            (None, None) => false,
+        }
+    }
+
     /// Whether the bonds that a seam cuts turn, stretch and break like others.
     pub fn has_seam_bonds(&self) -> bool {
         self.seam.is_some()
@@ -383,9 +392,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                     let point = moving.bonds_of_site[site] as usize;
                     let idle = self.seam.as_ref().map_or(&[][..], SeamBonds::idle);
                     if idle.is_empty() {
-                        let weight = |j: usize| match &self.seam {
-                            Some(s) if !s.is_whole(point, j) => 0.0,
-                            _ => 1.0,
+                        let weight = |j: usize| match self.is_passed_over(point, j as u32) {
+                            true => 1.0,
+                            false => 0.0,
                         };
                         body.add_force_row(point, weight, row);
                     } else {
@@ -453,12 +462,13 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 if damage[i] == 0.0 || moving.site_of_point[i] == NONE {
                     return 0.0;
                 }
-                let is_here = |j: u32| self.seam.as_ref().is_none_or(|s| s.is_whole(i, j as usize));
                 let pair = body.kernel(i).0;
                 let s = critical.at(cloud.horizon[i]);
                 let family = body.families.of(i).iter().zip(pair);
                 family
-                    .filter(|&(&j, _)| is_here(j) && !moving.pass.bonded(i, j as usize))
+                    .filter(|&(&j, _)| {
+                        self.is_passed_over(i, j) && !moving.pass.bonded(i, j as usize)
+                    })
                     .map(|(&j, p)| {
                         let r2 = body.bond(i, j as usize).norm_squared();
                         0.5 * p * r2 * r2 * s * s * cloud.volume[i] * cloud.volume[j as usize]
@@ -521,9 +531,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 let family = body.families.of(i).iter();
                 family
                     .filter(move |&&j| {
-                        let is_here =
-                            (self.seam.as_ref()).is_none_or(|s| s.is_whole(i, j as usize));
-                        is_here && site(j as usize) != NONE && !moving.pass.bonded(i, j as usize)
+                        self.is_passed_over(i, j)
+                            && site(j as usize) != NONE
+                            && !moving.pass.bonded(i, j as usize)
                     })
                     .map(move |&j| (site(i), site(j as usize)))
             })

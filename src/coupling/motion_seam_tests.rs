@@ -2,16 +2,17 @@
 
 use super::{
     BondBehaviour, Critical, Motion,
-    tests::{DENSITY, behaviour, case, largest, wave, with_motion},
+    tests::{DENSITY, behaviour, case, largest, wave, with_motion, with_motion_by},
 };
 use crate::{
-    coupling::SiteKind,
+    coupling::{SiteKind, Truncated, truncated::CutBonds},
     peridynamics::{Influence, Micromodulus, kernel::Kinematics},
     system::{Breakage, Dynamic, Symmetry},
     tensor::Vector,
     verify::{
         enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths},
         layers,
+        tangents::{Numbers, out_of_balance},
     },
 };
 
@@ -71,6 +72,80 @@ fn the_force_of_a_seam_that_stretches_is_the_gradient_of_its_energy_and_adds_up_
         ratio: 3,
         ..breaking_states_at_the_seam()
     });
+}
+
+/// A random displacement of every site, of up to `size`.
+fn random<const D: usize>(enclosed: &Enclosed<D>, size: f64) -> Vec<f64> {
+    let mut numbers = Numbers(17);
+    let unknowns = 0..enclosed.model.sites.len() * D;
+    unknowns.map(|_| size * numbers.draw()).collect()
+}
+
+#[test]
+fn moments_of_a_seam_that_moves_add_up_to_zero() {
+    fn check<const D: usize>(case: &Case) {
+        let places = |enclosed: &Enclosed<D>, u: &[f64]| -> Vec<Vector<D>> {
+            let moved = enclosed.positions().zip(u.chunks_exact(D));
+            moved
+                .map(|(x, u)| x + Vector::from_column_slice(u))
+                .collect()
+        };
+        // linear bonds, whatever moves: about the places at rest
+        let linear = behaviour(Kinematics::Linear, Some(0.5));
+        with_motion::<D, _>(case, &linear, |enclosed, motion| {
+            let u = random(enclosed, 0.4 * SPACING);
+            let mut force = vec![0.0; u.len()];
+            assert!(motion.internal_force_into(&u, &mut force, Breakage::Allowed) > 0);
+            let (forces, moments) = out_of_balance(&places(enclosed, &vec![0.0; u.len()]), &force);
+            assert!(forces.max(moments) < 1e-13, "{D} {forces:e} {moments:e}");
+        });
+        // exact bonds turn: about the places to which the points have moved; the elements, which are linear, all go the same way
+        let exact = behaviour(Kinematics::Exact, Some(0.5));
+        with_motion::<D, _>(case, &exact, |enclosed, motion| {
+            let mut u = random(enclosed, 0.4 * SPACING);
+            for (site, u) in enclosed.model.sites.iter().zip(u.chunks_exact_mut(D)) {
+                if let SiteKind::Node(_) = site.kind {
+                    u.copy_from_slice(&[0.3 * SPACING, -0.2 * SPACING, 0.1 * SPACING][..D]);
+                }
+            }
+            let mut force = vec![0.0; u.len()];
+            assert!(motion.internal_force_into(&u, &mut force, Breakage::Allowed) > 0);
+            let (forces, moments) = out_of_balance(&places(enclosed, &u), &force);
+            assert!(forces.max(moments) < 1e-13, "{D} {forces:e} {moments:e}");
+        });
+    }
+    for case in [breaking_at_the_seam(), breaking_states_at_the_seam()] {
+        check::<2>(&case);
+        check::<3>(&case);
+    }
+    check::<2>(&Case {
+        cells: Cells::Simplices,
+        ratio: 3,
+        ..breaking_states_at_the_seam()
+    });
+}
+
+#[test]
+fn forces_add_up_to_zero_where_cut_bonds_are_linear_and_others_are_not() {
+    fn check<const D: usize>() {
+        let case = breaking_at_the_seam();
+        let coupling = Truncated {
+            cut_bonds: CutBonds::Linear,
+        };
+        let enclosed = Enclosed::<D>::with(&case, Box::new(coupling), case.law.law()).unwrap();
+        let exact = behaviour(Kinematics::Exact, Some(0.5));
+        with_motion_by(&enclosed, &coupling, &exact, |enclosed, motion| {
+            let u = random(enclosed, 0.4 * SPACING);
+            let mut force = vec![0.0; u.len()];
+            assert!(motion.internal_force_into(&u, &mut force, Breakage::Allowed) > 0);
+            let places: Vec<Vector<D>> = enclosed.positions().copied().collect();
+            let (forces, _) = out_of_balance(&places, &force);
+            assert!(forces < 1e-13, "{D} {forces:e}");
+        });
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::{
     coupling::{
-        BlendingFunction, SiteKind,
+        BlendingFunction, Coupling, SiteKind,
         motion::{BondBehaviour, Critical, Motion, masses},
     },
     fem,
@@ -74,6 +74,16 @@ pub(super) fn with_motion<const D: usize, T>(
 ) -> T {
     let enclosed = Enclosed::<D>::new(case).unwrap();
     let coupling = case.method.coupling::<D>();
+    with_motion_by(&enclosed, coupling.as_ref(), behaviour, visit)
+}
+
+/// As [`with_motion`], of a model that is there; `coupling` is one with the same sites.
+pub(super) fn with_motion_by<const D: usize, T>(
+    enclosed: &Enclosed<D>,
+    coupling: &dyn Coupling<D>,
+    behaviour: &BondBehaviour<'_, D>,
+    visit: impl FnOnce(&Enclosed<D>, &mut Motion<'_, D>) -> T,
+) -> T {
     let operator = coupling.operator(&enclosed.model).unwrap();
     let mut motion = Motion::new(
         &enclosed.model,
@@ -83,7 +93,7 @@ pub(super) fn with_motion<const D: usize, T>(
         behaviour,
     )
     .unwrap();
-    visit(&enclosed, &mut motion)
+    visit(enclosed, &mut motion)
 }
 
 pub(super) fn wave<const D: usize>(enclosed: &Enclosed<D>, amplitude: f64) -> Vec<f64> {

@@ -312,20 +312,26 @@ fn from_segment(x: &[f64], a: &[f64], b: &[f64]) -> f64 {
     distance(x, &foot)
 }
 
+/// Distance of a point from a path of straight pieces; none from a path without points.
+///
+/// Shapes: one number per dimension for every point. Units: those of the points.
+pub fn distance_from_path<P: AsRef<[f64]>>(x: &[f64], path: &[P]) -> Option<f64> {
+    let first = distance(x, path.first()?.as_ref());
+    let pieces = path.windows(2);
+    let distances = pieces.map(|w| from_segment(x, w[0].as_ref(), w[1].as_ref()));
+    Some(distances.fold(first, f64::min))
+}
+
 fn length(path: &[(f64, Vec<f64>)]) -> f64 {
     path.windows(2).map(|w| distance(&w[0].1, &w[1].1)).sum()
 }
 
 fn path_error(own: &Columns, reference: &Columns) -> Option<f64> {
     let (own, reference) = (tip(own)?, tip(reference)?);
-    let from_path = |x: &[f64]| {
-        own.windows(2)
-            .map(|w| from_segment(x, &w[0].1, &w[1].1))
-            .fold(distance(x, &own[0].1), f64::min)
-    };
+    let own: Vec<_> = own.into_iter().map(|p| p.1).collect();
     let most = reference
         .iter()
-        .map(|p| from_path(&p.1))
+        .filter_map(|p| distance_from_path(&p.1, &own))
         .fold(0.0, f64::max);
     Some(most / length(&reference))
 }

@@ -31,7 +31,7 @@ use serde::{Deserialize, Serialize};
 pub use case::{Cost, Outcome};
 pub use effects::front;
 pub use knobs::{KNOBS, Knob, Setting, typed};
-pub use measure::Quantity;
+pub use measure::{Quantity, distance_from_path};
 
 pub(crate) use knobs::{Base, coordinates, corners, cutouts};
 pub(crate) use measure::Measured;

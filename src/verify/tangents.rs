@@ -263,12 +263,15 @@ fn rigid_force<const D: usize>(k: &BlockCsr, places: &[Vector<D>]) -> f64 {
     largest
 }
 
-/// Sum of all internal forces, and of their moments about the origin, under a random displacement, over the sum of their magnitudes.
 /// Sum of the forces and of the moments under a random displacement, over the sums of their sizes.
 pub fn momentum<const D: usize>(k: &BlockCsr, places: &[Vector<D>]) -> (f64, f64) {
     let mut numbers = Numbers(5);
     let u: Vec<f64> = (0..k.dofs()).map(|_| numbers.draw()).collect();
-    let force = k.multiply(&u);
+    out_of_balance(places, &k.multiply(&u))
+}
+
+/// Sum of forces at places, and of their moments about the origin, over the sums of their sizes.
+pub fn out_of_balance<const D: usize>(places: &[Vector<D>], force: &[f64]) -> (f64, f64) {
     let mut sum = Vector::<D>::zeros();
     let mut moment = Tensor::<D>::zeros();
     let (mut forces, mut moments) = (0.0, f64::MIN_POSITIVE);

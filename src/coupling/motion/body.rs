@@ -9,7 +9,7 @@ use crate::{
     assembly::Transfer,
     coupling::{Model, Operator, SeamBonds, SiteKind},
     peridynamics::{
-        BondEnergy, PdBody,
+        BondEnergy, Families, PdBody,
         contact::{Contact, ContactSetup, contact_stiffness},
         kernel::{
             BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, Storage, bond_pass,
@@ -31,6 +31,8 @@ pub(super) struct MovingBody<const D: usize> {
     pub transfer: Transfer,
     /// For each site the point whose force from the bonds it takes; `NONE` for a site that takes none.
     pub bonds_of_site: Vec<u32>,
+    /// The families that are passed over, where rows keep some bonds of their points to themselves; none if all are.
+    passed: Option<Families>,
     /// Sites whose row is that of the body alone.
     pub alone: usize,
     /// Points at the edge of the region where bonds can break, none if nothing can.
@@ -68,7 +70,18 @@ impl<const D: usize> MovingBody<D> {
             .into_par_iter()
             .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
             .collect();
-        let families = seam.map_or(&body.families, SeamBonds::families);
+        let shares = |site: usize| operator.has_body_bonds(site);
+        let passed = (seam.is_none() && (0..model.sites.len()).any(shares)).then(|| {
+            let mut passed = body.families.clone();
+            passed.retain(|i, j| own_row[i] || operator.is_body_bond(i, j as usize));
+            passed
+        });
+        let families = match (seam, &passed) {
+            (Some(seam), _) => seam.families(),
+            (None, Some(passed)) => passed,
+            (None, None) => &body.families,
+        };
+        let all_pass = seam.is_none() && passed.is_none();
         let edge = if behaviour.critical_stretch.is_some() && seam.is_none() {
             (0..points as u32)
                 .filter(|&i| {
@@ -84,13 +97,13 @@ impl<const D: usize> MovingBody<D> {
             Vec::new()
         };
         // a seam leaves some of the body's bonds out: those that stay keep their coefficients
-        let pair = |i: usize, k: usize, _: &Vector<D>| match seam {
-            None => body.kernel(i).0[k],
-            Some(_) => coefficient(body, i, families.of(i)[k]),
+        let pair = |i: usize, k: usize, _: &Vector<D>| match all_pass {
+            true => body.kernel(i).0[k],
+            false => coefficient(body, i, families.of(i)[k]),
         };
-        let omega = |i: usize, k: usize, _: &Vector<D>| match seam {
-            None => body.kernel(i).1[k],
-            Some(_) => omega_of(body, i, families.of(i)[k]),
+        let omega = |i: usize, k: usize, _: &Vector<D>| match all_pass {
+            true => body.kernel(i).1[k],
+            false => omega_of(body, i, families.of(i)[k]),
         };
         let force = match p.law.bond_energy(body.cloud.horizon[0]) {
             Some(BondEnergy::Pairwise { .. }) => BondForce::Pairwise { coefficient: &pair },
@@ -156,11 +169,18 @@ impl<const D: usize> MovingBody<D> {
             shift,
             transfer: body.cloud.transfer.clone(),
             bonds_of_site,
+            passed,
             alone: own_row.iter().filter(|own| **own).count(),
             edge,
             displacement: vec![0.0; points * D],
             force: vec![0.0; points * D],
         }))
+    }
+
+    /// Whether the pass knows of the bond between two points, where no seam has bonds of its own.
+    pub fn is_passed_over(&self, i: usize, j: u32) -> bool {
+        let passed = self.passed.as_ref();
+        passed.is_none_or(|families| families.of(i).binary_search(&j).is_ok())
     }
 
     /// The displacement of every point, from those of the sites.

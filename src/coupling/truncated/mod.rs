@@ -194,10 +194,15 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         alone && self.model.point_of(site).is_some() && !self.is_body_row(site)
     }
 
+    fn is_body_bond(&self, i: usize, j: usize) -> bool {
+        match &self.bonds {
+            Bonds::Alone(whole) => whole.contains(i, j),
+            Bonds::States(..) => true,
+        }
+    }
+
     fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>) {
-        if let (Bonds::Alone(whole), Some((body, i))) = (&self.bonds, self.model.point_of(site)) {
-            // the bonds that the body's pass is wrong about go
-            body.add_force_row(i, |j| f64::from(whole.contains(i, j)) - 1.0, row);
+        if self.has_body_bonds(site) {
             self.springs.add_row(site, row);
         }
     }
