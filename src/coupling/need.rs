@@ -33,6 +33,12 @@ const AVERAGED_OVER: f64 = 2.5;
 /// And at least over so many, or a cell has no neighbour.
 const AT_LEAST: f64 = 1.5;
 
+/// Cells per task: a number of its own, so that what a task remembers does not depend on the threads.
+const CHUNK: usize = 1024;
+
+/// How far centres may be from where a regular mesh has them, relative to the size of a cell.
+const ALIKE: f64 = 1e-12;
+
 /// No cell.
 const NONE: u32 = u32::MAX;
 
@@ -119,31 +125,32 @@ impl<const D: usize> Criteria<'_, D> {
             .collect();
         let around = Around {
             criteria: self,
+            kind: kinds(&neighbours, &centre, &volume),
             neighbours: &neighbours,
             strains: &strains,
             centre: &centre,
             volume: &volume,
         };
         let mut wrong = vec![0.0; count];
-        // stamps are as long as the mesh, so chunks are few
-        let chunk = count.div_ceil(4 * rayon::current_num_threads()).max(1);
-        wrong
-            .par_chunks_mut(chunk)
-            .enumerate()
-            .for_each(|(number, wrong)| {
-                let mut reached = Reached {
-                    cells: Vec::new(),
-                    stamp: vec![u32::MAX; count],
-                };
+        wrong.par_chunks_mut(CHUNK).enumerate().for_each_init(
+            || Reached {
+                from: NONE,
+                radius: 0.0,
+                cells: Vec::new(),
+                weights: Vec::new(),
+                stamp: vec![NONE; count],
+            },
+            |reached, (number, wrong)| {
+                reached.from = NONE;
                 for (i, wrong) in wrong.iter_mut().enumerate() {
-                    let c = number * chunk + i;
+                    let c = number * CHUNK + i;
                     if self.is_candidate(c) && !self.held[c] {
-                        let gradient =
-                            around.second_gradient(c, &mut reached) * self.length_squared(c);
+                        let gradient = around.second_gradient(c, reached) * self.length_squared(c);
                         *wrong = energy(c, &gradient).min(own[c]);
                     }
                 }
-            });
+            },
+        );
         let largest: Vec<f64> = (0..count)
             .into_par_iter()
             .map(|c| match self.stretch.is_some() && self.is_candidate(c) {
@@ -204,11 +211,17 @@ impl<const D: usize> Criteria<'_, D> {
                 near.sort_unstable();
                 near.dedup();
                 let x = mesh.centroid(c);
-                let data = near.iter().map(|&k| {
+                let places = near.iter().map(|&k| {
                     let k = k as usize;
-                    (mesh.centroid(k) - x, mesh.cell_volume(k).abs(), raw[k])
+                    (mesh.centroid(k) - x, mesh.cell_volume(k).abs())
                 });
-                level(data).unwrap_or(raw[c])
+                let mut weights = Vec::new();
+                level(places, &mut weights);
+                if weights.is_empty() {
+                    return raw[c];
+                }
+                let values = near.iter().map(|&k| raw[k as usize]);
+                values.zip(&weights).map(|(e, w)| e * *w).sum()
             })
             .collect()
     }
@@ -306,30 +319,95 @@ fn largest_eigenvalue<const D: usize>(e: &Tensor<D>) -> f64 {
     }
 }
 
+/// For each cell a number that it shares with the cell before it if neighbours, their centres and its volume lie alike, the numbers of cells shifted by one.
+fn kinds<const D: usize>(
+    neighbours: &[[u32; 6]],
+    centre: &[Vector<D>],
+    volume: &[f64],
+) -> Vec<u32> {
+    let is_alike = |c: usize| {
+        let size = volume[c].powf(1.0 / D as f64);
+        let of = |n: u32, c: usize| centre[n as usize] - centre[c];
+        (volume[c] - volume[c - 1]).abs() <= ALIKE * volume[c]
+            && neighbours[c]
+                .iter()
+                .zip(&neighbours[c - 1])
+                .all(|(&n, &m)| match (n, m) {
+                    (NONE, NONE) => true,
+                    (NONE, _) | (_, NONE) => false,
+                    (n, m) => n == m + 1 && (of(n, c) - of(m, c - 1)).amax() <= ALIKE * size,
+                })
+    };
+    let new: Vec<bool> = (0..neighbours.len())
+        .into_par_iter()
+        .map(|c| c == 0 || !is_alike(c))
+        .collect();
+    let mut number = 0;
+    let count = |is_new: bool| {
+        number += u32::from(is_new);
+        number
+    };
+    new.into_iter().map(count).collect()
+}
+
 /// The strains around a cell.
 struct Around<'a, const D: usize> {
     criteria: &'a Criteria<'a, D>,
+    /// What a cell has in common with those before it, [`kinds`].
+    kind: Vec<u32>,
     neighbours: &'a [[u32; 6]],
     strains: &'a [Tensor<D>],
     centre: &'a [Vector<D>],
     volume: &'a [f64],
 }
 
-/// Cells that have been reached, and for each cell of the mesh from which cell it was reached last.
+/// Cells that have been reached from a cell, with their weights in `∇²ε` there, and for each cell of the mesh from which cell it was reached last.
 struct Reached {
+    /// That cell; `NONE` for none yet.
+    from: u32,
+    radius: f64,
     cells: Vec<u32>,
+    /// Empty where there is no gradient.
+    weights: Vec<f64>,
     stamp: Vec<u32>,
 }
 
+impl Reached {
+    /// Whether a cell reaches the same cells, shifted, with the same weights: then all that are reached lie like those reached before.
+    fn serves(&self, c: usize, radius: f64, kind: &[u32]) -> bool {
+        if self.from == NONE || (radius - self.radius).abs() > ALIKE * radius {
+            return false;
+        }
+        let shift = c - self.from as usize;
+        let is_alike = |&k: &u32| kind.get(k as usize + shift) == Some(&kind[k as usize]);
+        self.cells.iter().all(is_alike)
+    }
+}
+
 impl<const D: usize> Around<'_, D> {
-    /// `∇²ε` at the centre of cell `c`: from the cells that a path of candidates within a small ball joins to it, so that no mean passes over a slit.
+    /// `∇²ε` at the centre of cell `c`, not before those that `reached` has seen.
     fn second_gradient(&self, c: usize, reached: &mut Reached) -> Tensor<D> {
         let size = self.volume[c].powf(1.0 / D as f64);
         let radius = (AVERAGED_OVER * size)
             .min(self.criteria.horizon[c])
             .max(AT_LEAST * size)
             * (1.0 + 1e-9);
+        if !reached.serves(c, radius, &self.kind) {
+            self.reach(c, radius, reached);
+        }
+        let shift = c - reached.from as usize;
+        let own = self.strains[c];
+        let mut sum = Tensor::zeros();
+        for (&k, &weight) in reached.cells.iter().zip(&reached.weights) {
+            sum += (self.strains[k as usize + shift] - own) * weight;
+        }
+        sum
+    }
+
+    /// The cells that a path of candidates within a small ball joins to cell `c`, so that no mean passes over a slit, and their weights.
+    fn reach(&self, c: usize, radius: f64, reached: &mut Reached) {
         let x = self.centre[c];
+        (reached.from, reached.radius) = (c as u32, radius);
         reached.cells.clear();
         reached.cells.push(c as u32);
         reached.stamp[c] = c as u32;
@@ -345,182 +423,57 @@ impl<const D: usize> Around<'_, D> {
                 }
             }
         }
+        let places = reached
+            .cells
+            .iter()
+            .map(|&k| (self.centre[k as usize] - x, self.volume[k as usize]));
         let (mut second, mut weight) = (0.0, 0.0);
-        for &k in &reached.cells {
-            let v = self.volume[k as usize];
-            second += v * (self.centre[k as usize] - x).norm_squared();
+        for (x, v) in places.clone() {
+            second += v * x.norm_squared();
             weight += v;
         }
-        let data = reached.cells.iter().map(|&k| {
-            let k = k as usize;
-            (
-                self.centre[k] - x,
-                self.volume[k],
-                self.strains[k] - self.strains[c],
-            )
-        });
+        level(places, &mut reached.weights);
         // the mean of ½ x·H·x over the ball is ½ ⟨x₁²⟩ tr H
-        match level(data) {
-            Some(difference) if second > 0.0 => difference * (2.0 * D as f64 * weight / second),
-            _ => Tensor::zeros(),
-        }
+        let factor = match second > 0.0 {
+            true => 2.0 * D as f64 * weight / second,
+            false => 0.0,
+        };
+        reached.weights.iter_mut().for_each(|w| *w *= factor);
     }
 }
 
-/// The value at zero of the plane that fits weighted values best; their mean where they do not determine a plane. `None` without weight.
+/// Weights of values in the value at zero of the plane that fits them best; in their mean where they do not determine a plane. None without weight.
 ///
-/// Shapes: position, weight and value of each. A plane loses what a one-sided mean makes of a constant gradient.
+/// Shapes: position and weight of each. A plane loses what a one-sided mean makes of a constant gradient.
 fn level<const D: usize>(
-    data: impl Iterator<Item = (Vector<D>, f64, Tensor<D>)> + Clone,
-) -> Option<Tensor<D>> {
-    let (mut weight, mut first, mut mean) = (0.0, Vector::<D>::zeros(), Tensor::<D>::zeros());
-    for (x, w, value) in data.clone() {
+    data: impl Iterator<Item = (Vector<D>, f64)> + Clone,
+    weights: &mut Vec<f64>,
+) {
+    weights.clear();
+    let (mut weight, mut first) = (0.0, Vector::<D>::zeros());
+    for (x, w) in data.clone() {
         weight += w;
         first += x * w;
-        mean += value * w;
     }
     if weight <= 0.0 {
-        return None;
+        return;
     }
     first /= weight;
-    mean /= weight;
     let mut second = Tensor::<D>::zeros();
-    for (x, w, _) in data.clone() {
+    for (x, w) in data.clone() {
         let x = x - first;
         second += x * x.transpose() * (w / weight);
     }
     let scale = second.trace();
-    let inverse = match crate::tensor::inverse(&second) {
-        Some((inverse, determinant)) if determinant > 1e-6 * scale.powi(D as i32) => inverse,
-        _ => return Some(mean),
+    let slope = match crate::tensor::inverse(&second) {
+        Some((inverse, determinant)) if determinant > 1e-6 * scale.powi(D as i32) => {
+            inverse * first
+        }
+        _ => Vector::zeros(),
     };
-    let slope = inverse * first;
-    let mut value = mean;
-    for (x, w, v) in data {
-        value -= v * (w / weight * slope.dot(&(x - first)));
-    }
-    Some(value)
+    weights.extend(data.map(|(x, w)| w / weight * (1.0 - slope.dot(&(x - first)))));
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mesh::generate::{Axis, Grid, cuboid, line, rectangle};
-    use crate::peridynamics::Micromodulus;
-
-    /// The need of a grid of one material with unit shear modulus.
-    fn need<const D: usize>(
-        mesh: &Mesh<D>,
-        horizon: f64,
-        ratio: f64,
-        tolerance: f64,
-        u: impl Fn(&Vector<D>) -> Vector<D> + Sync,
-    ) -> Need {
-        let count = mesh.cell_count();
-        Criteria {
-            mesh,
-            tensors: &[Tensor4::isotropic(1.0, 1.0)],
-            cell_material: &vec![0; count],
-            material: 0,
-            horizon: &vec![horizon; count],
-            gradient_ratio: ratio,
-            tolerance,
-            stretch: None,
-            cut: &vec![false; count],
-            unbreakable: &vec![false; count],
-            held: &vec![false; count],
-        }
-        .need(|n| u(&mesh.nodes[n]))
-    }
-
-    fn cells(n: usize) -> Axis {
-        Axis::Uniform {
-            min: -1.0,
-            max: 1.0,
-            cells: n,
-        }
-    }
-
-    #[test]
-    fn the_gradient_ratio_has_its_closed_forms() {
-        // λ = c/r² in 1D: L x⁴ = ∫ c (6 x² ξ² + ξ⁴) dξ = c (4 x² δ³ + 2 δ⁵/5) with E = c δ³/3, so L − L_0 = 6/5 E δ² = 24 E ℓ²
-        let found = gradient_ratio::<1>(|r| Micromodulus::Constant.shape(r, 0.3), 0.3);
-        assert!((found * 20.0 - 1.0).abs() < 1e-6, "{found}");
-        // λ = c/r³: L x⁴ = ∫ c/|ξ| (6 x² ξ² + ξ⁴) dξ = c (6 x² δ² + δ⁴/2) with E = c δ²/2, so L − L_0 = E δ² = 24 E ℓ²
-        let found = gradient_ratio::<1>(|r| Micromodulus::InverseDistance.shape(r, 0.3), 0.3);
-        assert!((found * 24.0 - 1.0).abs() < 1e-6, "{found}");
-        // 5/12 · 1/6 · (1/5)/(1/3) and 5/12 · 1/7 · (1/6)/(1/4)
-        let found = gradient_ratio::<2>(|r| Micromodulus::InverseDistance.shape(r, 2.0), 2.0);
-        assert!((found / (5.0 / 72.0 * 0.6) - 1.0).abs() < 1e-6, "{found}");
-        let found = gradient_ratio::<3>(|r| Micromodulus::InverseDistance.shape(r, 2.0), 2.0);
-        assert!(
-            (found / (5.0 / 84.0 * 2.0 / 3.0) - 1.0).abs() < 1e-6,
-            "{found}"
-        );
-    }
-
-    #[test]
-    fn a_field_of_the_fourth_degree_has_the_error_of_its_closed_form() {
-        // u = x⁴: ε = 4 x³ + x h² in a cell, ℓ²∇²ε = 24 ℓ² x, to round-off; E of λ = μ = 1 is 3 in 1D and drops out
-        let (n, delta) = (80, 0.1);
-        let h = 2.0 / n as f64;
-        let mesh = line(cells(n)).mesh().unwrap();
-        let ratio = gradient_ratio::<1>(|r| Micromodulus::InverseDistance.shape(r, delta), delta);
-        let found = need(&mesh, delta, ratio, 1.0, |x| Vector::<1>::new(x[0].powi(4)));
-        let middle = |i: usize| -1.0 + (i as f64 + 0.5) * h;
-        let (mut wrong, mut whole) = (0.0f64, 0.0f64);
-        for i in 0..n {
-            let x = middle(i);
-            // at an end, where the mean is one-sided, a plane leaves half as much: see `level`
-            let gradient = 24.0 * ratio * delta * delta * x;
-            let strain = 4.0 * x.powi(3) + x * h * h;
-            if i >= 2 && i + 2 < n {
-                wrong += gradient.powi(2).min(strain.powi(2));
-            }
-            whole += strain.powi(2);
-        }
-        let inner = (wrong / whole).sqrt();
-        // the four cells at the ends hold less than a tenth of the sum
-        assert!(
-            found.all_local >= inner * (1.0 - 1e-9) && found.all_local < 1.06 * inner,
-            "{} {inner}",
-            found.all_local
-        );
-    }
-
-    #[test]
-    fn fields_of_the_second_degree_need_nothing() {
-        fn check<const D: usize>(mut grid: Grid<D>) {
-            let jittered = grid.jitter(0.2, 7).mesh().unwrap();
-            let quadratic = |x: &Vector<D>| Vector::from_fn(|i, _| x[i] * x[(i + 1) % D] + x[0]);
-            let found = need(&jittered, 0.4, 0.04, 1e-3, quadratic);
-            assert!(found.all_local < 5e-3, "{D} {}", found.all_local);
-        }
-        check(line(cells(20)));
-        check(rectangle(cells(12), cells(12)));
-        check(cuboid(cells(8), cells(8), cells(8)));
-        let regular = rectangle(cells(12), cells(12)).mesh().unwrap();
-        let found = need(&regular, 0.4, 0.04, 1e-3, |x| {
-            Vector::<2>::new(x[0] * x[1], x[1] * x[1])
-        });
-        assert!(found.all_local < 1e-12, "{}", found.all_local);
-        assert!(!found.error.contains(&true));
-    }
-
-    #[test]
-    fn cells_are_marked_until_the_rest_is_within_the_tolerance() {
-        let (marked, all, left) = worst(&[4.0, 0.0, 1.0, 3.0, 0.5], 100.0, 0.13);
-        assert_eq!(marked, [true, false, false, true, false]);
-        assert!((all - 0.085f64.sqrt()).abs() < 1e-12 && (left - 0.015f64.sqrt()).abs() < 1e-12);
-        let (marked, all, _) = worst(&[0.0; 3], 0.0, 0.1);
-        assert!(!marked.contains(&true) && all == 0.0);
-    }
-
-    #[test]
-    fn principal_strains_are_those_of_known_tensors() {
-        let turned = Tensor::<2>::new(1.0, 2.0, 2.0, 1.0);
-        assert!((largest_eigenvalue(&turned) - 3.0).abs() < 1e-14);
-        let solid = Tensor::<3>::new(2.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, -5.0);
-        assert!((largest_eigenvalue(&solid) - 3.0).abs() < 1e-14);
-    }
-}
+#[path = "need_tests.rs"]
+mod tests;

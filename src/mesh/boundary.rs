@@ -1,6 +1,6 @@
 //! Facets at the boundary of a set of cells or between two sets, their normals, and distances to them.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::{Facet, Mesh, MeshError};
 use crate::tensor::Vector;
@@ -53,7 +53,7 @@ impl<const D: usize> Mesh<D> {
     /// The facets that belong to exactly one of `cells`, in the order of the cells, normals outwards.
     pub fn boundary_facets(&self, cells: impl IntoIterator<Item = u32>) -> Vec<BoundaryFacet> {
         let mut found: Vec<Option<BoundaryFacet>> = Vec::new();
-        let mut open: HashMap<[u32; 4], usize> = HashMap::new();
+        let mut open: FxHashMap<[u32; 4], usize> = FxHashMap::default();
         for c in cells {
             for facet in self.facets_of_cell(c as usize) {
                 match open.remove(&key(&facet.nodes)) {
@@ -95,7 +95,7 @@ impl<const D: usize> Mesh<D> {
             return Vec::new();
         }
         // facets meet in a node in 2D, in an edge in 3D
-        let mut waiting: HashMap<[u32; 2], (Vector<D>, Vector<D>)> = HashMap::new();
+        let mut waiting: FxHashMap<[u32; 2], (Vector<D>, Vector<D>)> = FxHashMap::default();
         let mut found = Vec::new();
         for facet in self.outer_facets() {
             let count = facet.nodes.len();
@@ -135,7 +135,7 @@ impl<const D: usize> Mesh<D> {
         first: &C,
         second: &C,
     ) -> Vec<InterfaceFacet> {
-        let mut waiting: HashMap<[u32; 4], BoundaryFacet> = HashMap::new();
+        let mut waiting: FxHashMap<[u32; 4], BoundaryFacet> = FxHashMap::default();
         let mut found = Vec::new();
         for c in 0..self.cell_count() {
             if class[c] != *first && class[c] != *second {
@@ -173,7 +173,7 @@ impl<const D: usize> Mesh<D> {
     /// # Errors
     /// [`MeshError::LooseFacet`] for a facet that belongs to no cell.
     pub fn locate_facets(&self, facets: &[Facet]) -> Result<Vec<BoundaryFacet>, MeshError> {
-        let mut wanted: HashMap<[u32; 4], Option<BoundaryFacet>> =
+        let mut wanted: FxHashMap<[u32; 4], Option<BoundaryFacet>> =
             facets.iter().map(|f| (key(f), None)).collect();
         for c in 0..self.cell_count() {
             for facet in self.facets_of_cell(c) {
