@@ -2,27 +2,15 @@
 
 use rayon::prelude::*;
 
-use super::{BondForce, BondPass, BondSetup, Kinematics, Storage, bond::psi};
+use super::{
+    BondForce, BondPass, BondSetup, Kinematics, Storage,
+    bond::psi,
+    packed::{Neighbours, Weights},
+};
 use crate::system::Breakage;
 
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
-
-/// Bond weights.
-enum Weights {
-    Double(Vec<f64>),
-    Single(Vec<f32>),
-}
-
-impl Weights {
-    #[inline(always)]
-    fn get(&self, bond: usize) -> f64 {
-        match self {
-            Self::Double(w) => w[bond],
-            Self::Single(w) => f64::from(w[bond]),
-        }
-    }
-}
 
 /// When bonds break, as a limit of `t`.
 enum Limit {
@@ -54,14 +42,14 @@ struct Solid {
     theta: Vec<f64>,
 }
 
-/// A bond pass over lists: four bytes of neighbour, eight (or four) of weight and one bit per directed bond.
+/// A bond pass over lists: two (or four) bytes of neighbour, eight (or four) of weight and one bit per directed bond.
 pub(super) struct List<const D: usize> {
     position: Vec<[f64; D]>,
     volume: Vec<f64>,
     row: Vec<bool>,
     no_fail: Vec<bool>,
     offsets: Vec<usize>,
-    neighbours: Vec<u32>,
+    neighbours: Neighbours,
     weights: Weights,
     limit: Limit,
     kinematics: Kinematics,
@@ -227,7 +215,7 @@ impl<const D: usize> List<D> {
             row: (0..points).map(|i| setup.row(i)).collect(),
             no_fail: (0..points).map(|i| setup.no_fail(i)).collect(),
             offsets: families.offsets.clone(),
-            neighbours: families.neighbours.clone(),
+            neighbours: Neighbours::new(&families.offsets, &families.neighbours),
             weights,
             limit,
             kinematics: setup.kinematics,
@@ -273,7 +261,7 @@ impl<const D: usize> List<D> {
                     for bond in self.offsets[i]..self.offsets[i + 1] {
                         let k = bond - self.offsets[i];
                         let byte = &mut bits[self.bytes[i] - first + k / 8];
-                        let j = self.neighbours[bond] as usize;
+                        let j = self.neighbours.get(i, bond);
                         if *byte >> (k % 8) & 1 == 0 || self.no_fail[i] || self.no_fail[j] {
                             continue;
                         }
@@ -303,7 +291,7 @@ impl<const D: usize> List<D> {
         let here = vector(u, i);
         for bond in self.offsets[i]..self.offsets[i + 1] {
             if self.stands(i, bond - self.offsets[i]) {
-                let j = self.neighbours[bond] as usize;
+                let j = self.neighbours.get(i, bond);
                 let s = stretched::<D, EXACT>(&self.xi(i, j), &here, &u[j * D..][..D]);
                 f(bond, j, &s);
             }
@@ -453,7 +441,7 @@ impl<const D: usize> BondPass<D> for List<D> {
                     let (mut own, mut others) = ([0.0; D], 0.0);
                     for bond in self.offsets[i]..self.offsets[i + 1] {
                         if self.stands(i, bond - self.offsets[i]) {
-                            let j = self.neighbours[bond] as usize;
+                            let j = self.neighbours.get(i, bond);
                             let w = self.weights.get(bond) * self.volume[j];
                             for (own, x) in own.iter_mut().zip(self.xi(i, j)) {
                                 *own += w * x;
@@ -480,7 +468,7 @@ impl<const D: usize> BondPass<D> for List<D> {
                     if !self.stands(i, bond - self.offsets[i]) {
                         continue;
                     }
-                    let j = self.neighbours[bond] as usize;
+                    let j = self.neighbours.get(i, bond);
                     let xi = self.xi(i, j);
                     let length: f64 = xi.iter().map(|x| x * x).sum();
                     let w = self.weights.get(bond) * self.volume[i] * self.volume[j];
@@ -530,7 +518,7 @@ impl<const D: usize> BondPass<D> for List<D> {
                 }
                 let (mut all, mut lost) = (0.0, 0.0);
                 for bond in self.offsets[i]..self.offsets[i + 1] {
-                    let v = self.volume[self.neighbours[bond] as usize];
+                    let v = self.volume[self.neighbours.get(i, bond)];
                     all += v;
                     if !self.stands(i, bond - self.offsets[i]) {
                         lost += v;
@@ -555,9 +543,9 @@ impl<const D: usize> BondPass<D> for List<D> {
     }
 
     fn bonded(&self, i: usize, j: usize) -> bool {
-        self.neighbours[self.offsets[i]..self.offsets[i + 1]]
-            .binary_search(&(j as u32))
-            .is_ok_and(|k| self.stands(i, k))
+        self.neighbours
+            .place(i, self.offsets[i]..self.offsets[i + 1], j)
+            .is_some_and(|k| self.stands(i, k))
     }
 
     fn damage_state(&self) -> Vec<u64> {
@@ -577,22 +565,18 @@ impl<const D: usize> BondPass<D> for List<D> {
     fn memory_bytes(&self) -> usize {
         let bytes = std::mem::size_of::<f64>();
         let solid = self.solid.as_ref().map_or(0, |s| 4 * s.theta.len() * bytes);
-        let weights = match &self.weights {
-            Weights::Double(w) => w.len() * 8,
-            Weights::Single(w) => w.len() * 4,
-        };
         let limit = match &self.limit {
             Limit::PerBond(t) => t.len() * bytes,
             _ => 0,
         };
         solid
-            + weights
+            + self.weights.memory_bytes()
             + limit
             + self.position.len() * (D + 1) * bytes
             + self.row.len()
             + self.no_fail.len()
             + (self.offsets.len() + self.bytes.len()) * std::mem::size_of::<usize>()
-            + self.neighbours.len() * 4
+            + self.neighbours.memory_bytes()
             + self.intact.len()
     }
 }

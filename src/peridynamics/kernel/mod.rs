@@ -5,6 +5,7 @@
 //! | `setup.rs` | what a pass is made from, and the errors |
 //! | `bond.rs` | one bond: stretch, force and extension without cancellation |
 //! | `list.rs` | the pass over neighbour lists, for any cloud |
+//! | `packed.rs` | neighbours and weights of a list in few bytes |
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
 //! | `lattice_build.rs` | how that one is made |
 //! | `stencil.rs` | the lattice's padded box, its offsets and bits |
@@ -23,6 +24,7 @@ mod lattice_build;
 mod list;
 #[cfg(test)]
 mod oracle;
+mod packed;
 mod setup;
 mod stencil;
 mod sweep;
