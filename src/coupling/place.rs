@@ -56,6 +56,7 @@ pub(super) fn place<const D: usize>(
             mine,
             own_horizon: horizon,
             beyond,
+            margin,
             low: low - margin,
             high: high + margin,
             region,
@@ -100,6 +101,8 @@ struct Placement<'a, const D: usize> {
     /// Corners of the box that holds all points.
     low: Vector<D>,
     high: Vector<D>,
+    /// How far from the cells points are needed.
+    margin: Vector<D>,
     /// Volume of the cells that hold points.
     region: f64,
 }
@@ -191,6 +194,19 @@ impl<const D: usize> Placement<'_, D> {
             let (lo, hi) = mesh.bounds_of(&facet.nodes);
             mark_box(&mut edge, &counts, &first, &origin, h, &lo, &hi);
         }
+        // what lies farther from the region than families reach is not needed
+        let mut near = vec![false; total];
+        let wanted = |c: u32| self.mine[c as usize] || roles[c as usize] == CellRole::StressElement;
+        let cells = (0..mesh.cell_count() as u32).filter(|&c| wanted(c));
+        for c in cells.clone() {
+            let (lo, hi) = mesh.bounds_of(mesh.cell(c as usize));
+            mark_box(&mut near, &counts, &first, &origin, h, &lo, &hi);
+        }
+        for facet in mesh.boundary_facets(cells) {
+            let (lo, hi) = mesh.bounds_of(&facet.nodes);
+            let (lo, hi) = (lo - self.margin, hi + self.margin);
+            mark_box(&mut near, &counts, &first, &origin, h, &lo, &hi);
+        }
         let samples = if D == 3 { 4 } else { 8 };
         let whole = h.powi(D as i32);
         type Found<const D: usize> = (Vector<D>, f64, f64, Zone, Option<(u32, Vec<f64>)>);
@@ -200,7 +216,7 @@ impl<const D: usize> Placement<'_, D> {
                 let mut list = Vec::new();
                 for index in block * BLOCK..((block + 1) * BLOCK).min(total) {
                     let x = position(index);
-                    if self.in_void(&x) {
+                    if !near[index] || self.in_void(&x) {
                         continue;
                     }
                     let located = elements.locate(mesh, &x, tolerance);

@@ -27,6 +27,9 @@ pub const MARGIN: f64 = 0.04;
 /// Probability with which the sharp bound of a symmetric model may fail.
 const FAILURE: f64 = 1e-9;
 
+/// Products between two looks at whether a step may stay.
+const ASKED: usize = 2;
+
 /// Basis vectors of Arnoldi may take this many bytes.
 const BASIS_BYTES: usize = 512 << 20;
 
@@ -202,10 +205,38 @@ fn normal_numbers(count: usize) -> Vec<f64> {
 /// [`StepError::Row`] for a site without mass or a row that is not finite, [`StepError::Eigenvalues`].
 pub fn stable_step(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepError> {
     // one change of threads instead of several per product
-    rayon::scope(|_| limits(system, prescribed))
+    Ok(rayon::scope(|_| limits(system, prescribed, None))?.0)
 }
 
-fn limits(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepError> {
+/// A step that a model has taken and that may stay after a change of what moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Held {
+    /// The step \[s\].
+    pub step: f64,
+    /// What it may be of the stable step at most.
+    pub fraction: f64,
+}
+
+/// As [`stable_step`], with no more products than it takes to see that a step may stay: fewer than for the sharpest bound, since a step at a fraction of the limit leaves a wider margin.
+///
+/// It may stay if it is within the bound that the products so far give, which fails as rarely as that of [`stable_step`], and within the fraction of the stable step as they estimate it. [`StepLimit::stable`] is that bound then.
+/// Models without symmetry take all products. Returns the limits, and whether the step may stay.
+///
+/// # Errors
+/// As [`stable_step`].
+pub fn stable_step_beyond(
+    system: &dyn Dynamic,
+    prescribed: &[u32],
+    held: Held,
+) -> Result<(StepLimit, bool), StepError> {
+    rayon::scope(|_| limits(system, prescribed, Some(held)))
+}
+
+fn limits(
+    system: &dyn Dynamic,
+    prescribed: &[u32],
+    held: Option<Held>,
+) -> Result<(StepLimit, bool), StepError> {
     let mut operator = Scaled::new(system, prescribed)?;
     let d = system.block().max(1);
     let (mut largest, mut certified_site) = (0.0, 0);
@@ -219,12 +250,27 @@ fn limits(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepErr
         }
     }
     let certified = 2.0 / largest.sqrt();
-    let theta = highest(&mut operator, Want::Value)?.0.max(0.0);
     // eigenvalues of a sum are at most the sum of the largest ones
     let hidden = system.hidden_rate();
-    let estimate = 2.0 / (theta + hidden).sqrt();
-    let sharp = 2.0 / (theta / (1.0 - MARGIN) + hidden).sqrt();
-    Ok(StepLimit {
+    let bound = |theta: f64, margin: f64| 2.0 / (theta / (1.0 - margin) + hidden).sqrt();
+    let unknowns = operator.free.count();
+    let is_symmetric = system.symmetry() == Symmetry::Symmetric;
+    let may_stay = |theta: f64, products: usize| {
+        held.filter(|_| is_symmetric).is_some_and(|held| {
+            let margin = margin_of(unknowns, products);
+            margin < 1.0
+                && held.step <= bound(theta, margin) * (1.0 - 1e-9)
+                && held.step <= bound(theta, MARGIN) * held.fraction
+        })
+    };
+    let theta = highest(&mut operator, Want::Value, &may_stay)?.0.max(0.0);
+    let estimate = bound(theta, 0.0);
+    let stays_early = may_stay(theta, operator.products);
+    let sharp = match stays_early {
+        true => bound(theta, margin_of(unknowns, operator.products).max(MARGIN)),
+        false => bound(theta, MARGIN),
+    };
+    let limit = StepLimit {
         certified,
         certified_site,
         // a Ritz value may exceed the bound on eigenvalues by rounding
@@ -232,7 +278,9 @@ fn limits(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepErr
         // where the row sum is the eigenvalue, rounding must not decide
         stable: certified.max(sharp) * (1.0 - 1e-9),
         products: operator.products,
-    })
+    };
+    let stays = held.is_some_and(|h| h.step <= limit.stable * h.fraction * (1.0 + 1e-9));
+    Ok((limit, stays || stays_early))
 }
 
 /// `2/√θ` after a few products: a little above the limit, where that matters little.
@@ -247,7 +295,7 @@ pub(super) fn rough_limit(
         if count == 0 {
             return Ok(f64::INFINITY);
         }
-        let (theta, _) = lanczos(&mut operator, count, Want::Value)?;
+        let (theta, _) = lanczos(&mut operator, count, Want::Value, &|_, _| false)?;
         Ok(2.0 / theta.max(0.0).sqrt())
     })
 }
@@ -273,7 +321,7 @@ impl StepLimit {
             return Ok(requested);
         }
         let mut operator = Scaled::new(system, prescribed)?;
-        let mode = highest(&mut operator, Want::Mode)?.1;
+        let mode = highest(&mut operator, Want::Mode, &|_, _| false)?.1;
         Err(StepError::TooLarge {
             requested,
             stable: self.stable,
@@ -289,6 +337,12 @@ fn products_for(unknowns: usize) -> usize {
     (0.5 * (needed + 1.0)).ceil() as usize
 }
 
+/// The margin with which the bound of a symmetric model holds after so many products, as rarely wrong as [`FAILURE`] says.
+fn margin_of(unknowns: usize, products: usize) -> f64 {
+    let needed = (1.648 * (unknowns.max(1) as f64).sqrt() / FAILURE).ln();
+    (needed / (2.0 * products as f64 - 1.0)).powi(2)
+}
+
 /// What of the highest mode is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Want {
@@ -296,14 +350,18 @@ enum Want {
     Mode,
 }
 
-/// The largest Ritz value in size, and its vector if that is wanted.
-fn highest(operator: &mut Scaled<'_>, want: Want) -> Result<(f64, Vec<f64>), StepError> {
+/// The largest Ritz value in size, and its vector if that is wanted; of a symmetric model with fewer products where `is_enough` says so.
+fn highest(
+    operator: &mut Scaled<'_>,
+    want: Want,
+    is_enough: &dyn Fn(f64, usize) -> bool,
+) -> Result<(f64, Vec<f64>), StepError> {
     let count = products_for(operator.free.count()).min(operator.free.count());
     if count == 0 {
         return Ok((0.0, vec![0.0; operator.dofs()]));
     }
     match operator.system.symmetry() {
-        Symmetry::Symmetric => lanczos(operator, count, want),
+        Symmetry::Symmetric => lanczos(operator, count, want, is_enough),
         // in one go, or in as many cycles as memory asks for
         _ => {
             let cycle = count.min((BASIS_BYTES / (operator.dofs() * size_of::<f64>())).max(20));
@@ -323,11 +381,12 @@ fn highest(operator: &mut Scaled<'_>, want: Want) -> Result<(f64, Vec<f64>), Ste
 /// Lanczos with three vectors; the basis is gone through a second time for the vector, if that is wanted.
 ///
 /// Vectors lose their orthogonality once a Ritz value has converged, which repeats that value and spoils none; to keep them orthogonal would
-/// cost more than the products.
+/// cost more than the products. It ends before `count` products where `is_enough`, asked every [`ASKED`] of them with the largest Ritz value and their number, says so.
 fn lanczos(
     operator: &mut Scaled<'_>,
     count: usize,
     want: Want,
+    is_enough: &dyn Fn(f64, usize) -> bool,
 ) -> Result<(f64, Vec<f64>), StepError> {
     let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut coefficients: Vec<f64> = Vec::new();
@@ -357,25 +416,37 @@ fn lanczos(
                     break;
                 }
                 off.push(b);
+                let done = diagonal.len();
+                if done.is_multiple_of(ASKED)
+                    && done < count
+                    && is_enough(ritz(&diagonal, &off)?.0, done)
+                {
+                    break;
+                }
             }
             std::mem::swap(&mut last, &mut q);
             q.iter_mut().zip(&w).for_each(|(q, w)| *q = w / b);
         }
         if pass == 0 {
-            let n = diagonal.len();
-            let small = faer::Mat::from_fn(n, n, |i, j| match i.abs_diff(j) {
-                0 => diagonal[i],
-                1 => off[i.min(j)],
-                _ => 0.0,
-            });
-            let eigen = small
-                .self_adjoint_eigen(faer::Side::Lower)
-                .map_err(|_| StepError::Eigenvalues)?;
-            theta = eigen.S().column_vector()[n - 1];
-            coefficients = (0..n).map(|i| eigen.U()[(i, n - 1)]).collect();
+            (theta, coefficients) = ritz(&diagonal, &off)?;
         }
     }
     Ok((theta, mode))
+}
+
+/// The largest eigenvalue of a symmetric tridiagonal matrix, with its vector.
+fn ritz(diagonal: &[f64], off: &[f64]) -> Result<(f64, Vec<f64>), StepError> {
+    let n = diagonal.len();
+    let small = faer::Mat::from_fn(n, n, |i, j| match i.abs_diff(j) {
+        0 => diagonal[i],
+        1 => off[i.min(j)],
+        _ => 0.0,
+    });
+    let eigen = small
+        .self_adjoint_eigen(faer::Side::Lower)
+        .map_err(|_| StepError::Eigenvalues)?;
+    let theta = eigen.S().column_vector()[n - 1];
+    Ok((theta, (0..n).map(|i| eigen.U()[(i, n - 1)]).collect()))
 }
 
 /// A Krylov space with its orthonormal basis and the operator in it.

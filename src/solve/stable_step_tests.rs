@@ -117,3 +117,35 @@ fn rows_without_mass_or_number_are_named() {
         "{found:?}"
     );
 }
+
+#[test]
+fn a_step_stays_with_fewer_products_only_where_it_is_stable() {
+    let system = springs(300);
+    let free: Vec<usize> = (0..300).collect();
+    let limit = 2.0 / largest(&system, &free).sqrt();
+    let all = stable_step(&system, &[]).expect("positive masses");
+    let held = |part: f64| Held {
+        step: part * limit,
+        fraction: 0.95,
+    };
+    let mut before = 0;
+    for part in [0.5, 0.8, 0.9, 0.929] {
+        let (found, stays) = stable_step_beyond(&system, &[], held(part)).expect("masses");
+        assert!(stays && found.products < all.products, "{part}: {found:?}");
+        // a wider margin for fewer products: the bound lies between the step and the limit
+        assert!(found.products >= before && found.stable <= limit);
+        assert!(
+            found.stable >= part * limit * (1.0 - 1e-8),
+            "{part}: {found:?}"
+        );
+        before = found.products;
+    }
+    // within the limit, but beyond the fraction of the stable step
+    let (found, stays) = stable_step_beyond(&system, &[], held(0.94)).expect("masses");
+    assert!(!stays && found == all);
+    let whole = Held {
+        step: 1.001 * limit,
+        fraction: 1.0,
+    };
+    assert!(!stable_step_beyond(&system, &[], whole).expect("masses").1);
+}

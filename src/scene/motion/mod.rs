@@ -14,6 +14,7 @@
 //! | `switching.rs` | what a change of the zone carries over, and what it costs |
 //! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
 
+mod cells;
 mod drive;
 mod explicit;
 mod laid_out;

@@ -11,7 +11,7 @@ use crate::scene::run::RunError;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::BeyondLimitSpec;
 use crate::solve::explicit::State;
-use crate::solve::stable_step::{StepLimit, stable_step};
+use crate::solve::stable_step::{Held, StepLimit, stable_step, stable_step_beyond};
 use crate::solve::sub_cycling::{FineSites, SubCycled, SubCyclingError};
 use crate::system::Dynamic;
 
@@ -96,7 +96,12 @@ pub(super) fn repaced(
     before: StepChoice,
     state: &State,
 ) -> Result<StepChoice, RunError> {
-    let limit = stable_step(system, held)?;
+    let fraction = spec.step.map_or(spec.fraction, |_| 1.0);
+    let stays = Held {
+        step: before.step,
+        fraction,
+    };
+    let (limit, stays) = stable_step_beyond(system, held, stays)?;
     let choice = StepChoice {
         stable: limit.stable,
         certified: limit.certified,
@@ -104,8 +109,7 @@ pub(super) fn repaced(
         ..before
     };
     // what was asked for may stay up to the limit itself
-    let largest = limit.stable * spec.step.map_or(spec.fraction, |_| 1.0);
-    if before.step <= largest * (1.0 + 1e-9) {
+    if stays {
         return Ok(choice);
     }
     let left = spec.duration - state.time;

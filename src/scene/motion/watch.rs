@@ -1,12 +1,10 @@
 //! Where a zone that follows the crack is wanted, and when that is looked at.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
+use super::cells::CellBoxes;
 use crate::coupling::{Model, SiteKind, Zone};
 use crate::fem;
-use crate::peridynamics::PdBody;
 use crate::scene::follow::Follow;
 use crate::system::Dynamic;
 use crate::tensor::{Tensor, Vector};
@@ -15,7 +13,14 @@ use crate::tensor::{Tensor, Vector};
 const CROSSED: f64 = 0.3;
 
 /// The zone also changes where it is this many times larger than it would be.
-const TOO_LARGE: f64 = 1.5;
+const TOO_LARGE: f64 = 2.0;
+
+/// The zone reaches farther ahead of the tip of a crack, by this many paddings: fewer changes, and points take the place of elements before the waves of the tip are there.
+const AHEAD: f64 = 1.5;
+
+/// A stretched cell is at the front of the damage within this many reaches of it if the middle of that is [`AIMED`] of this distance away: half of it at the tip of a straight crack, nothing within its path.
+const SEEN: f64 = 1.5;
+const AIMED: f64 = 0.35;
 
 /// Bonds of these lengths, in horizons, are looked at: some of each direction, mirror images together, so that the zone of a symmetric motion stays symmetric.
 const LOOKED_AT: [f64; 2] = [0.5, 0.75];
@@ -30,19 +35,15 @@ pub(super) struct Watch<'a, const D: usize> {
     every: u64,
     /// How far a crack comes in between \[m\].
     travel: f64,
-    /// Bonds to look at, by their points.
-    bonds: Vec<[u32; 2]>,
-    /// The cell of each point; `u32::MAX` for one that follows sites.
-    cell_of_point: Vec<u32>,
-    /// The cell of each site that is a point.
-    cell_of_site: Vec<u32>,
-    /// Cells that stay nonlocal for what cuts their bonds at rest.
+    /// Bonds to look at, by their points, with their lengths squared \[m²\].
+    bonds: Vec<([u32; 2], f64)>,
+    /// The cells at whose boxes each site lies that is a point, several for one on a face, and where those of each begin.
+    cells_at: Vec<u32>,
+    starts: Vec<usize>,
+    /// Cells that stay nonlocal for what cuts their bonds at rest, and those that it passes.
     cut: Vec<bool>,
-    boxes: Vec<(Vector<D>, Vector<D>)>,
-    /// Cells by the middle of their boxes, and half the extent of the largest.
-    bins: HashMap<[i64; D], Vec<u32>>,
-    size: f64,
-    half: f64,
+    notched: Vec<bool>,
+    boxes: CellBoxes<D>,
     /// Elements with the sites and weights of the gradient at their centres.
     elements: Vec<u32>,
     gradients: Vec<(u32, Vector<D>)>,
@@ -67,17 +68,20 @@ impl<'a, const D: usize> Watch<'a, D> {
         let every = (free / (speed * step)).floor().clamp(1.0, 1e9) as u64;
         let barriers = model.peridynamics.as_ref().map_or(&[][..], |p| &p.barriers);
         let voids = model.peridynamics.as_ref().map_or(&[][..], |p| &p.voids);
-        let boxes: Vec<_> = (0..cells).map(|c| mesh.bounds_of(mesh.cell(c))).collect();
-        let cut = (0..cells)
+        let boxes = CellBoxes::new(mesh);
+        let (cut, notched) = (0..cells)
             .into_par_iter()
             .map(|c| {
-                let (x, (low, high)) = (mesh.centroid(c), &boxes[c]);
+                let (x, (low, high)) = (mesh.centroid(c), boxes.of(c));
                 let own = 0.5 * (high - low).amax();
                 let shapes = barriers.iter().map(|b| b.shape()).chain(voids);
-                let near = |d: f64| d < follow.reach + own * (1.0 - 1e-9);
-                !follow.barred[c] && shapes.into_iter().any(|s| near(s.signed_distance(&x)))
+                let distance = shapes
+                    .map(|s| s.signed_distance(&x))
+                    .fold(f64::INFINITY, f64::min);
+                let is_cut = distance < follow.reach + own * (1.0 - 1e-9);
+                (!follow.barred[c] && is_cut, distance < own * (1.0 + 1e-9))
             })
-            .collect();
+            .unzip();
         let mut watch = Self {
             follow,
             model,
@@ -85,38 +89,19 @@ impl<'a, const D: usize> Watch<'a, D> {
             every,
             travel: speed * step * every as f64,
             bonds: Vec::new(),
-            cell_of_point: Vec::new(),
-            cell_of_site: vec![u32::MAX; model.sites.len()],
+            cells_at: Vec::new(),
+            starts: vec![0],
             cut,
-            half: 0.5
-                * boxes
-                    .iter()
-                    .map(|(l, h)| (h - l).amax())
-                    .fold(0.0, f64::max),
+            notched,
             boxes,
-            bins: HashMap::new(),
-            size: follow.padding,
             elements: Vec::new(),
             gradients: Vec::new(),
             offsets: vec![0],
             site_of_point: Vec::new(),
         };
-        for c in 0..cells {
-            let key = watch.bin(&watch.middle(c));
-            watch.bins.entry(key).or_default().push(c as u32);
-        }
         watch.find_bonds();
         watch.find_gradients();
         watch
-    }
-
-    fn middle(&self, cell: usize) -> Vector<D> {
-        let (low, high) = &self.boxes[cell];
-        (low + high) * 0.5
-    }
-
-    fn bin(&self, x: &Vector<D>) -> [i64; D] {
-        std::array::from_fn(|a| (x[a] / self.size).floor() as i64)
     }
 
     fn find_gradients(&mut self) {
@@ -143,45 +128,30 @@ impl<'a, const D: usize> Watch<'a, D> {
         let Some(body) = self.model.body() else {
             return;
         };
-        let mesh = &self.model.mesh;
-        let cells = (0..mesh.cell_count()).filter(|&c| !self.model.is_element(c));
-        let locator = fem::Locator::new(mesh, cells);
         let sites = &self.model.sites;
         self.site_of_point = vec![u32::MAX; body.cloud.position.len()];
+        // a point on a face belongs to the cells on both sides, or mirror images would differ
+        let touching = 1e-9 * self.follow.reach;
         for (site, s) in sites.iter().enumerate() {
             if let SiteKind::Point(p) = s.kind {
                 self.site_of_point[p as usize] = site as u32;
+                let cells_at = &mut self.cells_at;
+                let push = |c: usize| cells_at.push(c as u32);
+                (self.boxes).near(&s.position, &s.position, touching, push);
             }
+            self.starts.push(self.cells_at.len());
         }
-        self.cell_of_site = sites
-            .par_iter()
-            .map(|s| match s.kind {
-                SiteKind::Node(_) => u32::MAX,
-                SiteKind::Point(_) => locator
-                    .locate(mesh, &s.position, 1e-9)
-                    .map_or(u32::MAX, |l| l.cell as u32),
-            })
-            .collect();
-        self.cell_of_point = vec![u32::MAX; body.cloud.position.len()];
-        for (s, &cell) in sites.iter().zip(&self.cell_of_site) {
-            if let SiteKind::Point(p) = s.kind {
-                self.cell_of_point[p as usize] = cell;
-            }
-        }
-        let is_known = |p: u32| self.cell_of_point[p as usize] != u32::MAX;
+        let is_known = |p: u32| self.site_of_point[p as usize] != u32::MAX;
         let [shortest, longest] = LOOKED_AT;
-        for i in (0..self.cell_of_point.len() as u32).filter(|&i| is_known(i)) {
+        for i in (0..self.site_of_point.len() as u32).filter(|&i| is_known(i)) {
             let horizon = body.cloud.horizon[i as usize] * (1.0 + 1e-6);
             let of = body.families.of(i as usize).iter().copied();
-            self.bonds.extend(
-                of.filter(|&j| {
-                    let r = body.bond(i as usize, j as usize).norm();
-                    j > i
-                        && is_known(j)
-                        && (shortest * horizon * (1.0 - 2e-6)..longest * horizon).contains(&r)
-                })
-                .map(|j| [i, j]),
-            );
+            let lengths = (shortest * horizon * (1.0 - 2e-6)).powi(2)..(longest * horizon).powi(2);
+            self.bonds
+                .extend(of.filter(|&j| j > i && is_known(j)).filter_map(|j| {
+                    let r2 = body.bond(i as usize, j as usize).norm_squared();
+                    lengths.contains(&r2).then_some(([i, j], r2))
+                }));
         }
     }
 
@@ -196,25 +166,23 @@ impl<'a, const D: usize> Watch<'a, D> {
         let hot = self.stretched(u);
         let mut damaged = vec![false; cells];
         for site in system.damaged_sites() {
-            if let Some(c) = damaged.get_mut(self.cell_of_site[site as usize] as usize) {
-                *c = true;
-            }
+            self.mark_point(site, &mut damaged);
         }
+        let hot = self.front(&hot, &damaged);
         let reach = self.follow.reach;
         let now: Vec<bool> = (0..cells)
             .map(|c| self.model.zones[c] == Zone::Nonlocal)
             .collect();
-        let around = |ahead: f64| -> Vec<bool> {
-            let mut wanted = self.cut.clone();
-            self.grow(&damaged, reach, &mut wanted);
-            self.grow(&hot, ahead, &mut wanted);
-            wanted
-        };
-        let short = around(reach + self.travel)
-            .iter()
-            .zip(&now)
-            .any(|(wanted, now)| *wanted && !now);
-        let mut next = around(self.follow.padding);
+        let mut kept = self.cut.clone();
+        self.grow(&damaged, reach, &mut kept);
+        let mut needed = kept.clone();
+        self.grow(&hot, reach + self.travel, &mut needed);
+        let short = needed.iter().zip(&now).any(|(n, now)| *n && !now);
+        let mut next = kept;
+        self.grow(&hot, self.follow.padding, &mut next);
+        if short {
+            self.mark_ahead(&hot, &damaged, &mut next);
+        }
         self.close(&mut next);
         let count = |set: &[bool]| set.iter().filter(|c| **c).count() as f64;
         let large = count(&now) > TOO_LARGE * count(&next);
@@ -241,52 +209,126 @@ impl<'a, const D: usize> Watch<'a, D> {
             .collect();
         found.into_iter().for_each(|c| hot[c as usize] = true);
         if let Some(body) = self.model.body() {
+            let position = &body.cloud.position;
+            let [lowest, highest] = [limit, critical].map(|s| s * (2.0 + s));
             let found: Vec<[u32; 2]> = self
                 .bonds
                 .par_iter()
                 .with_min_len(1024)
-                .filter(|[i, j]| {
-                    // a bond beyond the critical stretch is broken, or may not break
-                    let s = self.stretch(body, *i as usize, *j as usize, u);
-                    s > limit && s <= critical
+                .filter(|([i, j], r2)| {
+                    let [a, b] = [*i, *j].map(|p| self.site_of_point[p as usize] as usize * D);
+                    let (mut along, mut square) = (0.0, 0.0);
+                    for k in 0..D {
+                        let eta = u[b + k] - u[a + k];
+                        along += (position[*j as usize][k] - position[*i as usize][k]) * eta;
+                        square += eta * eta;
+                    }
+                    // (|ξ + η|² − |ξ|²)/|ξ|² = s (2 + s); a bond beyond the critical stretch is broken, or may not break
+                    let t = 2.0 * along + square;
+                    t > lowest * r2 && t <= highest * r2
                 })
-                .copied()
+                .map(|bond| bond.0)
                 .collect();
             for point in found.into_iter().flatten() {
-                hot[self.cell_of_point[point as usize] as usize] = true;
+                self.mark_point(self.site_of_point[point as usize], &mut hot);
             }
         }
         hot
     }
 
-    /// Marks the cells whose boxes come nearer than `by` to one of a set, along every axis.
+    /// Marks the cells whose boxes come nearer than `by` to one of a set.
     fn grow(&self, cells: &[bool], by: f64, marked: &mut [bool]) {
-        let by = by * (1.0 - 1e-9);
         for member in (0..cells.len()).filter(|&c| cells[c]) {
-            let (from, to) = &self.boxes[member];
-            let margin = Vector::repeat(by + self.half);
-            let (first, last) = (self.bin(&(from - margin)), self.bin(&(to + margin)));
-            for_each_bin(first, last, |key| {
-                for &c in self.bins.get(&key).into_iter().flatten() {
-                    let c = c as usize;
-                    let (low, high) = &self.boxes[c];
-                    marked[c] |= !self.follow.barred[c]
-                        && (0..D).all(|a| from[a] - high[a] < by && low[a] - to[a] < by);
-                }
-            });
+            let (from, to) = self.boxes.of(member);
+            self.mark(from, to, by, marked);
         }
     }
 
-    /// Stretch of the bond between two points that are sites.
-    fn stretch(&self, body: &PdBody<D>, i: usize, j: usize, u: &[f64]) -> f64 {
-        let of = |p: usize| {
-            let site = self.site_of_point[p] as usize;
-            Vector::<D>::from_column_slice(&u[site * D..][..D])
+    /// Marks the cells at which a site lies that is a point.
+    fn mark_point(&self, site: u32, marked: &mut [bool]) {
+        let site = site as usize;
+        let at = &self.cells_at[self.starts[site]..self.starts[site + 1]];
+        at.iter().for_each(|&c| marked[c as usize] = true);
+    }
+
+    /// Marks the cells whose boxes come nearer than `by` to a box.
+    fn mark(&self, from: &Vector<D>, to: &Vector<D>, by: f64, marked: &mut [bool]) {
+        let barred = &self.follow.barred;
+        (self.boxes).near(from, to, by, |c| marked[c] |= !barred[c]);
+    }
+
+    /// Those of stretched cells that are at the front of the damage, or away from it: in the flanks of a crack that has passed bonds stay stretched, and need no zone around them.
+    fn front(&self, hot: &[bool], damaged: &[bool]) -> Vec<bool> {
+        let seen = SEEN * self.follow.reach;
+        let is_front = |c: usize| {
+            let (from, to) = self.boxes.of(c);
+            let behind = self.damage_near(from, to, seen, damaged);
+            let way = self.mean(&behind).map(|x| self.boxes.middle(c) - x);
+            way.is_none_or(|way| way.norm() > AIMED * seen)
         };
-        let xi = body.bond(i, j);
-        let eta = of(j) - of(i);
-        let r = xi.norm();
-        (2.0 * xi.dot(&eta) + eta.norm_squared()) / (r * (r + (xi + eta).norm()))
+        (0..hot.len()).map(|c| hot[c] && is_front(c)).collect()
+    }
+
+    /// Cells that are damaged, or cut at rest, nearer than `by` to a box.
+    fn damage_near(
+        &self,
+        from: &Vector<D>,
+        to: &Vector<D>,
+        by: f64,
+        damaged: &[bool],
+    ) -> Vec<usize> {
+        let mut found = Vec::new();
+        self.boxes.near(from, to, by, |c| {
+            if damaged[c] || self.notched[c] {
+                found.push(c);
+            }
+        });
+        found
+    }
+
+    /// Marks what lies ahead of the tips of cracks: groups of cells at the front, moved away from the damage behind them.
+    fn mark_ahead(&self, front: &[bool], damaged: &[bool], marked: &mut [bool]) {
+        let Follow { reach, padding, .. } = *self.follow;
+        let beside = 0.5 * (reach + self.travel + padding);
+        let ahead = AHEAD * padding;
+        let mut is_left = front.to_vec();
+        for first in 0..front.len() {
+            if !std::mem::take(&mut is_left[first]) {
+                continue;
+            }
+            let (mut group, mut next) = (vec![first], 0);
+            while let Some(&member) = group.get(next) {
+                next += 1;
+                let (from, to) = self.boxes.of(member);
+                self.boxes.near(from, to, reach, |c| {
+                    if std::mem::take(&mut is_left[c]) {
+                        group.push(c);
+                    }
+                });
+            }
+            let Some(tip) = self.mean(&group) else {
+                continue;
+            };
+            let behind = self.damage_near(&tip, &tip, padding, damaged);
+            let way = self.mean(&behind).map_or(Vector::zeros(), |x| tip - x);
+            if way.norm() < AIMED * reach {
+                continue;
+            }
+            let parts = (ahead / reach).ceil();
+            for part in 1..=parts as usize {
+                let shift = way * (ahead * part as f64 / parts / way.norm());
+                for &c in &group {
+                    let (from, to) = self.boxes.of(c);
+                    self.mark(&(from + shift), &(to + shift), beside, marked);
+                }
+            }
+        }
+    }
+
+    /// Mean of the middles of cells; none of no cell.
+    fn mean(&self, cells: &[usize]) -> Option<Vector<D>> {
+        let sum: Vector<D> = cells.iter().map(|&c| self.boxes.middle(c)).sum();
+        (!cells.is_empty()).then(|| sum / cells.len() as f64)
     }
 
     /// Takes cells in that all but one of their faces join to the set: no slits and no dents one cell wide.
@@ -310,19 +352,6 @@ impl<'a, const D: usize> Watch<'a, D> {
                 return;
             }
         }
-    }
-}
-
-/// Visits the bins from one corner to the other.
-fn for_each_bin<const D: usize>(first: [i64; D], last: [i64; D], mut visit: impl FnMut([i64; D])) {
-    let counts: [i64; D] = std::array::from_fn(|a| last[a] - first[a] + 1);
-    for index in 0..counts.iter().product::<i64>() {
-        let mut rest = index;
-        visit(std::array::from_fn(|a| {
-            let k = rest % counts[a];
-            rest /= counts[a];
-            first[a] + k
-        }));
     }
 }
 
