@@ -124,7 +124,8 @@ mod tests {
         };
         let x = axis(-3.0, &[1.0, 0.2, 0.3, 2.5, 0.7, 1.0]);
         let y = axis(10.0, &[0.1, 0.4, 0.9, 0.9]);
-        let mesh = rectangle(&Axis::At(x), &Axis::At(y)).expect("ascending");
+        let grid = rectangle(Axis::Coordinates(x), Axis::Coordinates(y));
+        let mesh = grid.mesh().expect("ascending");
         let boxes = CellBoxes::new(&mesh);
         assert_eq!(boxes.len(), 24);
         for member in 0..boxes.len() {
