@@ -331,7 +331,10 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let points = body.pass.row_sums();
         // a point that follows sites spreads its column over them: at most the sum of its weights' sizes
         let spread = (0..body.site_of_point.len())
-            .map(|p| body.transfer.row(p).map(|(_, w)| w.abs()).sum::<f64>())
+            .map(|p| match &body.transfer {
+                Some(transfer) => transfer.row(p).map(|(_, w)| w.abs()).sum::<f64>(),
+                None => 0.0,
+            })
             .fold(1.0, f64::max);
         let contact = body
             .contact

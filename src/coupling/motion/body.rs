@@ -28,7 +28,8 @@ pub(super) struct MovingBody<const D: usize> {
     pub site_of_point: Vec<u32>,
     /// All points follow this many sites later, if they do.
     pub shift: Option<usize>,
-    pub transfer: Transfer,
+    /// How points that are no sites follow these; none where no bond and no contact asks for them.
+    pub transfer: Option<Transfer>,
     /// For each site the point whose force from the bonds it takes; `NONE` for a site that takes none.
     pub bonds_of_site: Vec<u32>,
     /// The families that are passed over, where rows keep some bonds of their points to themselves; none if all are.
@@ -154,6 +155,8 @@ impl<const D: usize> MovingBody<D> {
             })?)),
             None => None,
         };
+        let asks = |i: usize| families.of(i).iter().any(|&j| !is_site[j as usize]);
+        let is_asked = contact.is_some() || (0..points).any(|i| is_site[i] && asks(i));
         let first = site_of_point.first().copied().unwrap_or(0);
         let shift = site_of_point
             .iter()
@@ -167,7 +170,7 @@ impl<const D: usize> MovingBody<D> {
             contact,
             site_of_point,
             shift,
-            transfer: body.cloud.transfer.clone(),
+            transfer: is_asked.then(|| body.cloud.transfer.clone()),
             bonds_of_site,
             passed,
             alone: own_row.iter().filter(|own| **own).count(),
@@ -197,8 +200,10 @@ impl<const D: usize> MovingBody<D> {
                     let point = chunk * CHUNK + k;
                     match self.site_of_point[point] {
                         NONE => {
-                            let x: Vector<D> = self.transfer.displacement(point, u);
-                            value.copy_from_slice(x.as_slice());
+                            if let Some(transfer) = &self.transfer {
+                                let x: Vector<D> = transfer.displacement(point, u);
+                                value.copy_from_slice(x.as_slice());
+                            }
                         }
                         site => value.copy_from_slice(&u[site as usize * D..][..D]),
                     }
