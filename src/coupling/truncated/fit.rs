@@ -26,6 +26,9 @@ use crate::{
 /// Least factor of the energy of a piece; the largest was 4 where this one was asked for.
 const FLOOR: f64 = 0.1;
 
+/// Largest factor of an energy for which it is shown that none helps.
+const MOST_FACTOR: f64 = 1e3;
+
 /// What is missing in the force on a node, relative to the largest traction of a face, below which a seam follows the lattice.
 const FOLLOWS: f64 = 1e-10;
 
@@ -123,6 +126,8 @@ pub struct SeamConditions {
     pub unknowns: usize,
     /// What no change of them can meet, relative to what is missing: zero if there are factors, of any sign, that meet all conditions.
     pub unreachable: f64,
+    /// What no factors between 0.1 and 1000 can meet, a bound from below; zero if none is found.
+    pub out_of_reach: f64,
 }
 
 /// Looks at the conditions of the pairwise part.
@@ -132,11 +137,13 @@ pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> Seam
     let parts = parts(segments);
     let (conditions, target) = pair_conditions(segments, &parts, &missing);
     let (rank, unreachable) = conditions.rank(&target);
+    let out_of_reach = conditions.out_of_reach(&target, FLOOR - 1.0, MOST_FACTOR - 1.0);
     SeamConditions {
         conditions: target.len(),
         rank,
         unknowns: parts.len(),
         unreachable,
+        out_of_reach,
     }
 }
 

@@ -8,6 +8,12 @@ const MOST_STEPS: usize = 20;
 /// A step that leaves more than this part of the gap, without a floor in the way, shows conditions that contradict each other.
 const STALLED: f64 = 0.5;
 
+/// Iterations of the search for what bounded changes cannot reach.
+const MOST_GRADIENTS: usize = 20_000;
+
+/// That search ends when its bound is this near to what it has reached.
+const CLOSED: f64 = 0.98;
+
 /// Iterations of conjugate gradients within a step.
 const MOST_ITERATIONS: usize = 4000;
 
@@ -111,6 +117,71 @@ impl Conditions {
         }
         let norm: f64 = target.iter().map(|t| t * t).sum();
         (rank, (left / norm.max(f64::MIN_POSITIVE)).sqrt())
+    }
+
+    /// A part of `target` that no change between `floor` and `most` can reach, a bound from below of the norm of what is left over that of the target; zero if none is found. Rows are scaled to the same size.
+    ///
+    /// For any `r`, `|t − A x| ≥ r·(t − A x)/|r|`, and `(Aᵀ r)·x` is largest with every `x` at one of its ends (Farkas' lemma). The `r` of the least squares is the best one; accelerated gradients, which restart when they
+    /// overshoot, go there.
+    pub fn out_of_reach(&self, target: &[f64], floor: f64, most: f64) -> f64 {
+        let scale = self.row_scale();
+        let mut scaled = self.clone();
+        for (&r, v) in self.rows.iter().zip(scaled.values.iter_mut()) {
+            *v *= scale[r as usize];
+        }
+        let target: Vec<f64> = target.iter().zip(&scale).map(|(t, s)| t * s).collect();
+        let norm = |v: &[f64]| dot(v, v).sqrt();
+        let whole = norm(&target).max(f64::MIN_POSITIVE);
+        let left = |x: &[f64]| -> Vec<f64> {
+            let sum = scaled.sum(x);
+            target.iter().zip(sum).map(|(t, s)| t - s).collect()
+        };
+        // the largest eigenvalue of the normal equations is at most the largest sum of sizes along a row times that along a column
+        let mut along = vec![0.0f64; self.count];
+        let mut across = 0.0f64;
+        for k in 0..self.changes() {
+            let sizes = scaled.column(k).map(|(r, v)| {
+                along[r] += v.abs();
+                v.abs()
+            });
+            across = across.max(sizes.sum());
+        }
+        let curvature = across * along.iter().copied().fold(0.0, f64::max);
+        let mut x = vec![0.0f64.clamp(floor, most); self.changes()];
+        let (mut ahead, mut pace) = (x.clone(), 1.0f64);
+        let (mut best, mut was) = (0.0f64, f64::INFINITY);
+        for _ in 0..MOST_GRADIENTS {
+            let gap = left(&ahead);
+            let slope = scaled.transposed(&gap);
+            let ends = slope
+                .iter()
+                .map(|g| g * if *g > 0.0 { most } else { floor });
+            let size = norm(&gap);
+            best = best.max((dot(&gap, &target) - ends.sum::<f64>()) / size);
+            if best >= CLOSED * size || size <= 1e-9 * whole {
+                break;
+            }
+            let next: Vec<f64> = ahead
+                .iter()
+                .zip(&slope)
+                .map(|(x, g)| (x + g / curvature).clamp(floor, most))
+                .collect();
+            let faster = 0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt());
+            let push = if size > was {
+                0.0
+            } else {
+                (pace - 1.0) / faster
+            };
+            pace = if size > was { 1.0 } else { faster };
+            was = size;
+            ahead = next
+                .iter()
+                .zip(&x)
+                .map(|(n, x)| (n + push * (n - x)).clamp(floor, most))
+                .collect();
+            x = next;
+        }
+        best / whole
     }
 
     fn transposed(&self, multiplier: &[f64]) -> Vec<f64> {
@@ -274,6 +345,24 @@ mod tests {
             (x[0] - 1.0).abs() < 1e-13 && (x[1] - 2.0).abs() < 1e-13,
             "{x:?}"
         );
+    }
+
+    #[test]
+    fn what_bounded_changes_cannot_reach() {
+        // x + y = -3 with a floor of -0.9 leaves 1.2 of 3, and so does the same condition at any scale
+        for size in [1.0, 1e5] {
+            let c = conditions(&[&[size, size]]);
+            let bound = c.out_of_reach(&[-3.0 * size], -0.9, 1e3);
+            assert!((0.39..=0.4 + 1e-12).contains(&bound), "{bound}");
+            assert_eq!(c.out_of_reach(&[3.0 * size], -0.9, 1e3), 0.0);
+            // from above: 2 + 2 of 5
+            let bound = c.out_of_reach(&[5.0 * size], -0.9, 2.0);
+            assert!((0.19..=0.2 + 1e-12).contains(&bound), "{bound}");
+        }
+        // two conditions against each other: 1 and 2 by the same number leave (1, -1)/2 of (1, 2)
+        let c = conditions(&[&[1.0], &[1.0]]);
+        let bound = c.out_of_reach(&[1.0, 2.0], -9.0, 9.0);
+        assert!((0.3..=0.1f64.sqrt() + 1e-12).contains(&bound), "{bound}");
     }
 
     #[test]

@@ -234,6 +234,11 @@ fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<Row> {
         rows.push(Row::info(&name, "rank", found.rank as f64));
         rows.push(Row::info(&name, "unknowns", found.unknowns as f64));
         rows.push(Row::info(&name, "unreachable", found.unreachable));
+        rows.push(Row::info(
+            &name,
+            "unreachable by factors of 0.1 to 1000, at least",
+            found.out_of_reach,
+        ));
     }
     rows.push(match placed.coupling.operator(&placed.model) {
         Ok(_) => Row::info(&name, "left after the fit", 0.0),
