@@ -209,7 +209,7 @@ pub(super) fn choose(
         let fitted = ran.and_then(|pilot| {
             ladder.levels.push((n as f64, pilot));
             let rest = ladder.fit.rest;
-            let fit = estimate::fit(&ladder.levels, &bench.quantities, asked.decay());
+            let fit = estimate::fit(&ladder.levels, &bench.quantities);
             fit.map(|f| f.with_rest(rest))
         });
         match fitted {
@@ -227,7 +227,7 @@ fn climb(asked: &Asked, family: &Family, bench: &mut Bench) -> Option<Ladder> {
         let n = asked.fitting(first << rung);
         levels.push((n as f64, bench.run(&asked.overrides(family, n), 0.0)?));
     }
-    let mut fit = estimate::fit(&levels, &bench.quantities, asked.decay())?;
+    let mut fit = estimate::fit(&levels, &bench.quantities)?;
     if let Some(padding) = family.padding {
         // what the edge of the zone does shows in one twice as far
         let wider = Family {

@@ -7,15 +7,6 @@ use crate::trade::Quantity;
 /// (\[SAND2015-7998\] (2.23) to (2.28): the difference from the local operator is δ² times fourth derivatives).
 const ORDERS: (f64, f64) = (0.8, 2.0);
 
-/// How errors fall with the spacing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Decay {
-    /// With a power of it.
-    Smooth,
-    /// Where bonds are cut: a lattice knows a crack only as lying between two of its layers, and where these fall differs from run to run. The error is of the first order, with a factor that jumps: the largest of the pilots' counts.
-    Cut,
-}
-
 /// The order where two runs leave it open.
 const USUAL: f64 = 1.6;
 
@@ -70,26 +61,17 @@ pub(crate) fn difference(coarse: &Pilot, fine: &Pilot, quantities: &[Quantity]) 
 }
 
 /// Fits runs in the order of their cells along an edge; `None` for fewer than two that can be compared.
-pub(super) fn fit(levels: &[(f64, Pilot)], quantities: &[Quantity], decay: Decay) -> Option<Fit> {
+pub(super) fn fit(levels: &[(f64, Pilot)], quantities: &[Quantity]) -> Option<Fit> {
     let steps: Vec<(f64, f64, f64)> = levels
         .windows(2)
         .map(|w| Some((w[0].0, w[1].0, difference(&w[0].1, &w[1].1, quantities)?)))
         .collect::<Option<_>>()?;
-    of_differences(&steps, decay)
+    of_differences(&steps)
 }
 
 /// From `(n, finer n, difference)`.
-fn of_differences(steps: &[(f64, f64, f64)], decay: Decay) -> Option<Fit> {
+fn of_differences(steps: &[(f64, f64, f64)]) -> Option<Fit> {
     let &(coarse, fine, last) = steps.last()?;
-    if decay == Decay::Cut {
-        let scales = steps.iter().map(|(n, m, d)| d / (1.0 / n - 1.0 / m));
-        let scale = scales.fold(0.0, f64::max);
-        return scale.is_finite().then_some(Fit {
-            scale,
-            order: 1.0,
-            rest: 0.0,
-        });
-    }
     let order = match steps {
         [.., (before, _, first), _] => {
             // differences go as the error of the coarser run
@@ -116,7 +98,7 @@ mod tests {
             let steps: Vec<_> = [(4.0, 8.0), (8.0, 16.0)]
                 .map(|(a, b)| (a, b, e(a) - e(b)))
                 .into();
-            let fit = of_differences(&steps, Decay::Smooth).unwrap();
+            let fit = of_differences(&steps).unwrap();
             assert!((fit.order - p).abs() < 1e-12, "{fit:?}");
             assert!((fit.error(40.0) / e(40.0) - 1.0).abs() < 1e-12);
             assert!((fit.cells(e(25.0)).unwrap() - 25.0).abs() < 1e-9);
@@ -129,10 +111,6 @@ mod tests {
         };
         assert_eq!(fit.cells(0.01), None);
         assert!((fit.cells(0.02).unwrap() - 100.0).abs() < 1e-9);
-        assert_eq!(of_differences(&[], Decay::Smooth), None);
-        // e = 1/n, 0.3/n, 0.8/n: the largest scale of the differences is that of the first two
-        let steps = [(4.0, 8.0, 0.25 - 0.0375), (8.0, 16.0, 0.05 - 0.0375)];
-        let fit = of_differences(&steps, Decay::Cut).unwrap();
-        assert!((fit.error(10.0) - 0.17).abs() < 1e-12, "{fit:?}");
+        assert_eq!(of_differences(&[]), None);
     }
 }

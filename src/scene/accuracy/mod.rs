@@ -25,8 +25,6 @@ pub use choose::{Candidate, Chosen};
 pub use open::Family;
 
 pub(crate) use estimate::{SPREAD, difference};
-
-use estimate::Decay;
 pub(crate) use pilot::Bench;
 
 use super::error::SceneError;
@@ -157,11 +155,7 @@ pub fn predicted_error(
             None => levels.clear(),
         }
     }
-    let decay = match base.breaks {
-        true => Decay::Cut,
-        false => Decay::Smooth,
-    };
-    let Some(fit) = estimate::fit(&levels, &bench.quantities, decay) else {
+    let Some(fit) = estimate::fit(&levels, &bench.quantities) else {
         return Ok(None);
     };
     Ok(Some(ErrorPrediction {

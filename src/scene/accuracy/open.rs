@@ -3,7 +3,6 @@
 use super::super::error::{SceneError, SceneErrorKind};
 use super::super::source::Source;
 use super::super::spec::SceneSpec;
-use super::estimate::Decay;
 use crate::trade::{self, Base, coordinates};
 
 /// A scene with an `accuracy`, as far as the choice looks at it.
@@ -172,14 +171,6 @@ impl Asked {
     /// Whether the spacing is open at all.
     pub fn has_ladder(&self) -> bool {
         self.axes || self.points() && self.lattice
-    }
-
-    /// How errors fall with the spacing.
-    pub fn decay(&self) -> Decay {
-        match self.breaks {
-            true => Decay::Cut,
-            false => Decay::Smooth,
-        }
     }
 
     /// Whether candidates have peridynamic points.
