@@ -219,7 +219,7 @@ pub struct Held {
 
 /// As [`stable_step`], with no more products than it takes to see that a step may stay: fewer than for the sharpest bound, since a step at a fraction of the limit leaves a wider margin.
 ///
-/// It may stay if it is within the bound that the products so far give, which fails as rarely as that of [`stable_step`], and within the fraction of the stable step as they estimate it. [`StepLimit::stable`] is that bound then.
+/// It may stay if it is within the bound that the products so far give, which fails as rarely at each of the some ten looks as that of [`stable_step`] does once, and within the fraction of the stable step as they estimate it. [`StepLimit::stable`] is that bound then.
 /// Models without symmetry take all products. Returns the limits, and whether the step may stay.
 ///
 /// # Errors

@@ -173,8 +173,10 @@ impl Trade {
             .map(scaled)
             .collect();
         let base = self.cases.first().and_then(|c| c.point(self.by));
+        // where the scene lies means nothing to those who see the plot
+        let name = self.scene.file_name().unwrap_or(self.scene.as_os_str());
         LinePlot {
-            title: format!("{}: error against cost", self.scene.display()),
+            title: format!("{}: error against cost", name.display()),
             x_label: format!("{} over that of the scene as it is", self.by.name()),
             y_label: "relative error".to_owned(),
             x_scale: Scale::Log,

@@ -84,6 +84,23 @@ impl Conditions {
         size.iter().map(scale).collect()
     }
 
+    /// The same conditions with all rows brought to the same size, and what is wanted of them.
+    fn scaled(&self, target: &[f64]) -> (Self, Vec<f64>) {
+        let scale = self.row_scale();
+        let mut scaled = self.clone();
+        for (&r, v) in self.rows.iter().zip(scaled.values.iter_mut()) {
+            *v *= scale[r as usize];
+        }
+        let target = target.iter().zip(&scale).map(|(t, s)| t * s);
+        (scaled, target.collect())
+    }
+
+    /// What changes leave of what is wanted.
+    fn left(&self, target: &[f64], change: &[f64]) -> Vec<f64> {
+        let sum = self.sum(change);
+        target.iter().zip(sum).map(|(t, s)| t - s).collect()
+    }
+
     /// The rank of the conditions, and the part of `target` that no change at all can reach: the norm of what is left, over that of the target. Rows are scaled to the same size.
     ///
     /// From all eigenvectors of `A Aᵀ`, so for some thousand conditions at most; singular values below 3e-7 of the largest count as zero.
@@ -124,18 +141,9 @@ impl Conditions {
     /// For any `r`, `|t − A x| ≥ r·(t − A x)/|r|`, and `(Aᵀ r)·x` is largest with every `x` at one of its ends (Farkas' lemma). The `r` of the least squares is the best one; accelerated gradients, which restart when they
     /// overshoot, go there.
     pub fn out_of_reach(&self, target: &[f64], floor: f64, most: f64) -> f64 {
-        let scale = self.row_scale();
-        let mut scaled = self.clone();
-        for (&r, v) in self.rows.iter().zip(scaled.values.iter_mut()) {
-            *v *= scale[r as usize];
-        }
-        let target: Vec<f64> = target.iter().zip(&scale).map(|(t, s)| t * s).collect();
-        let norm = |v: &[f64]| dot(v, v).sqrt();
+        let (scaled, target) = self.scaled(target);
         let whole = norm(&target).max(f64::MIN_POSITIVE);
-        let left = |x: &[f64]| -> Vec<f64> {
-            let sum = scaled.sum(x);
-            target.iter().zip(sum).map(|(t, s)| t - s).collect()
-        };
+        let left = |x: &[f64]| scaled.left(&target, x);
         // the largest eigenvalue of the normal equations is at most the largest sum of sizes along a row times that along a column
         let mut along = vec![0.0f64; self.count];
         let mut across = 0.0f64;
@@ -198,19 +206,10 @@ impl Conditions {
     /// the floor. Where the conditions contradict each other or the floor, the change that came nearest is returned: the caller looks at what is still missing.
     pub fn least_change(&self, missing: &[f64], floor: f64) -> Vec<f64> {
         // all rows to the same size, or conjugate gradients take ages
-        let scale = self.row_scale();
-        let mut scaled = self.clone();
-        for (&r, v) in self.rows.iter().zip(scaled.values.iter_mut()) {
-            *v *= scale[r as usize];
-        }
-        let target: Vec<f64> = missing.iter().zip(&scale).map(|(m, s)| m * s).collect();
-        let norm = |v: &[f64]| dot(v, v).sqrt();
+        let (scaled, target) = self.scaled(missing);
         let goal = 1e-15 * norm(&target);
         let lifted = |z: &[f64]| -> Vec<f64> { z.iter().map(|z| z.max(floor)).collect() };
-        let left = |x: &[f64]| -> Vec<f64> {
-            let sum = scaled.sum(x);
-            target.iter().zip(sum).map(|(t, s)| t - s).collect()
-        };
+        let left = |x: &[f64]| scaled.left(&target, x);
         // the dual, to be made large
         let dual = |multiplier: &[f64], z: &[f64]| -> f64 {
             let penalty: f64 = z
@@ -307,6 +306,10 @@ impl Conditions {
         }
         solution
     }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    dot(v, v).sqrt()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
