@@ -31,24 +31,23 @@ impl Transfer {
     pub fn from_rows(rows: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
         let mut transfer = Self::new();
         for row in rows {
-            transfer.push(&row);
+            transfer.push(row);
         }
         transfer
     }
 
     /// Appends a row; entries for the same site are added, zero weights dropped.
-    pub fn push(&mut self, row: &[(u32, f64)]) {
-        let mut row: Vec<_> = row.iter().copied().filter(|&(_, w)| w != 0.0).collect();
-        row.sort_by_key(|&(site, _)| site);
+    pub fn push(&mut self, row: impl IntoIterator<Item = (u32, f64)>) {
         let start = self.sites.len();
-        for (site, weight) in row {
-            if self.sites.len() > start && self.sites.last() == Some(&site) {
-                if let Some(last) = self.weights.last_mut() {
-                    *last += weight;
-                }
+        for (site, weight) in row.into_iter().filter(|&(_, w)| w != 0.0) {
+            // rows are short, and most come in order
+            let behind = self.sites[start..].iter().rev().take_while(|s| **s > site);
+            let place = self.sites.len() - behind.count();
+            if place > start && self.sites[place - 1] == site {
+                self.weights[place - 1] += weight;
             } else {
-                self.sites.push(site);
-                self.weights.push(weight);
+                self.sites.insert(place, site);
+                self.weights.insert(place, weight);
             }
         }
         self.offsets.push(self.sites.len());

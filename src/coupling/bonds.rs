@@ -8,7 +8,7 @@ use crate::{
     mesh::{Mesh, boundary::BoundaryFacet, cutter::SegmentCutter},
     peridynamics::{
         BondWeights, Families, Family, PartialVolume, StatePart, TIE_TOLERANCE, collapsed_tensor,
-        isotropic_shell_factors, partial_volume::lattice_shells,
+        isotropic_shell_factors, offsets::OffsetTable, partial_volume::lattice_shells,
     },
     shape::Barriers,
     tensor::{Tensor4, Vector},
@@ -36,14 +36,17 @@ pub(super) fn cut<const D: usize>(
         .par_iter()
         .map(|x| barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x)))
         .collect();
-    families.retain(|i, j| {
-        let j = j as usize;
-        if !(near[i] && near[j]) {
-            return true;
-        }
-        let (a, b) = (&position[i], &position[j]);
-        !barriers.cuts(a, b) && !cutter.as_ref().is_some_and(|c| c.cuts(a, b))
-    });
+    families.retain_of(
+        |i| near[i],
+        |i, j| {
+            let j = j as usize;
+            if !near[j] {
+                return true;
+            }
+            let (a, b) = (&position[i], &position[j]);
+            !barriers.cuts(a, b) && !cutter.as_ref().is_some_and(|c| c.cuts(a, b))
+        },
+    );
 }
 
 /// Bins of the size of a horizon in or beside which facets lie.
@@ -81,45 +84,6 @@ impl<const D: usize> NearBins<D> {
 
     fn contains(&self, x: &Vector<D>) -> bool {
         self.bins.contains(&Self::bin(x, self.size))
-    }
-}
-
-/// A value for each bond of a lattice, by its integer offset.
-struct OffsetTable<T, const D: usize> {
-    reach: i32,
-    /// Of all offsets of at most `reach` along each axis, the last axis fastest.
-    values: Vec<Option<T>>,
-}
-
-impl<T: Copy, const D: usize> OffsetTable<T, D> {
-    fn new(known: &[([i32; D], T)]) -> Self {
-        let components = known.iter().flat_map(|(offset, _)| offset);
-        let reach = components.map(|k| k.abs()).max().unwrap_or(0);
-        let mut table = Self {
-            reach,
-            values: vec![None; (2 * reach as usize + 1).pow(D as u32)],
-        };
-        for (offset, value) in known {
-            if let Some(place) = table.place(offset) {
-                table.values[place] = Some(*value);
-            }
-        }
-        table
-    }
-
-    fn place(&self, offset: &[i32; D]) -> Option<usize> {
-        let mut place = 0;
-        for &k in offset {
-            if k.abs() > self.reach {
-                return None;
-            }
-            place = place * (2 * self.reach + 1) as usize + (k + self.reach) as usize;
-        }
-        Some(place)
-    }
-
-    fn of(&self, offset: &[i32; D]) -> Option<T> {
-        self.values[self.place(offset)?]
     }
 }
 

@@ -10,9 +10,8 @@
 //! for quadratic fields on cells of any shape, for `Σ N_a (x_a − x) = 0` and the second derivatives of `u_a` and `½ G_a` cancel. Shape functions alone are exact for affine fields
 //! only, and the energy of what they make of a wave is off by the square of its wave number. A node that comes alive follows a quadratic fit to the points around it.
 
-use std::collections::{HashMap, HashSet};
-
 use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::{FitDegree, Model, SiteKind, derivative, fit::Bins};
 use crate::{assembly::Transfer, fem::Locator, tensor::Vector};
@@ -34,14 +33,14 @@ fn key<const D: usize>(x: &Vector<D>) -> Key<D> {
 /// Bonds by the places of their ends, whatever their points are numbered.
 #[derive(Clone, Debug, Default)]
 pub struct BrokenBonds<const D: usize> {
-    of: HashMap<Key<D>, HashSet<Key<D>>>,
+    of: FxHashMap<Key<D>, FxHashSet<Key<D>>>,
 }
 
 impl<const D: usize> BrokenBonds<D> {
     /// The bonds of a layout by the sites of their ends, each once for each direction, as [`crate::system::Dynamic::broken_bonds`] gives them.
     pub fn of(model: &Model<D>, bonds: &[(u32, u32)]) -> Self {
         let at = |site: u32| key(&model.sites[site as usize].position);
-        let mut of: HashMap<Key<D>, HashSet<Key<D>>> = HashMap::new();
+        let mut of: FxHashMap<Key<D>, FxHashSet<Key<D>>> = FxHashMap::default();
         for &(i, j) in bonds {
             of.entry(at(i)).or_default().insert(at(j));
         }
@@ -53,7 +52,7 @@ impl<const D: usize> BrokenBonds<D> {
         &'a self,
         position: &'a [Vector<D>],
     ) -> impl Fn(usize, usize) -> bool + Sync + 'a {
-        let of: Vec<Option<&HashSet<Key<D>>>> =
+        let of: Vec<Option<&FxHashSet<Key<D>>>> =
             position.iter().map(|x| self.of.get(&key(x))).collect();
         move |i, j| of[i].is_some_and(|set| set.contains(&key(&position[j])))
     }
@@ -70,7 +69,7 @@ pub struct Carried<const D: usize> {
     position: Vec<Vector<D>>,
     /// The site of each node, [`NONE`] for one that is none.
     node_site: Vec<u32>,
-    points: HashMap<Key<D>, u32>,
+    points: FxHashMap<Key<D>, u32>,
     /// Sites that are points.
     listed: Vec<u32>,
     is_element: Vec<bool>,
@@ -115,7 +114,7 @@ impl<const D: usize> Carried<D> {
     pub fn of(model: &Model<D>) -> Self {
         let position: Vec<Vector<D>> = model.sites.iter().map(|s| s.position).collect();
         let mut node_site = vec![NONE; model.mesh.nodes.len()];
-        let (mut points, mut listed) = (HashMap::new(), Vec::new());
+        let (mut points, mut listed) = (FxHashMap::default(), Vec::new());
         for (site, s) in model.sites.iter().enumerate() {
             match s.kind {
                 SiteKind::Node(n) => node_site[n as usize] = site as u32,
@@ -237,7 +236,7 @@ impl<const D: usize> Carried<D> {
 struct Gradients<'a, const D: usize> {
     carried: &'a Carried<D>,
     /// By node; none where the nodes around do not determine a quadratic field.
-    of: HashMap<u32, Option<Vec<(u32, Vector<D>)>>>,
+    of: FxHashMap<u32, Option<Vec<(u32, Vector<D>)>>>,
 }
 
 impl<'a, const D: usize> Gradients<'a, D> {

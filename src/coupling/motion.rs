@@ -469,8 +469,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 let s = critical.at(cloud.horizon[i]);
                 let family = body.families.of(i).iter().zip(pair);
                 family
+                    // most stand, which is quickly seen
                     .filter(|&(&j, _)| {
-                        self.is_passed_over(i, j) && !moving.pass.bonded(i, j as usize)
+                        !moving.pass.bonded(i, j as usize) && self.is_passed_over(i, j)
                     })
                     .map(|(&j, p)| {
                         let r2 = body.bond(i, j as usize).norm_squared();
@@ -534,9 +535,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 let family = body.families.of(i).iter();
                 family
                     .filter(move |&&j| {
-                        self.is_passed_over(i, j)
+                        !moving.pass.bonded(i, j as usize)
                             && site(j as usize) != NONE
-                            && !moving.pass.bonded(i, j as usize)
+                            && self.is_passed_over(i, j)
                     })
                     .map(move |&j| (site(i), site(j as usize)))
             })

@@ -198,7 +198,7 @@ impl<'a, const D: usize> Elements<'a, D> {
                 cloud.position.push(g.position);
                 cloud.volume.push(g.weight);
                 cloud.horizon.push((peridynamics.horizon)(&g.position));
-                cloud.transfer.push(&weights);
+                cloud.transfer.push(weights);
             }
         }
         let families = Self::families(model, &mut cloud, points, peridynamics.law.as_ref())?;

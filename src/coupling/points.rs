@@ -1,6 +1,6 @@
 //! Peridynamic points before they are sites: those of the peridynamic region, and those that complete their families.
 
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 use crate::{
     coupling::{Reach, Zone},
@@ -93,10 +93,14 @@ impl<const D: usize> PointCloud<D> {
         let size = largest + 2.0 * self.spacing * (D as f64).sqrt();
         let bin =
             |x: &Vector<D>| -> [i64; D] { std::array::from_fn(|i| (x[i] / size).floor() as i64) };
-        let mut near = HashSet::new();
+        let mut near = FxHashSet::default();
+        let mut centres = FxHashSet::default();
         for (x, element) in self.position.iter().zip(&self.element) {
             if element.is_none() {
                 let centre = bin(x);
+                if !centres.insert(centre) {
+                    continue;
+                }
                 for index in 0..3usize.pow(D as u32) {
                     let mut rest = index;
                     near.insert(std::array::from_fn(|i| {

@@ -56,6 +56,14 @@ pub struct PdBody<const D: usize> {
     pairwise: bool,
 }
 
+/// One family, in memory that the next one takes over.
+#[derive(Default)]
+struct Scratch<const D: usize> {
+    bonds: Vec<Vector<D>>,
+    volumes: Vec<f64>,
+    factors: Vec<f64>,
+}
+
 /// The kernel factors of a body's bonds.
 pub enum Factors<'a, const D: usize> {
     /// All 1.
@@ -95,7 +103,7 @@ impl<const D: usize> PdBody<D> {
             .par_iter_mut()
             .zip(omega_rows.par_iter_mut())
             .enumerate()
-            .map(|(i, (pair, omega))| {
+            .map_init(Scratch::default, |of, (i, (pair, omega))| {
                 if pair.is_empty() {
                     return Ok(None);
                 }
@@ -106,30 +114,32 @@ impl<const D: usize> PdBody<D> {
                     source,
                 };
                 let horizon = cloud.horizon[i];
-                let (xi, volumes): (Vec<_>, Vec<_>) = families
-                    .of(i)
-                    .iter()
-                    .map(|&j| {
-                        (
-                            cloud.position[j as usize] - cloud.position[i],
-                            cloud.volume[j as usize],
-                        )
-                    })
-                    .unzip();
-                let weight = match factors {
-                    Factors::Plain => vec![1.0; xi.len()],
-                    Factors::Shells(f) => xi.iter().map(|xi| f(horizon, xi)).collect(),
-                    Factors::Fitted => {
-                        let bonds: Vec<(Vector<D>, f64)> =
-                            xi.iter().copied().zip(volumes.iter().copied()).collect();
-                        fitted(law, &bonds, horizon).map_err(at)?
+                let family = families.of(i).iter().map(|&j| j as usize);
+                of.bonds.clear();
+                of.bonds.extend(
+                    family
+                        .clone()
+                        .map(|j| cloud.position[j] - cloud.position[i]),
+                );
+                of.volumes.clear();
+                of.volumes.extend(family.map(|j| cloud.volume[j]));
+                of.factors.clear();
+                match factors {
+                    Factors::Plain => of.factors.resize(of.bonds.len(), 1.0),
+                    Factors::Shells(f) => {
+                        of.factors.extend(of.bonds.iter().map(|xi| f(horizon, xi)));
                     }
-                };
+                    Factors::Fitted => {
+                        let bonds = of.bonds.iter().copied().zip(of.volumes.iter().copied());
+                        let bonds: Vec<(Vector<D>, f64)> = bonds.collect();
+                        of.factors.extend(fitted(law, &bonds, horizon).map_err(at)?);
+                    }
+                }
                 law.coefficients(
                     &Family {
-                        bonds: &xi,
-                        volumes: &volumes,
-                        factors: &weight,
+                        bonds: &of.bonds,
+                        volumes: &of.volumes,
+                        factors: &of.factors,
                         horizon,
                     },
                     pair,

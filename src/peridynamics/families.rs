@@ -194,17 +194,40 @@ impl Families {
     ///
     /// `keep` is called from several threads; the result does not depend on their number.
     pub fn retain(&mut self, keep: impl Fn(usize, u32) -> bool + Sync) -> usize {
+        self.retain_of(|_| true, keep)
+    }
+
+    /// As [`Families::retain`], with the rows for which `may_lose` does not hold as they are.
+    pub fn retain_of(
+        &mut self,
+        may_lose: impl Fn(usize) -> bool + Sync,
+        keep: impl Fn(usize, u32) -> bool + Sync,
+    ) -> usize {
         let before = self.neighbours.len();
-        let kept: Vec<Vec<u32>> = (0..self.len())
+        let kept: Vec<Option<Vec<u32>>> = (0..self.len())
             .into_par_iter()
             .with_min_len(256)
-            .map(|i| self.of(i).iter().copied().filter(|&j| keep(i, j)).collect())
+            .map(|i| {
+                let row = self.of(i);
+                let rest = || row.iter().copied().filter(|&j| keep(i, j));
+                let loses = may_lose(i) && !row.iter().all(|&j| keep(i, j));
+                loses.then(|| rest().collect())
+            })
             .collect();
         let mut end = 0;
         for (i, row) in kept.iter().enumerate() {
-            self.neighbours[end..end + row.len()].copy_from_slice(row);
+            let own = self.offsets[i]..self.offsets[i + 1];
             self.offsets[i] = end;
-            end += row.len();
+            match row {
+                Some(row) => {
+                    self.neighbours[end..end + row.len()].copy_from_slice(row);
+                    end += row.len();
+                }
+                None => {
+                    end += own.len();
+                    self.neighbours.copy_within(own, self.offsets[i]);
+                }
+            }
         }
         if let Some(last) = self.offsets.last_mut() {
             *last = end;

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `influence.rs` | influence functions ω, micromoduli λ | [SAND2015-7998] eq. (5.8), (3.1) |
 //! | `families.rs` | neighbour search with a horizon per point | eq. (5.2) |
+//! | `offsets.rs` | a value for each bond of a lattice | |
 //! | `shells.rs` | isotropic weights of a lattice, shell by shell | eq. (3.6) as a sum |
 //! | `weights.rs` | moment-fitted weights of one irregular family | |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
@@ -26,6 +27,7 @@ pub mod kernel;
 pub mod law;
 pub(crate) mod least_change;
 pub mod lps;
+pub(crate) mod offsets;
 pub mod partial_volume;
 pub mod shape_tensor;
 pub mod shells;

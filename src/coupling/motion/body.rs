@@ -74,7 +74,7 @@ impl<const D: usize> MovingBody<D> {
         let shares = |site: usize| operator.has_body_bonds(site);
         let passed = (seam.is_none() && (0..model.sites.len()).any(shares)).then(|| {
             let mut passed = body.families.clone();
-            passed.retain(|i, j| own_row[i] || operator.is_body_bond(i, j as usize));
+            passed.retain_of(|i| !own_row[i], |i, j| operator.is_body_bond(i, j as usize));
             passed
         });
         let families = match (seam, &passed) {
@@ -98,11 +98,12 @@ impl<const D: usize> MovingBody<D> {
             Vec::new()
         };
         // a seam leaves some of the body's bonds out: those that stay keep their coefficients
-        let pair = |i: usize, k: usize, _: &Vector<D>| match all_pass {
+        let is_all_of = |i: usize| all_pass || families.of(i).len() == body.families.of(i).len();
+        let pair = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
             true => body.kernel(i).0[k],
             false => coefficient(body, i, families.of(i)[k]),
         };
-        let omega = |i: usize, k: usize, _: &Vector<D>| match all_pass {
+        let omega = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
             true => body.kernel(i).1[k],
             false => omega_of(body, i, families.of(i)[k]),
         };

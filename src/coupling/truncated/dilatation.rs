@@ -143,7 +143,7 @@ impl<const D: usize> Dilatations<D> {
         // what pieces hand over
         for s in &segments.cut {
             let xi = body.bond(s.i as usize, s.j as usize);
-            let difference = segments.difference(s);
+            let difference: Vec<(u32, f64)> = segments.difference(s).collect();
             common.shares(segments, s, |carrier, factor| {
                 let functional = functionals.entry(carrier).or_default();
                 for &(site, w) in &difference {

@@ -8,6 +8,7 @@
 //!
 //! Where the seam follows the lattice nothing is missing, and nothing is changed.
 
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::{
@@ -42,6 +43,8 @@ fn rounding<const D: usize>(segments: &Segments<'_, D>) -> f64 {
     8.0 * f64::EPSILON * farthest / segments.model.spacing()
 }
 
+const NONE: u32 = u32::MAX;
+
 /// Something whose energy may change: a piece, or a whole bond between points that have pieces.
 enum Part {
     Piece(usize),
@@ -67,7 +70,7 @@ impl Part {
                     xi: segments.body.bond(s.i as usize, s.j as usize),
                     length: s.piece.to - s.piece.from,
                     share: s.piece.share,
-                    difference: segments.difference(s),
+                    difference: segments.difference(s).collect(),
                 }
             }
             Self::Bond(i, j) => Shape {
@@ -161,22 +164,26 @@ fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
     let nodes = loaded_nodes(segments);
     let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
     let tensor = pair_tensor(segments);
-    let mut missing = FxHashMap::default();
-    for (&site, b) in &nodes {
-        let mut row = third(b, &tensor);
-        row.iter_mut().for_each(|v| *v = -*v);
-        missing.insert(site, row);
+    let count = triples::<D>().count();
+    let mut row_of_site = vec![NONE; segments.model.sites.len()];
+    let mut rows = Vec::with_capacity(nodes.len() * count);
+    for (row, (&site, b)) in nodes.iter().enumerate() {
+        row_of_site[site as usize] = row as u32;
+        rows.extend(third(b, &tensor).map(|v| -v));
     }
-    for k in 0..segments.cut.len() {
-        let (i, j) = (segments.cut[k].i, segments.cut[k].j);
-        let shape = Part::Piece(k).shape(segments);
-        let cube = cube(&shape.xi, segments.stiffness(i, j) * shape.share);
-        for (site, w) in shape.difference {
-            if let Some(row) = missing.get_mut(&site) {
+    for s in &segments.cut {
+        let xi = segments.body.bond(s.i as usize, s.j as usize);
+        let cube = cube(&xi, s.stiffness * s.piece.share);
+        for (site, w) in segments.difference(s) {
+            let row = row_of_site[site as usize];
+            if row != NONE {
+                let row = &mut rows[row as usize * count..][..count];
                 row.iter_mut().zip(&cube).for_each(|(m, c)| *m -= w * c);
             }
         }
     }
+    let missing = nodes.keys().copied().zip(rows.chunks_exact(count));
+    let missing = missing.map(|(site, row)| (site, row.to_vec())).collect();
     Missing {
         nodes,
         missing,
@@ -253,36 +260,42 @@ pub(super) fn fit<const D: usize>(
 fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> FxHashMap<u32, Vector<D>> {
     let model = segments.model;
     let full = segments.passing.whole[0].bonds().count();
-    let mut nodes = FxHashMap::default();
-    let mut dropped = Vec::new();
+    let mut at_face = vec![false; model.sites.len()];
+    let mut is_dropped = at_face.clone();
     for s in &segments.cut {
-        let broken = [s.i, s.j]
-            .iter()
-            .any(|&p| segments.is_point(p) && segments.body.families.of(p as usize).len() < full);
-        for (site, _) in segments.difference(s) {
-            if !matches!(model.sites[site as usize].kind, SiteKind::Node(_)) {
-                continue;
+        let lacks =
+            |&p: &u32| segments.is_point(p) && segments.body.families.of(p as usize).len() < full;
+        let is_broken = [s.i, s.j].iter().any(lacks);
+        for end in &s.ends {
+            let End::Face(foot) = end else { continue };
+            for &(site, _) in &foot.trace {
+                at_face[site as usize] = true;
+                is_dropped[site as usize] |= is_broken;
             }
-            if broken {
-                dropped.push(site);
-            }
-            nodes.entry(site).or_insert_with(|| {
-                let mut sum = Vector::<D>::zeros();
-                for (c, local) in model.cells_of_site(site as usize) {
-                    if model.node_takes(c) {
-                        fem::for_each_point(&model.mesh, c, fem::Rule::Stiffness, |p| {
-                            sum += p.gradient[local] * p.weight;
-                        });
-                    }
-                }
-                sum
-            });
         }
     }
-    for site in dropped {
-        nodes.remove(&site);
-    }
-    nodes
+    let integral = |site: usize| {
+        let mut sum = Vector::<D>::zeros();
+        for (c, local) in model.cells_of_site(site) {
+            if model.node_takes(c) {
+                fem::for_each_point(&model.mesh, c, fem::Rule::Stiffness, |p| {
+                    sum += p.gradient[local] * p.weight;
+                });
+            }
+        }
+        sum
+    };
+    let is_loaded = |site: usize| {
+        let is_node = matches!(model.sites[site].kind, SiteKind::Node(_));
+        is_node && at_face[site] && !is_dropped[site]
+    };
+    let sites = (0..model.sites.len()).into_par_iter();
+    sites
+        .filter(|&site| is_loaded(site))
+        .map(|site| (site as u32, integral(site)))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
 }
 
 /// The fourth moments of the lattice's pairwise part.
@@ -296,22 +309,26 @@ fn pair_tensor<const D: usize>(segments: &Segments<'_, D>) -> Tensor4<D> {
     tensor
 }
 
+/// Components of a symmetric tensor of third order in 3D.
+const MOST_TRIPLES: usize = 10;
+
 /// The components `i ≤ j ≤ k` of a symmetric tensor of third order.
 fn triples<const D: usize>() -> impl Iterator<Item = [usize; 3]> {
     (0..D).flat_map(|i| (i..D).flat_map(move |j| (j..D).map(move |k| [i, j, k])))
 }
 
-fn cube<const D: usize>(xi: &Vector<D>, factor: f64) -> Vec<f64> {
-    triples::<D>()
-        .map(|[i, j, k]| factor * xi[i] * xi[j] * xi[k])
-        .collect()
+/// The components of `factor ξ⊗ξ⊗ξ`, as many as [`triples`] gives.
+fn cube<const D: usize>(xi: &Vector<D>, factor: f64) -> [f64; MOST_TRIPLES] {
+    let mut cube = [0.0; MOST_TRIPLES];
+    for (c, [i, j, k]) in cube.iter_mut().zip(triples::<D>()) {
+        *c = factor * xi[i] * xi[j] * xi[k];
+    }
+    cube
 }
 
 /// `C_ijkl b_l`.
-fn third<const D: usize>(b: &Vector<D>, tensor: &Tensor4<D>) -> Vec<f64> {
-    triples::<D>()
-        .map(|[i, j, k]| (0..D).map(|l| tensor.get(i, j, k, l) * b[l]).sum())
-        .collect()
+fn third<const D: usize>(b: &Vector<D>, tensor: &Tensor4<D>) -> impl Iterator<Item = f64> {
+    triples::<D>().map(|[i, j, k]| (0..D).map(|l| tensor.get(i, j, k, l) * b[l]).sum())
 }
 
 /// All pieces, and the whole bonds between points at the seam.
@@ -350,7 +367,7 @@ fn pair_conditions<const D: usize>(
         let cube = cube(&shape.xi, segments.stiffness(i, j) * shape.share);
         for (site, w) in shape.difference {
             if let Some(&row) = rows.get(&site) {
-                for (c, v) in cube.iter().enumerate() {
+                for (c, v) in cube.iter().take(count).enumerate() {
                     conditions.add(row * count + c, w * v);
                 }
             }

@@ -206,7 +206,7 @@ impl<const D: usize> SeamBonds<D> {
         }
         let bond = self.bonds.len() as u32 - 1;
         of_site.extend(difference.iter().map(|&(site, w)| (site, number, w)));
-        self.difference.push(difference);
+        self.difference.push(difference.iter().copied());
         self.parts.push(Part { bond, ..part });
         bond
     }

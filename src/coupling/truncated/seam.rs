@@ -16,6 +16,12 @@ const ON_FACE: f64 = 1e-9;
 /// Far above [`ON_FACE`], far below any distance within a lattice.
 const PROBE: f64 = 1e-6;
 
+/// Distance from the edges of a face within which a bond passes through an edge, relative to the size of a bin.
+const EDGE: f64 = 1e-6;
+
+/// Places on a bond that are this near to each other, as fractions of it, are one.
+const SAME: f64 = 1e-8;
+
 /// A piece of a bond inside of the peridynamic zone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
@@ -27,12 +33,56 @@ pub(super) struct Piece {
     pub share: f64,
 }
 
+impl Piece {
+    /// A bond from end to end.
+    pub const WHOLE: Self = Self {
+        from: 0.0,
+        to: 1.0,
+        share: 1.0,
+    };
+
+    /// What is inside of the zone of a bond that is not outside as a whole; of one that is cut, the first part or the last.
+    pub fn of(course: Course, is_first: bool) -> Self {
+        match (course, is_first) {
+            (Course::Cut(to), true) => Self { to, ..Self::WHOLE },
+            (Course::Cut(from), false) => Self {
+                from,
+                ..Self::WHOLE
+            },
+            _ => Self::WHOLE,
+        }
+    }
+}
+
 /// A face between the zone and an element.
 struct Face<const D: usize> {
     nodes: Vec<u32>,
-    /// Its corners, one triangle after another in 3D.
-    simplices: Vec<[Vector<D>; D]>,
+    /// Its corners, one triangle after another in 3D, with the unit normal of each; none of a degenerate one.
+    simplices: Vec<([Vector<D>; D], Option<Vector<D>>)>,
+    /// The box around it, a little larger.
+    low: Vector<D>,
+    high: Vector<D>,
     cell: u32,
+}
+
+impl<const D: usize> Face<D> {
+    /// Whether its box meets another.
+    fn may_meet(&self, low: &Vector<D>, high: &Vector<D>) -> bool {
+        (0..D).all(|i| low[i] <= self.high[i] && high[i] >= self.low[i])
+    }
+}
+
+/// How a bond runs, where a look at the faces tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Course {
+    /// Inside of the zone.
+    Inside,
+    /// Outside of it.
+    Outside,
+    /// Through the faces once, at this fraction of it.
+    Cut(f64),
+    /// [`Seam::pieces`] has to tell: along a face, through an edge of the zone, or more often.
+    Unclear,
 }
 
 /// What a cell is to a lattice.
@@ -66,6 +116,7 @@ pub(super) struct Seam<'a, const D: usize> {
     /// Bins from which a bond reaches a face.
     around: FxHashSet<[i64; D]>,
     size: f64,
+    longest: f64,
     zone: Locator<D>,
 }
 
@@ -79,8 +130,8 @@ pub(super) struct Foot {
 }
 
 impl<'a, const D: usize> Seam<'a, D> {
-    /// Collects the faces of one lattice of a model; `size` is about the length of its bonds.
-    pub fn new(model: &'a Model<D>, lattice: usize, size: f64) -> Self {
+    /// Collects the faces of one lattice of a model; `size` is about the length of its bonds, none of which is longer than `longest`.
+    pub fn new(model: &'a Model<D>, lattice: usize, size: f64, longest: f64) -> Self {
         let mesh = &model.mesh;
         let side = sides(model, lattice);
         let mut faces = Vec::new();
@@ -89,10 +140,11 @@ impl<'a, const D: usize> Seam<'a, D> {
         for facet in mesh.interface_facets(&side, &Side::Points, &Side::Element) {
             let n = facet.first.nodes;
             let x = |i: usize| mesh.nodes[n[i.min(n.len() - 1)] as usize];
-            let mut simplices = vec![std::array::from_fn(x)];
+            let mut simplices: Vec<[Vector<D>; D]> = vec![std::array::from_fn(x)];
             if n.len() == 4 {
                 simplices.push(std::array::from_fn(|i| x([0, 2, 3][i.min(2)])));
             }
+            let with_normal = |corners| (corners, normal_of(&corners));
             let (low, high) = mesh.bounds_of(&n);
             let margin = Vector::repeat(size * 1e-3);
             for_box(
@@ -102,7 +154,7 @@ impl<'a, const D: usize> Seam<'a, D> {
                     bins.entry(key).or_default().push(faces.len() as u32);
                 },
             );
-            let reach = Vector::repeat(size * (1.0 + 1e-3));
+            let reach = Vector::repeat(longest * (1.0 + 1e-3));
             for_box(
                 &bin(&(low - reach), size),
                 &bin(&(high + reach), size),
@@ -112,7 +164,9 @@ impl<'a, const D: usize> Seam<'a, D> {
             );
             faces.push(Face {
                 nodes: n,
-                simplices,
+                simplices: simplices.into_iter().map(with_normal).collect(),
+                low: low.add_scalar(-2.0 * EDGE * size),
+                high: high.add_scalar(2.0 * EDGE * size),
                 cell: facet.second.cell,
             });
         }
@@ -122,6 +176,7 @@ impl<'a, const D: usize> Seam<'a, D> {
             bins,
             around,
             size,
+            longest,
             zone: Locator::new(
                 mesh,
                 (0..mesh.cell_count()).filter(|&c| side[c] == Side::Points),
@@ -129,25 +184,109 @@ impl<'a, const D: usize> Seam<'a, D> {
         }
     }
 
-    /// The faces that a bond may meet, each once.
-    fn faces_near(&self, a: &Vector<D>, b: &Vector<D>) -> Vec<u32> {
-        let mut near = Vec::new();
-        for_box(
-            &bin(&a.inf(b), self.size),
-            &bin(&a.sup(b), self.size),
-            |key| near.extend(self.bins.get(&key).into_iter().flatten().copied()),
-        );
+    /// Collects the faces that a bond of a point at `x` may meet, each once, ascending.
+    pub fn faces_around(&self, x: &Vector<D>, near: &mut Vec<u32>) {
+        near.clear();
+        let reach = self.longest * (1.0 + 1e-3);
+        let (low, high) = (x.add_scalar(-reach), x.add_scalar(reach));
+        for_box(&bin(&low, self.size), &bin(&high, self.size), |key| {
+            near.extend(self.bins.get(&key).into_iter().flatten().copied());
+        });
         near.sort_unstable();
         near.dedup();
-        near
+    }
+
+    /// Those of `faces` whose box meets that of a bond.
+    fn meeting<'f>(
+        &'f self,
+        a: &Vector<D>,
+        b: &Vector<D>,
+        faces: &'f [u32],
+    ) -> impl Iterator<Item = &'f Face<D>> {
+        let (low, high) = (a.inf(b), a.sup(b));
+        let faces = faces.iter().map(|&f| &self.faces[f as usize]);
+        faces.filter(move |face| face.may_meet(&low, &high))
     }
 
     /// Whether `x` lies on one of the faces.
     fn touches(&self, x: &Vector<D>, faces: &[u32]) -> bool {
-        faces.iter().any(|&f| {
-            let nodes = &self.faces[f as usize].nodes;
-            self.model.mesh.distance_to_facet(x, nodes) <= ON_FACE * self.size
-        })
+        let distance = |face: &Face<D>| self.model.mesh.distance_to_facet(x, &face.nodes);
+        self.meeting(x, x, faces)
+            .any(|face| distance(face) <= ON_FACE * self.size)
+    }
+
+    /// How the bond from `a` to `b` runs, as far as its ends and the faces tell: of each end, whether it is a point of the zone.
+    ///
+    /// Between two cuts a bond is inside or outside of the zone as a whole, and at an end that lies on no face it is what this end is.
+    pub fn course(
+        &self,
+        a: &Vector<D>,
+        b: &Vector<D>,
+        is_site: [bool; 2],
+        faces: &[u32],
+    ) -> Course {
+        let tolerance = 2.0 * ON_FACE * self.size;
+        let edge = EDGE * self.size;
+        let mut on_face = [false; 2];
+        let (mut hit, mut is_at_edge): (Option<f64>, bool) = (None, true);
+        for face in self.meeting(a, b, faces) {
+            for (corners, normal) in &face.simplices {
+                let Some(normal) = normal else {
+                    return Course::Unclear;
+                };
+                let (p, q) = ((a - corners[0]).dot(normal), (b - corners[0]).dot(normal));
+                if (p > tolerance && q > tolerance) || (p < -tolerance && q < -tolerance) {
+                    continue;
+                }
+                let ends = [p.abs() <= tolerance, q.abs() <= tolerance];
+                if ends == [true; 2] {
+                    return Course::Unclear;
+                }
+                let t = match ends {
+                    [true, _] => 0.0,
+                    [_, true] => 1.0,
+                    _ => p / (p - q),
+                };
+                let beyond = beyond_edges(&(a + (b - a) * t), corners, normal);
+                if beyond > edge {
+                    continue;
+                }
+                if beyond > tolerance {
+                    return Course::Unclear;
+                }
+                if ends != [false; 2] {
+                    on_face[usize::from(ends[1])] = true;
+                    continue;
+                }
+                is_at_edge &= beyond > -edge;
+                match hit {
+                    _ if !(SAME..1.0 - SAME).contains(&t) => return Course::Unclear,
+                    Some(known) if (known - t).abs() > SAME => return Course::Unclear,
+                    Some(known) => hit = Some(known.min(t)),
+                    None => hit = Some(t),
+                }
+            }
+        }
+        let state = |k: usize| match (is_site[k], on_face[k]) {
+            (true, true) => None,
+            (false, true) => Some(None),
+            (is_site, false) => Some(Some(is_site)),
+        };
+        let (Some(first), Some(last)) = (state(0), state(1)) else {
+            return Course::Unclear;
+        };
+        let all = |inside: bool| match inside {
+            true => Course::Inside,
+            false => Course::Outside,
+        };
+        match (hit, first, last) {
+            (None, Some(s), None) | (None, None, Some(s)) => all(s),
+            (None, Some(s), Some(r)) if s == r => all(s),
+            // through an edge of the zone, past it
+            (Some(_), Some(s), Some(r)) if s == r && is_at_edge => all(s),
+            (Some(t), Some(s), Some(r)) if s != r => Course::Cut(t),
+            _ => Course::Unclear,
+        }
     }
 
     fn in_zone(&self, x: &Vector<D>) -> bool {
@@ -157,21 +296,21 @@ impl<'a, const D: usize> Seam<'a, D> {
     /// The pieces of the bond from `a` to `b` that lie in the zone, in order.
     ///
     /// A bond that runs within a face or an edge, or through an edge or a corner, is the mean of the bonds beside it: only so
-    /// does the sum of a shape function over the ends on a face equal its integral.
-    pub fn pieces(&self, a: &Vector<D>, b: &Vector<D>, pieces: &mut Vec<Piece>) {
+    /// does the sum of a shape function over the ends on a face equal its integral. `near` lists the faces around, as [`Seam::faces_around`] gives them.
+    pub fn pieces(&self, a: &Vector<D>, b: &Vector<D>, near: &[u32], pieces: &mut Vec<Piece>) {
         pieces.clear();
-        let near = self.faces_near(a, b);
         let mut cuts = vec![0.0, 1.0];
-        for &f in &near {
-            for simplex in &self.faces[f as usize].simplices {
-                cuts.extend(crossing(a, b, simplex, ON_FACE * self.size));
+        for face in self.meeting(a, b, near) {
+            for (corners, normal) in &face.simplices {
+                let normal = normal.as_ref();
+                cuts.extend(normal.and_then(|n| crossing(a, b, corners, n, ON_FACE * self.size)));
             }
         }
         cuts.sort_unstable_by(f64::total_cmp);
-        cuts.dedup_by(|t, s| *t - *s <= 1e-8);
+        cuts.dedup_by(|t, s| *t - *s <= SAME);
         // the last may have swallowed 1
         if let Some(last) = cuts.last_mut()
-            && 1.0 - *last <= 1e-8
+            && 1.0 - *last <= SAME
         {
             *last = 1.0;
         }
@@ -179,7 +318,7 @@ impl<'a, const D: usize> Seam<'a, D> {
         // a tie is decided by the bonds beside this one
         let tied = cuts
             .windows(2)
-            .any(|w| self.touches(&at(0.5 * (w[0] + w[1])), &near));
+            .any(|w| self.touches(&at(0.5 * (w[0] + w[1])), near));
         let probes = if tied { 1 << D } else { 1 };
         for probe in 0..probes {
             let offset = Vector::<D>::from_fn(|i, _| {
@@ -227,14 +366,16 @@ impl<'a, const D: usize> Seam<'a, D> {
         found
     }
 
-    /// The end of a bond at `x`, on the faces; `None` if no face is there.
-    pub fn foot(&self, x: &Vector<D>) -> Option<Foot> {
+    /// The end of a bond at `x`, on the faces, of those that `near` lists; `None` if no face is there.
+    pub fn foot(&self, x: &Vector<D>, near: &[u32]) -> Option<Foot> {
         let mesh = &self.model.mesh;
-        let mut near = self.faces_near(x, x);
-        near.retain(|&f| {
-            mesh.distance_to_facet(x, &self.faces[f as usize].nodes) <= 1e-7 * self.size
-        });
-        let cell = self.faces[*near.first()? as usize].cell as usize;
+        let distance = |face: &&Face<D>| mesh.distance_to_facet(x, &face.nodes);
+        let cells: Vec<u32> = self
+            .meeting(x, x, near)
+            .filter(|face| distance(face) <= 1e-7 * self.size)
+            .map(|face| face.cell)
+            .collect();
+        let cell = *cells.first()? as usize;
         let reference = fem::reference_of(mesh, cell, x)?;
         let (shape, count) = fem::shape_values(mesh, cell, &reference);
         let mut trace: Vec<(u32, f64)> = Vec::with_capacity(count);
@@ -251,10 +392,7 @@ impl<'a, const D: usize> Seam<'a, D> {
         // what rounding leaves on the nodes behind the face goes to those on it
         let sum: f64 = trace.iter().map(|t| t.1).sum();
         trace.iter_mut().for_each(|t| t.1 /= sum);
-        Some(Foot {
-            trace,
-            cells: near.iter().map(|&f| self.faces[f as usize].cell).collect(),
-        })
+        Some(Foot { trace, cells })
     }
 }
 
@@ -270,10 +408,10 @@ fn crossing<const D: usize>(
     a: &Vector<D>,
     b: &Vector<D>,
     corners: &[Vector<D>; D],
+    normal: &Vector<D>,
     tolerance: f64,
 ) -> Option<f64> {
-    let normal = normal_of(corners)?;
-    let (p, q) = ((a - corners[0]).dot(&normal), (b - corners[0]).dot(&normal));
+    let (p, q) = ((a - corners[0]).dot(normal), (b - corners[0]).dot(normal));
     if (p > tolerance && q > tolerance)
         || (p < -tolerance && q < -tolerance)
         || (p - q).abs() <= 2.0 * tolerance
@@ -281,8 +419,16 @@ fn crossing<const D: usize>(
         return None;
     }
     let t = (p / (p - q)).clamp(0.0, 1.0);
-    let x = a + (b - a) * t;
-    let outside = match D {
+    (beyond_edges(&(a + (b - a) * t), corners, normal) <= tolerance).then_some(t)
+}
+
+/// How far a place in the plane of a point (1D), an edge (2D) or a triangle (3D) lies beyond its ends, \[m\]; negative inside of them.
+fn beyond_edges<const D: usize>(
+    x: &Vector<D>,
+    corners: &[Vector<D>; D],
+    normal: &Vector<D>,
+) -> f64 {
+    match D {
         1 => 0.0,
         2 => {
             let e = corners[1] - corners[0];
@@ -303,8 +449,7 @@ fn crossing<const D: usize>(
                 -across / e.norm()
             })
             .fold(f64::NEG_INFINITY, f64::max),
-    };
-    (outside <= tolerance).then_some(t)
+    }
 }
 
 /// Unit normal; none of a degenerate face.
@@ -348,5 +493,95 @@ fn for_box<const D: usize>(first: &[i64; D], last: &[i64; D], mut visit: impl Fn
         if axis == D {
             return;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        coupling::SiteKind,
+        peridynamics::Micromodulus,
+        verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
+    };
+
+    /// Bonds of all kinds at a seam: how they run against their pieces, which are found by looking where the middle of each part lies. Returns bonds cut, and those that are unclear.
+    fn compare<const D: usize>(cells: Cells, shift: f64) -> (usize, usize) {
+        let case = Case {
+            method: Method::Truncated,
+            law: Law::BondBased(Micromodulus::InverseDistance),
+            cells,
+            widths: Widths {
+                nonlocal: 2 * cells.size(),
+                transition: 0,
+                local: 4 / cells.size() * cells.size(),
+            },
+            ratio: 3,
+        };
+        let enclosed = Enclosed::<D>::new(&case).unwrap();
+        let model = &enclosed.model;
+        let (body, passing) = (model.body().unwrap(), model.passing().unwrap());
+        let horizon = body.cloud.horizon[0];
+        let seam = Seam::new(model, 0, horizon, horizon);
+        let mut is_site = vec![false; body.cloud.position.len()];
+        for site in &model.sites {
+            if let SiteKind::Point(p) = site.kind {
+                is_site[p as usize] = true;
+            }
+        }
+        let mut position = body.cloud.position.clone();
+        // on faces too: the corner of the zone becomes a point of the lattice
+        let by = Vector::repeat(shift * model.spacing());
+        position.iter_mut().for_each(|x| *x += by);
+        for (known, x) in is_site.iter_mut().zip(&position) {
+            let touches = seam
+                .faces
+                .iter()
+                .any(|face| model.mesh.distance_to_facet(x, &face.nodes) <= ON_FACE * seam.size);
+            *known = seam.in_zone(x) && !touches;
+        }
+        let (mut cut, mut unclear) = (0, 0);
+        let (mut near, mut pieces) = (Vec::new(), Vec::new());
+        for i in 0..position.len() {
+            let family = match body.families.of(i) {
+                [] => passing.families.of(i),
+                family => family,
+            };
+            seam.faces_around(&position[i], &mut near);
+            for &j in family {
+                let (a, b) = (&position[i], &position[j as usize]);
+                let ends = [is_site[i], is_site[j as usize]];
+                seam.pieces(a, b, &near, &mut pieces);
+                let wanted: &[Piece] = match seam.course(a, b, ends, &near) {
+                    Course::Unclear => {
+                        unclear += usize::from(seam.near(a, b));
+                        continue;
+                    }
+                    Course::Inside => &[Piece::WHOLE],
+                    Course::Outside => &[],
+                    course => {
+                        cut += 1;
+                        &[Piece::of(course, ends[0])]
+                    }
+                };
+                assert_eq!(pieces, wanted, "{cells:?}, {a} to {b}");
+            }
+        }
+        (cut, unclear)
+    }
+
+    #[test]
+    fn how_a_bond_runs_agrees_with_its_pieces() {
+        for cells in [Cells::Matching, Cells::Coarse, Cells::Simplices] {
+            for shift in [0.0, 0.5, 0.137] {
+                for (cut, unclear) in [compare::<2>(cells, shift), compare::<3>(cells, shift)] {
+                    assert!(cut > 100, "{cut}");
+                    // few enough for most of the work to be saved
+                    assert!(unclear < 2 * cut, "{cells:?}, {shift}: {unclear} of {cut}");
+                }
+            }
+        }
+        let (cut, unclear) = compare::<1>(Cells::Coarse, 0.137);
+        assert!(cut > 0 && unclear == 0);
     }
 }

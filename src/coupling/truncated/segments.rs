@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::seam::{Foot, Piece, Seam};
+use super::seam::{Course, Foot, Piece, Seam};
 use crate::{
     assembly::{Row, Transfer},
     coupling::{Model, SiteKind, lattices::Passing},
@@ -29,6 +29,8 @@ pub(super) struct Segment {
     pub j: u32,
     pub piece: Piece,
     pub ends: [End; 2],
+    /// Stiffness of the energy `½ k (ξ·η)²` of its whole bond.
+    pub stiffness: f64,
     /// Factor of its energy: 1 where the seam follows the lattice.
     pub scale: f64,
     /// What the dilatations at its ends get of its elongation.
@@ -74,73 +76,41 @@ impl<'a, const D: usize> Segments<'a, D> {
                 let of = passing.of_point.iter().zip(&cloud.horizon);
                 let own = of.filter(|(of, _)| usize::from(**of) == l);
                 let horizon = own.map(|(_, d)| *d).fold(0.0, f64::max);
-                Seam::new(model, l, horizon)
+                let longest = model
+                    .peridynamics
+                    .as_ref()
+                    .map_or(horizon, |p| p.reach(horizon));
+                Seam::new(model, l, horizon, longest)
             })
             .collect();
-        let found: Vec<Vec<(u32, u32, Vec<Segment>)>> = (0..cloud.position.len())
+        let ends = Ends {
+            site: &site,
+            body,
+            passing,
+        };
+        let found: Vec<Cut> = (0..cloud.position.len())
             .into_par_iter()
             .map(|i| {
-                let family = if site[i] == NONE {
-                    passing.families.of(i)
-                } else {
-                    body.families.of(i)
-                };
                 let seam = &seams[usize::from(passing.of_point[i])];
-                let mut list = Vec::new();
-                if !seam.is_around(&cloud.position[i]) {
-                    return list;
+                match seam.is_around(&cloud.position[i]) {
+                    true => ends.cut(seam, i),
+                    false => Cut::default(),
                 }
-                let mut pieces = Vec::new();
-                for &j in family.iter().filter(|&&j| j as usize > i) {
-                    let (a, b) = (&cloud.position[i], &cloud.position[j as usize]);
-                    if !seam.near(a, b) {
-                        continue;
-                    }
-                    seam.pieces(a, b, &mut pieces);
-                    let both = site[i] != NONE && site[j as usize] != NONE;
-                    let whole = |p: &Piece| p.from == 0.0 && p.to == 1.0 && p.share == 1.0;
-                    if both && pieces.len() == 1 && whole(&pieces[0]) {
-                        continue;
-                    }
-                    let segments = pieces
-                        .iter()
-                        .filter_map(|piece| {
-                            let end = |t: f64, point: u32, is_end: bool| {
-                                if is_end && site[point as usize] != NONE {
-                                    Some(End::Point(point))
-                                } else {
-                                    seam.foot(&(a + (b - a) * t)).map(End::Face)
-                                }
-                            };
-                            Some(Segment {
-                                i: i as u32,
-                                j,
-                                piece: *piece,
-                                scale: 1.0,
-                                hands: hands_of(piece),
-                                ends: [
-                                    end(piece.from, i as u32, piece.from == 0.0)?,
-                                    end(piece.to, j, piece.to == 1.0)?,
-                                ],
-                            })
-                        })
-                        .collect();
-                    list.push((i as u32, j, segments));
-                }
-                list
             })
             .collect();
-        let mut cut = Vec::new();
+        let mut cut = Vec::with_capacity(found.iter().map(|f| f.segments.len()).sum());
         let mut broken = FxHashSet::default();
         let mut at_seam = vec![false; site.len()];
-        for (i, j, segments) in found.into_iter().flatten() {
-            for p in [i, j] {
-                at_seam[p as usize] |= site[p as usize] != NONE;
+        for (i, found) in found.into_iter().enumerate() {
+            for &j in &found.to {
+                let is_site = [i, j as usize].map(|p| site[p] != NONE);
+                at_seam[i] |= is_site[0];
+                at_seam[j as usize] |= is_site[1];
+                if is_site == [true; 2] {
+                    broken.insert((i as u32, j));
+                }
             }
-            if site[i as usize] != NONE && site[j as usize] != NONE {
-                broken.insert((i, j));
-            }
-            cut.extend(segments);
+            cut.extend(found.segments);
         }
         Self {
             model,
@@ -186,14 +156,14 @@ impl<'a, const D: usize> Segments<'a, D> {
 
     /// The coefficients `p` and `ω` that point `i` gives its bond to `j`; those of a whole family if it lies in an element.
     pub fn coefficients(&self, i: u32, j: u32) -> (f64, f64) {
-        let xi = self.body.bond(i as usize, j as usize);
-        if self.site[i as usize] == NONE {
-            return self.passing.whole_of(i).of(&xi);
-        }
-        let (pair, omega) = self.body.kernel(i as usize);
-        match self.body.families.of(i as usize).binary_search(&j) {
-            Ok(k) => (pair[k], omega.get(k).copied().unwrap_or(0.0)),
-            Err(_) => (0.0, 0.0),
+        self.ends().coefficients(i, j)
+    }
+
+    fn ends(&self) -> Ends<'_, D> {
+        Ends {
+            site: &self.site,
+            body: self.body,
+            passing: self.passing,
         }
     }
 
@@ -216,22 +186,109 @@ impl<'a, const D: usize> Segments<'a, D> {
 
     /// Stiffness of the bond's energy `½ k (ξ·η)²`.
     pub fn stiffness(&self, i: u32, j: u32) -> f64 {
+        self.ends().stiffness(i, j)
+    }
+
+    /// Sites and weights of the difference of displacement over a piece.
+    pub fn difference<'s>(&'s self, segment: &'s Segment) -> impl Iterator<Item = (u32, f64)> + 's {
+        let ends = segment.ends.iter().zip([-1.0, 1.0]);
+        ends.flat_map(move |(end, sign)| {
+            let (point, trace) = match end {
+                End::Point(p) => (Some((self.site[*p as usize], sign)), &[][..]),
+                End::Face(foot) => (None, &foot.trace[..]),
+            };
+            let trace = trace.iter().map(move |&(s, w)| (s, sign * w));
+            point.into_iter().chain(trace)
+        })
+    }
+}
+
+/// What the bonds of one point to those of higher numbers leave in the zone.
+#[derive(Default)]
+struct Cut {
+    /// Where the bonds go that are not whole.
+    to: Vec<u32>,
+    segments: Vec<Segment>,
+}
+
+/// The points of a model, to tell what bonds between them are.
+#[derive(Clone, Copy)]
+struct Ends<'a, const D: usize> {
+    site: &'a [u32],
+    body: &'a PdBody<D>,
+    passing: &'a Passing<D>,
+}
+
+impl<const D: usize> Ends<'_, D> {
+    /// Cuts the bonds of a point to those of higher numbers.
+    fn cut(&self, seam: &Seam<'_, D>, i: usize) -> Cut {
+        let position = &self.body.cloud.position;
+        let is_site = |p: usize| self.site[p] != NONE;
+        let family = match is_site(i) {
+            true => self.body.families.of(i),
+            false => self.passing.families.of(i),
+        };
+        let mut cut = Cut::default();
+        let (mut pieces, mut near) = (Vec::new(), Vec::new());
+        seam.faces_around(&position[i], &mut near);
+        for &j in family.iter().filter(|&&j| j as usize > i) {
+            let (a, b) = (&position[i], &position[j as usize]);
+            let are_sites = [is_site(i), is_site(j as usize)];
+            match seam.course(a, b, are_sites, &near) {
+                Course::Inside if are_sites == [true; 2] => continue,
+                Course::Outside => continue,
+                Course::Unclear if !seam.near(a, b) => continue,
+                Course::Unclear => seam.pieces(a, b, &near, &mut pieces),
+                course => {
+                    pieces.clear();
+                    pieces.push(Piece::of(course, are_sites[0]));
+                }
+            }
+            if are_sites == [true; 2] && pieces == [Piece::WHOLE] {
+                continue;
+            }
+            cut.to.push(j);
+            let end = |t: f64, point: u32, is_end: bool| match is_end && is_site(point as usize) {
+                true => Some(End::Point(point)),
+                false => seam.foot(&(a + (b - a) * t), &near).map(End::Face),
+            };
+            cut.segments.extend(pieces.iter().filter_map(|piece| {
+                Some(Segment {
+                    i: i as u32,
+                    j,
+                    piece: *piece,
+                    ends: [
+                        end(piece.from, i as u32, piece.from == 0.0)?,
+                        end(piece.to, j, piece.to == 1.0)?,
+                    ],
+                    stiffness: self.stiffness(i as u32, j),
+                    scale: 1.0,
+                    hands: hands_of(piece),
+                })
+            }));
+        }
+        cut
+    }
+
+    /// As [`Segments::coefficients`].
+    fn coefficients(&self, i: u32, j: u32) -> (f64, f64) {
+        if self.site[i as usize] == NONE {
+            let xi = self.body.bond(i as usize, j as usize);
+            return self.passing.whole_of(i).of(&xi);
+        }
+        let (pair, omega) = self.body.kernel(i as usize);
+        match self.body.families.of(i as usize).binary_search(&j) {
+            Ok(k) => (pair[k], omega.get(k).copied().unwrap_or(0.0)),
+            Err(_) => (0.0, 0.0),
+        }
+    }
+
+    /// As [`Segments::stiffness`].
+    fn stiffness(&self, i: u32, j: u32) -> f64 {
         let volume = &self.body.cloud.volume;
         (self.coefficients(i, j).0 + self.coefficients(j, i).0)
             * volume[i as usize]
             * volume[j as usize]
-    }
-
-    /// Sites and weights of the difference of displacement over a piece.
-    pub fn difference(&self, segment: &Segment) -> Vec<(u32, f64)> {
-        let mut row = Vec::new();
-        for (end, sign) in segment.ends.iter().zip([-1.0, 1.0]) {
-            match end {
-                End::Point(p) => row.push((self.site[*p as usize], sign)),
-                End::Face(foot) => row.extend(foot.trace.iter().map(|&(s, w)| (s, sign * w))),
-            }
-        }
-        row
     }
 }
 
@@ -329,8 +386,8 @@ impl<const D: usize> Springs<D> {
                 .push(body.bond(s.i as usize, s.j as usize));
             springs
                 .stiffness
-                .push(segments.stiffness(s.i, s.j) * s.piece.share * s.scale / length);
-            springs.difference.push(&segments.difference(s));
+                .push(s.stiffness * s.piece.share * s.scale / length);
+            springs.difference.push(segments.difference(s));
             springs.origin.push(Origin {
                 bond: [s.i, s.j],
                 piece: s.piece,
@@ -378,7 +435,7 @@ impl<const D: usize> Springs<D> {
             .push(segments.body.bond(i as usize, j as usize));
         self.stiffness
             .push(segments.stiffness(i, j) * segments.scale(i, j));
-        self.difference.push(&[
+        self.difference.push([
             (segments.site[i as usize], -1.0),
             (segments.site[j as usize], 1.0),
         ]);

@@ -98,17 +98,20 @@ pub trait BondPass<const D: usize>: Send + Sync {
 pub fn bond_pass<const D: usize>(
     setup: &BondSetup<'_, D>,
 ) -> Result<Box<dyn BondPass<D>>, KernelError> {
-    setup.check()?;
+    setup.check_lists()?;
+    let mut why = None;
     if setup.layout != Layout::List {
         match lattice::Lattice::new(setup) {
             Ok(pass) => return Ok(Box::new(pass)),
-            Err(why) if setup.layout == Layout::Lattice => {
-                return Err(KernelError::NoLattice { why });
-            }
-            Err(_) => {}
+            Err(reason) => why = Some(reason),
         }
     }
-    Ok(Box::new(list::List::new(setup)))
+    // a lattice has looked at its bonds by offsets; what stands against one may be a fault
+    setup.check_bonds()?;
+    match why {
+        Some(why) if setup.layout == Layout::Lattice => Err(KernelError::NoLattice { why }),
+        _ => Ok(Box::new(list::List::new(setup))),
+    }
 }
 
 /// The pass of a full block of a lattice, without lists on the way.

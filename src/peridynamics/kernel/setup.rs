@@ -224,8 +224,8 @@ impl<const D: usize> BondSetup<'_, D> {
             .sum()
     }
 
-    /// Whether lists belong together and bonds weigh the same from both ends.
-    pub(super) fn check(&self) -> Result<(), KernelError> {
+    /// Whether lists belong together and families have weight.
+    pub(super) fn check_lists(&self) -> Result<(), KernelError> {
         let points = self.position.len();
         let no_fail = self.failure.map_or(&[][..], |f| f.no_fail);
         for (what, length, may_be_empty) in [
@@ -243,40 +243,48 @@ impl<const D: usize> BondSetup<'_, D> {
                 });
             }
         }
-        let fault = (0..points)
-            .into_par_iter()
-            .with_min_len(256)
-            .find_map_first(|i| self.fault(i));
-        if let Some(fault) = fault {
-            return Err(fault);
+        if let Some(&j) = self.families.neighbours.iter().max()
+            && j as usize >= points
+        {
+            return Err(KernelError::Length {
+                what: "a family",
+                length: j as usize,
+                points,
+            });
         }
-        if let BondForce::Solid { .. } = self.force {
-            for point in 0..points {
-                let weighted_volume = self.weighted_volume(point);
-                if !self.families.of(point).is_empty()
-                    && !self.is_idle(point)
-                    && (weighted_volume.is_nan() || weighted_volume <= 0.0)
-                {
-                    return Err(KernelError::Family {
-                        point,
-                        weighted_volume,
-                    });
-                }
-            }
-        }
-        Ok(())
+        let BondForce::Solid { .. } = self.force else {
+            return Ok(());
+        };
+        let without_weight = |point: usize| {
+            let weighted_volume = self.weighted_volume(point);
+            let is_wanted = !self.families.of(point).is_empty() && !self.is_idle(point);
+            (is_wanted && (weighted_volume.is_nan() || weighted_volume <= 0.0)).then_some(
+                KernelError::Family {
+                    point,
+                    weighted_volume,
+                },
+            )
+        };
+        self.first_fault(without_weight)
+    }
+
+    /// Whether every bond has its reverse, and weighs the same from both ends.
+    pub(super) fn check_bonds(&self) -> Result<(), KernelError> {
+        self.first_fault(|i| self.fault(i))
+    }
+
+    fn first_fault(
+        &self,
+        fault: impl Fn(usize) -> Option<KernelError> + Sync + Send,
+    ) -> Result<(), KernelError> {
+        let points = (0..self.position.len()).into_par_iter().with_min_len(256);
+        points.find_map_first(fault).map_or(Ok(()), Err)
     }
 
     fn fault(&self, i: usize) -> Option<KernelError> {
         for (k, &j) in self.families.of(i).iter().enumerate() {
             let j = j as usize;
-            let Some(other) = (j < self.families.len()).then(|| self.families.of(j)) else {
-                return Some(KernelError::Length {
-                    what: "a family",
-                    length: j,
-                    points: self.position.len(),
-                });
-            };
+            let other = self.families.of(j);
             if other.is_empty() || j < i {
                 if !other.is_empty() && other.binary_search(&(i as u32)).is_err() {
                     return Some(KernelError::OneSided { i, j });

@@ -1,10 +1,8 @@
 //! A lattice of points in a padded box, and its families as one stencil.
 
-use rayon::prelude::*;
-use rustc_hash::FxHashMap;
-
 use super::{BondSetup, lanes::LANES};
-use crate::tensor::Vector;
+use crate::{peridynamics::offsets::OffsetTable, tensor::Vector};
+use rayon::prelude::*;
 
 /// Largest distance of a point from its lattice site, and of a weight from that of its offset, in parts of the spacing and of the weight.
 const TOLERANCE: f64 = 1e-9;
@@ -12,6 +10,9 @@ const TOLERANCE: f64 = 1e-9;
 /// Cells of the box per point, and lanes per point with a family, above which lists are better.
 const SPARSEST_BOX: usize = 12;
 const SPARSEST_LANES: usize = 3;
+
+/// Steps of the box around the longest bond above which lists are better.
+const MOST_STEPS: f64 = 1e6;
 
 /// Rows and groups of eight of a tile: two to three tiles' width of 2m + 1 planes stay in the second-level cache.
 const TILE_ROWS: usize = 16;
@@ -199,6 +200,74 @@ fn sites<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Sites<D>, String> {
     })
 }
 
+/// Points of which a task looks at the bonds, at least, and tasks at most: each has a table.
+const POINTS: usize = 1024;
+const TASKS: usize = 64;
+
+/// Whether weights and limits of two bonds differ.
+fn differs((w, l): (f64, f64), (weight, limit): (f64, f64)) -> bool {
+    (w - weight).abs() > TOLERANCE * w.abs()
+        || (l != limit && (l - limit).abs() > TOLERANCE * l.abs())
+}
+
+/// Weight and limit of each bond that occurs, by its steps; or why bonds of the same steps differ.
+fn numbers<const D: usize>(
+    setup: &BondSetup<'_, D>,
+    points: usize,
+    step: impl Fn(usize, u32) -> [i32; D] + Sync,
+) -> Result<OffsetTable<(f64, f64), D>, String> {
+    let reach = (0..points)
+        .into_par_iter()
+        .with_min_len(POINTS)
+        .map(|i| {
+            let family = setup.families.of(i).iter();
+            let farthest = |&j: &u32| step(i, j).into_iter().map(i32::abs).max();
+            family.filter_map(farthest).max().unwrap_or(0)
+        })
+        .max()
+        .unwrap_or(0);
+    if f64::from(2 * reach + 1).powi(D as i32) > MOST_STEPS {
+        return Err(format!("a bond takes {reach} steps of it"));
+    }
+    let fault = |i: usize, j: u32| {
+        format!("the bond of points {i} and {j} weighs other than its like elsewhere")
+    };
+    // tasks of fixed size, joined in order: the first point with a bond gives its numbers, for any number of threads
+    let size = POINTS.max(points.div_ceil(TASKS));
+    let parts: Vec<_> = (0..points.div_ceil(size))
+        .into_par_iter()
+        .map(|task| {
+            let mut found = OffsetTable::empty(reach);
+            for i in task * size..((task + 1) * size).min(points) {
+                for (k, &j) in setup.families.of(i).iter().enumerate() {
+                    let xi = setup.bond(i, j as usize);
+                    let own = (setup.weight(i, k, &xi), setup.limit(i, k, &xi));
+                    let Some(known) = found.slot(&step(i, j)) else {
+                        continue;
+                    };
+                    let (known, ..) = *known.get_or_insert((own, i, j));
+                    if differs(known, own) {
+                        return Err(fault(i, j));
+                    }
+                }
+            }
+            Ok(found)
+        })
+        .collect::<Result<_, _>>()?;
+    let mut all = OffsetTable::empty(reach);
+    for part in parts {
+        for (steps, (own, i, j)) in part.known() {
+            let Some(known) = all.slot(&steps) else {
+                continue;
+            };
+            if differs(*known.get_or_insert(own), own) {
+                return Err(fault(i, j));
+            }
+        }
+    }
+    Ok(all)
+}
+
 impl<const D: usize> Stencil<D> {
     /// The stencil of a cloud, or why it has none.
     pub(super) fn new(setup: &BondSetup<'_, D>, volume: f64) -> Result<Self, String> {
@@ -207,26 +276,11 @@ impl<const D: usize> Stencil<D> {
             site,
             counts,
         } = sites(setup)?;
-        // steps and numbers of each bond that occurs
-        let mut found: FxHashMap<[i32; D], (f64, f64)> = FxHashMap::default();
         let step = |i: usize, j: u32| -> [i32; D] {
             std::array::from_fn(|a| site[j as usize][a] - site[i][a])
         };
-        for i in 0..site.len() {
-            for (k, &j) in setup.families.of(i).iter().enumerate() {
-                let xi = setup.bond(i, j as usize);
-                let (weight, limit) = (setup.weight(i, k, &xi), setup.limit(i, k, &xi));
-                let (w, l) = *found.entry(step(i, j)).or_insert((weight, limit));
-                if (w - weight).abs() > TOLERANCE * w.abs()
-                    || (l != limit && (l - limit).abs() > TOLERANCE * l.abs())
-                {
-                    return Err(format!(
-                        "the bond of points {i} and {j} weighs other than its like elsewhere"
-                    ));
-                }
-            }
-        }
-        let mut steps: Vec<[i32; D]> = found.keys().copied().collect();
+        let found = numbers(setup, site.len(), step)?;
+        let mut steps: Vec<[i32; D]> = found.known().map(|(s, _)| s).collect();
         // by the flat offset; the numbers of an offset and its opposite are one
         steps.sort_unstable_by_key(|s| {
             let mut reversed = *s;
@@ -247,17 +301,26 @@ impl<const D: usize> Stencil<D> {
                 cells.cells
             ));
         }
+        let opposite = |s: &[i32; D]| found.of(&s.map(|s| -s));
+        if let Some((s, _)) = found
+            .known()
+            .find(|(s, own)| opposite(s).is_some_and(|other| differs(other, *own)))
+        {
+            return Err(format!(
+                "bonds over {s:?} steps weigh other than those back"
+            ));
+        }
         let offsets: Vec<Offset<D>> = steps
             .iter()
             .map(|s| {
                 let mirror = s.map(|s| -s);
                 let key = if *s < mirror { *s } else { mirror };
-                let (weight, limit) = found.get(&key).copied().unwrap_or(found[s]);
+                let (weight, limit) = found.of(&key).or(found.of(s)).unwrap_or_default();
                 Offset::new(*s, spacing, cells.delta(s), weight * volume, limit)
             })
             .collect();
-        let position: FxHashMap<[i32; D], usize> =
-            steps.iter().enumerate().map(|(o, s)| (*s, o)).collect();
+        let number = |(o, s): (usize, &[i32; D])| (*s, o);
+        let position = OffsetTable::new(&steps.iter().enumerate().map(number).collect::<Vec<_>>());
         let mut point_of = vec![NONE; cells.cells];
         for (i, s) in site.iter().enumerate() {
             let cell = cells.cell(std::array::from_fn(
@@ -296,7 +359,9 @@ impl<const D: usize> Stencil<D> {
                     }
                     let i = i as usize;
                     for &j in setup.families.of(i) {
-                        let o = position[&step(i, j)];
+                        let Some(o) = position.of(&step(i, j)) else {
+                            continue;
+                        };
                         reference[o] |= 1 << lane;
                         if !setup.precracked.is_some_and(|cut| cut(i, j as usize)) {
                             intact[o] |= 1 << lane;
@@ -304,13 +369,50 @@ impl<const D: usize> Stencil<D> {
                     }
                 }
             });
-        Ok(Self {
+        let stencil = Self {
             offsets,
             point_of,
             groups,
             reference,
             intact,
-        })
+        };
+        let mirror: Vec<Option<usize>> =
+            steps.iter().map(|s| position.of(&s.map(|s| -s))).collect();
+        match stencil.has_one_sided(&mirror, with_family) {
+            true => Err("a bond stands in one family only".into()),
+            false => Ok(stencil),
+        }
+    }
+
+    /// Whether a bond lacks its reverse, where the point at its other end has a family; `mirror` is the offset opposite to each.
+    fn has_one_sided(
+        &self,
+        mirror: &[Option<usize>],
+        with_family: impl Fn(u32) -> bool + Sync,
+    ) -> bool {
+        let count = self.offsets.len();
+        let mut group_of = vec![NONE; self.point_of.len().div_ceil(LANES)];
+        for (g, &cell) in self.groups.iter().enumerate() {
+            group_of[cell as usize / LANES] = g as u32;
+        }
+        let stands = |cell: usize, offset: usize| match group_of[cell / LANES] {
+            NONE => false,
+            g => self.reference[g as usize * count + offset] >> (cell % LANES) & 1 == 1,
+        };
+        let is_one_sided = |here: usize, bits: &[u8]| {
+            let offsets = bits.iter().zip(&self.offsets).zip(mirror);
+            offsets.into_iter().any(|((&bits, offset), mirror)| {
+                (0..LANES).filter(|l| bits >> l & 1 == 1).any(|lane| {
+                    let there = ((here + lane) as isize + offset.delta) as usize;
+                    with_family(self.point_of[there])
+                        && !mirror.is_some_and(|back| stands(there, back))
+                })
+            })
+        };
+        self.reference
+            .par_chunks(count.max(1))
+            .zip(&self.groups)
+            .any(|(bits, &cell)| is_one_sided(cell as usize, bits))
     }
 }
 

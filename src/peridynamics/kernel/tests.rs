@@ -400,6 +400,8 @@ fn what_cannot_be_is_refused() {
         lopsided.contains("bond of points 0 and 1 has weight"),
         "{lopsided}"
     );
+    let leaning = setup(&case, &|_, _, xi| 1.0 + 0.1 * xi.x.signum());
+    assert!(leaning.contains("has weight"), "{leaning}");
     case.families.retain(|i, j| i != 5 || j != 6);
     assert!(setup(&case, &coefficient).contains("point 6 has a bond to point 5"));
     case.volume.pop();

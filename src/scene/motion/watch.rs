@@ -183,9 +183,14 @@ impl<'a, const D: usize> Watch<'a, D> {
         if short {
             self.mark_ahead(&hot, &damaged, &mut next);
         }
-        self.close(&mut next);
         let count = |set: &[bool]| set.iter().filter(|c| **c).count() as f64;
-        let large = count(&now) > TOO_LARGE * count(&next);
+        let is_large = |next: &[bool]| count(&now) > TOO_LARGE * count(next);
+        // to close it only adds cells
+        if !short && !is_large(&next) {
+            return None;
+        }
+        self.close(&mut next);
+        let large = is_large(&next);
         ((short || large) && next != now && next.contains(&true) && next.contains(&false))
             .then_some(next)
     }
