@@ -16,7 +16,7 @@ const REACH: f64 = 2.0;
 /// Horizons more with an LPS, whose bonds act through the dilatations of both ends.
 const DILATATION: f64 = 1.0;
 
-/// Padding in horizons, if the scene leaves it out: in `examples/branching_moving.toml` the path keeps within 0.7 mm of full peridynamics, and the zone has at most a third of the plate.
+/// Padding in horizons, if the scene leaves it out: in `examples/branching_moving.toml` the path keeps within 1 mm of full peridynamics, and the zone has at most 37 % of the plate.
 const PADDING: f64 = 6.0;
 
 /// Fraction of the critical stretch from which a cell is wanted, if the scene leaves it out: from 0.5 on waves of the branching plate mark most of it at the end.

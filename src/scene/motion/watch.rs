@@ -15,6 +15,9 @@ const CROSSED: f64 = 0.3;
 /// The zone also changes where it is this many times larger than it would be.
 const TOO_LARGE: f64 = 2.0;
 
+/// A zone that changes keeps all its cells if it is at most this many times larger for it: where waves come and go the same cells would be given up and taken back.
+const KEPT: f64 = 1.15;
+
 /// The zone reaches farther ahead of the tip of a crack, by this many paddings: fewer changes, and points take the place of elements before the waves of the tip are there.
 const AHEAD: f64 = 1.5;
 
@@ -180,14 +183,17 @@ impl<'a, const D: usize> Watch<'a, D> {
         let short = needed.iter().zip(&now).any(|(n, now)| *n && !now);
         let mut next = kept;
         self.grow(&hot, self.follow.padding, &mut next);
-        if short {
-            self.mark_ahead(&hot, &damaged, &mut next);
-        }
         let count = |set: &[bool]| set.iter().filter(|c| **c).count() as f64;
         let is_large = |next: &[bool]| count(&now) > TOO_LARGE * count(next);
-        // to close it only adds cells
+        // what follows only adds cells
         if !short && !is_large(&next) {
             return None;
+        }
+        // a zone that shrinks keeps what lies ahead too, or it would soon have to grow again
+        self.mark_ahead(&hot, &damaged, &mut next);
+        let both: Vec<bool> = next.iter().zip(&now).map(|(a, b)| *a || *b).collect();
+        if count(&both) <= KEPT * count(&next) {
+            next = both;
         }
         self.close(&mut next);
         let large = is_large(&next);
