@@ -1,6 +1,6 @@
 //! The displacement anywhere in a coupled model: from finite elements, or from the peridynamic points around.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use crate::{
     coupling::{FitDegree, Model, SiteKind, derivative},
@@ -19,7 +19,7 @@ const ASIDE: f64 = 2.4;
 pub struct Sampler<'a, const D: usize> {
     model: &'a Model<D>,
     elements: Locator<D>,
-    bins: HashMap<[i64; D], Vec<u32>>,
+    bins: FxHashMap<[i64; D], Vec<u32>>,
     barriers: Barriers<D>,
 }
 
@@ -39,7 +39,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
             &model.mesh,
             (0..model.mesh.cell_count()).filter(|&c| model.is_element(c)),
         );
-        let mut bins: HashMap<[i64; D], Vec<u32>> = HashMap::new();
+        let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
         for (s, site) in model.sites.iter().enumerate() {
             if matches!(site.kind, SiteKind::Point(_)) {
                 bins.entry(bin(&site.position, model.spacing()))

@@ -407,6 +407,16 @@ mod tests {
         assert!(!families.is_symmetric());
 
         let whole = rows(&families);
+        let mut half = families.clone();
+        half.retain_of(|i| i % 2 == 0, |i, j| i % 4 == 0 && j % 3 == 0);
+        for (i, row) in rows(&half).into_iter().enumerate() {
+            let expected: Vec<u32> = match i % 4 {
+                0 => whole[i].iter().copied().filter(|j| j % 3 == 0).collect(),
+                2 => vec![],
+                _ => whole[i].clone(),
+            };
+            assert_eq!(row, expected);
+        }
         let same_side = |i: usize, j: u32| (points[i].x < 0.2) == (points[j as usize].x < 0.2);
         let cut = families.retain(same_side);
         let expected: Vec<Vec<u32>> = whole

@@ -500,13 +500,12 @@ fn for_box<const D: usize>(first: &[i64; D], last: &[i64; D], mut visit: impl Fn
 mod tests {
     use super::*;
     use crate::{
-        coupling::SiteKind,
         peridynamics::Micromodulus,
         verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
     };
 
-    /// Bonds of all kinds at a seam: how they run against their pieces, which are found by looking where the middle of each part lies. Returns bonds cut, and those that are unclear.
-    fn compare<const D: usize>(cells: Cells, shift: f64) -> (usize, usize) {
+    /// Bonds of all kinds at a seam, of a lattice moved by some parts of its spacing: how they run against their pieces, which are found by looking where the middle of each part lies.
+    fn compare<const D: usize>(cells: Cells) {
         let case = Case {
             method: Method::Truncated,
             law: Law::BondBased(Micromodulus::InverseDistance),
@@ -523,65 +522,54 @@ mod tests {
         let (body, passing) = (model.body().unwrap(), model.passing().unwrap());
         let horizon = body.cloud.horizon[0];
         let seam = Seam::new(model, 0, horizon, horizon);
-        let mut is_site = vec![false; body.cloud.position.len()];
-        for site in &model.sites {
-            if let SiteKind::Point(p) = site.kind {
-                is_site[p as usize] = true;
-            }
-        }
-        let mut position = body.cloud.position.clone();
-        // on faces too: the corner of the zone becomes a point of the lattice
-        let by = Vector::repeat(shift * model.spacing());
-        position.iter_mut().for_each(|x| *x += by);
-        for (known, x) in is_site.iter_mut().zip(&position) {
-            let touches = seam
-                .faces
-                .iter()
-                .any(|face| model.mesh.distance_to_facet(x, &face.nodes) <= ON_FACE * seam.size);
-            *known = seam.in_zone(x) && !touches;
-        }
-        let (mut cut, mut unclear) = (0, 0);
-        let (mut near, mut pieces) = (Vec::new(), Vec::new());
-        for i in 0..position.len() {
-            let family = match body.families.of(i) {
-                [] => passing.families.of(i),
-                family => family,
+        // points on faces last
+        for shift in [0.0, 0.137, 0.5] {
+            let by = Vector::repeat(shift * model.spacing());
+            let position: Vec<Vector<D>> = body.cloud.position.iter().map(|x| x + by).collect();
+            let is_site = |x: &Vector<D>| {
+                let distance = |f: &Face<D>| model.mesh.distance_to_facet(x, &f.nodes);
+                let touches = |f: &Face<D>| distance(f) <= ON_FACE * seam.size;
+                seam.in_zone(x) && !seam.faces.iter().any(touches)
             };
-            seam.faces_around(&position[i], &mut near);
-            for &j in family {
-                let (a, b) = (&position[i], &position[j as usize]);
-                let ends = [is_site[i], is_site[j as usize]];
-                seam.pieces(a, b, &near, &mut pieces);
-                let wanted: &[Piece] = match seam.course(a, b, ends, &near) {
-                    Course::Unclear => {
+            let is_site: Vec<bool> = position.iter().map(is_site).collect();
+            let (mut cut, mut unclear) = (0, 0);
+            let (mut near, mut pieces) = (Vec::new(), Vec::new());
+            for i in 0..position.len() {
+                let family = match body.families.of(i) {
+                    [] => passing.families.of(i),
+                    family => family,
+                };
+                seam.faces_around(&position[i], &mut near);
+                for &j in family.iter().filter(|&&j| j as usize > i) {
+                    let (a, b) = (&position[i], &position[j as usize]);
+                    let ends = [is_site[i], is_site[j as usize]];
+                    let course = seam.course(a, b, ends, &near);
+                    if course == Course::Unclear {
                         unclear += usize::from(seam.near(a, b));
                         continue;
                     }
-                    Course::Inside => &[Piece::WHOLE],
-                    Course::Outside => &[],
-                    course => {
-                        cut += 1;
-                        &[Piece::of(course, ends[0])]
-                    }
-                };
-                assert_eq!(pieces, wanted, "{cells:?}, {a} to {b}");
+                    cut += usize::from(matches!(course, Course::Cut(_)));
+                    seam.pieces(a, b, &near, &mut pieces);
+                    let wanted = Piece::of(course, ends[0]);
+                    let wanted = (course != Course::Outside).then_some(wanted);
+                    assert_eq!(pieces, wanted.as_slice(), "{cells:?}, {a} to {b}");
+                }
             }
+            assert!(cut > 50, "{cut}");
+            // few enough for most of the work to be saved, unless points lie on faces
+            let few = cut / 5;
+            assert!(
+                shift == 0.5 || unclear < few,
+                "{cells:?}, {shift}: {unclear} of {cut}"
+            );
         }
-        (cut, unclear)
     }
 
     #[test]
     fn how_a_bond_runs_agrees_with_its_pieces() {
         for cells in [Cells::Matching, Cells::Coarse, Cells::Simplices] {
-            for shift in [0.0, 0.5, 0.137] {
-                for (cut, unclear) in [compare::<2>(cells, shift), compare::<3>(cells, shift)] {
-                    assert!(cut > 100, "{cut}");
-                    // few enough for most of the work to be saved
-                    assert!(unclear < 2 * cut, "{cells:?}, {shift}: {unclear} of {cut}");
-                }
-            }
+            compare::<2>(cells);
         }
-        let (cut, unclear) = compare::<1>(Cells::Coarse, 0.137);
-        assert!(cut > 0 && unclear == 0);
+        compare::<3>(Cells::Matching);
     }
 }
