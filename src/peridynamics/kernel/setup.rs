@@ -4,6 +4,9 @@ use rayon::prelude::*;
 
 use crate::{peridynamics::Families, tensor::Vector};
 
+/// Largest difference of a number of a bond between its ends, in parts of it.
+pub(super) const ENDS: f64 = 1e-12;
+
 /// How bonds follow the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kinematics {
@@ -304,7 +307,7 @@ impl<const D: usize> BondSetup<'_, D> {
                 ),
             ];
             for (what, there, back) in pairs {
-                if there != back && (there - back).abs() > 1e-12 * there.abs() {
+                if there != back && (there - back).abs() > ENDS * there.abs() {
                     return Some(KernelError::Ends {
                         what,
                         i,

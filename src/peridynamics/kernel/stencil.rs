@@ -1,6 +1,6 @@
 //! A lattice of points in a padded box, and its families as one stencil.
 
-use super::{BondSetup, lanes::LANES};
+use super::{BondSetup, lanes::LANES, setup::ENDS};
 use crate::{peridynamics::offsets::OffsetTable, tensor::Vector};
 use rayon::prelude::*;
 
@@ -204,10 +204,19 @@ fn sites<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Sites<D>, String> {
 const POINTS: usize = 1024;
 const TASKS: usize = 64;
 
-/// Whether weights and limits of two bonds differ.
-fn differs((w, l): (f64, f64), (weight, limit): (f64, f64)) -> bool {
-    (w - weight).abs() > TOLERANCE * w.abs()
-        || (l != limit && (l - limit).abs() > TOLERANCE * l.abs())
+/// Part of [`ENDS`] by which like bonds may differ for their ends to be known alike without a look at each: a bond and its reverse are five comparisons apart.
+const ALIKE: f64 = 0.2 * ENDS;
+
+/// Whether weights and limits of two bonds differ by more than a part of them.
+fn differs((w, l): (f64, f64), (weight, limit): (f64, f64), part: f64) -> bool {
+    (w - weight).abs() > part * w.abs() || (l != limit && (l - limit).abs() > part * l.abs())
+}
+
+/// Weights and limits of the bonds of a lattice.
+struct Numbers<const D: usize> {
+    by_steps: OffsetTable<(f64, f64), D>,
+    /// Whether all of them differ so little that no bond differs between its ends.
+    are_alike: bool,
 }
 
 /// Weight and limit of each bond that occurs, by its steps; or why bonds of the same steps differ.
@@ -215,7 +224,7 @@ fn numbers<const D: usize>(
     setup: &BondSetup<'_, D>,
     points: usize,
     step: impl Fn(usize, u32) -> [i32; D] + Sync,
-) -> Result<OffsetTable<(f64, f64), D>, String> {
+) -> Result<Numbers<D>, String> {
     let reach = (0..points)
         .into_par_iter()
         .with_min_len(POINTS)
@@ -237,7 +246,7 @@ fn numbers<const D: usize>(
     let parts: Vec<_> = (0..points.div_ceil(size))
         .into_par_iter()
         .map(|task| {
-            let mut found = OffsetTable::empty(reach);
+            let (mut found, mut are_alike) = (OffsetTable::empty(reach), true);
             for i in task * size..((task + 1) * size).min(points) {
                 for (k, &j) in setup.families.of(i).iter().enumerate() {
                     let xi = setup.bond(i, j as usize);
@@ -246,26 +255,37 @@ fn numbers<const D: usize>(
                         continue;
                     };
                     let (known, ..) = *known.get_or_insert((own, i, j));
-                    if differs(known, own) {
+                    if differs(known, own, TOLERANCE) {
                         return Err(fault(i, j));
                     }
+                    are_alike &= !differs(known, own, ALIKE);
                 }
             }
-            Ok(found)
+            Ok((found, are_alike))
         })
         .collect::<Result<_, _>>()?;
-    let mut all = OffsetTable::empty(reach);
-    for part in parts {
+    let (mut all, mut are_alike) = (OffsetTable::empty(reach), true);
+    for (part, are) in parts {
+        are_alike &= are;
         for (steps, (own, i, j)) in part.known() {
             let Some(known) = all.slot(&steps) else {
                 continue;
             };
-            if differs(*known.get_or_insert(own), own) {
+            let known = *known.get_or_insert(own);
+            if differs(known, own, TOLERANCE) {
                 return Err(fault(i, j));
             }
+            are_alike &= !differs(known, own, ALIKE);
         }
     }
-    Ok(all)
+    let back = |steps: &[i32; D]| all.of(&steps.map(|s| -s));
+    are_alike &= all
+        .known()
+        .all(|(steps, own)| back(&steps).is_none_or(|other| !differs(other, own, ALIKE)));
+    Ok(Numbers {
+        by_steps: all,
+        are_alike,
+    })
 }
 
 impl<const D: usize> Stencil<D> {
@@ -279,7 +299,13 @@ impl<const D: usize> Stencil<D> {
         let step = |i: usize, j: u32| -> [i32; D] {
             std::array::from_fn(|a| site[j as usize][a] - site[i][a])
         };
-        let found = numbers(setup, site.len(), step)?;
+        let Numbers {
+            by_steps: found,
+            are_alike,
+        } = numbers(setup, site.len(), step)?;
+        if !are_alike {
+            setup.check_bonds().map_err(|fault| fault.to_string())?;
+        }
         let mut steps: Vec<[i32; D]> = found.known().map(|(s, _)| s).collect();
         // by the flat offset; the numbers of an offset and its opposite are one
         steps.sort_unstable_by_key(|s| {
@@ -299,15 +325,6 @@ impl<const D: usize> Stencil<D> {
             return Err(format!(
                 "its box has {} cells for {points} points",
                 cells.cells
-            ));
-        }
-        let opposite = |s: &[i32; D]| found.of(&s.map(|s| -s));
-        if let Some((s, _)) = found
-            .known()
-            .find(|(s, own)| opposite(s).is_some_and(|other| differs(other, *own)))
-        {
-            return Err(format!(
-                "bonds over {s:?} steps weigh other than those back"
             ));
         }
         let offsets: Vec<Offset<D>> = steps
