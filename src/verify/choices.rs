@@ -107,6 +107,46 @@ struct Outcome {
 /// Candidates beside the choice, as shares of its cells.
 const SWEEP: [f64; 4] = [0.5, 0.65, 0.8, 0.9];
 
+/// A candidate is run until that took so many seconds, or so many times; the least time counts, as all else that a machine does only adds.
+const LONG: f64 = 0.1;
+const MOST_RUNS: usize = 10;
+
+/// The keys of a candidate and what its runs took.
+struct Timed {
+    keys: Vec<String>,
+    least: f64,
+    spent: f64,
+    runs: usize,
+}
+
+impl Timed {
+    fn after(keys: Vec<String>, seconds: f64) -> Self {
+        Self {
+            keys,
+            least: seconds,
+            spent: seconds,
+            runs: 1,
+        }
+    }
+
+    fn enough(&self) -> bool {
+        self.spent >= LONG || self.runs >= MOST_RUNS
+    }
+}
+
+/// Runs candidates in turn, so that all see the same of what else the machine does.
+fn repeat(timed: &mut [Timed], mut run: impl FnMut(&[String]) -> Option<f64>) {
+    while timed.iter().any(|t| !t.enough()) {
+        for t in timed.iter_mut().filter(|t| !t.enough()) {
+            t.runs += 1;
+            if let Some(seconds) = run(&t.keys) {
+                t.least = t.least.min(seconds);
+                t.spent += seconds;
+            }
+        }
+    }
+}
+
 fn source(case: &Case, wanted: f64) -> Result<Source, String> {
     let mut source = Source::new(case.name, case.text);
     source
@@ -137,32 +177,38 @@ fn measured(
     let spec = SceneSpec::parse(&finest.1).map_err(|e| e.message().to_owned())?;
     let mut bench = Bench::new(&source(case, case.wanted[0])?, here, &spec);
     let reference = bench
-        .run(&finest.2.reference(case.finer), 0.0)
+        .run(&finest.2.reference(case.finer))
         .ok_or_else(|| bench.refusal.clone().unwrap_or_default())?;
     let quantities = bench.quantities.clone();
     for (wanted, complete, chosen) in &found {
+        let mut timed = Vec::new();
         let mut run = |candidate: &Candidate| {
-            let pilot = bench.run(&chosen.overrides_of(candidate), f64::INFINITY)?;
-            Some((difference(&pilot, &reference, &quantities)?, pilot.seconds))
+            let keys = chosen.overrides_of(candidate);
+            let pilot = bench.run(&keys)?;
+            let error = difference(&pilot, &reference, &quantities)?;
+            let first = timed.is_empty();
+            if first || error <= *wanted {
+                timed.push(Timed::after(keys, pilot.seconds));
+            }
+            Some(error)
         };
-        let (error, seconds) = run(&chosen.candidate).ok_or("the choice does not run")?;
-        let mut cheapest = seconds;
+        let error = run(&chosen.candidate).ok_or("the choice does not run")?;
+        let mut swept = vec![chosen.candidate.clone()];
         for family in chosen.families() {
             for share in SWEEP.iter().chain(&[1.0]) {
                 let candidate = Candidate {
                     family: family.clone(),
                     cells: ((chosen.candidate.cells as f64 * share).round() as usize).max(1),
                 };
-                if candidate == chosen.candidate {
-                    continue;
-                }
-                if let Some((e, s)) = run(&candidate)
-                    && e <= *wanted
-                {
-                    cheapest = cheapest.min(s);
+                if !swept.contains(&candidate) {
+                    run(&candidate);
+                    swept.push(candidate);
                 }
             }
         }
+        repeat(&mut timed, |keys| Some(bench.run(keys)?.seconds));
+        let seconds = timed[0].least;
+        let cheapest = timed.iter().fold(seconds, |least, t| least.min(t.least));
         let outcome = Outcome {
             half: case.half,
             wanted: *wanted,
@@ -303,18 +349,21 @@ mod tests {
         assert!((10..30).contains(&n), "{n}");
         let tau = 2.0 * std::f64::consts::PI;
         let exact = |x: f64| (tau * x).sin() / (tau * tau);
-        let (mut apart, mut size) = (0.0, 0.0);
-        for k in 0..1000 {
-            let x = (k as f64 + 0.5) / 1000.0;
-            let cell = (x * n as f64).floor();
-            let (a, b) = (cell / n as f64, (cell + 1.0) / n as f64);
-            let t = x * n as f64 - cell;
-            let u = exact(a) * (1.0 - t) + exact(b) * t;
-            apart += (u - exact(x)).powi(2);
-            size += exact(x).powi(2);
-        }
-        let error = (apart / size).sqrt();
-        assert!(error <= 0.01, "{error}");
+        let error = |n: f64| {
+            let (mut apart, mut size) = (0.0, 0.0);
+            for k in 0..1000 {
+                let x = (k as f64 + 0.5) / 1000.0;
+                let cell = (x * n).floor();
+                let t = x * n - cell;
+                let u = exact(cell / n) * (1.0 - t) + exact((cell + 1.0) / n) * t;
+                apart += (u - exact(x)).powi(2);
+                size += exact(x).powi(2);
+            }
+            (apart / size).sqrt()
+        };
+        assert!(error(n as f64) <= 0.01, "{n}");
+        // and hardly any coarser mesh does
+        assert!(error((n - 2) as f64) > 0.01, "{n}");
     }
 
     #[test]
@@ -326,6 +375,20 @@ mod tests {
         );
         let error = AnyScene::from_source(&source, Path::new(""), "crack").unwrap_err();
         assert!(error.message().contains("horizon"), "{}", error.message());
+    }
+
+    /// One of 3 ms and then 1 ms runs ten times, one of 60 ms and then 50 ms twice; in turn while both run.
+    #[test]
+    fn the_least_of_several_runs_counts() {
+        let mut timed =
+            [("a", 0.003), ("b", 0.06)].map(|(key, s)| Timed::after(vec![key.to_owned()], s));
+        let mut order = String::new();
+        repeat(&mut timed, |keys| {
+            order.push_str(&keys[0]);
+            Some(if keys[0] == "a" { 0.001 } else { 0.05 })
+        });
+        assert_eq!(order, "abaaaaaaaa");
+        assert_eq!(timed.map(|t| t.least), [0.001, 0.05]);
     }
 
     /// What is typed stays: here the mesh, so that nothing is left to choose but the coupling.

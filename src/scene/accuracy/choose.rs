@@ -5,9 +5,10 @@ use std::path::Path;
 use super::super::error::{SceneError, SceneErrorKind};
 use super::super::source::Source;
 use super::ErrorPrediction;
-use super::estimate::{self, CHOICES, Fit, SAFETY, SPREAD};
+use super::estimate::{CHOICES, SPREAD};
+use super::ladder::{AFFORDABLE, Ladder};
 use super::open::{Asked, Family};
-use super::pilot::{Bench, Pilot};
+use super::pilot::Bench;
 use crate::observe::summary::Choice;
 
 /// A candidate: a family at a spacing.
@@ -63,44 +64,6 @@ impl Chosen {
     }
 }
 
-/// A family with what its pilots told.
-struct Ladder {
-    family: Family,
-    levels: Vec<(f64, Pilot)>,
-    fit: Fit,
-    /// Fewest cells along an edge.
-    fewest: f64,
-}
-
-/// Rungs before the first fit.
-const FIRST: usize = 3;
-
-/// A candidate may be finer than its finest pilot by this factor.
-const BEYOND: f64 = 2.0;
-
-/// No rung is climbed after a pilot of so many seconds.
-const PATIENCE: f64 = 10.0;
-
-/// Fewest cells along an edge: below, no power law holds.
-const FEWEST: f64 = 2.0;
-
-impl Ladder {
-    fn cells(&self, accuracy: f64) -> f64 {
-        self.fit
-            .cells(accuracy / SAFETY)
-            .map_or(f64::INFINITY, |n| (n - 1e-9).ceil().max(self.fewest))
-    }
-
-    /// Work of the candidate, from that of the finest pilot by the usual growth with the number of cells.
-    fn cost(&self, accuracy: f64, dimension: usize) -> f64 {
-        let Some((n, pilot)) = self.levels.last() else {
-            return f64::INFINITY;
-        };
-        let growth = [1.0, 2.4, 4.5][dimension - 1];
-        pilot.work * (self.cells(accuracy) / n).powf(growth)
-    }
-}
-
 fn error(source: &Source, asked: &Asked, why: &str) -> SceneError {
     SceneError::new(
         SceneErrorKind::Conflict,
@@ -118,7 +81,6 @@ pub(super) fn choose(
     directory: &Path,
 ) -> Result<Chosen, SceneError> {
     let families = asked.families();
-    let dimension = asked.spec.dimension();
     let mut bench = Bench::new(source, directory, &asked.spec);
     let done =
         |family: &Family, n: usize, choices, prediction: Option<ErrorPrediction>, seconds| Chosen {
@@ -153,14 +115,13 @@ pub(super) fn choose(
             .collect();
         return Ok(done(&family, 1, choices, None, 0.0));
     }
-    let mut ladders = Vec::new();
-    for family in &families {
-        if let Some(ladder) = climb(asked, family, &mut bench) {
-            ladders.push(ladder);
-        }
-    }
+    let mut left = AFFORDABLE;
+    let mut ladders: Vec<Ladder> = families
+        .iter()
+        .filter_map(|family| Ladder::climb(asked, family, &mut bench))
+        .collect();
     loop {
-        let cost = |l: &Ladder| l.cost(asked.accuracy, dimension);
+        let cost = |l: &Ladder| l.cost(asked.accuracy);
         let Some(k) =
             (0..ladders.len()).min_by(|&a, &b| cost(&ladders[a]).total_cmp(&cost(&ladders[b])))
         else {
@@ -170,83 +131,54 @@ pub(super) fn choose(
             return Err(error(source, asked, &why));
         };
         let ladder = &mut ladders[k];
-        let wanted = ladder.cells(asked.accuracy);
-        let Some((finest, pilot)) = ladder.levels.last() else {
-            continue;
-        };
-        let near = wanted <= BEYOND * finest;
-        if near || pilot.seconds > PATIENCE {
-            if wanted.is_infinite() {
-                return Err(error(source, asked, "its zone limits the error"));
-            }
-            let n = asked.fitting(wanted as usize);
+        if let Some(found) = ladder.found {
             let mut choices = coupling(asked, &ladder.family);
             choices.push(Choice {
-                choice: asked.words(&ladder.family, n),
+                choice: asked.words(&ladder.family, found.cells),
                 why: format!(
                     "error {:.1e} predicted, within a factor of {SPREAD} in {CHOICES} that were measured (order {:.1}), for {:.1e} wanted; the least work of {} kinds, counted in pilots of {:.2} s{}",
-                    ladder.fit.error(n as f64),
+                    found.error,
                     ladder.fit.order,
                     asked.accuracy,
                     families.len(),
                     bench.seconds,
-                    if near { "" } else { "; a finer pilot would take too long" },
+                    if ladder.reaches(found.cells as f64) {
+                        ""
+                    } else {
+                        "; a finer pilot would take too long"
+                    },
                 ),
             });
             let prediction = Some(ErrorPrediction {
                 quantities: bench.quantities.iter().map(|q| q.name()).collect(),
-                error: ladder.fit.error(n as f64),
+                error: found.error,
                 spread: SPREAD,
                 share: CHOICES,
                 order: ladder.fit.order,
-                pilots: ladder.levels.len(),
+                pilots: ladder.pilots(),
                 seconds: bench.seconds,
             });
-            return Ok(done(&ladder.family, n, choices, prediction, bench.seconds));
+            return Ok(done(
+                &ladder.family,
+                found.cells,
+                choices,
+                prediction,
+                bench.seconds,
+            ));
         }
-        let n = asked.fitting(2 * *finest as usize);
-        let ran = bench.run(&asked.overrides(&ladder.family, n), 0.0);
-        let fitted = ran.and_then(|pilot| {
-            ladder.levels.push((n as f64, pilot));
-            let rest = ladder.fit.rest;
-            let fit = estimate::fit(&ladder.levels, &bench.quantities);
-            fit.map(|f| f.with_rest(rest))
-        });
-        match fitted {
-            Some(fit) => ladder.fit = fit,
-            None => drop(ladders.remove(k)),
-        }
-    }
-}
-
-/// The first rungs of a family; `None` if one does not run.
-fn climb(asked: &Asked, family: &Family, bench: &mut Bench) -> Option<Ladder> {
-    let first = asked.first(family);
-    let mut levels = Vec::new();
-    for rung in 0..FIRST {
-        let n = asked.fitting(first << rung);
-        levels.push((n as f64, bench.run(&asked.overrides(family, n), 0.0)?));
-    }
-    let mut fit = estimate::fit(&levels, &bench.quantities)?;
-    if let Some(padding) = family.padding {
-        // what the edge of the zone does shows in one twice as far
-        let wider = Family {
-            padding: Some(2.0 * padding),
-            ..family.clone()
+        let wanted = ladder.cells(asked.accuracy);
+        let kept = if ladder.reaches(wanted) || ladder.slow() {
+            if wanted.is_infinite() {
+                return Err(error(source, asked, "its zone limits the error"));
+            }
+            ladder.look(asked, &mut left, &mut bench)
+        } else {
+            ladder.double(asked, &mut bench)
         };
-        let pilot = bench.run(&asked.overrides(&wider, first), 0.0)?;
-        fit.rest = estimate::difference(&levels[0].1, &pilot, &bench.quantities)?;
+        if kept.is_none() {
+            drop(ladders.remove(k));
+        }
     }
-    Some(Ladder {
-        family: family.clone(),
-        levels,
-        fit,
-        fewest: match asked.horizon {
-            // coarser points would have no neighbours
-            Some(_) if asked.points() => first as f64,
-            _ => FEWEST,
-        },
-    })
 }
 
 /// The coupling as a choice, where it is one.

@@ -10,6 +10,9 @@ const ORDERS: (f64, f64) = (0.8, 2.0);
 /// The order where two runs leave it open.
 const USUAL: f64 = 1.6;
 
+/// Halvings of [`ORDERS`] that leave round-off.
+const HALVINGS: usize = 50;
+
 /// The factor by which predictions are judged; [`CHOICES`] and [`CHECKS`] say how many keep to it.
 pub(crate) const SPREAD: f64 = 3.0;
 
@@ -73,10 +76,7 @@ pub(super) fn fit(levels: &[(f64, Pilot)], quantities: &[Quantity]) -> Option<Fi
 fn of_differences(steps: &[(f64, f64, f64)]) -> Option<Fit> {
     let &(coarse, fine, last) = steps.last()?;
     let order = match steps {
-        [.., (before, _, first), _] => {
-            // differences go as the error of the coarser run
-            ((first / last).ln() / (coarse / before).ln()).clamp(ORDERS.0, ORDERS.1)
-        }
+        [.., (a, b, first), _] => order(first / last, (*a, *b), (coarse, fine)),
         _ => USUAL,
     };
     let scale = last / (coarse.powf(-order) - fine.powf(-order));
@@ -87,6 +87,25 @@ fn of_differences(steps: &[(f64, f64, f64)]) -> Option<Fit> {
     })
 }
 
+/// The order, within [`ORDERS`], whose differences between the first two and between the last two numbers of cells have this ratio.
+fn order(ratio: f64, first: (f64, f64), last: (f64, f64)) -> f64 {
+    // grows with the order
+    let of = |p: f64| {
+        let step = |(a, b): (f64, f64)| a.powf(-p) - b.powf(-p);
+        step(first) / step(last)
+    };
+    let (mut low, mut high) = ORDERS;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if of(middle) < ratio {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,13 +114,14 @@ mod tests {
     fn a_power_law_is_found_from_its_differences() {
         for p in [1.0, 1.5, 2.0] {
             let e = |n: f64| 3.0 * n.powf(-p);
-            let steps: Vec<_> = [(4.0, 8.0), (8.0, 16.0)]
-                .map(|(a, b)| (a, b, e(a) - e(b)))
-                .into();
-            let fit = of_differences(&steps).unwrap();
-            assert!((fit.order - p).abs() < 1e-12, "{fit:?}");
-            assert!((fit.error(40.0) / e(40.0) - 1.0).abs() < 1e-12);
-            assert!((fit.cells(e(25.0)).unwrap() - 25.0).abs() < 1e-9);
+            // steps need not be alike
+            for pairs in [[(4.0, 8.0), (8.0, 16.0)], [(4.0, 8.0), (8.0, 11.0)]] {
+                let steps = pairs.map(|(a, b)| (a, b, e(a) - e(b)));
+                let fit = of_differences(&steps).unwrap();
+                assert!((fit.order - p).abs() < 1e-12, "{fit:?}");
+                assert!((fit.error(40.0) / e(40.0) - 1.0).abs() < 1e-12);
+                assert!((fit.cells(e(25.0)).unwrap() - 25.0).abs() < 1e-9);
+            }
         }
         // an error that stays leaves less for the spacing
         let fit = Fit {

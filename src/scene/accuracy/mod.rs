@@ -6,6 +6,8 @@
 //! | `open.rs` | what a scene leaves open, and the keys of a candidate |
 //! | `pilot.rs` | small runs of a scene, and how far they are from each other |
 //! | `estimate.rs` | error and order from the differences of pilots; the constants, and where they come from |
+//! | `coarsest.rs` | the coarsest candidate whose error is small enough, by looking at candidates themselves |
+//! | `ladder.rs` | a family of candidates, with runs of it from coarse to fine |
 //! | `choose.rs` | the cheapest candidate whose predicted error is small enough |
 //!
 //! Errors are those of `bondline trade`: relative root mean square of the displacement along the scene's lines and probes, over time
@@ -13,7 +15,9 @@
 //! length of the material, and errors are against the same horizon with many more points.
 
 mod choose;
+mod coarsest;
 mod estimate;
+mod ladder;
 mod open;
 mod pilot;
 
@@ -150,7 +154,7 @@ pub fn predicted_error(
     }
     factors.sort_by(|a, b| b.total_cmp(a));
     for f in factors {
-        match bench.run(&base.overrides(&base.scaled(f)), f64::INFINITY) {
+        match bench.run(&base.overrides(&base.scaled(f))) {
             Some(pilot) => levels.push((1.0 / base.coarsened(f), pilot)),
             None => levels.clear(),
         }

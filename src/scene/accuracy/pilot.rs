@@ -63,9 +63,6 @@ pub(crate) struct Bench {
     pub refusal: Option<String>,
 }
 
-/// Runs below this are repeated once, and the faster one counts.
-const SHORT: f64 = 0.2;
-
 impl Bench {
     /// Pilots of `source`, of which `spec` is a complete version.
     pub fn new(source: &Source, directory: &Path, spec: &SceneSpec) -> Self {
@@ -80,33 +77,21 @@ impl Bench {
         }
     }
 
-    /// Runs the scene with these keys; `None` if it does not run. Runs shorter than `repeat` and [`SHORT`] are repeated.
-    pub fn run(&mut self, overrides: &[String], repeat: f64) -> Option<Pilot> {
-        let mut best: Option<Pilot> = None;
-        for _ in 0..2 {
-            match self.once(overrides) {
-                Ok(pilot) => {
-                    self.seconds += pilot.seconds;
-                    let short = pilot.seconds < SHORT.min(repeat);
-                    if best.as_ref().is_none_or(|b| pilot.seconds < b.seconds) {
-                        best = Some(pilot);
-                    }
-                    if !short {
-                        break;
-                    }
+    /// Runs the scene with these keys; `None` if it does not run.
+    pub fn run(&mut self, overrides: &[String]) -> Option<Pilot> {
+        match self.once(overrides) {
+            Ok(pilot) => {
+                self.seconds += pilot.seconds;
+                if self.quantities.is_empty() {
+                    self.quantities = pilot.measured.quantities();
                 }
-                Err(why) => {
-                    self.refusal = Some(why);
-                    return None;
-                }
+                Some(pilot)
+            }
+            Err(why) => {
+                self.refusal = Some(why);
+                None
             }
         }
-        if self.quantities.is_empty()
-            && let Some(pilot) = &best
-        {
-            self.quantities = pilot.measured.quantities();
-        }
-        best
     }
 
     fn once(&self, overrides: &[String]) -> Result<Pilot, String> {
