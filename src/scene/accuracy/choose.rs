@@ -173,7 +173,7 @@ pub(super) fn choose(
             }
             ladder.look(asked, &mut left, &mut bench)
         } else {
-            ladder.double(asked, &mut bench)
+            ladder.rise(asked, &mut bench)
         };
         if kept.is_none() {
             drop(ladders.remove(k));

@@ -10,8 +10,11 @@ const ORDERS: (f64, f64) = (0.8, 2.0);
 /// The order where two runs leave it open.
 const USUAL: f64 = 1.6;
 
-/// Halvings of [`ORDERS`] that leave round-off.
-const HALVINGS: usize = 50;
+/// Runs that are fitted at most: coarser ones are too far from a power law.
+const MOST: usize = 4;
+
+/// Smaller and smaller neighbourhoods in which the order is looked for.
+const ZOOMS: usize = 50;
 
 /// The factor by which predictions are judged; [`CHOICES`] and [`CHECKS`] say how many keep to it.
 pub(crate) const SPREAD: f64 = 3.0;
@@ -63,47 +66,49 @@ pub(crate) fn difference(coarse: &Pilot, fine: &Pilot, quantities: &[Quantity]) 
         .try_fold(ROUND_OFF, |most, e| Some(e?.max(most)))
 }
 
-/// Fits runs in the order of their cells along an edge; `None` for fewer than two that can be compared.
+/// Fits runs in the order of their cells along an edge, the finest [`MOST`] of them; `None` for fewer than two that can be compared.
 pub(super) fn fit(levels: &[(f64, Pilot)], quantities: &[Quantity]) -> Option<Fit> {
-    let steps: Vec<(f64, f64, f64)> = levels
-        .windows(2)
-        .map(|w| Some((w[0].0, w[1].0, difference(&w[0].1, &w[1].1, quantities)?)))
+    let ((finest, reference), coarser) = levels.split_last()?;
+    let distances: Vec<(f64, f64)> = coarser[coarser.len().saturating_sub(MOST - 1)..]
+        .iter()
+        .map(|(n, pilot)| Some((*n, difference(pilot, reference, quantities)?)))
         .collect::<Option<_>>()?;
-    of_differences(&steps)
+    of_distances(&distances, *finest)
 }
 
-/// From `(n, finer n, difference)`.
-fn of_differences(steps: &[(f64, f64, f64)]) -> Option<Fit> {
-    let &(coarse, fine, last) = steps.last()?;
-    let order = match steps {
-        [.., (a, b, first), _] => order(first / last, (*a, *b), (coarse, fine)),
-        _ => USUAL,
+/// From `(n, distance from the finest)`: least squares of logarithms. All distances are from the finest run, as errors of runs whose nodes lie
+/// elsewhere need not point the same way, and the finest has the least of its own.
+fn of_distances(distances: &[(f64, f64)], finest: f64) -> Option<Fit> {
+    if distances.is_empty() {
+        return None;
+    }
+    // logarithm of the scale, and how far distances are from it
+    let scales = |order: f64| {
+        let each = distances
+            .iter()
+            .map(|(n, d)| d.ln() - (n.powf(-order) - finest.powf(-order)).ln());
+        let mean = each.clone().sum::<f64>() / distances.len() as f64;
+        (mean, each.map(|s| (s - mean).powi(2)).sum::<f64>())
     };
-    let scale = last / (coarse.powf(-order) - fine.powf(-order));
+    let mut order = USUAL;
+    if distances.len() > 1 {
+        let mut half = 0.5 * (ORDERS.1 - ORDERS.0);
+        order = ORDERS.0 + half;
+        for _ in 0..ZOOMS {
+            order = [-1.0, -0.5, 0.0, 0.5, 1.0]
+                .map(|k| (order + k * half).clamp(ORDERS.0, ORDERS.1))
+                .into_iter()
+                .min_by(|&a, &b| scales(a).1.total_cmp(&scales(b).1))
+                .unwrap_or(order);
+            half *= 0.6;
+        }
+    }
+    let scale = scales(order).0.exp();
     scale.is_finite().then_some(Fit {
         scale,
         order,
         rest: 0.0,
     })
-}
-
-/// The order, within [`ORDERS`], whose differences between the first two and between the last two numbers of cells have this ratio.
-fn order(ratio: f64, first: (f64, f64), last: (f64, f64)) -> f64 {
-    // grows with the order
-    let of = |p: f64| {
-        let step = |(a, b): (f64, f64)| a.powf(-p) - b.powf(-p);
-        step(first) / step(last)
-    };
-    let (mut low, mut high) = ORDERS;
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if of(middle) < ratio {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
 }
 
 #[cfg(test)]
@@ -115,12 +120,12 @@ mod tests {
         for p in [1.0, 1.5, 2.0] {
             let e = |n: f64| 3.0 * n.powf(-p);
             // steps need not be alike
-            for pairs in [[(4.0, 8.0), (8.0, 16.0)], [(4.0, 8.0), (8.0, 11.0)]] {
-                let steps = pairs.map(|(a, b)| (a, b, e(a) - e(b)));
-                let fit = of_differences(&steps).unwrap();
-                assert!((fit.order - p).abs() < 1e-12, "{fit:?}");
-                assert!((fit.error(40.0) / e(40.0) - 1.0).abs() < 1e-12);
-                assert!((fit.cells(e(25.0)).unwrap() - 25.0).abs() < 1e-9);
+            for coarser in [&[4.0, 8.0][..], &[8.0, 11.0], &[4.0, 6.0, 9.0]] {
+                let distances: Vec<_> = coarser.iter().map(|&n| (n, e(n) - e(13.0))).collect();
+                let fit = of_distances(&distances, 13.0).unwrap();
+                assert!((fit.order - p).abs() < 1e-7, "{fit:?}");
+                assert!((fit.error(40.0) / e(40.0) - 1.0).abs() < 1e-6, "{fit:?}");
+                assert!((fit.cells(e(25.0)).unwrap() - 25.0).abs() < 1e-4);
             }
         }
         // an error that stays leaves less for the spacing
@@ -131,6 +136,9 @@ mod tests {
         };
         assert_eq!(fit.cells(0.01), None);
         assert!((fit.cells(0.02).unwrap() - 100.0).abs() < 1e-9);
-        assert_eq!(of_differences(&[]), None);
+        assert_eq!(of_distances(&[], 8.0), None);
+        // one distance: the usual order
+        let fit = of_distances(&[(4.0, 4f64.powf(-1.6) - 8f64.powf(-1.6))], 8.0).unwrap();
+        assert!((fit.error(8.0) - 8f64.powf(-1.6)).abs() < 1e-15);
     }
 }

@@ -10,8 +10,8 @@ use crate::trade::Base;
 /// Rungs before the first fit.
 const FIRST: usize = 3;
 
-/// A candidate may be finer than its finest pilot by this factor.
-const BEYOND: f64 = 2.0;
+/// A rung has at most so many times the work of the one below, and a candidate of the finest.
+const RUNG: f64 = 6.0;
 
 /// The finest pilot is to have this share of the wanted error, where that is [`AFFORDABLE`]: so much of a candidate's error is not measured.
 const SHARE: f64 = 0.2;
@@ -19,8 +19,11 @@ const SHARE: f64 = 0.2;
 /// A pilot that is finer by less is not worth its run.
 const STEP: f64 = 1.25;
 
-/// Work of all pilots beyond the first fits, in counted seconds.
+/// Work of all pilots beyond the fits, in counted seconds: a matter of patience.
 pub(super) const AFFORDABLE: f64 = 1.0;
+
+/// So many candidates are to be paid for beside a finer pilot.
+const LOOKED: f64 = 2.0;
 
 /// No rung is climbed after a pilot of so many seconds.
 const PATIENCE: f64 = 10.0;
@@ -55,9 +58,11 @@ impl Ladder {
     pub fn climb(asked: &Asked, family: &Family, bench: &mut Bench) -> Option<Self> {
         let first = asked.first(family);
         let mut levels = Vec::new();
-        for rung in 0..FIRST {
-            let n = asked.fitting(first << rung);
+        let growth = growth(&asked.spec);
+        let mut n = asked.fitting(first);
+        while levels.len() < FIRST {
             levels.push((n as f64, bench.run(&asked.overrides(family, n))?));
+            n = asked.fitting(above(n, growth));
         }
         let mut fit = estimate::fit(&levels, &bench.quantities)?;
         if let Some(padding) = family.padding {
@@ -74,7 +79,7 @@ impl Ladder {
             levels,
             fit,
             found: None,
-            growth: growth(&asked.spec),
+            growth,
             fewest: match asked.horizon {
                 // coarser points would have no neighbours
                 Some(_) if asked.points() => first as f64,
@@ -101,7 +106,7 @@ impl Ladder {
 
     /// Whether the fit may be trusted for so many cells.
     pub fn reaches(&self, n: f64) -> bool {
-        n <= BEYOND * self.finest()
+        n <= rung(self.growth) * self.finest()
     }
 
     /// Whether no finer rung is to be climbed.
@@ -126,9 +131,10 @@ impl Ladder {
         }
     }
 
-    /// Adds a pilot of twice the cells; `None` if it does not run.
-    pub fn double(&mut self, asked: &Asked, bench: &mut Bench) -> Option<()> {
-        self.refine(asked, asked.fitting(2 * self.finest() as usize), bench)
+    /// Adds the next rung; `None` if it does not run.
+    pub fn rise(&mut self, asked: &Asked, bench: &mut Bench) -> Option<()> {
+        let n = above(self.finest() as usize, self.growth);
+        self.refine(asked, asked.fitting(n), bench)
     }
 
     fn refine(&mut self, asked: &Asked, n: usize, bench: &mut Bench) -> Option<()> {
@@ -139,14 +145,16 @@ impl Ladder {
         Some(())
     }
 
-    /// Cells of the pilot whose error is [`SHARE`] of the wanted one, or of as fine a one as `left` pays; `None` where that is hardly finer than
-    /// the finest, or than the candidate.
+    /// Cells of the pilot whose error is [`SHARE`] of the wanted one, or of as fine a one as `left` pays beside candidates; `None` where that
+    /// is hardly finer than the finest, or than the candidate.
     fn finer(&self, asked: &Asked, left: f64) -> Option<usize> {
         let wanted = self.fit.cells(SHARE * asked.accuracy)?;
         let finest = self.finest();
+        let guess = self.cells(asked.accuracy);
+        let left = (left - LOOKED * self.work(guess)).max(0.0);
         let paid = finest * (left / self.work(finest)).powf(1.0 / self.growth);
         let n = wanted.min(paid);
-        let enough = STEP * finest.max(self.cells(asked.accuracy));
+        let enough = STEP * finest.max(guess);
         (n >= enough).then(|| asked.fitting(n as usize))
     }
 
@@ -155,7 +163,7 @@ impl Ladder {
     /// The error of a candidate is its difference from the finest pilot and what the fit says of that one; only the latter wants a reserve. What
     /// `left` does not pay is left to the fit.
     pub fn look(&mut self, asked: &Asked, left: &mut f64, bench: &mut Bench) -> Option<()> {
-        while let Some(n) = self.finer(asked, 0.5 * *left) {
+        while let Some(n) = self.finer(asked, *left) {
             *left -= self.work(n as f64);
             self.refine(asked, n, bench)?;
         }
@@ -220,5 +228,33 @@ fn growth(spec: &SceneSpec) -> f64 {
         dimension as f64 + 1.0
     } else {
         [1.0, 2.4, 4.5][dimension - 1]
+    }
+}
+
+/// Cells along an edge over those of the rung below: two at most, less where work grows fast, as orders of rungs that are near to the candidate
+/// are nearer to its own.
+fn rung(growth: f64) -> f64 {
+    RUNG.powf(1.0 / growth).min(2.0)
+}
+
+fn above(n: usize, growth: f64) -> usize {
+    ((n as f64 * rung(growth)).round() as usize).max(n + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Six times the work: (3/2)^4.5 = 6.2 and (9/6)^4.5, (13/9)^4.5 = 5.2.
+    #[test]
+    fn rungs_are_nearer_where_work_grows_faster() {
+        let ladder = |first, growth| {
+            let rungs = std::iter::successors(Some(first), |&n| Some(above(n, growth)));
+            rungs.take(4).collect::<Vec<_>>()
+        };
+        assert_eq!(ladder(8, 1.0), [8, 16, 32, 64]);
+        assert_eq!(ladder(4, 2.4), [4, 8, 16, 32]);
+        assert_eq!(ladder(4, 4.5), [4, 6, 9, 13]);
+        assert_eq!(ladder(1, 4.5), [1, 2, 3, 4]);
     }
 }
