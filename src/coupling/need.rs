@@ -80,6 +80,8 @@ pub struct Need {
     pub all_local: f64,
     /// What remains of it outside of the cells of `error`.
     pub remaining: f64,
+    /// The part of the square of `all_local` that each cell has.
+    pub squares: Vec<f64>,
     /// The largest principal strain; zero if no bond breaks.
     pub largest_strain: f64,
 }
@@ -95,6 +97,18 @@ pub fn gradient_ratio<const D: usize>(lambda: impl Fn(f64) -> f64, horizon: f64)
             .sum()
     };
     5.0 / 12.0 / (D + 4) as f64 * moment(6) / moment(4)
+}
+
+impl Need {
+    /// What remains of the estimated error of the local model outside of a set of cells, one entry per cell, relative in the norm of energy.
+    pub fn remaining_outside(&self, cells: &[bool]) -> f64 {
+        let outside = self
+            .squares
+            .iter()
+            .zip(cells)
+            .filter(|(_, inside)| !**inside);
+        outside.map(|(square, _)| square).sum::<f64>().sqrt()
+    }
 }
 
 impl<const D: usize> Criteria<'_, D> {
@@ -158,7 +172,12 @@ impl<const D: usize> Criteria<'_, D> {
                 false => 0.0,
             })
             .collect();
-        let (error, all_local, remaining) = worst(&wrong, own.iter().sum(), self.tolerance);
+        let whole = own.iter().sum();
+        let (error, all_local, remaining) = worst(&wrong, whole, self.tolerance);
+        let is_known = all_local > 0.0;
+        wrong
+            .iter_mut()
+            .for_each(|w| *w = if is_known { *w / whole } else { 0.0 });
         Need {
             error,
             stretch: (0..count)
@@ -169,6 +188,7 @@ impl<const D: usize> Criteria<'_, D> {
                 .collect(),
             all_local,
             remaining,
+            squares: wrong,
             largest_strain: largest.iter().copied().fold(0.0, f64::max),
         }
     }

@@ -82,6 +82,20 @@ fn a_field_of_the_fourth_degree_has_the_error_of_its_closed_form() {
         "{} {inner}",
         found.all_local
     );
+    // outside of a set: the closed form over the cells that are left, here the right third without its end
+    let left: Vec<bool> = (0..n).map(|i| !(53..n - 2).contains(&i)).collect();
+    let sum: f64 = (0..n)
+        .filter(|&i| !left[i])
+        .map(|i| {
+            let x = middle(i);
+            let gradient = 24.0 * ratio * delta * delta * x;
+            gradient.powi(2).min((4.0 * x.powi(3) + x * h * h).powi(2))
+        })
+        .sum();
+    let (outside, exact) = (found.remaining_outside(&left), (sum / whole).sqrt());
+    assert!((outside / exact - 1.0).abs() < 1e-9, "{outside} {exact}");
+    assert!((found.remaining_outside(&vec![false; n]) / found.all_local - 1.0).abs() < 1e-12);
+    assert!((found.remaining_outside(&found.error) / found.remaining - 1.0).abs() < 1e-9);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //!
 //! 1. Cells at cracks, at voids and at notches are marked, the last for good only where bonds break. What is marked is padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled.
 //! 2. A static scene is solved with that zone, with elements alone where it is empty. Elements in which [`Criteria`](crate::coupling::need::Criteria) finds the local model wrong or a bond near its end are marked too.
-//! 3. Where they lie outside, or ask for much less than a zone around notches, the zone is theirs and the scene is solved again. Else the solution is that of the scene, and is kept: the run writes it without solving again. A look costs its search only.
+//! 3. Where they lie outside, the zone is theirs and the scene is solved again; one around notches only where it leaves clearly more of the error than the tolerance, or is much larger than theirs. Else the solution is that of the scene, and is kept: the run writes it without solving again. A look costs its search only.
 //!
 //! A load that grows is looked at once, at its end, with elements alone in which cells at cracks and voids carry next to nothing; a motion at its start.
 //!
@@ -172,9 +172,12 @@ struct Search<'a, const D: usize> {
 const ROUNDS: usize = 4;
 
 /// Horizons around a notch that its strains are taken to ask for, before they are known; the slit plate asks for a sixth to a third.
-const GUESS: f64 = 0.34;
+const GUESS: f64 = 0.17;
 
-/// A zone around notches is kept if the solution with it asks for no more cells, and for this share of them: smaller ones cost as much, and another solution besides.
+/// Times the tolerance that a zone may leave of the error if cells around notches were taken for those asked for: another solution takes longer than all that it could save.
+const SETTLED: f64 = 1.2;
+
+/// A zone around notches is kept if the solution with it asks for this share of its cells: smaller ones cost as much, and another solution besides.
 const SPARE: usize = 2;
 
 impl<const D: usize> Search<'_, D> {
@@ -229,18 +232,23 @@ impl<const D: usize> Search<'_, D> {
                 }
                 placed.nonlocal = grown;
             } else {
-                let need = self.need(&self.marked.cut, &kept.everywhere())?;
-                let asked = self.zone(&either(&need.error, &need.stretch));
+                let mut need = self.need(&self.marked.cut, &kept.everywhere())?;
+                let wanted = either(&need.error, &need.stretch);
+                let asked = self.zone(&wanted);
                 if !asked.contains(&true) {
                     return self.at_once();
                 }
                 let count = |cells: &[bool]| cells.iter().filter(|c| **c).count();
-                let holds = asked.iter().zip(&placed.nonlocal).all(|(a, p)| *p || !a);
+                let remaining = need.remaining_outside(&criteria);
+                let are_in = |(s, taken): (&bool, &bool)| *taken || !s;
+                let holds = remaining <= SETTLED * self.options.tolerance
+                    && need.stretch.iter().zip(&criteria).all(are_in);
                 let spare = count(&placed.nonlocal) <= SPARE * count(&asked);
                 if (holds && spare) || round == ROUNDS {
+                    (need.error, need.remaining) = (criteria, remaining);
                     return Ok(self.placed(placed.nonlocal, &need, Some(kept)));
                 }
-                placed.nonlocal = asked;
+                (criteria, placed.nonlocal) = (wanted, asked);
             }
             round += 1;
         }
