@@ -67,7 +67,14 @@ impl<const D: usize> Model<D> {
             .iter()
             .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
         let reaches: Vec<f64> = cloud.horizon.iter().map(|&d| p.reach(d)).collect();
-        let mut families = Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?;
+        let one = reaches.first().filter(|d| reaches.iter().all(|r| r == *d));
+        let known = one.filter(|_| cloud.is_lattice).and_then(|reach| {
+            Families::search_lattice(&cloud.position, cloud.spacing, *reach, TIE_TOLERANCE)
+        });
+        let mut families = match known {
+            Some(families) => families,
+            None => Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?,
+        };
         let factors = LatticeFactors::new(p, &cloud)?;
         factors.drop_without_share(&cloud, &mut families);
         let surface = match (self.interface, p.surfaces) {

@@ -166,7 +166,7 @@ impl<const D: usize> Placement<'_, D> {
         let in_region = |x: &Vector<D>| {
             by_zone
                 .iter()
-                .find(|(_, l)| l.locate(mesh, x, tolerance).is_some())
+                .find(|(_, l)| l.holds(mesh, x, tolerance))
                 .map(|(z, _)| *z)
         };
 
@@ -243,9 +243,7 @@ impl<const D: usize> Placement<'_, D> {
                             }
                             let inside = in_region(&s).is_some();
                             here += usize::from(inside);
-                            body += usize::from(
-                                inside || elements.locate(mesh, &s, tolerance).is_some(),
-                            );
+                            body += usize::from(inside || elements.holds(mesh, &s, tolerance));
                         });
                         volume = whole * body as f64 / count as f64;
                         share = whole * here as f64 / count as f64;

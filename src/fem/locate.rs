@@ -151,6 +151,26 @@ impl<const D: usize> Locator<D> {
         best
     }
 
+    /// Whether a cell holds `x`, as [`Locator::locate`] has it: no more than a look at the cell's box where `x` lies inside of a line, a rectangle or a cuboid along the axes.
+    pub fn holds(&self, mesh: &Mesh<D>, x: &Vector<D>, tolerance: f64) -> bool {
+        if self.cells.is_empty() || !x.iter().all(|x| x.is_finite()) {
+            return false;
+        }
+        let margin = Vector::repeat(tolerance * self.largest);
+        let (first, last) = (self.index(&(x - margin)), self.index(&(x + margin)));
+        let mut is_held = false;
+        for_grid(&first, &last, &self.counts, |n| {
+            let cells = &self.cells[self.offsets[n] as usize..self.offsets[n + 1] as usize];
+            let holds = |c: usize| {
+                let (low, high) = bounding_box(mesh, c);
+                let inside = (0..D).all(|i| x[i] > low[i] && x[i] < high[i]);
+                (inside && is_box(mesh, c, &low, &high)) || located(mesh, c, x, tolerance).is_some()
+            };
+            is_held = is_held || cells.iter().any(|&c| holds(c as usize));
+        });
+        is_held
+    }
+
     /// Bin index of a point, per axis; points outside belong to the bins at the rim.
     fn index(&self, x: &Vector<D>) -> [usize; D] {
         std::array::from_fn(|i| {
@@ -201,6 +221,13 @@ fn bounding_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> (Vector<D>, Vector<
         high = high.sup(&mesh.nodes[n as usize]);
     }
     (low, high)
+}
+
+/// Whether a cell fills its bounding box: as many nodes as the box has corners, and each at one.
+fn is_box<const D: usize>(mesh: &Mesh<D>, c: usize, low: &Vector<D>, high: &Vector<D>) -> bool {
+    let nodes = mesh.cell(c);
+    let at_corner = |x: &Vector<D>| (0..D).all(|i| x[i] == low[i] || x[i] == high[i]);
+    nodes.len() == 1 << D && nodes.iter().all(|&n| at_corner(&mesh.nodes[n as usize]))
 }
 
 /// The point in cell `c`, unless it lies further outside than the tolerance.
@@ -275,6 +302,13 @@ mod tests {
                 assert!((reference_of(&mesh, c, &x).unwrap() - xi).amax() < 1e-13);
                 let found = locator.locate(&mesh, &x, 1e-9).unwrap();
                 assert_eq!((found.cell, found.nodes), (c, n));
+                assert!(locator.holds(&mesh, &x, 1e-9));
+                for way in [0.7, 1.4] {
+                    // somewhere around, within a cell or outside of all
+                    let x = x + Vector::from_fn(|i, _| way * (noise(c, i) - 0.3));
+                    let found = locator.locate(&mesh, &x, 1e-9).is_some();
+                    assert_eq!(locator.holds(&mesh, &x, 1e-9), found);
+                }
                 for (found, weight) in found.shape.iter().zip(&shape) {
                     assert!((found - weight).abs() < 1e-13);
                 }
@@ -311,6 +345,9 @@ mod tests {
             let outside = Vector::repeat(1.0 + 1e-6);
             assert!(locator.locate(&mesh, &outside, 1e-9).is_none());
             assert!(locator.locate(&mesh, &outside, 1e-3).is_some());
+            assert!(!locator.holds(&mesh, &outside, 1e-9));
+            assert!(locator.holds(&mesh, &outside, 1e-3));
+            assert!(!locator.holds(&mesh, &Vector::repeat(f64::NAN), 1e-9));
             assert!(
                 locator
                     .locate(&mesh, &Vector::repeat(f64::NAN), 1e-9)

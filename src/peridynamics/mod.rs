@@ -24,6 +24,7 @@ pub mod fracture;
 mod grid;
 pub mod influence;
 pub mod kernel;
+mod lattice_families;
 pub mod law;
 pub(crate) mod least_change;
 pub mod lps;

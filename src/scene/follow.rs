@@ -16,8 +16,11 @@ const REACH: f64 = 2.0;
 /// Horizons more with an LPS, whose bonds act through the dilatations of both ends.
 const DILATATION: f64 = 1.0;
 
-/// Padding in horizons, if the scene leaves it out: in `examples/branching_moving.toml` the path keeps within 1 mm of full peridynamics, and the zone has at most 37 % of the plate.
-const PADDING: f64 = 6.0;
+/// Padding in horizons, if the scene leaves it out: in `examples/branching_moving.toml` the path keeps within 1 mm of full peridynamics, and the zone has at most 34 % of the plate.
+const PADDING: f64 = 5.0;
+
+/// Paddings that it reaches ahead of the tips of cracks, if the scene leaves that out: fewer changes, and points take the place of elements before the waves of the tip are there.
+const AHEAD: f64 = 1.5;
 
 /// Fraction of the critical stretch from which a cell is wanted, if the scene leaves it out: from 0.5 on waves of the branching plate mark most of it at the end.
 const STRETCH: f64 = 0.8;
@@ -29,6 +32,8 @@ pub struct Follow {
     pub stretch: f64,
     /// How far the zone reaches beyond such cells when it changes \[m\].
     pub padding: f64,
+    /// How far it reaches ahead of the tips of cracks when it changes \[m\].
+    pub ahead: f64,
     /// How far it reaches beyond damage, cracks and voids, at all times \[m\].
     pub reach: f64,
     /// Cells that stay elements whatever happens, one entry per cell.
@@ -140,6 +145,19 @@ pub(crate) fn follow<const D: usize>(
         )?,
         None => PADDING * horizon,
     };
+    let ahead = match &follow.ahead {
+        Some(w) => check::within(
+            "zones.follow.ahead",
+            w,
+            w.value >= padding && w.value.is_finite(),
+            &format!("must be at least the padding, {padding}"),
+            &format!(
+                "the zone has {} ahead of the tips if it is left out; more makes fewer changes",
+                AHEAD * padding
+            ),
+        )?,
+        None => AHEAD * padding,
+    };
     let mut barred: Vec<bool> = (0..mesh.cell_count()).map(|c| !is_peridynamic(c)).collect();
     if let Some(SkinSpec::FreeSurfaces) = spec.zones.skin {
         let skin = mesh.cells_at_boundary();
@@ -148,6 +166,7 @@ pub(crate) fn follow<const D: usize>(
     Ok(Some(Follow {
         stretch,
         padding,
+        ahead,
         reach,
         barred,
     }))

@@ -70,9 +70,19 @@ fn a_crack_that_leaves_its_first_zone_runs_as_in_full_peridynamics() {
             "{}",
             text(s)
         );
+        // a zone less than twice as large as it would be gives nothing up
+        assert_eq!(s["removed"], 0, "{}", text(s));
     }
     let most = motion["nonlocal_share"][1].as_f64().unwrap();
     assert!(most < 0.45, "{most}");
+    let ahead = ["plate.toml", "--output", "ahead", "--json"];
+    let said = run(
+        folder.path(),
+        &[&ahead[..], &["--set", "zones.follow.ahead=15"]].concat(),
+    );
+    let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let wider = summary["motion"]["nonlocal_share"][1].as_f64().unwrap();
+    assert!(wider > 1.1 * most, "{wider} {most}");
 
     run(
         folder.path(),
@@ -172,6 +182,11 @@ fn what_cannot_follow_is_refused() {
             "follow = { padding = 5 }",
             "follow = { padding = 1.5 }",
             "two horizons",
+        ),
+        (
+            "follow = { padding = 5 }",
+            "follow = { padding = 5, ahead = 4 }",
+            "at least the padding",
         ),
         (
             "follow = { padding = 5 }",

@@ -22,11 +22,16 @@ struct Account<const D: usize> {
 
 impl<const D: usize> Account<D> {
     fn of(model: &Model<D>, system: &dyn Dynamic, state: &State) -> Self {
+        Self::with(model, system, state, system.stored_energy(&state.u))
+    }
+
+    /// With an energy of the displacement that is known.
+    fn with(model: &Model<D>, system: &dyn Dynamic, state: &State, stored: f64) -> Self {
         let (low, high) = model.mesh.bounds();
         let middle = (low + high) * 0.5;
         let mut account = Self {
             kinetic: 0.0,
-            stored: system.stored_energy(&state.u),
+            stored,
             momentum: Vector::zeros(),
             angular: vec![0.0; D * (D - 1) / 2],
             scale: 0.0,
@@ -114,10 +119,11 @@ impl<const D: usize> Leaving<D> {
             is_held: &is_held,
         };
         fresh.push(&lost, &mut state.v);
-        let pushed = Account::of(model, system, &state);
+        // only velocities change from here on
+        let pushed = Account::with(model, system, &state, fitted.stored);
         let energy = self.before.kinetic + self.before.stored - pushed.kinetic - pushed.stored;
         let restored = fresh.heat(energy, &mut state.v);
-        let after = Account::of(model, system, &state);
+        let after = Account::with(model, system, &state, fitted.stored);
         let now = nonlocal(model);
         let changed = |from: bool| {
             let pairs = self.was.iter().zip(&now);

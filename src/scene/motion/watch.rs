@@ -12,14 +12,9 @@ use crate::tensor::{Tensor, Vector};
 /// Part of the padding beyond the reach that the fastest crack may cross between two looks; the rest is how far it runs before the zone has to change.
 const CROSSED: f64 = 0.3;
 
-/// The zone also changes where it is this many times larger than it would be.
+/// The zone also changes where it is this many times larger than it would be, and one that grows keeps all its cells until then: a change takes as long as some hundred steps, and
+/// where waves come and go the same cells would be given up and taken back.
 const TOO_LARGE: f64 = 2.0;
-
-/// A zone that changes keeps all its cells if it is at most this many times larger for it: where waves come and go the same cells would be given up and taken back.
-const KEPT: f64 = 1.15;
-
-/// The zone reaches farther ahead of the tip of a crack, by this many paddings: fewer changes, and points take the place of elements before the waves of the tip are there.
-const AHEAD: f64 = 1.5;
 
 /// A stretched cell is at the front of the damage within this many reaches of it if the middle of that is [`AIMED`] of this distance away: half of it at the tip of a straight crack, nothing within its path.
 const SEEN: f64 = 1.5;
@@ -192,7 +187,7 @@ impl<'a, const D: usize> Watch<'a, D> {
         // a zone that shrinks keeps what lies ahead too, or it would soon have to grow again
         self.mark_ahead(&hot, &damaged, &mut next);
         let both: Vec<bool> = next.iter().zip(&now).map(|(a, b)| *a || *b).collect();
-        if count(&both) <= KEPT * count(&next) {
+        if short && count(&both) <= TOO_LARGE * count(&next) {
             next = both;
         }
         self.close(&mut next);
@@ -299,9 +294,13 @@ impl<'a, const D: usize> Watch<'a, D> {
 
     /// Marks what lies ahead of the tips of cracks: groups of cells at the front, moved away from the damage behind them.
     fn mark_ahead(&self, front: &[bool], damaged: &[bool], marked: &mut [bool]) {
-        let Follow { reach, padding, .. } = *self.follow;
+        let Follow {
+            reach,
+            padding,
+            ahead,
+            ..
+        } = *self.follow;
         let beside = 0.5 * (reach + self.travel + padding);
-        let ahead = AHEAD * padding;
         let mut is_left = front.to_vec();
         for first in 0..front.len() {
             if !std::mem::take(&mut is_left[first]) {

@@ -62,9 +62,12 @@ pub struct FollowSpec {
     /// Fraction of the critical stretch from which on a cell is wanted; 0.8 if left out.
     #[serde(default)]
     pub stretch: Option<Number>,
-    /// How far the zone reaches beyond such cells when it changes; six horizons if left out.
+    /// How far the zone reaches beyond such cells when it changes; five horizons if left out.
     #[serde(default)]
     pub padding: Option<Number>,
+    /// How far it reaches ahead of the tips of cracks when it changes; 1.5 paddings if left out.
+    #[serde(default)]
+    pub ahead: Option<Number>,
 }
 
 /// A part of the nonlocal zone with a horizon and a lattice of its own.

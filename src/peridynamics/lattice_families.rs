@@ -1,0 +1,181 @@
+//! Families of points of one lattice and one horizon: a table of the points by their places on the lattice takes the search's place.
+
+use rayon::prelude::*;
+
+use super::families::Families;
+use crate::tensor::Vector;
+
+/// How far from its place a point may lie, in spacings: far less than lengths of bonds may differ from the horizon and still count as that.
+const OFF_LATTICE: f64 = 1e-9;
+
+/// Most places of the table per point; a cloud that fills less of its box is searched.
+const PLACES_PER_POINT: usize = 16;
+
+const NONE: u32 = u32::MAX;
+
+impl Families {
+    /// As [`Families::search`] with one horizon for all, of points that lie on a lattice of the given spacing; `None` if they do not, or fill too little of their box.
+    ///
+    /// Units: positions, spacing and horizon \[m\].
+    pub fn search_lattice<const D: usize>(
+        points: &[Vector<D>],
+        spacing: f64,
+        horizon: f64,
+        tie_tolerance: f64,
+    ) -> Option<Self> {
+        let steps = horizon / spacing * (1.0 + tie_tolerance);
+        if !(0.0..1e3).contains(&steps) || points.len() >= NONE as usize {
+            return None;
+        }
+        let reach = steps as usize;
+        let first = *points.first()?;
+        let low = points.iter().fold(first, |a, x| a.inf(x));
+        let high = points.iter().fold(first, |a, x| a.sup(x));
+        let counts = ((high - low) / spacing).map(|n| n.round() + 1.0 + 2.0 * reach as f64);
+        let total: f64 = counts.iter().product();
+        if total.is_nan() || total > (PLACES_PER_POINT * points.len() + 100_000) as f64 {
+            return None;
+        }
+        let counts: [usize; D] = std::array::from_fn(|a| counts[a] as usize);
+        let flat = |k: &[usize; D]| (0..D).fold(0, |n, a| n * counts[a] + k[a]);
+        // padded by the reach on all sides: no bond leaves the table
+        let place = |x: &Vector<D>| -> Option<usize> {
+            let steps = (x - low) / spacing;
+            let k = steps.map(f64::round);
+            let is_there = (steps - k).amax() <= OFF_LATTICE;
+            is_there.then(|| flat(&std::array::from_fn(|a| k[a] as usize + reach)))
+        };
+        let places = points.par_iter().map(place).collect::<Option<Vec<_>>>()?;
+        let mut table = vec![NONE; counts.iter().product()];
+        for (i, &place) in places.iter().enumerate() {
+            // two points at one place are for the search to refuse
+            if std::mem::replace(&mut table[place], i as u32) != NONE {
+                return None;
+            }
+        }
+        // one after another as their places are: families come out ascending where the points are numbered so
+        let side = 2 * reach + 1;
+        let ways: Vec<isize> = (0..side.pow(D as u32))
+            .filter_map(|n| {
+                let mut rest = n;
+                let mut k = [0isize; D];
+                for k in k.iter_mut().rev() {
+                    *k = (rest % side) as isize - reach as isize;
+                    rest /= side;
+                }
+                let length: f64 = k.iter().map(|&k| (k * k) as f64).sum::<f64>().sqrt();
+                let is_bond = length > 0.0 && length <= steps;
+                is_bond.then(|| (0..D).fold(0, |n, a| n * counts[a] as isize + k[a]))
+            })
+            .collect();
+        let of = |place: usize| {
+            let table = &table;
+            let at = ways
+                .iter()
+                .map(move |way| table[place.wrapping_add_signed(*way)]);
+            at.filter(|&j| j != NONE)
+        };
+        let sizes: Vec<usize> = places.par_iter().map(|&place| of(place).count()).collect();
+        let mut offsets = Vec::with_capacity(points.len() + 1);
+        let mut end = 0;
+        offsets.push(0);
+        for size in &sizes {
+            end += size;
+            offsets.push(end);
+        }
+        let mut neighbours = vec![0u32; end];
+        let mut rows = Vec::with_capacity(points.len());
+        let mut rest = neighbours.as_mut_slice();
+        for size in sizes {
+            let (row, tail) = rest.split_at_mut(size);
+            rows.push(row);
+            rest = tail;
+        }
+        rows.into_par_iter()
+            .with_min_len(64)
+            .zip(&places)
+            .for_each(|(row, &place)| {
+                row.iter_mut().zip(of(place)).for_each(|(n, j)| *n = j);
+                if !row.is_sorted() {
+                    row.sort_unstable();
+                }
+            });
+        Some(Self {
+            offsets,
+            neighbours,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peridynamics::TIE_TOLERANCE;
+
+    /// Points of a block of a lattice, some left out, in or against its order.
+    fn block<const D: usize>(
+        counts: [usize; D],
+        h: f64,
+        origin: f64,
+        swap: bool,
+    ) -> Vec<Vector<D>> {
+        let total: usize = counts.iter().product();
+        let mut points: Vec<Vector<D>> = (0..total)
+            .filter(|n| n % 7 != 3)
+            .map(|n| {
+                let mut rest = n;
+                let mut x = Vector::zeros();
+                for a in (0..D).rev() {
+                    x[a] = origin + (rest % counts[a]) as f64 * h;
+                    rest /= counts[a];
+                }
+                x
+            })
+            .collect();
+        if swap {
+            points.reverse();
+        }
+        points
+    }
+
+    #[test]
+    fn families_of_a_lattice_are_those_of_the_search() {
+        fn check<const D: usize>(counts: [usize; D]) {
+            for (h, origin, swap) in [(0.1, 0.0, false), (1.0 / 977.0, 12.345, true)] {
+                let points = block(counts, h, origin, swap);
+                for m in [1.0, 2.0, 2.5, 3.0, 4.015] {
+                    let horizon = m * h;
+                    let horizons = vec![horizon; points.len()];
+                    let searched = Families::search(&points, &horizons, TIE_TOLERANCE).unwrap();
+                    let found = Families::search_lattice(&points, h, horizon, TIE_TOLERANCE);
+                    assert_eq!(found, Some(searched), "{D}D, m = {m}, {swap}");
+                }
+            }
+        }
+        check([40]);
+        check([17, 12]);
+        check([9, 7, 8]);
+    }
+
+    #[test]
+    fn other_points_are_left_to_the_search() {
+        let search = |points: &[Vector<2>], h: f64| {
+            Families::search_lattice(points, h, 3.0 * h, TIE_TOLERANCE)
+        };
+        let points = block([9, 9], 0.1, 0.0, false);
+        assert!(search(&points, 0.1).is_some());
+        let mut moved = points.clone();
+        moved[5][0] += 1e-5;
+        assert!(search(&moved, 0.1).is_none());
+        let mut twins = points.clone();
+        twins[5] = twins[6];
+        assert!(search(&twins, 0.1).is_none());
+        let mut far = points.clone();
+        far[5] = Vector::<2>::new(1e4, 1e4);
+        assert!(search(&far, 0.1).is_none());
+        far[5][0] = f64::NAN;
+        assert!(search(&far, 0.1).is_none());
+        assert!(search(&[], 0.1).is_none());
+        assert!(search(&points, 0.0).is_none());
+    }
+}
