@@ -94,9 +94,17 @@ pub struct Row<const D: usize> {
     slot: Vec<u32>,
     columns: Vec<u32>,
     blocks: Vec<Tensor<D>>,
+    /// Stiffnesses of elements, each at its number's remainder: nodes that follow each other have elements in common.
+    elements: Vec<(u32, ElementRows<D>)>,
 }
 
+/// The block rows of an element's stiffness, by the nodes of row and column.
+pub type ElementRows<const D: usize> = [[Tensor<D>; 8]; 8];
+
 const EMPTY: u32 = u32::MAX;
+
+/// Elements that a row remembers: some rows of a mesh in the plane.
+const ELEMENTS: usize = 512;
 
 impl<const D: usize> Row<D> {
     /// An empty row of a system of `sites` sites.
@@ -105,7 +113,25 @@ impl<const D: usize> Row<D> {
             slot: vec![EMPTY; sites],
             columns: Vec::new(),
             blocks: Vec::new(),
+            elements: Vec::new(),
         }
+    }
+
+    /// The block row of a local node in the stiffness of an element of the one model that the row is for; `stiffness` is asked where the element is not remembered.
+    pub fn element_row(
+        &mut self,
+        element: usize,
+        local_node: usize,
+        stiffness: impl FnOnce() -> ElementRows<D>,
+    ) -> [Tensor<D>; 8] {
+        if self.elements.is_empty() {
+            self.elements = vec![(EMPTY, [[Tensor::zeros(); 8]; 8]); ELEMENTS];
+        }
+        let (known, rows) = &mut self.elements[element % ELEMENTS];
+        if *known as usize != element {
+            (*known, *rows) = (element as u32, stiffness());
+        }
+        rows[local_node]
     }
 
     /// Adds `block · u(site)` to the row.
@@ -356,6 +382,27 @@ mod tests {
             }
             row.add_site(((site + 5) % sites) as u32, &Tensor::zeros());
             row.add_site(site as u32, &(k * 2.0));
+        }
+    }
+
+    #[test]
+    fn remembered_elements_are_told_apart() {
+        let mut row = Row::<2>::new(1);
+        let stiffness = |element: usize| {
+            let entry = |a: usize, b: usize| Tensor::repeat((100 * element + 10 * a + b) as f64);
+            std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b)))
+        };
+        let asked = std::cell::Cell::new(0);
+        // the third takes the place of the first
+        for (element, times) in [(3, 1), (4, 2), (3, 2), (3 + ELEMENTS, 3), (3, 4), (4, 4)] {
+            for local in [0, 5] {
+                let blocks = row.element_row(element, local, || {
+                    asked.set(asked.get() + 1);
+                    stiffness(element)
+                });
+                assert_eq!(blocks, stiffness(element)[local], "{element}");
+            }
+            assert_eq!(asked.get(), times, "{element}");
         }
     }
 

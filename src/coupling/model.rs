@@ -14,7 +14,7 @@ use crate::{
     peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody},
     progress::Progress,
     system::BlockCsr,
-    tensor::{Tensor, Tensor4, Vector},
+    tensor::{Tensor4, Vector},
 };
 
 /// What keeps degrees of freedom at a site.
@@ -512,12 +512,12 @@ impl<const D: usize> Model<D> {
 
     /// Adds the finite-element row of a node: all cells around it but those whose stress is a partial stress.
     pub fn add_element_rows(&self, site: usize, row: &mut Row<D>) {
-        let mut blocks = [Tensor::zeros(); 8];
         for (c, local) in self.cells_of_site(site) {
             if self.roles[c] == CellRole::StressElement || !self.node_takes(c) {
                 continue;
             }
-            fem::row(&self.mesh, c, self.tensor_of_cell(c), local, &mut blocks);
+            let stiffness = || fem::stiffness(&self.mesh, c, self.tensor_of_cell(c));
+            let blocks = row.element_row(c, local, stiffness);
             for (b, &n) in self.mesh.cell(c).iter().enumerate() {
                 row.add(&self.node_transfer, n as usize, &blocks[b]);
             }
@@ -526,7 +526,6 @@ impl<const D: usize> Model<D> {
 
     /// Adds the force that the finite elements around a node of the mesh exert on it, all by their classical law and none that overlaps: the gradient of their own energy.
     pub fn add_own_element_rows(&self, node: u32, row: &mut Row<D>) {
-        let mut blocks = [Tensor::zeros(); 8];
         let (offsets, cells) = &self.node_cells;
         for &c in &cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize] {
             let c = c as usize;
@@ -537,7 +536,8 @@ impl<const D: usize> Model<D> {
             if !self.is_element(c) {
                 continue;
             }
-            fem::row(&self.mesh, c, self.tensor_of_cell(c), local, &mut blocks);
+            let stiffness = || fem::stiffness(&self.mesh, c, self.tensor_of_cell(c));
+            let blocks = row.element_row(c, local, stiffness);
             for (b, &n) in cell.iter().enumerate() {
                 row.add(&self.node_transfer, n as usize, &blocks[b]);
             }

@@ -173,23 +173,7 @@ pub fn row_at<const D: usize>(
     }
 }
 
-/// The block row of node `local_node` in the stiffness of cell `c`: `K u = f_external`; overwrites `blocks`.
-///
-/// Shapes: `blocks[b]` is the block of local node b; blocks beyond the cell's nodes are zero.
-pub fn row<const D: usize>(
-    mesh: &Mesh<D>,
-    c: usize,
-    tangent: &Tensor4<D>,
-    local_node: usize,
-    blocks: &mut [Tensor<D>; 8],
-) {
-    *blocks = [Tensor::zeros(); 8];
-    for_each_point(mesh, c, Rule::Stiffness, |p| {
-        row_at(p, tangent, local_node, blocks);
-    });
-}
-
-/// All block rows of the stiffness of cell `c`: `[a][b]` is the block of local nodes a and b.
+/// The block rows of the stiffness of cell `c`, `K u = f_external`: `[a][b]` is the block of local nodes a and b; blocks beyond the cell's nodes are zero.
 pub fn stiffness<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,
@@ -338,12 +322,6 @@ mod tests {
             let tangent = tangent::<D>(1.0, 0.3);
             let rows = stiffness(&mesh, c, &tangent);
             let nodes = mesh.cell(c).len();
-            // rows one by one and all together
-            for (a, expected) in rows.iter().enumerate().take(nodes) {
-                let mut blocks = [Tensor::repeat(7.0); 8];
-                row(&mesh, c, &tangent, a, &mut blocks);
-                assert_eq!(&blocks, expected);
-            }
             // a tensor without any symmetry tells its indices apart
             let mut odd = Tensor4::<D>::zeros();
             for i in 0..D {

@@ -61,7 +61,7 @@ pub use body::{FemError, assemble, check, internal_force, lumped_mass, nodal_vol
 pub use cell::{ReferenceCell, Rule, RulePoint};
 pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at_centre,
-    for_each_point, quadrature, quadrature_of, row, row_at, shape_values, stiffness,
+    for_each_point, quadrature, quadrature_of, row_at, shape_values, stiffness,
 };
 pub use load::{FacetPoint, body_force_vector, facet_area, facet_points, traction_vector};
 pub use locate::{Located, Locator, reference_of};
