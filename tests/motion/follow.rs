@@ -70,8 +70,8 @@ fn a_crack_that_leaves_its_first_zone_runs_as_in_full_peridynamics() {
             "{}",
             text(s)
         );
-        // a zone less than twice as large as it would be gives nothing up
-        assert_eq!(s["removed"], 0, "{}", text(s));
+        // one that grows, to less than twice of what is wanted, gives nothing up
+        assert!(s["added"] == 0 || s["removed"] == 0, "{}", text(s));
     }
     let most = motion["nonlocal_share"][1].as_f64().unwrap();
     assert!(most < 0.45, "{most}");
