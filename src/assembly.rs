@@ -118,6 +118,8 @@ impl<const D: usize> Row<D> {
     }
 
     /// The block row of a local node in the stiffness of an element of the one model that the row is for; `stiffness` is asked where the element is not remembered.
+    ///
+    /// Shapes: one block of `D` by `D` per node of the element, in its order; zeros beyond its last node. Units: \[N/m^(4−D)\], as those of [`crate::fem::stiffness`].
     pub fn element_row(
         &mut self,
         element: usize,

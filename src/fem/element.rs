@@ -145,7 +145,7 @@ pub fn shape_values<const D: usize>(
 
 /// Adds one quadrature point's share of the block row `K_ab = ∫ ∂N_a/∂x · C · ∂N_b/∂x dV`, `a = local_node`.
 ///
-/// Shapes: `blocks[b]` is the block of local node b. Units: [N/m^(D−2)] per unit thickness where D < 3.
+/// Shapes: `blocks[b]` is the block of local node b. Units: \[N/m^(4−D)\], the forces being per unit of thickness in a plane and of area on a line.
 pub fn row_at<const D: usize>(
     point: &QuadraturePoint<D>,
     tangent: &Tensor4<D>,

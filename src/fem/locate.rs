@@ -130,14 +130,9 @@ impl<const D: usize> Locator<D> {
     /// cell a point may lie, relative to the cell's extent; 1e-9 is a good value. Shape functions within 1e-10 of 0 or 1
     /// are exactly that.
     pub fn locate(&self, mesh: &Mesh<D>, x: &Vector<D>, tolerance: f64) -> Option<Located<D>> {
-        if self.cells.is_empty() || !x.iter().all(|x| x.is_finite()) {
-            return None;
-        }
-        let margin = Vector::repeat(tolerance * self.largest);
-        let (first, last) = (self.index(&(x - margin)), self.index(&(x + margin)));
         let mut best: Option<Located<D>> = None;
-        for_grid(&first, &last, &self.counts, |n| {
-            for &c in &self.cells[self.offsets[n] as usize..self.offsets[n + 1] as usize] {
+        self.around(x, tolerance, |cells| {
+            for &c in cells {
                 let c = c as usize;
                 if best.as_ref().is_some_and(|b| b.cell <= c) {
                     break;
@@ -153,14 +148,8 @@ impl<const D: usize> Locator<D> {
 
     /// Whether a cell holds `x`, as [`Locator::locate`] has it: no more than a look at the cell's box where `x` lies inside of a line, a rectangle or a cuboid along the axes.
     pub fn holds(&self, mesh: &Mesh<D>, x: &Vector<D>, tolerance: f64) -> bool {
-        if self.cells.is_empty() || !x.iter().all(|x| x.is_finite()) {
-            return false;
-        }
-        let margin = Vector::repeat(tolerance * self.largest);
-        let (first, last) = (self.index(&(x - margin)), self.index(&(x + margin)));
         let mut is_held = false;
-        for_grid(&first, &last, &self.counts, |n| {
-            let cells = &self.cells[self.offsets[n] as usize..self.offsets[n + 1] as usize];
+        self.around(x, tolerance, |cells| {
             let holds = |c: usize| {
                 let (low, high) = bounding_box(mesh, c);
                 let inside = (0..D).all(|i| x[i] > low[i] && x[i] < high[i]);
@@ -169,6 +158,18 @@ impl<const D: usize> Locator<D> {
             is_held = is_held || cells.iter().any(|&c| holds(c as usize));
         });
         is_held
+    }
+
+    /// Visits the cells of each bin within the tolerance of `x`, by ascending number within a bin; none where `x` is not finite.
+    fn around(&self, x: &Vector<D>, tolerance: f64, mut visit: impl FnMut(&[u32])) {
+        if self.cells.is_empty() || !x.iter().all(|x| x.is_finite()) {
+            return;
+        }
+        let margin = Vector::repeat(tolerance * self.largest);
+        let (first, last) = (self.index(&(x - margin)), self.index(&(x + margin)));
+        for_grid(&first, &last, &self.counts, |n| {
+            visit(&self.cells[self.offsets[n] as usize..self.offsets[n + 1] as usize]);
+        });
     }
 
     /// Bin index of a point, per axis; points outside belong to the bins at the rim.

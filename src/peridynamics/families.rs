@@ -170,6 +170,36 @@ impl Families {
         )
     }
 
+    /// Rows of the given lengths, each written by `fill(row, its neighbours)`, in parallel and in any order.
+    pub(super) fn filled(
+        lengths: impl ExactSizeIterator<Item = usize>,
+        fill: impl Fn(usize, &mut [u32]) + Sync,
+    ) -> Self {
+        let mut offsets = Vec::with_capacity(lengths.len() + 1);
+        let mut end = 0;
+        offsets.push(0);
+        for length in lengths {
+            end += length;
+            offsets.push(end);
+        }
+        let mut neighbours = vec![0u32; end];
+        let mut rows = Vec::with_capacity(offsets.len() - 1);
+        let mut rest = neighbours.as_mut_slice();
+        for ends in offsets.windows(2) {
+            let (row, tail) = rest.split_at_mut(ends[1] - ends[0]);
+            rows.push(row);
+            rest = tail;
+        }
+        rows.into_par_iter()
+            .with_min_len(64)
+            .enumerate()
+            .for_each(|(i, row)| fill(i, row));
+        Self {
+            offsets,
+            neighbours,
+        }
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.offsets.len().saturating_sub(1)

@@ -202,37 +202,14 @@ impl<const D: usize> Grid<D> {
                 position: x.iter().copied().collect(),
             });
         }
-        let mut offsets = Vec::with_capacity(rows + 1);
-        let mut end = 0;
-        offsets.push(0);
-        for (count, _) in &counted {
-            end += count;
-            offsets.push(end);
-        }
-        drop(counted);
-        let mut neighbours = vec![0u32; end];
-        let mut slices = Vec::with_capacity(rows);
-        let mut rest = neighbours.as_mut_slice();
-        for w in offsets.windows(2) {
-            let (slice, tail) = rest.split_at_mut(w[1] - w[0]);
-            slices.push(slice);
-            rest = tail;
-        }
-        slices
-            .into_par_iter()
-            .with_min_len(64)
-            .enumerate()
-            .for_each(|(row, slice)| {
-                let mut next = 0;
-                each(row, &mut |j| {
-                    slice[next] = j;
-                    next += 1;
-                });
-                slice.sort_unstable();
+        let counts = counted.into_iter().map(|(count, _)| count);
+        Ok(Families::filled(counts, |row, neighbours| {
+            let mut next = 0;
+            each(row, &mut |j| {
+                neighbours[next] = j;
+                next += 1;
             });
-        Ok(Families {
-            offsets,
-            neighbours,
-        })
+            neighbours.sort_unstable();
+        }))
     }
 }

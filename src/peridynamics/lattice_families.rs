@@ -76,34 +76,12 @@ impl Families {
             at.filter(|&j| j != NONE)
         };
         let sizes: Vec<usize> = places.par_iter().map(|&place| of(place).count()).collect();
-        let mut offsets = Vec::with_capacity(points.len() + 1);
-        let mut end = 0;
-        offsets.push(0);
-        for size in &sizes {
-            end += size;
-            offsets.push(end);
-        }
-        let mut neighbours = vec![0u32; end];
-        let mut rows = Vec::with_capacity(points.len());
-        let mut rest = neighbours.as_mut_slice();
-        for size in sizes {
-            let (row, tail) = rest.split_at_mut(size);
-            rows.push(row);
-            rest = tail;
-        }
-        rows.into_par_iter()
-            .with_min_len(64)
-            .zip(&places)
-            .for_each(|(row, &place)| {
-                row.iter_mut().zip(of(place)).for_each(|(n, j)| *n = j);
-                if !row.is_sorted() {
-                    row.sort_unstable();
-                }
-            });
-        Some(Self {
-            offsets,
-            neighbours,
-        })
+        Some(Self::filled(sizes.into_iter(), |i, row| {
+            row.iter_mut().zip(of(places[i])).for_each(|(n, j)| *n = j);
+            if !row.is_sorted() {
+                row.sort_unstable();
+            }
+        }))
     }
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `influence.rs` | influence functions ω, micromoduli λ | [SAND2015-7998] eq. (5.8), (3.1) |
 //! | `families.rs` | neighbour search with a horizon per point | eq. (5.2) |
+//! | `lattice_families.rs` | the same for points of one lattice and one horizon, without a search | |
 //! | `offsets.rs` | a value for each bond of a lattice | |
 //! | `shells.rs` | isotropic weights of a lattice, shell by shell | eq. (3.6) as a sum |
 //! | `weights.rs` | moment-fitted weights of one irregular family | |

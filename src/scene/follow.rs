@@ -9,6 +9,7 @@ use super::peridynamics::{Peridynamics, Points};
 use super::solve::Solve;
 use super::spec::{CouplingSpec, CutBondsSpec, SceneSpec, SkinSpec, ZonesNeeded};
 use crate::mesh::Mesh;
+use crate::observe::report::number;
 
 /// Horizons between damage and the edge of the zone: one in which bonds do not break, and one to the points whose bonds reach there.
 const REACH: f64 = 2.0;
@@ -140,7 +141,7 @@ pub(crate) fn follow<const D: usize>(
             "must be more than two horizons, three with an lps material",
             &format!(
                 "bonds break no nearer to elements; {} is the default",
-                PADDING * horizon
+                number(PADDING * horizon)
             ),
         )?,
         None => PADDING * horizon,
@@ -153,7 +154,7 @@ pub(crate) fn follow<const D: usize>(
             &format!("must be at least the padding, {padding}"),
             &format!(
                 "the zone has {} ahead of the tips if it is left out; more makes fewer changes",
-                AHEAD * padding
+                number(AHEAD * padding)
             ),
         )?,
         None => AHEAD * padding,
