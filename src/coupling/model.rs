@@ -1,5 +1,8 @@
 //! What all couplings share: sites, peridynamic points, their families, and the places at the seam that follow sites.
 
+use std::any::Any;
+use std::sync::OnceLock;
+
 use crate::{
     assembly::{self, Row, Transfer},
     coupling::{
@@ -65,6 +68,8 @@ pub struct Model<const D: usize> {
     passing: Option<Passing<D>>,
     spacing: f64,
     volumes: Volumes,
+    /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
+    pub(super) worked_out: OnceLock<Box<dyn Any + Send + Sync>>,
 }
 
 impl<const D: usize> Model<D> {
@@ -110,6 +115,7 @@ impl<const D: usize> Model<D> {
             passing: None,
             spacing: 0.0,
             volumes: Volumes::default(),
+            worked_out: OnceLock::new(),
         };
         let has_points = model.roles.contains(&CellRole::Points);
         if has_points && model.peridynamics.is_none() {

@@ -26,46 +26,94 @@ pub struct InterfaceFacet {
 }
 
 /// Sorted node numbers of a facet, padded: the same for all cells that share it.
-fn key(nodes: &[u32]) -> [u32; 4] {
+fn key(nodes: impl Iterator<Item = u32>) -> [u32; 4] {
     let mut k = [u32::MAX; 4];
-    for (k, &n) in k.iter_mut().zip(nodes) {
-        *k = n;
-    }
+    k.iter_mut().zip(nodes).for_each(|(k, n)| *k = n);
     k.sort_unstable();
     k
+}
+
+/// Facets that wait for their second cell, in a list for each smallest node: a few steps where a table of keys would hash.
+struct Waiting {
+    /// The last facet of each node's list.
+    last: Vec<u32>,
+    /// The key of each facet, and the one before it in its list.
+    facets: Vec<([u32; 4], u32)>,
+}
+
+impl Waiting {
+    const NONE: u32 = u32::MAX;
+
+    fn new(nodes: usize) -> Self {
+        Self {
+            last: vec![Self::NONE; nodes],
+            facets: Vec::new(),
+        }
+    }
+
+    /// The number of the facet with the same nodes, which waits no longer. If there is none this one waits, with the next number.
+    fn meet(&mut self, key: [u32; 4]) -> Option<usize> {
+        let first = key[0] as usize;
+        let (mut at, mut after) = (self.last[first], Self::NONE);
+        while at != Self::NONE {
+            let (other, before) = self.facets[at as usize];
+            if other == key {
+                match after {
+                    Self::NONE => self.last[first] = before,
+                    after => self.facets[after as usize].1 = before,
+                }
+                return Some(at as usize);
+            }
+            (after, at) = (at, before);
+        }
+        let number = self.facets.len() as u32;
+        let before = std::mem::replace(&mut self.last[first], number);
+        self.facets.push((key, before));
+        None
+    }
 }
 
 impl<const D: usize> Mesh<D> {
     /// The facets of cell `c`, normals outwards.
     pub fn facets_of_cell(&self, c: usize) -> impl Iterator<Item = BoundaryFacet> + '_ {
-        let nodes = self.cell(c);
-        self.shapes[c]
-            .facets()
-            .iter()
-            .enumerate()
-            .map(move |(local, places)| BoundaryFacet {
-                nodes: places.iter().map(|&i| nodes[i]).collect(),
-                cell: c as u32,
-                local: local as u8,
-            })
+        (0..self.shapes[c].facets().len()).map(move |local| self.facet((c as u32, local as u8)))
+    }
+
+    /// The facet of a cell with this number in [`CellShape::facets`](super::CellShape::facets), its normal outwards.
+    fn facet(&self, (cell, local): (u32, u8)) -> BoundaryFacet {
+        let nodes = self.cell(cell as usize);
+        let places = self.shapes[cell as usize].facets()[usize::from(local)];
+        BoundaryFacet {
+            nodes: places.iter().map(|&i| nodes[i]).collect(),
+            cell,
+            local,
+        }
+    }
+
+    /// The facets of a cell by their numbers, with their keys.
+    fn keys_of_cell(&self, c: u32) -> impl Iterator<Item = ((u32, u8), [u32; 4])> + '_ {
+        let nodes = self.cell(c as usize);
+        let facets = self.shapes[c as usize].facets().iter().enumerate();
+        facets.map(move |(local, places)| {
+            let key = key(places.iter().map(|&i| nodes[i]));
+            ((c, local as u8), key)
+        })
     }
 
     /// The facets that belong to exactly one of `cells`, in the order of the cells, normals outwards.
     pub fn boundary_facets(&self, cells: impl IntoIterator<Item = u32>) -> Vec<BoundaryFacet> {
-        let mut found: Vec<Option<BoundaryFacet>> = Vec::new();
-        let mut open: FxHashMap<[u32; 4], usize> = FxHashMap::default();
+        let mut found: Vec<Option<(u32, u8)>> = Vec::new();
+        let mut waiting = Waiting::new(self.nodes.len());
         for c in cells {
-            for facet in self.facets_of_cell(c as usize) {
-                match open.remove(&key(&facet.nodes)) {
+            for (facet, key) in self.keys_of_cell(c) {
+                match waiting.meet(key) {
                     Some(other) => found[other] = None,
-                    None => {
-                        open.insert(key(&facet.nodes), found.len());
-                        found.push(Some(facet));
-                    }
+                    None => found.push(Some(facet)),
                 }
             }
         }
-        found.into_iter().flatten().collect()
+        let alone = found.into_iter().flatten();
+        alone.map(|facet| self.facet(facet)).collect()
     }
 
     /// The facets that belong to exactly one cell of the whole mesh.
@@ -135,31 +183,29 @@ impl<const D: usize> Mesh<D> {
         first: &C,
         second: &C,
     ) -> Vec<InterfaceFacet> {
-        let mut waiting: FxHashMap<[u32; 4], BoundaryFacet> = FxHashMap::default();
+        let mut waiting = Waiting::new(self.nodes.len());
+        let mut facets = Vec::new();
         let mut found = Vec::new();
         for c in 0..self.cell_count() {
             if class[c] != *first && class[c] != *second {
                 continue;
             }
-            for facet in self.facets_of_cell(c) {
-                let key = key(&facet.nodes);
-                let Some(other) = waiting.remove(&key) else {
-                    waiting.insert(key, facet);
+            for (facet, key) in self.keys_of_cell(c as u32) {
+                let Some(other) = waiting.meet(key) else {
+                    facets.push(facet);
                     continue;
                 };
-                if class[other.cell as usize] == class[c] {
+                let other: (u32, u8) = facets[other];
+                if class[other.0 as usize] == class[c] {
                     continue;
                 }
-                found.push(if class[c] == *first {
-                    InterfaceFacet {
-                        first: facet,
-                        second: other,
-                    }
-                } else {
-                    InterfaceFacet {
-                        first: other,
-                        second: facet,
-                    }
+                let (one, two) = match class[c] == *first {
+                    true => (facet, other),
+                    false => (other, facet),
+                };
+                found.push(InterfaceFacet {
+                    first: self.facet(one),
+                    second: self.facet(two),
                 });
             }
         }
@@ -173,19 +219,21 @@ impl<const D: usize> Mesh<D> {
     /// # Errors
     /// [`MeshError::LooseFacet`] for a facet that belongs to no cell.
     pub fn locate_facets(&self, facets: &[Facet]) -> Result<Vec<BoundaryFacet>, MeshError> {
-        let mut wanted: FxHashMap<[u32; 4], Option<BoundaryFacet>> =
-            facets.iter().map(|f| (key(f), None)).collect();
+        let mut wanted: FxHashMap<[u32; 4], Option<BoundaryFacet>> = facets
+            .iter()
+            .map(|f| (key(f.iter().copied()), None))
+            .collect();
         for c in 0..self.cell_count() {
-            for facet in self.facets_of_cell(c) {
-                if let Some(slot @ None) = wanted.get_mut(&key(&facet.nodes)) {
-                    *slot = Some(facet);
+            for (facet, key) in self.keys_of_cell(c as u32) {
+                if let Some(slot @ None) = wanted.get_mut(&key) {
+                    *slot = Some(self.facet(facet));
                 }
             }
         }
         facets
             .iter()
             .map(|f| {
-                wanted[&key(f)]
+                wanted[&key(f.iter().copied())]
                     .clone()
                     .ok_or_else(|| MeshError::LooseFacet { nodes: f.clone() })
             })
@@ -226,8 +274,11 @@ impl<const D: usize> Mesh<D> {
         let p = |i: usize| self.nodes[nodes[i] as usize];
         let to = |corners: &[Vector<D>]| (x - closest_point(x, corners).0).norm();
         match nodes.len() {
-            4 => to(&[p(0), p(1), p(2)]).min(to(&[p(0), p(2), p(3)])),
-            n => to(&(0..n).map(p).collect::<Vec<_>>()),
+            0 => f64::INFINITY,
+            1 => to(&[p(0)]),
+            2 => to(&[p(0), p(1)]),
+            3 => to(&[p(0), p(1), p(2)]),
+            _ => to(&[p(0), p(1), p(2)]).min(to(&[p(0), p(2), p(3)])),
         }
     }
 }

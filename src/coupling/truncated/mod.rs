@@ -32,6 +32,8 @@ mod states;
 
 pub use self::{fit::SeamConditions, moving::SeamBonds};
 
+use std::sync::Arc;
+
 use self::{
     dilatation::{Common, Dilatations},
     edges::Strings,
@@ -95,6 +97,15 @@ impl<const D: usize> Coupling<D> for Truncated {
         let (Some(body), Some(passing)) = (model.body(), model.passing()) else {
             return Ok(Box::new(super::single::OwnModel { model }));
         };
+        let known = model.worked_out.get();
+        if let Some(pieces) = known.and_then(|known| known.downcast_ref::<Arc<Pieces<D>>>()) {
+            return Ok(Box::new(TruncatedRows {
+                model,
+                states: None,
+                cut_bonds: self.cut_bonds,
+                pieces: Arc::clone(pieces),
+            }));
+        }
         let mut segments = Segments::new(model, body, passing);
         let mut strings = Strings::new(&segments);
         if fit::fit(&mut segments, &strings)? {
@@ -114,19 +125,27 @@ impl<const D: usize> Coupling<D> for Truncated {
             None => Dilatations::none(model.sites.len()),
         };
         let squares = common.as_ref().is_none_or(|c| c.bulk >= 0.0);
-        let bonds = match common {
-            None => Bonds::Alone(WholeBonds::of(segments)),
-            Some(common) => Bonds::States(Box::new(segments), common),
+        let (whole, states) = match common {
+            None => (Some(WholeBonds::of(segments)), None),
+            Some(common) => (None, Some((segments, common))),
         };
-        Ok(Box::new(TruncatedRows {
-            model,
-            bonds,
-            cut_bonds: self.cut_bonds,
+        let pieces = Arc::new(Pieces {
+            whole,
             squares,
             strings,
             springs,
             dilatations,
             listed,
+        });
+        if states.is_none() {
+            // one that is there already says the same
+            let _ = model.worked_out.set(Box::new(Arc::clone(&pieces)));
+        }
+        Ok(Box::new(TruncatedRows {
+            model,
+            states,
+            cut_bonds: self.cut_bonds,
+            pieces,
         }))
     }
 }
@@ -142,8 +161,16 @@ pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamCondition
 
 struct TruncatedRows<'a, const D: usize> {
     model: &'a Model<D>,
-    bonds: Bonds<'a, D>,
+    /// The bonds of the points at the seam, of a law whose bonds share dilatations.
+    states: Option<(Segments<'a, D>, Common)>,
     cut_bonds: CutBonds,
+    pieces: Arc<Pieces<D>>,
+}
+
+/// What becomes of the bonds of the points at the seam.
+struct Pieces<const D: usize> {
+    /// Those of a pairwise law that are whole, and the body's; the others are springs. With dilatations all are springs.
+    whole: Option<WholeBonds>,
     springs: Springs<D>,
     dilatations: Dilatations<D>,
     strings: Strings<D>,
@@ -153,90 +180,79 @@ struct TruncatedRows<'a, const D: usize> {
     squares: bool,
 }
 
-/// The bonds of the points at the seam.
-enum Bonds<'a, const D: usize> {
-    /// Of a pairwise law: the whole ones are the body's, the others springs.
-    Alone(WholeBonds),
-    /// Of a law whose bonds share dilatations: all are springs.
-    States(Box<Segments<'a, D>>, Common),
-}
-
 impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     fn add_row(&self, site: usize, row: &mut Row<D>) {
         match self.model.point_of(site) {
-            Some((body, i)) if !self.listed[i] => {
+            Some((body, i)) if !self.pieces.listed[i] => {
                 body.add_force_row(i, |_| 1.0, row);
                 return;
             }
             Some((body, i)) => {
-                if let Bonds::Alone(whole) = &self.bonds {
+                if let Some(whole) = &self.pieces.whole {
                     body.add_force_row(i, |j| f64::from(whole.contains(i, j)), row);
                 }
             }
             None => {
                 self.model.add_element_rows(site, row);
-                self.strings.add_row(site, row);
+                self.pieces.strings.add_row(site, row);
             }
         }
-        self.springs.add_row(site, row);
-        self.dilatations.add_row(site, row);
+        self.pieces.springs.add_row(site, row);
+        self.pieces.dilatations.add_row(site, row);
     }
 
     fn is_body_row(&self, site: usize) -> bool {
         self.model
             .point_of(site)
-            .is_some_and(|(_, i)| !self.listed[i])
+            .is_some_and(|(_, i)| !self.pieces.listed[i])
     }
 
     fn has_body_bonds(&self, site: usize) -> bool {
         // the dilatations of an LPS differ from the body's
-        let alone = matches!(self.bonds, Bonds::Alone(_));
+        let alone = self.pieces.whole.is_some();
         alone && self.model.point_of(site).is_some() && !self.is_body_row(site)
     }
 
     fn is_body_bond(&self, i: usize, j: usize) -> bool {
-        match &self.bonds {
-            Bonds::Alone(whole) => whole.contains(i, j),
-            Bonds::States(..) => true,
-        }
+        let whole = self.pieces.whole.as_ref();
+        whole.is_none_or(|whole| whole.contains(i, j))
     }
 
     fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>) {
         if self.has_body_bonds(site) {
-            self.springs.add_row(site, row);
+            self.pieces.springs.add_row(site, row);
         }
     }
 
     fn is_sum_of_squares(&self) -> bool {
-        self.squares
+        self.pieces.squares
     }
 
     fn seam_bonds(&self) -> Option<SeamBonds<D>> {
         if self.cut_bonds == CutBonds::Linear {
             return None;
         }
-        let (broken, states) = match &self.bonds {
-            Bonds::Alone(whole) => (&whole.broken, None),
-            Bonds::States(segments, common) => {
-                (&segments.broken, Some((segments.as_ref(), common)))
-            }
+        let states = self.states.as_ref();
+        let broken = match (&self.pieces.whole, states) {
+            (Some(whole), _) => &whole.broken,
+            (None, Some((segments, _))) => &segments.broken,
+            (None, None) => return None,
         };
-        let body = self.model.body()?;
         Some(SeamBonds::new(
             self.model,
-            body,
-            &self.springs,
+            self.model.body()?,
+            &self.pieces.springs,
             broken,
-            states,
+            states.map(|(segments, common)| (segments, common)),
         ))
     }
 
     fn add_row_without_bonds(&self, site: usize, row: &mut Row<D>) {
         if self.model.point_of(site).is_none() {
             self.model.add_element_rows(site, row);
-            self.strings.add_row(site, row);
+            self.pieces.strings.add_row(site, row);
             // the elements behind the seam have other dilatations, with the bonds
-            self.dilatations.take_back(site, row);
+            self.pieces.dilatations.take_back(site, row);
         }
     }
 

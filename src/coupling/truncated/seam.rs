@@ -370,25 +370,32 @@ impl<'a, const D: usize> Seam<'a, D> {
     pub fn foot(&self, x: &Vector<D>, near: &[u32]) -> Option<Foot> {
         let mesh = &self.model.mesh;
         let distance = |face: &&Face<D>| mesh.distance_to_facet(x, &face.nodes);
-        let cells: Vec<u32> = self
+        let mut faces = self
             .meeting(x, x, near)
-            .filter(|face| distance(face) <= 1e-7 * self.size)
-            .map(|face| face.cell)
-            .collect();
-        let cell = *cells.first()? as usize;
-        let reference = fem::reference_of(mesh, cell, x)?;
-        let (shape, count) = fem::shape_values(mesh, cell, &reference);
-        let mut trace: Vec<(u32, f64)> = Vec::with_capacity(count);
-        for (&n, &w) in mesh.cell(cell).iter().zip(&shape[..count]) {
+            .filter(|face| distance(face) <= 1e-7 * self.size);
+        let first = faces.next()?;
+        let mut trace: Vec<(u32, f64)> = Vec::with_capacity(4);
+        let mut weigh = |n: u32, w: f64| {
             if w.abs() > 1e-9 {
-                trace.extend(
-                    self.model
-                        .node_transfer
-                        .row(n as usize)
-                        .map(|(site, share)| (site, share * w)),
-                );
+                let row = self.model.node_transfer.row(n as usize);
+                trace.extend(row.map(|(site, share)| (site, share * w)));
             }
+        };
+        if let [p, q] = first.nodes[..] {
+            // linear along an edge
+            let from = mesh.nodes[p as usize];
+            let along = mesh.nodes[q as usize] - from;
+            let t = (x - from).dot(&along) / along.norm_squared();
+            weigh(p, 1.0 - t);
+            weigh(q, t);
+        } else {
+            let cell = first.cell as usize;
+            let reference = fem::reference_of(mesh, cell, x)?;
+            let (shape, count) = fem::shape_values(mesh, cell, &reference);
+            (mesh.cell(cell).iter().zip(&shape[..count])).for_each(|(&n, &w)| weigh(n, w));
         }
+        let cells = std::iter::once(first).chain(faces).map(|face| face.cell);
+        let cells = cells.collect();
         // what rounding leaves on the nodes behind the face goes to those on it
         let sum: f64 = trace.iter().map(|t| t.1).sum();
         trace.iter_mut().for_each(|t| t.1 /= sum);

@@ -39,13 +39,21 @@ impl<const D: usize> Kept<D> {
         u
     }
 
-    /// The same, with what points around give at the nodes inside of a zone.
+    /// The same, with what points around give at the nodes of cells that hold points.
     pub(super) fn everywhere(&self) -> Vec<Vector<D>> {
         let sampler = Sampler::new(&self.model);
         let displacement = &self.equilibrium.solution.displacement;
-        let at = |x| sampler.displacement(x, displacement);
-        let nodes = self.model.mesh.nodes.iter();
-        nodes.map(|x| at(x).unwrap_or_else(Vector::zeros)).collect()
+        let mesh = &self.model.mesh;
+        let mut u = self.at_nodes();
+        let mut is_known = vec![true; u.len()];
+        for c in (0..mesh.cell_count()).filter(|&c| !self.model.is_element(c)) {
+            (mesh.cell(c).iter()).for_each(|&n| is_known[n as usize] = false);
+        }
+        for n in (0..u.len()).filter(|&n| !is_known[n]) {
+            let found = sampler.displacement(&mesh.nodes[n], displacement);
+            u[n] = found.unwrap_or_else(Vector::zeros);
+        }
+        u
     }
 }
 
