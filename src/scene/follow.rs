@@ -17,7 +17,7 @@ const REACH: f64 = 2.0;
 /// Horizons more with an LPS, whose bonds act through the dilatations of both ends.
 const DILATATION: f64 = 1.0;
 
-/// Padding in horizons, if the scene leaves it out: in `examples/branching_moving.toml` the path keeps within 1 mm of full peridynamics, and the zone has at most 34 % of the plate.
+/// Padding in horizons, if the scene leaves it out: in `examples/branching_moving.toml` the path keeps within 1 mm of full peridynamics, and the zone has at most 38 % of the plate.
 const PADDING: f64 = 5.0;
 
 /// Paddings that it reaches ahead of the tips of cracks, if the scene leaves that out: fewer changes, and points take the place of elements before the waves of the tip are there.

@@ -316,19 +316,24 @@ fn leg<'r, const D: usize>(
             recorder.checkpoint(&moment, pace, edge, zone.clone())?;
         }
     }
-    let looks_at = |step: u64| {
-        eyes.as_ref()
-            .is_some_and(|w| step.is_multiple_of(w.every()))
-    };
     // a checkpoint that an interrupt left behind, in the step in which the zone was to be looked at
-    let mut stop = match (&eyes, &zone) {
+    let mut stop = match (&eyes, &mut zone) {
         (Some(eyes), Some(zone)) if !zone.looked => {
             let arrived = || edge.is_none() && motion.system().damage_at_edge().is_some();
-            let is_due = looks_at(first) || arrived();
-            is_due
-                .then(|| eyes.look(&motion.state().u, motion.system()))
-                .flatten()
-                .map(Stop::Switch)
+            let arrived = arrived();
+            let [due, whole] = eyes.looks_after(first).map(|due| due || arrived);
+            due.then(|| {
+                let state = motion.state();
+                eyes.look(
+                    &state.u,
+                    state.time,
+                    motion.system(),
+                    whole,
+                    &mut zone.wanted,
+                )
+            })
+            .flatten()
+            .map(Stop::Switch)
         }
         _ => None,
     };
@@ -360,10 +365,17 @@ fn leg<'r, const D: usize>(
         let mut next = None;
         if let (Some(eyes), Some(zone)) = (&eyes, &mut zone) {
             // damage that has come to the edge between two looks is looked at too
-            zone.looked = !last && (looks_at(state.step) || arrived);
+            let [due, whole] = eyes.looks_after(state.step).map(|due| due || arrived);
+            zone.looked = !last && due;
             if zone.looked {
                 let begun = Instant::now();
-                next = eyes.look(&state.u, motion.system());
+                next = eyes.look(
+                    &state.u,
+                    state.time,
+                    motion.system(),
+                    whole,
+                    &mut zone.wanted,
+                );
                 looking += begun.elapsed().as_secs_f64();
             }
             if next.is_some() {

@@ -45,6 +45,8 @@ pub(super) struct Saved {
 pub(super) struct Zone {
     /// Whether each cell is nonlocal.
     pub nonlocal: Vec<bool>,
+    /// When each was wanted last \[s\], or became nonlocal; minus infinity if never.
+    pub wanted: Vec<f64>,
     /// Whether the state was looked at for a change already, where one is due.
     pub looked: bool,
     /// The changes so far.
@@ -57,8 +59,14 @@ impl Zone {
     /// Of the layout that a run begins with.
     pub fn first<const D: usize>(model: &Model<D>) -> Self {
         let share = share(model);
+        let nonlocal = nonlocal(model);
+        let never = f64::NEG_INFINITY;
         Self {
-            nonlocal: nonlocal(model),
+            wanted: nonlocal
+                .iter()
+                .map(|n| if *n { 0.0 } else { never })
+                .collect(),
+            nonlocal,
             looked: true,
             switches: Vec::new(),
             shares: [share; 2],
@@ -67,7 +75,13 @@ impl Zone {
 
     /// After a change to another layout.
     pub fn after<const D: usize>(mut self, switch: Switch, model: &Model<D>) -> Self {
-        self.nonlocal = nonlocal(model);
+        let now = nonlocal(model);
+        let was = std::mem::replace(&mut self.nonlocal, now);
+        for ((wanted, was), now) in self.wanted.iter_mut().zip(was).zip(&self.nonlocal) {
+            if *now && !was {
+                *wanted = switch.time;
+            }
+        }
         self.looked = true;
         self.shares[1] = self.shares[1].max(switch.share);
         self.switches.push(switch);

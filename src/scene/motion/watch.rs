@@ -12,9 +12,14 @@ use crate::tensor::{Tensor, Vector};
 /// Part of the padding beyond the reach that the fastest crack may cross between two looks; the rest is how far it runs before the zone has to change.
 const CROSSED: f64 = 0.3;
 
-/// The zone also changes where it is this many times larger than it would be, and one that grows keeps all its cells until then: a change takes as long as some hundred steps, and
-/// where waves come and go the same cells would be given up and taken back.
+/// The zone also changes where it is this many times larger than what was wanted of late, and one that grows keeps all its cells until then.
 const TOO_LARGE: f64 = 2.0;
+
+/// Steps for which a cell stays wanted. A change takes as long as some two hundred steps: what a wave marks, leaves and marks again within them is cheaper kept than given up.
+const REMEMBERED: u64 = 200;
+
+/// One look in this many is at the whole zone. The others are at its rim, where something stretched asks for cells that are not there yet.
+const WHOLE: u64 = 8;
 
 /// A stretched cell is at the front of the damage within this many reaches of it if the middle of that is [`AIMED`] of this distance away: half of it at the tip of a straight crack, nothing within its path.
 const SEEN: f64 = 1.5;
@@ -33,8 +38,11 @@ pub(super) struct Watch<'a, const D: usize> {
     every: u64,
     /// How far a crack comes in between \[m\].
     travel: f64,
-    /// Bonds to look at, by their points, with their lengths squared \[m²\].
+    /// How long a cell stays wanted \[s\].
+    remembered: f64,
+    /// Bonds to look at, by their points, with their lengths squared \[m²\]; first those of the rim.
     bonds: Vec<([u32; 2], f64)>,
+    of_rim: usize,
     /// The cells at whose boxes each site lies that is a point, several for one on a face, and where those of each begin.
     cells_at: Vec<u32>,
     starts: Vec<usize>,
@@ -86,7 +94,9 @@ impl<'a, const D: usize> Watch<'a, D> {
             limits: [follow.stretch * critical, critical],
             every,
             travel: speed * step * every as f64,
+            remembered: step * REMEMBERED as f64,
             bonds: Vec::new(),
+            of_rim: 0,
             cells_at: Vec::new(),
             starts: vec![0],
             cut,
@@ -151,33 +161,76 @@ impl<'a, const D: usize> Watch<'a, D> {
                     lengths.contains(&r2).then_some(([i, j], r2))
                 }));
         }
+        let free: Vec<bool> = (0..self.boxes.len())
+            .map(|c| self.model.zones[c] != Zone::Nonlocal && !self.follow.barred[c])
+            .collect();
+        let mut rim = vec![false; self.boxes.len()];
+        self.grow(&free, self.follow.reach + self.travel, &mut rim);
+        let bonds = std::mem::take(&mut self.bonds);
+        let is_of_rim = |p: u32| {
+            let cells = self.cells_of(self.site_of_point[p as usize]);
+            cells.iter().any(|&c| rim[c as usize])
+        };
+        let (first, rest): (Vec<_>, Vec<_>) =
+            (bonds.into_iter()).partition(|(points, _)| points.iter().any(|&p| is_of_rim(p)));
+        self.of_rim = first.len();
+        self.bonds = first;
+        self.bonds.extend(rest);
     }
 
-    /// Steps between two looks.
-    pub fn every(&self) -> u64 {
-        self.every
+    /// Whether a step ends with a look, and with one at the whole zone.
+    pub fn looks_after(&self, step: u64) -> [bool; 2] {
+        [self.every, self.every.saturating_mul(WHOLE)].map(|n| step.is_multiple_of(n))
     }
 
-    /// The cells that shall be nonlocal, if the present ones will not do.
-    pub fn look(&self, u: &[f64], system: &dyn Dynamic) -> Option<Vec<bool>> {
+    /// The cells that shall be nonlocal, if the present ones will not do; `wanted` holds when each was wanted last \[s\].
+    ///
+    /// A look that is not at the whole zone finds what must be added at once. Damage comes to the rim with stretched bonds, or is noticed by the caller at the edge.
+    pub fn look(
+        &self,
+        u: &[f64],
+        time: f64,
+        system: &dyn Dynamic,
+        whole: bool,
+        wanted: &mut [f64],
+    ) -> Option<Vec<bool>> {
         let cells = self.boxes.len();
-        let hot = self.stretched(u);
+        let mut hot = vec![false; cells];
+        self.mark_elements(u, &mut hot);
+        self.mark_bonds(u, &self.bonds[..self.of_rim], &mut hot);
+        if !whole && !hot.contains(&true) {
+            return None;
+        }
         let mut damaged = vec![false; cells];
         for site in system.damaged_sites() {
             self.mark_point(site, &mut damaged);
         }
-        let hot = self.front(&hot, &damaged);
         let reach = self.follow.reach;
-        let now: Vec<bool> = (0..cells)
-            .map(|c| self.model.zones[c] == Zone::Nonlocal)
-            .collect();
         let mut kept = self.cut.clone();
         self.grow(&damaged, reach, &mut kept);
         let mut needed = kept.clone();
-        self.grow(&hot, reach + self.travel, &mut needed);
+        self.grow(
+            &self.front(&hot, &damaged),
+            reach + self.travel,
+            &mut needed,
+        );
+        let now: Vec<bool> = (0..cells)
+            .map(|c| self.model.zones[c] == Zone::Nonlocal)
+            .collect();
         let short = needed.iter().zip(&now).any(|(n, now)| *n && !now);
+        if !whole && !short {
+            return None;
+        }
+        self.mark_bonds(u, &self.bonds[self.of_rim..], &mut hot);
+        let hot = self.front(&hot, &damaged);
         let mut next = kept;
         self.grow(&hot, self.follow.padding, &mut next);
+        for (last, next) in wanted.iter_mut().zip(&mut next) {
+            if *next {
+                *last = time;
+            }
+            *next = time - *last <= self.remembered;
+        }
         let count = |set: &[bool]| set.iter().filter(|c| **c).count() as f64;
         let is_large = |next: &[bool]| count(&now) > TOO_LARGE * count(next);
         // what follows only adds cells
@@ -192,14 +245,14 @@ impl<'a, const D: usize> Watch<'a, D> {
         }
         self.close(&mut next);
         let large = is_large(&next);
-        ((short || large) && next != now && next.contains(&true) && next.contains(&false))
-            .then_some(next)
+        let changes =
+            (short || large) && next != now && next.contains(&true) && next.contains(&false);
+        changes.then_some(next)
     }
 
-    /// Cells in which a bond, or an element, is stretched beyond the limit.
-    fn stretched(&self, u: &[f64]) -> Vec<bool> {
-        let [limit, critical] = self.limits;
-        let mut hot = vec![false; self.boxes.len()];
+    /// Marks the elements that are stretched beyond the limit.
+    fn mark_elements(&self, u: &[f64], hot: &mut [bool]) {
+        let limit = self.limits[0];
         let of_site = |site: u32| Vector::<D>::from_column_slice(&u[site as usize * D..][..D]);
         let found: Vec<u32> = (0..self.elements.len())
             .into_par_iter()
@@ -214,32 +267,35 @@ impl<'a, const D: usize> Watch<'a, D> {
             .map(|e| self.elements[e])
             .collect();
         found.into_iter().for_each(|c| hot[c as usize] = true);
-        if let Some(body) = self.model.body() {
-            let position = &body.cloud.position;
-            let [lowest, highest] = [limit, critical].map(|s| s * (2.0 + s));
-            let found: Vec<[u32; 2]> = self
-                .bonds
-                .par_iter()
-                .with_min_len(1024)
-                .filter(|([i, j], r2)| {
-                    let [a, b] = [*i, *j].map(|p| self.site_of_point[p as usize] as usize * D);
-                    let (mut along, mut square) = (0.0, 0.0);
-                    for k in 0..D {
-                        let eta = u[b + k] - u[a + k];
-                        along += (position[*j as usize][k] - position[*i as usize][k]) * eta;
-                        square += eta * eta;
-                    }
-                    // (|ξ + η|² − |ξ|²)/|ξ|² = s (2 + s); a bond beyond the critical stretch is broken, or may not break
-                    let t = 2.0 * along + square;
-                    t > lowest * r2 && t <= highest * r2
-                })
-                .map(|bond| bond.0)
-                .collect();
-            for point in found.into_iter().flatten() {
-                self.mark_point(self.site_of_point[point as usize], &mut hot);
-            }
+    }
+
+    /// Marks the cells in which one of some bonds is stretched beyond the limit.
+    fn mark_bonds(&self, u: &[f64], bonds: &[([u32; 2], f64)], hot: &mut [bool]) {
+        let Some(body) = self.model.body() else {
+            return;
+        };
+        let position = &body.cloud.position;
+        let [lowest, highest] = self.limits.map(|s| s * (2.0 + s));
+        let found: Vec<[u32; 2]> = bonds
+            .par_iter()
+            .with_min_len(1024)
+            .filter(|([i, j], r2)| {
+                let [a, b] = [*i, *j].map(|p| self.site_of_point[p as usize] as usize * D);
+                let (mut along, mut square) = (0.0, 0.0);
+                for k in 0..D {
+                    let eta = u[b + k] - u[a + k];
+                    along += (position[*j as usize][k] - position[*i as usize][k]) * eta;
+                    square += eta * eta;
+                }
+                // (|ξ + η|² − |ξ|²)/|ξ|² = s (2 + s); a bond beyond the critical stretch is broken, or may not break
+                let t = 2.0 * along + square;
+                t > lowest * r2 && t <= highest * r2
+            })
+            .map(|bond| bond.0)
+            .collect();
+        for point in found.into_iter().flatten() {
+            self.mark_point(self.site_of_point[point as usize], hot);
         }
-        hot
     }
 
     /// Marks the cells whose boxes come nearer than `by` to one of a set.
@@ -252,9 +308,14 @@ impl<'a, const D: usize> Watch<'a, D> {
 
     /// Marks the cells at which a site lies that is a point.
     fn mark_point(&self, site: u32, marked: &mut [bool]) {
+        let at = self.cells_of(site).iter();
+        at.for_each(|&c| marked[c as usize] = true);
+    }
+
+    /// The cells at which a site lies that is a point.
+    fn cells_of(&self, site: u32) -> &[u32] {
         let site = site as usize;
-        let at = &self.cells_at[self.starts[site]..self.starts[site + 1]];
-        at.iter().for_each(|&c| marked[c as usize] = true);
+        &self.cells_at[self.starts[site]..self.starts[site + 1]]
     }
 
     /// Marks the cells whose boxes come nearer than `by` to a box.
