@@ -417,19 +417,31 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     }
 
     fn stored_energy(&self, u: &[f64]) -> f64 {
-        if let Some(seam) = &self.seam {
+        let of_rows = || {
             let rows = |site: usize| self.linear.product::<D>(site, u);
             let sites = (0..self.mass.len()).into_par_iter().with_min_len(CHUNK);
             let elements: Vec<f64> = sites
                 .map(|s| 0.5 * rows(s).dot(&Vector::from_column_slice(&u[s * D..][..D])))
                 .collect();
-            return elements.iter().sum::<f64>() + self.bond_energy(u) + seam.energy(u);
+            elements.iter().sum::<f64>()
+        };
+        if let Some(seam) = &self.seam {
+            return of_rows() + self.bond_energy(u) + seam.energy(u);
         }
         let is_body_alone = self
             .body
             .as_ref()
             .is_some_and(|b| b.alone == self.mass.len());
-        if self.symmetry == Symmetry::Symmetric && !is_body_alone {
+        let takes_bonds = |body: &MovingBody<D>| {
+            let mut points = body.site_of_point.iter().filter(|site| **site != NONE);
+            points.all(|&site| body.bonds_of_site[site as usize] != NONE)
+        };
+        let is_symmetric = self.symmetry == Symmetry::Symmetric;
+        if is_symmetric && !is_body_alone && self.body.as_ref().is_some_and(takes_bonds) {
+            // whole bonds are passed over, exact where they turn; rows have what the seam cuts
+            return of_rows() + self.bond_energy(u);
+        }
+        if is_symmetric && !is_body_alone {
             // a seam that has an energy: that of the whole, to first order in the stretch of exact bonds
             let mut force = vec![0.0; u.len()];
             self.tangent_into(u, &mut force);

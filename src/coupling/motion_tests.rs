@@ -7,7 +7,7 @@ use crate::{
     },
     fem,
     peridynamics::{Influence, Micromodulus, kernel::Kinematics},
-    system::{Breakage, Dynamic, Symmetry},
+    system::{Breakage, Dynamic},
     tensor::Vector,
     verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
 };
@@ -88,7 +88,7 @@ pub(super) fn with_motion_by<const D: usize, T>(
     let mut motion = Motion::new(
         &enclosed.model,
         operator.as_ref(),
-        Symmetry::Unsymmetric,
+        coupling.symmetry(),
         |_| DENSITY,
         behaviour,
     )
