@@ -432,17 +432,13 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             .body
             .as_ref()
             .is_some_and(|b| b.alone == self.mass.len());
-        let takes_bonds = |body: &MovingBody<D>| {
-            let mut points = body.site_of_point.iter().filter(|site| **site != NONE);
-            points.all(|&site| body.bonds_of_site[site as usize] != NONE)
-        };
-        let is_symmetric = self.symmetry == Symmetry::Symmetric;
-        if is_symmetric && !is_body_alone && self.body.as_ref().is_some_and(takes_bonds) {
-            // whole bonds are passed over, exact where they turn; rows have what the seam cuts
-            return of_rows() + self.bond_energy(u);
-        }
-        if is_symmetric && !is_body_alone {
-            // a seam that has an energy: that of the whole, to first order in the stretch of exact bonds
+        if self.symmetry == Symmetry::Symmetric && !is_body_alone {
+            // a seam that has an energy
+            if self.body.as_ref().is_some_and(MovingBody::takes_all_points) {
+                // whole bonds are passed over, exact where they turn; rows have what the seam cuts
+                return of_rows() + self.bond_energy(u);
+            }
+            // rows have whole bonds too: the energy of all is known to first order in the stretch of exact bonds
             let mut force = vec![0.0; u.len()];
             self.tangent_into(u, &mut force);
             let products: Vec<f64> = u

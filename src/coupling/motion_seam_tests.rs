@@ -28,6 +28,21 @@ fn breaking_states_at_the_seam() -> Case {
     case(Method::Truncated, Law::StateBased(Influence::Gaussian))
 }
 
+/// Asserts that a force is the gradient of the stored energy, at about a hundred of the unknowns, by differences over twice a step.
+fn is_gradient<const D: usize>(motion: &Motion<'_, D>, u: &[f64], force: &[f64], step: f64) {
+    let scale = largest(force.iter().copied());
+    for dof in (0..u.len()).step_by(u.len() / 97 + 1) {
+        let energy = |by: f64| {
+            let mut moved = u.to_vec();
+            moved[dof] += by;
+            motion.stored_energy(&moved)
+        };
+        let slope = (energy(step) - energy(-step)) / (2.0 * step);
+        let off = (slope - force[dof]).abs();
+        assert!(off < 1e-6 * scale, "{D}, {dof}: {slope:e} {:e}", force[dof]);
+    }
+}
+
 #[test]
 fn the_force_of_a_seam_that_stretches_is_the_gradient_of_its_energy_and_adds_up_to_zero() {
     fn check<const D: usize>(case: &Case) {
@@ -45,20 +60,7 @@ fn the_force_of_a_seam_that_stretches_is_the_gradient_of_its_energy_and_adds_up_
                 let sum: f64 = force[k..].iter().step_by(D).sum();
                 assert!(sum.abs() < 1e-12 * scale * u.len() as f64, "{D} {sum:e}");
             }
-            let step = 1e-4 * amplitude;
-            for dof in (0..u.len()).step_by(u.len() / 97 + 1) {
-                let energy = |by: f64| {
-                    let mut moved = u.clone();
-                    moved[dof] += by;
-                    motion.stored_energy(&moved)
-                };
-                let slope = (energy(step) - energy(-step)) / (2.0 * step);
-                assert!(
-                    (slope - force[dof]).abs() < 1e-6 * scale,
-                    "{D}, {dof}: {slope:e} {:e}",
-                    force[dof]
-                );
-            }
+            is_gradient(motion, &u, &force, 1e-4 * amplitude);
         });
     }
     for case in [breaking_at_the_seam(), breaking_states_at_the_seam()] {
@@ -143,17 +145,7 @@ fn forces_are_gradients_and_add_up_to_zero_where_cut_bonds_are_linear_and_others
             let (forces, _) = out_of_balance(&places, &force);
             assert!(forces < 1e-13, "{D} {forces:e}");
             // bonds turn by as much as they are long, so the energy of the tangent at rest is another
-            let (step, scale) = (1e-5 * SPACING, largest(force.iter().copied()));
-            for dof in (0..u.len()).step_by(u.len() / 97 + 1) {
-                let energy = |by: f64| {
-                    let mut moved = u.clone();
-                    moved[dof] += by;
-                    motion.stored_energy(&moved)
-                };
-                let slope = (energy(step) - energy(-step)) / (2.0 * step);
-                let off = (slope - force[dof]).abs();
-                assert!(off < 1e-6 * scale, "{D}, {dof}: {slope:e} {:e}", force[dof]);
-            }
+            is_gradient(motion, &u, &force, 1e-5 * SPACING);
         });
     }
     check::<1>();

@@ -187,6 +187,12 @@ impl<const D: usize> MovingBody<D> {
         passed.is_none_or(|families| families.of(i).binary_search(&j).is_ok())
     }
 
+    /// Whether every point that is a site takes a force from the bonds that are passed over.
+    pub fn takes_all_points(&self) -> bool {
+        let mut sites = self.site_of_point.iter().filter(|site| **site != NONE);
+        sites.all(|&site| self.bonds_of_site[site as usize] != NONE)
+    }
+
     /// The displacement of every point, from those of the sites.
     pub fn spread(&self, u: &[f64], points: &mut [f64]) {
         if let Some(shift) = self.shift {

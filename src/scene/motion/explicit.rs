@@ -319,8 +319,7 @@ fn leg<'r, const D: usize>(
     // a checkpoint that an interrupt left behind, in the step in which the zone was to be looked at
     let mut stop = match (&eyes, &mut zone) {
         (Some(eyes), Some(zone)) if !zone.looked => {
-            let arrived = || edge.is_none() && motion.system().damage_at_edge().is_some();
-            let arrived = arrived();
+            let arrived = edge.is_none() && motion.system().damage_at_edge().is_some();
             let [due, whole] = eyes.looks_after(first).map(|due| due || arrived);
             due.then(|| {
                 let state = motion.state();

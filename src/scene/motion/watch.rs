@@ -42,6 +42,7 @@ pub(super) struct Watch<'a, const D: usize> {
     remembered: f64,
     /// Bonds to look at, by their points, with their lengths squared \[m²\]; first those of the rim.
     bonds: Vec<([u32; 2], f64)>,
+    /// How many of them are of the rim: with an end in a cell within the reach, and the way of a crack between two looks, of cells that may become nonlocal.
     of_rim: usize,
     /// The cells at whose boxes each site lies that is a point, several for one on a face, and where those of each begin.
     cells_at: Vec<u32>,
@@ -183,7 +184,9 @@ impl<'a, const D: usize> Watch<'a, D> {
         [self.every, self.every.saturating_mul(WHOLE)].map(|n| step.is_multiple_of(n))
     }
 
-    /// The cells that shall be nonlocal, if the present ones will not do; `wanted` holds when each was wanted last \[s\].
+    /// The cells that shall be nonlocal, if the present ones will not do; `wanted` holds when each was wanted last.
+    ///
+    /// Shapes: displacements `u` by site and axis \[m\]; `wanted` and the result by cell, the first \[s\], as `time`.
     ///
     /// A look that is not at the whole zone finds what must be added at once. Damage comes to the rim with stretched bonds, or is noticed by the caller at the edge.
     pub fn look(
