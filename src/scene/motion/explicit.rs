@@ -5,26 +5,24 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::RunOptions;
-use super::drive::SceneDrive;
-use super::laid_out::{Begun, LaidOut, begun, breaks, lay_out, opened, restore};
-use super::pace::{held, paced, repaced};
-use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice, Zone as ZoneState};
+use super::laid_out::{Begun, LaidOut, begun, breaks, lay_out, opened};
+use super::ready::{Before, Between, Ready};
+use super::record::{Breaks, EdgeReached, Moment, Saved};
 use super::switching::{Leaving, share};
-use super::system::{Moving, critical_stretch, start};
+use super::system::critical_stretch;
 use super::watch::{Watch, fastest_crack};
-use crate::coupling::{BrokenBonds, Model, Operator, Sampler, SiteKind, Zone};
+use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::summary::{
-    Choice, Ended, MotionSummary, RunSummary, Sizes, Stopwatch, Timings, bytes_text,
-    peak_memory_bytes,
+    Ended, MotionSummary, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::scene::run::{self, Rest, RunError, Solved};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::scene::validate::Scene;
-use crate::solve::explicit::{Explicit, ExplicitParams, State};
+use crate::solve::explicit::{Explicit, ExplicitParams};
 
 /// How often whoever watches is told.
 const TOLD_EVERY: Duration = Duration::from_millis(200);
@@ -77,26 +75,6 @@ enum Leg<'a, const D: usize> {
     Ended(Box<RunSummary>),
     /// In a change of the zones.
     Switch(Begun, Box<Between<'a, D>>),
-}
-
-/// A run between two layouts of its zones.
-struct Between<'a, const D: usize> {
-    /// Choices before the change: all but those that every layout makes anew.
-    told: usize,
-    /// Stages before the change.
-    timings: Timings,
-    leaving: Leaving<D>,
-    broken: BrokenBonds<D>,
-    /// The cells that become nonlocal.
-    nonlocal: Vec<bool>,
-    recorder: Recorder<'a, D>,
-    /// Whether a checkpoint was due with the change.
-    due: bool,
-    pace: StepChoice,
-    edge: Option<EdgeReached>,
-    zone: Option<ZoneState>,
-    /// Steps taken by this program, and their seconds.
-    taken: (u64, f64),
 }
 
 /// Runs a scene in time.
@@ -172,9 +150,15 @@ fn leg<'r, const D: usize>(
         ..
     } = laid_out;
     progress.stage("stable step", None);
-    let held = held(model, &rest.conditions)?;
-    let begin = start(model, &rest.initial);
-    let sampler = Sampler::new(model);
+    let before = Before {
+        model,
+        rest,
+        spec,
+        moving,
+        choices: &mut choices,
+        timings: &mut timings,
+        watch: &mut watch,
+    };
     let Ready {
         mut moving,
         mut recorder,
@@ -190,90 +174,9 @@ fn leg<'r, const D: usize>(
     } = match from {
         From::Start(file, saved) => {
             let saved = saved.map(|saved| *saved);
-            choices.push(Choice {
-                choice: format!("{} in rows and bonds", bytes_text(moving.bytes as u64)),
-                why: "read once per step".to_owned(),
-            });
-            let known = saved.as_ref().map(|saved| saved.pace);
-            let (mut moving, pace) = paced(spec, growing, moving, &held, known, &mut choices)?;
-            watch.lap(&mut timings, "stable step");
-            let drive = driven(model, rest, &begin.u, &pace, spec)?;
-            if drive.evaluates_everywhere() {
-                choices.push(Choice {
-                    choice: "loads evaluated at every place and step".to_owned(),
-                    why: "an expression holds both t and a coordinate; written as two conditions, each with one, it would cost nothing"
-                        .to_owned(),
-                });
-            }
-            restore(moving.system.as_mut(), saved.as_ref(), &file)?;
-            let recorder = Recorder::new(
-                &rest.output,
-                &sampler,
-                breaks(moving.system.as_ref(), rest),
-                moving.is_linear,
-                file,
-                options.checkpoint_every.or(spec.checkpoint_every),
-                saved.as_ref().map(|s| &s.written),
-            )?;
-            let resumed = saved.is_some();
-            let edge = saved.as_ref().and_then(|s| s.edge);
-            let (state, zone) = match saved {
-                Some(saved) => (saved.state, saved.zone),
-                None => (begin, None),
-            };
-            Ready {
-                moving,
-                recorder,
-                state,
-                pace,
-                drive,
-                edge,
-                zone: zone.or_else(|| rest.follow.as_ref().map(|_| ZoneState::first(model))),
-                told: choices.len(),
-                taken: (0, 0.0),
-                resumed,
-                due: false,
-            }
+            before.at_start(growing, options.checkpoint_every, file, saved)?
         }
-        From::Switch(between) => {
-            let Between {
-                told,
-                timings: before,
-                leaving,
-                mut recorder,
-                due,
-                pace,
-                edge,
-                zone,
-                taken,
-                ..
-            } = *between;
-            choices.truncate(told);
-            let pace = repaced(spec, moving.system.as_ref(), &held, pace, leaving.state())?;
-            watch.lap(&mut timings, "stable step");
-            let drive = driven(model, rest, &begin.u, &pace, spec)?;
-            let (state, switch) = leaving.arrive(model, moving.system.as_ref(), &drive)?;
-            recorder.move_to(&sampler);
-            recorder.energy_at_start += switch.left();
-            watch.lap(&mut timings, "state carried over");
-            let own = std::mem::replace(&mut timings, before);
-            for stage in &own.stages {
-                timings.add(&format!("zone changes: {}", stage.name), stage.seconds);
-            }
-            Ready {
-                moving,
-                recorder,
-                state,
-                pace,
-                drive,
-                edge,
-                zone: zone.map(|z| z.after(switch, model)),
-                told,
-                taken,
-                resumed: true,
-                due,
-            }
-        }
+        From::Switch(between) => before.after_switch(*between)?,
     };
     let breaks = breaks(moving.system.as_ref(), rest);
     let zones = run::zone_of_site(model);
@@ -325,7 +228,7 @@ fn leg<'r, const D: usize>(
                 let state = motion.state();
                 eyes.look(
                     &state.u,
-                    state.time,
+                    (state.time, pace.steps - state.step),
                     motion.system(),
                     whole,
                     &mut zone.wanted,
@@ -370,7 +273,7 @@ fn leg<'r, const D: usize>(
                 let begun = Instant::now();
                 next = eyes.look(
                     &state.u,
-                    state.time,
+                    (state.time, pace.steps - state.step),
                     motion.system(),
                     whole,
                     &mut zone.wanted,
@@ -527,37 +430,6 @@ fn leg<'r, const D: usize>(
         files: recorder.files(),
         ..RunSummary::default()
     })))
-}
-
-/// What a run with one layout needs before its first step.
-struct Ready<'r, 'm, const D: usize> {
-    moving: Moving<'m>,
-    recorder: Recorder<'r, D>,
-    state: State,
-    pace: StepChoice,
-    drive: SceneDrive<'m, D>,
-    edge: Option<EdgeReached>,
-    zone: Option<ZoneState>,
-    told: usize,
-    taken: (u64, f64),
-    resumed: bool,
-    /// Whether a checkpoint is due before the first step.
-    due: bool,
-}
-
-/// The conditions of a scene, from time zero to its end.
-fn driven<'m, const D: usize>(
-    model: &'m Model<D>,
-    rest: &'m Rest<D>,
-    start: &[f64],
-    pace: &StepChoice,
-    spec: &Spec,
-) -> Result<SceneDrive<'m, D>, RunError> {
-    let steps = match pace.since {
-        (0, _) => pace.steps,
-        _ => (spec.duration / pace.step).ceil() as u64,
-    };
-    SceneDrive::new(model, &rest.conditions, start, pace.step, steps)
 }
 
 pub(super) fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {

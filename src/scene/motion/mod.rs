@@ -6,6 +6,7 @@
 //! | `system.rs` | what moves, its masses, its start |
 //! | `drive.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
+//! | `ready.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
 //! | `quasi_static.rs` | the run under a load that grows |
 //! | `pace.rs` | the time step, with sub-cycling |
 //! | `stability.rs` | whether the motion stays bounded |
@@ -21,6 +22,7 @@ mod laid_out;
 mod pace;
 mod predict;
 mod quasi_static;
+mod ready;
 mod record;
 mod stability;
 mod switching;

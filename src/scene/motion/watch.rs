@@ -36,7 +36,7 @@ pub(super) struct Watch<'a, const D: usize> {
     limits: [f64; 2],
     /// Steps between looks.
     every: u64,
-    /// How far a crack comes in between \[m\].
+    /// How far a crack comes in a step \[m\].
     travel: f64,
     /// How long a cell stays wanted \[s\].
     remembered: f64,
@@ -94,7 +94,7 @@ impl<'a, const D: usize> Watch<'a, D> {
             model,
             limits: [follow.stretch * critical, critical],
             every,
-            travel: speed * step * every as f64,
+            travel: speed * step,
             remembered: step * REMEMBERED as f64,
             bonds: Vec::new(),
             of_rim: 0,
@@ -166,7 +166,7 @@ impl<'a, const D: usize> Watch<'a, D> {
             .map(|c| self.model.zones[c] != Zone::Nonlocal && !self.follow.barred[c])
             .collect();
         let mut rim = vec![false; self.boxes.len()];
-        self.grow(&free, self.follow.reach + self.travel, &mut rim);
+        self.grow(&free, self.follow.reach + self.way(u64::MAX), &mut rim);
         let bonds = std::mem::take(&mut self.bonds);
         let is_of_rim = |p: u32| {
             let cells = self.cells_of(self.site_of_point[p as usize]);
@@ -179,12 +179,17 @@ impl<'a, const D: usize> Watch<'a, D> {
         self.bonds.extend(rest);
     }
 
+    /// How far a crack comes until the next look, or until the run ends in so many steps \[m\].
+    fn way(&self, left: u64) -> f64 {
+        self.travel * self.every.min(left) as f64
+    }
+
     /// Whether a step ends with a look, and with one at the whole zone.
     pub fn looks_after(&self, step: u64) -> [bool; 2] {
         [self.every, self.every.saturating_mul(WHOLE)].map(|n| step.is_multiple_of(n))
     }
 
-    /// The cells that shall be nonlocal, if the present ones will not do; `wanted` holds when each was wanted last.
+    /// The cells that shall be nonlocal for the steps that are `left`, if the present ones will not do; `wanted` holds when each was wanted last.
     ///
     /// Shapes: displacements `u` by site and axis \[m\]; `wanted` and the result by cell, the first \[s\], as `time`.
     ///
@@ -192,7 +197,7 @@ impl<'a, const D: usize> Watch<'a, D> {
     pub fn look(
         &self,
         u: &[f64],
-        time: f64,
+        (time, left): (f64, u64),
         system: &dyn Dynamic,
         whole: bool,
         wanted: &mut [f64],
@@ -214,7 +219,7 @@ impl<'a, const D: usize> Watch<'a, D> {
         let mut needed = kept.clone();
         self.grow(
             &self.front(&hot, &damaged),
-            reach + self.travel,
+            reach + self.way(left),
             &mut needed,
         );
         let now: Vec<bool> = (0..cells)
@@ -364,7 +369,7 @@ impl<'a, const D: usize> Watch<'a, D> {
             ahead,
             ..
         } = *self.follow;
-        let beside = 0.5 * (reach + self.travel + padding);
+        let beside = 0.5 * (reach + self.way(u64::MAX) + padding);
         let mut is_left = front.to_vec();
         for first in 0..front.len() {
             if !std::mem::take(&mut is_left[first]) {
