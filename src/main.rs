@@ -83,10 +83,13 @@ enum Command {
         #[arg(long)]
         resume: bool,
     },
-    /// Validate a scene and predict its size, memory and time, without solving it.
+    /// Validate a scene and predict its size, memory, time and error, without solving it.
     Check {
         #[command(flatten)]
         scene: SceneArguments,
+        /// Seconds that runs with other spacings may take, which the error is predicted from; by default a second, or 0.15 of the predicted time.
+        #[arg(long, value_name = "SECONDS")]
+        pilots: Option<f64>,
         /// Print the prediction as JSON.
         #[arg(long)]
         json: bool,
@@ -303,9 +306,13 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             }
             return Ok(code);
         }
-        Command::Check { scene, json } => {
+        Command::Check {
+            scene,
+            pilots,
+            json,
+        } => {
             let progress = TerminalProgress::on_stderr();
-            let found = scene::check(&scene.scene, &scene.overrides, &progress);
+            let found = scene::check(&scene.scene, &scene.overrides, pilots, &progress);
             let prediction = found.map_err(|e| match e {
                 CheckError::Scene(e) => e.report(),
                 CheckError::Run(e) => miette::miette!("{e}"),

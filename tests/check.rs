@@ -126,3 +126,85 @@ fn an_accuracy_beside_a_zone_that_is_placed() {
     }
     assert_eq!(measured["sizes"]["points"].as_u64(), Some(0));
 }
+
+/// The error of a scene that leaves nothing open, against the closed form `u = sin(2πx)/4π²`: linear elements are exact at nodes here.
+#[test]
+fn the_error_of_a_typed_scene_is_predicted() {
+    let folder = tempfile::tempdir().unwrap();
+    let tau = 2.0 * std::f64::consts::PI;
+    let exact = |x: f64| (tau * x).sin() / (tau * tau);
+    for cells in [10, 40] {
+        let (mut apart, mut size) = (0.0, 0.0);
+        for k in 0..101 {
+            let x = 0.013 + 0.974 * f64::from(k) / 100.0;
+            let n = f64::from(cells);
+            let (cell, t) = ((x * n).floor(), (x * n).fract());
+            let u = exact(cell / n) * (1.0 - t) + exact((cell + 1.0) / n) * t;
+            apart += (u - exact(x)).powi(2);
+            size += exact(x).powi(2);
+        }
+        let error = f64::sqrt(apart / size);
+        let mesh = format!("mesh.line.x.cells={cells}");
+        let overrides = [mesh.as_str(), "coupling=local"];
+        let found = json(
+            "check",
+            "examples/choices/bar_sine.toml",
+            &overrides,
+            folder.path(),
+        );
+        let predicted = found["error"]["error"].as_f64().unwrap();
+        assert_eq!(found["error"]["against"], "elasticity");
+        let ratio = predicted / error;
+        assert!(
+            (1.0 / 1.15..1.15).contains(&ratio),
+            "{cells} cells: {predicted} of {error}"
+        );
+    }
+}
+
+/// Where no error is predicted, `check` says why, and what would help.
+#[test]
+fn an_error_that_is_not_predicted_has_a_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let why = |scene: &str| {
+        let found = json("check", scene, &[], folder.path());
+        assert_eq!(found["error"], Value::Null);
+        found["no_error"].as_str().unwrap().to_owned()
+    };
+    assert!(why("examples/slit_plate_gmsh.toml").contains("mesh from a file"));
+    // coarser points would take the cracks other ways, and finer ones cost too much
+    assert!(why("examples/branching.toml").contains("--pilots"));
+}
+
+/// Elements with a partial stress at free sides are warned of, by `check` and by `run`; a splice has none.
+#[test]
+fn one_sided_families_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let coarse = [
+        "peridynamics.horizon=0.004",
+        "mesh.box.x.cells=20",
+        "mesh.box.y.cells=6",
+        "mesh.box.z.cells=6",
+    ];
+    for (coupling, expected) in [
+        ("coupling.partial-stress.form=elements", true),
+        ("coupling=splice", false),
+    ] {
+        let mut overrides = coarse.to_vec();
+        overrides.push(coupling);
+        for command in ["check", "run"] {
+            let found = json(
+                command,
+                "examples/coupled_bar_3d.toml",
+                &overrides,
+                folder.path(),
+            );
+            let warnings = found["warnings"].to_string();
+            assert_eq!(
+                warnings.contains("one-sided"),
+                expected,
+                "{command}: {warnings}"
+            );
+        }
+    }
+}

@@ -193,6 +193,9 @@ pub struct RunSummary {
     pub reactions: Vec<Reaction>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
     pub energy: Option<f64>,
+    /// What may be inaccurate.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// What became of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSummary>,
@@ -403,6 +406,9 @@ impl fmt::Display for RunSummary {
                 r.condition,
                 components(&r.force)
             )?;
+        }
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
         }
         for file in &self.files {
             writeln!(f, "wrote                  {}", file.display())?;

@@ -11,6 +11,7 @@
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `follow.rs`, `output.rs` | its parts |
 //! | `automatic/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `definite.rs` | whether a seam that may be unstable is |
+//! | `doubts.rs` | what of a model makes its results doubtful |
 //! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
@@ -31,6 +32,7 @@ mod conditions;
 mod converge;
 mod cost;
 mod definite;
+mod doubts;
 mod error;
 mod expression;
 mod follow;

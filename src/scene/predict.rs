@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::accuracy::ErrorPrediction;
 use super::cost::{made_up, output_seconds};
+use super::doubts;
 use super::loads;
 use super::motion;
 use super::run::{self, RunError, Solved};
@@ -79,8 +80,11 @@ pub struct Prediction {
     pub choices: Vec<Choice>,
     /// What will be costly or inaccurate.
     pub warnings: Vec<String>,
-    /// How far results will be from those of a finer model, where coarser ones tell; see [`check`](fn@super::check).
+    /// How far results will be from those of a finer model, where runs with other spacings tell; see [`check`](fn@super::check).
     pub error: Option<ErrorPrediction>,
+    /// Why there is none, if it was looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_error: Option<String>,
     /// The steps of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionPrediction>,
@@ -279,6 +283,7 @@ pub(crate) fn predict<const D: usize>(
         choices,
         warnings: Vec::new(),
         error: None,
+        no_error: None,
         motion: None,
     };
     prediction.warnings = warnings(&model, joining, &prediction);
@@ -334,6 +339,7 @@ pub(super) fn warnings<const D: usize>(
             }
         }
     }
+    list.extend(doubts::one_sided(model));
     if prediction.sizes.bonds > MANY_BONDS {
         list.push(format!(
             "{} bonds: shrink the nonlocal zone or the horizon over spacing",
@@ -473,20 +479,18 @@ impl fmt::Display for Prediction {
         if let Some(e) = &self.error {
             writeln!(
                 f,
-                "error                  about {} of {}, within a factor of {} in {} that were measured (order {:.1}, from {} coarser runs of {:.2} s)",
+                "error                  about {} of {} against {}, within a factor of {} in {} that were measured (order {:.1}, from {} runs with other spacings, {:.2} s)",
                 number(e.error),
                 e.quantities.join(", "),
+                e.against,
                 e.spread,
                 e.share,
                 e.order,
                 e.pilots,
                 e.seconds
             )?;
-        } else {
-            writeln!(
-                f,
-                "error                  not predicted: it takes two coarser versions of the scene that run in a second or 0.15 of the run"
-            )?;
+        } else if let Some(why) = &self.no_error {
+            writeln!(f, "error                  not predicted: {why}")?;
         }
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;

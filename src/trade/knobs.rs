@@ -50,6 +50,9 @@ pub const KNOBS: [&str; 6] = [
     "step-fraction",
 ];
 
+/// Spacings of versions of a scene over its own.
+const VERSIONS: [f64; 8] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 8.0];
+
 /// The numbers of a scene that knobs change.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Base {
@@ -61,6 +64,8 @@ pub(crate) struct Base {
     mesh: Option<Generated>,
     nonlocal: Option<Grown>,
     transition: Option<Grown>,
+    /// Width of a transition zone that is typed as one around the nonlocal zone.
+    around: Option<f64>,
     has_transition: bool,
     /// Cracks or voids that elements do not see, or bonds that may break: δ is a length of the material, and elements alone are no model.
     pub breaks: bool,
@@ -137,6 +142,10 @@ impl Base {
                     Some(Grown::Box(b.min.values.clone(), b.max.values.clone()))
                 }
                 TransitionSpec::Near(n) => Some(Grown::Near(n.within.value)),
+                _ => None,
+            }),
+            around: transition.and_then(|t| match t {
+                TransitionSpec::Around(width) => Some(width.value),
                 _ => None,
             }),
             has_transition: transition.is_some(),
@@ -227,30 +236,60 @@ impl Base {
         self.scaled(0.5)
     }
 
-    /// Factors by which the scene can be coarser and still be one.
-    pub(crate) fn coarser(&self) -> Vec<f64> {
-        let mut fewest = self.mesh.as_ref().map_or(0.0, |_| f64::INFINITY);
-        if let Some(mesh) = &self.mesh {
-            for (k, (_, axis)) in mesh.axes.iter().enumerate() {
-                let length = mesh.max[k] - mesh.min[k];
-                fewest = fewest.min(match axis {
-                    Axis::Cells(n) => *n as f64,
-                    Axis::Spacing(s) | Axis::Graded { spacing: s, .. } => length / s,
-                });
-            }
-        }
-        // families of two spacings are the smallest that are any good
-        let (factors, least) = match self.ratio() {
-            Some(m) if self.breaks => ([1.5, 2.0, 3.0], m / 1.99),
-            _ => ([2.0, 4.0, 8.0], f64::INFINITY),
+    /// Factors of the spacing for which the scene is still one, in rising order: a quarter, half, one, and those that leave an order to be seen.
+    ///
+    /// They leave a whole number of cells along the first axis. There are none for a mesh from a file.
+    pub(crate) fn versions(&self) -> Vec<f64> {
+        let Some(mesh) = &self.mesh else {
+            return Vec::new();
+        };
+        let cells = mesh
+            .axes
+            .iter()
+            .enumerate()
+            .map(|(k, (_, axis))| match axis {
+                Axis::Cells(n) => *n as f64,
+                Axis::Spacing(s) | Axis::Graded { spacing: s, .. } => {
+                    (mesh.max[k] - mesh.min[k]) / s
+                }
+            });
+        let fewest = cells.fold(f64::INFINITY, f64::min);
+        // families of two spacings are the smallest that are any good; cracks that run take other ways in coarser points
+        let coarsest = match self.ratio() {
+            _ if self.can_break => 1.0,
+            Some(m) if self.breaks => m / 1.99,
+            _ => f64::INFINITY,
         };
         // coarser ones say nothing of an order
-        let fits = |f: &f64| *f <= least && fewest / f >= 4.0;
-        factors.into_iter().filter(fits).collect()
+        let fits = |f: &f64| *f <= 1.0 || (*f <= coarsest && fewest / f >= 3.99);
+        let mut factors: Vec<f64> = VERSIONS
+            .iter()
+            .map(|f| self.whole(*f))
+            .filter(fits)
+            .collect();
+        factors.dedup();
+        factors
     }
 
-    /// The factor that a whole number of cells leaves of one.
-    pub(crate) fn coarsened(&self, factor: f64) -> f64 {
+    /// Points of full peridynamics with spacings so many times larger, in the box around the body.
+    pub(crate) fn points_of_all(&self, factor: f64) -> Option<f64> {
+        let mesh = self.mesh.as_ref()?;
+        let spacing = self.spacing()? * factor;
+        let edges = mesh.max.iter().zip(&mesh.min);
+        Some(edges.map(|(max, min)| (max - min) / spacing).product())
+    }
+
+    /// The scene with all spacings `factor` times as large, and peridynamics everywhere; `None` where it is already, or where nothing cuts bonds.
+    pub(crate) fn everywhere(&self, factor: f64) -> Option<Vec<Change>> {
+        let is_all = matches!(self.joining.zones, ZonesNeeded::Everywhere(_));
+        (self.breaks && !is_all).then(|| {
+            let all = Change::Coupling("nonlocal".to_owned());
+            self.scaled(factor).into_iter().chain([all]).collect()
+        })
+    }
+
+    /// A factor next to one that leaves a whole number of cells along the first axis.
+    fn whole(&self, factor: f64) -> f64 {
         match self.mesh.as_ref().and_then(|m| m.axes.first()) {
             Some((_, Axis::Cells(n))) => *n as f64 / (*n as f64 / factor).round().max(1.0),
             _ => factor,
@@ -320,13 +359,17 @@ impl Base {
         };
         self.mesh_overrides(cells, &mut list);
         let grown = padding * horizon;
-        zone_overrides("zones.nonlocal", self.nonlocal.as_ref(), grown, &mut list);
-        zone_overrides(
-            "zones.transition",
-            self.transition.as_ref(),
-            grown,
-            &mut list,
-        );
+        if grown != 0.0 {
+            zone_overrides("zones.nonlocal", self.nonlocal.as_ref(), grown, &mut list);
+        }
+        let transition = self.transition_at(delta);
+        let key = "zones.transition";
+        if grown != 0.0 || transition != self.transition {
+            zone_overrides(key, transition.as_ref(), grown, &mut list);
+        }
+        if let Some(width) = self.around.filter(|_| delta != 1.0) {
+            list.push(format!("{key}.around={:e}", width * delta));
+        }
         if let ZonesNeeded::Transition { width, .. } = joining.zones
             && !self.has_transition
         {
@@ -335,6 +378,33 @@ impl Base {
             list.push(format!("zones.transition.around={width:e}"));
         }
         list
+    }
+
+    /// The transition zone as wide in horizons as it is typed, where that of `delta` times the horizon still lies in the body.
+    fn transition_at(&self, delta: f64) -> Option<Grown> {
+        let typed = self.transition.as_ref()?;
+        let moved = |from: f64, to: f64| from + (to - from) * delta;
+        let each = |from: &[f64], to: &[f64]| -> Vec<f64> {
+            from.iter().zip(to).map(|(f, t)| moved(*f, *t)).collect()
+        };
+        let scaled = match (self.nonlocal.as_ref(), typed) {
+            _ if delta == 1.0 => None,
+            (Some(Grown::Near(from)), Grown::Near(to)) => Some(Grown::Near(moved(*from, *to))),
+            (Some(Grown::Box(low, high)), Grown::Box(min, max)) => {
+                let (low, high) = (each(low, min), each(high, max));
+                let stays = |mesh: &Generated| {
+                    let mut axes = 0..low.len().min(mesh.min.len());
+                    axes.all(|k| {
+                        (min[k] <= mesh.min[k] || low[k] > mesh.min[k])
+                            && (max[k] >= mesh.max[k] || high[k] < mesh.max[k])
+                    })
+                };
+                let is_inside = self.mesh.as_ref().is_some_and(stays);
+                is_inside.then_some(Grown::Box(low, high))
+            }
+            _ => None,
+        };
+        scaled.or_else(|| Some(typed.clone()))
     }
 
     fn lattice_overrides(&self, spacing: f64, coupling: Option<Joining>, list: &mut Vec<String>) {
@@ -404,9 +474,6 @@ fn named(name: &str) -> Option<CouplingSpec> {
 }
 
 fn zone_overrides(key: &str, zone: Option<&Grown>, grown: f64, list: &mut Vec<String>) {
-    if grown == 0.0 {
-        return;
-    }
     match zone {
         Some(Grown::Box(min, max)) => {
             let moved = |x: &[f64], by: f64| x.iter().map(|v| v + by).collect::<Vec<_>>();

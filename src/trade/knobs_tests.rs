@@ -90,3 +90,42 @@ fn a_typed_knob_is_a_list() {
     assert!(typed("a=3").unwrap_err().contains("no list"));
     assert!(typed("a=[]").unwrap_err().contains("no values"));
 }
+
+/// A transition zone two horizons wide on either side stays so at half the horizon; at four times the horizon it would leave the plate, and stays as it is typed.
+#[test]
+fn a_transition_zone_keeps_its_width_in_horizons() {
+    let mut source = Source::new("plate", PLATE);
+    for o in [
+        "coupling=blending",
+        "zones.transition.box.min=[0.4, -1]",
+        "zones.transition.box.max=[1.6, 2]",
+        "zones.nonlocal.box.min=[0.7, -1]",
+        "zones.nonlocal.box.max=[1.3, 2]",
+    ] {
+        source.push_override(o).unwrap();
+    }
+    let base = Base::of(&SceneSpec::parse(&source).unwrap());
+    let transition = |factor: f64| {
+        let all = base.overrides(&base.scaled(factor));
+        let of_zone = |o: &String| o.starts_with("zones.transition");
+        all.into_iter().filter(of_zone).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        transition(0.5),
+        [
+            "zones.transition.box.min=[5.5e-1, -1e0]",
+            "zones.transition.box.max=[1.45e0, 2e0]"
+        ]
+    );
+    assert_eq!(transition(1.0), Vec::<String>::new());
+    assert_eq!(transition(4.0), Vec::<String>::new());
+    source
+        .push_override("zones.transition={ around = 0.3 }")
+        .unwrap();
+    let base = Base::of(&SceneSpec::parse(&source).unwrap());
+    let all = base.overrides(&base.scaled(0.5));
+    assert!(
+        all.contains(&"zones.transition.around=1.5e-1".to_owned()),
+        "{all:?}"
+    );
+}

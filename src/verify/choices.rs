@@ -8,7 +8,9 @@ use std::path::Path;
 
 use crate::observe::report::{Columns, Row, Table};
 use crate::progress::{Progress, Silent};
-use crate::scene::accuracy::{Bench, Candidate, Chosen, SPREAD, completed, difference};
+use crate::scene::accuracy::{
+    Bench, Candidate, Chosen, LEAST, SPREAD, completed, difference, error_of,
+};
 use crate::scene::{AnyScene, SceneSpec, Source};
 use crate::verify::Effort;
 
@@ -102,6 +104,16 @@ struct Outcome {
     predicted: f64,
     cost: f64,
     time: f64,
+    checked: Checked,
+}
+
+/// What `check` would say of the chosen scene, had it been typed: errors, `None` where it does not predict one.
+#[derive(Clone, Copy, Debug, Default)]
+struct Checked {
+    /// As it does.
+    usual: Option<f64>,
+    /// As it does of scenes that take long: from runs that together take little of the time.
+    coarser: Option<f64>,
 }
 
 /// Candidates beside the choice, as shares of its cells.
@@ -216,6 +228,7 @@ fn measured(
             predicted: chosen.error.unwrap_or(f64::NAN),
             cost: seconds / cheapest,
             time: time_ratio(complete)?,
+            checked: checked(complete)?,
         };
         let what = chosen.choices.iter().map(|c| c.choice.clone());
         let label = format!("{} ({}), {wanted}", case.name, case.half.name());
@@ -241,9 +254,39 @@ fn measured(
             "predicted time over measured",
             outcome.time,
         ));
+        for (what, error) in [
+            (
+                "error predicted by `check` over measured",
+                outcome.checked.usual,
+            ),
+            ("the same from coarser runs alone", outcome.checked.coarser),
+        ] {
+            table.push(match error {
+                Some(e) => Row::info(&label, what, e / outcome.error),
+                None => Row::refused(&label, what, "no versions that can be paid for"),
+            });
+        }
         outcomes.push(outcome);
     }
     Ok(())
+}
+
+fn checked(complete: &Source) -> Result<Checked, String> {
+    let here = Path::new("");
+    let prediction = AnyScene::from_source(complete, here, "scene")
+        .map_err(|e| e.message().to_owned())?
+        .predict(&Silent)
+        .map_err(|e| e.to_string())?;
+    let error = |least: f64| {
+        let found = error_of(complete, here, &prediction, least);
+        found
+            .map(|e| e.ok().map(|e| e.error))
+            .map_err(|e| e.message().to_owned())
+    };
+    Ok(Checked {
+        usual: error(LEAST)?,
+        coarser: error(0.0)?,
+    })
 }
 
 /// Runs below this are taken three times, and the median ratio counts.
@@ -301,6 +344,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
                     predicted: f64::NAN,
                     cost: f64::NAN,
                     time: f64::NAN,
+                    checked: Checked::default(),
                 });
             }
             table.push(Row::refused(case.name, "choice", why));
@@ -325,6 +369,9 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         });
         share("predicted time within a factor of 1.5", &|o| {
             within(o.time, TIME_LIMIT)
+        });
+        share("error predicted by `check` within a factor of 3", &|o| {
+            o.checked.usual.is_some_and(|e| within(e / o.error, SPREAD))
         });
     }
     vec![table, shares]

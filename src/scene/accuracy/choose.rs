@@ -4,11 +4,11 @@ use std::path::Path;
 
 use super::super::error::{SceneError, SceneErrorKind};
 use super::super::source::Source;
-use super::ErrorPrediction;
 use super::estimate::{CHOICES, SPREAD};
 use super::ladder::{AFFORDABLE, Ladder};
 use super::open::{Asked, Family};
 use super::pilot::Bench;
+use super::{Against, ErrorPrediction};
 use crate::observe::summary::Choice;
 
 /// A candidate: a family at a spacing.
@@ -152,6 +152,11 @@ pub(super) fn choose(
             let prediction = Some(ErrorPrediction {
                 quantities: bench.quantities.iter().map(|q| q.name()).collect(),
                 error: found.error,
+                against: if asked.breaks {
+                    Against::Peridynamics
+                } else {
+                    Against::Elasticity
+                },
                 spread: SPREAD,
                 share: CHOICES,
                 order: ladder.fit.order,

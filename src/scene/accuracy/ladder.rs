@@ -2,7 +2,7 @@
 
 use super::super::spec::SceneSpec;
 use super::coarsest::coarsest;
-use super::estimate::{self, Fit, SAFETY};
+use super::estimate::{self, Fit, SAFETY, USUAL};
 use super::open::{Asked, Family};
 use super::pilot::{Bench, Pilot};
 use crate::trade::Base;
@@ -64,7 +64,7 @@ impl Ladder {
             levels.push((n as f64, bench.run(&asked.overrides(family, n))?));
             n = asked.fitting(above(n, growth));
         }
-        let mut fit = estimate::fit(&levels, &bench.quantities)?;
+        let mut fit = estimate::fit(&levels, &bench.quantities, USUAL[0])?;
         if let Some(padding) = family.padding {
             // what the edge of the zone does shows in one twice as far
             let wider = Family {
@@ -140,7 +140,7 @@ impl Ladder {
     fn refine(&mut self, asked: &Asked, n: usize, bench: &mut Bench) -> Option<()> {
         let pilot = bench.run(&asked.overrides(&self.family, n))?;
         self.levels.push((n as f64, pilot));
-        let fit = estimate::fit(&self.levels, &bench.quantities)?;
+        let fit = estimate::fit(&self.levels, &bench.quantities, USUAL[0])?;
         self.fit = fit.with_rest(self.fit.rest);
         Some(())
     }
@@ -222,7 +222,7 @@ impl Ladder {
 }
 
 /// Factors of direct solvers grow faster than cells; in motion there are more steps, too.
-fn growth(spec: &SceneSpec) -> f64 {
+pub(super) fn growth(spec: &SceneSpec) -> f64 {
     let dimension = spec.dimension();
     if Base::of(spec).moves {
         dimension as f64 + 1.0

@@ -9,6 +9,7 @@
 //! | `coarsest.rs` | the coarsest candidate whose error is small enough, by looking at candidates themselves |
 //! | `ladder.rs` | a family of candidates, with runs of it from coarse to fine |
 //! | `choose.rs` | the cheapest candidate whose predicted error is small enough |
+//! | `versions.rs` | the error of a complete scene, from coarser and finer versions of it |
 //!
 //! Errors are those of `bondline trade`: relative root mean square of the displacement along the scene's lines and probes, over time
 //! for histories. Where nothing is cut and no bond can break the horizon is numerical, and errors are against elasticity; else it is a
@@ -20,6 +21,7 @@ mod estimate;
 mod ladder;
 mod open;
 mod pilot;
+mod versions;
 
 use std::path::Path;
 
@@ -30,15 +32,14 @@ pub use open::Family;
 
 pub(crate) use estimate::{SPREAD, difference};
 pub(crate) use pilot::Bench;
+use versions::predicted_error;
 
 use super::error::SceneError;
 use super::predict::Prediction;
 use super::run::RunError;
 use super::source::Source;
-use super::spec::SceneSpec;
 use super::validate::{AnyScene, read};
 use crate::progress::Progress;
-use crate::trade::Base;
 
 /// Why there is nothing to tell of a scene.
 #[derive(Debug, thiserror::Error)]
@@ -61,15 +62,17 @@ impl From<SceneError> for CheckError {
 const PILOTS: f64 = 0.15;
 
 /// Seconds that pilots may take whatever the run does.
-const LEAST: f64 = 1.0;
+pub(crate) const LEAST: f64 = 1.0;
 
-/// What a run of a scene file will need, and how large its error will be, without running it.
+/// What a run of a scene file will need, and how large its error will be, without running it; runs of it with other spacings may take so many
+/// seconds for the latter, 0.15 of the predicted time or one second if that is left open.
 ///
 /// # Errors
 /// [`CheckError`], each with place and remedy.
 pub fn check(
     path: &Path,
     overrides: &[String],
+    pilots: Option<f64>,
     progress: &dyn Progress,
 ) -> Result<Prediction, CheckError> {
     let (source, directory, name) = read(path, overrides)?;
@@ -80,24 +83,71 @@ pub fn check(
         scene.chose(chosen.choices.clone());
     }
     let mut prediction = scene.predict(progress)?;
-    let run = prediction.total_seconds - prediction.timings.seconds("output");
-    let most = (PILOTS * run).max(LEAST);
-    progress.stage("coarser runs", None);
-    prediction.error = match chosen.as_ref().and_then(|(_, c)| c.prediction()) {
-        Some(known) => Some(known),
-        None => predicted_error(complete, directory, run, most)?,
+    progress.stage("coarser and finer runs", None);
+    let known = chosen.as_ref().and_then(|(_, c)| c.prediction());
+    let found = match (known, pilots) {
+        (Some(known), _) => Ok(known),
+        (None, None) => error_of(complete, directory, &prediction, LEAST)?,
+        (None, Some(most)) => predicted_error(complete, directory, solving(&prediction), most)?,
     };
+    match found {
+        Ok(error) => prediction.error = Some(error),
+        Err(why) => prediction.no_error = Some(why),
+    }
     progress.finish();
     Ok(prediction)
 }
 
-/// An error, predicted from coarser runs of the scene.
+/// The error of a complete scene, from versions of it that take [`PILOTS`] of its predicted time, or `least` seconds; else why there is none.
+///
+/// # Errors
+/// [`SceneError`] of the scene itself.
+pub(crate) fn error_of(
+    complete: &Source,
+    directory: &Path,
+    prediction: &Prediction,
+    least: f64,
+) -> Result<Result<ErrorPrediction, String>, SceneError> {
+    let run = solving(prediction);
+    predicted_error(complete, directory, run, (PILOTS * run).max(least))
+}
+
+/// Seconds of a run but for its output.
+fn solving(prediction: &Prediction) -> f64 {
+    prediction.total_seconds - prediction.timings.seconds("output")
+}
+
+/// What a predicted error is measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Against {
+    /// Elasticity: nothing is cut, and no bond can break, so that the horizon is a number of the method.
+    Elasticity,
+    /// Peridynamics everywhere, with the horizon of the scene.
+    Peridynamics,
+    /// The scene itself with many more points under its horizon: what elements do to a body whose bonds are cut or break is not in it.
+    FinerScene,
+}
+
+impl std::fmt::Display for Against {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Elasticity => "elasticity",
+            Self::Peridynamics => "peridynamics everywhere",
+            Self::FinerScene => "finer points with the same horizon",
+        })
+    }
+}
+
+/// An error, predicted from other runs of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ErrorPrediction {
     /// What is compared.
     pub quantities: Vec<String>,
     /// The relative error.
     pub error: f64,
+    /// Against what.
+    pub against: Against,
     /// The measured error was within this factor in so many scenes as `share` says.
     pub spread: f64,
     /// Of how many scenes that is true, see `docs/choosing.md`.
@@ -127,48 +177,4 @@ pub fn completed(
         complete.push_override(o)?;
     }
     Ok(Some((complete, chosen)))
-}
-
-/// The error of a complete scene from runs at twice the spacing and more; `None` where no coarser scene runs, or where its pilots
-/// would take more than `seconds`.
-///
-/// # Errors
-/// [`SceneError`] of the scene itself.
-pub fn predicted_error(
-    source: &Source,
-    directory: &Path,
-    run_seconds: f64,
-    seconds: f64,
-) -> Result<Option<ErrorPrediction>, SceneError> {
-    let spec = SceneSpec::parse(source)?;
-    let base = Base::of(&spec);
-    let dimension = spec.dimension() as i32;
-    let mut bench = pilot::Bench::new(source, directory, &spec);
-    // a pilot with twice the spacing costs this share, steps included
-    let share = 0.5f64.powi(dimension + i32::from(base.moves));
-    let mut levels = Vec::new();
-    let mut factors = base.coarser();
-    factors.retain(|f| run_seconds * share.powf(f.log2()) <= seconds);
-    if factors.len() < 2 {
-        return Ok(None);
-    }
-    factors.sort_by(|a, b| b.total_cmp(a));
-    for f in factors {
-        match bench.run(&base.overrides(&base.scaled(f))) {
-            Some(pilot) => levels.push((1.0 / base.coarsened(f), pilot)),
-            None => levels.clear(),
-        }
-    }
-    let Some(fit) = estimate::fit(&levels, &bench.quantities) else {
-        return Ok(None);
-    };
-    Ok(Some(ErrorPrediction {
-        quantities: bench.quantities.iter().map(|q| q.name()).collect(),
-        error: fit.error(1.0),
-        spread: estimate::SPREAD,
-        share: estimate::CHECKS,
-        order: fit.order,
-        pilots: levels.len(),
-        seconds: bench.seconds,
-    }))
 }

@@ -18,6 +18,8 @@ pub(crate) struct Pilot {
     pub seconds: f64,
     /// Seconds that it would take by counting, [`work`].
     pub work: f64,
+    /// Peridynamic points.
+    pub points: usize,
 }
 
 /// Seconds of a run but for its output, by its counts and the rates of one machine: a choice between candidates is the same whatever else a
@@ -115,6 +117,7 @@ impl Bench {
             measured,
             seconds,
             work,
+            points: summary.sizes.points,
         })
     }
 }

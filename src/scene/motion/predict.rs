@@ -89,6 +89,7 @@ fn prediction<const D: usize>(
         choices,
         warnings: Vec::new(),
         error: None,
+        no_error: None,
         motion: None,
     }
 }

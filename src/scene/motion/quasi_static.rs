@@ -16,6 +16,7 @@ use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
 use crate::observe::summary::{Choice, Ended, MotionSummary, RunSummary, peak_memory_bytes};
 use crate::progress::Progress;
+use crate::scene::doubts::one_sided;
 use crate::scene::run::{self, RunError, Solved};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
@@ -230,6 +231,7 @@ fn load_steps<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
+        warnings: one_sided(model).into_iter().collect(),
         iterations: info.iterations,
         motion: Some(MotionSummary {
             ended,
