@@ -97,10 +97,10 @@ fn a_transition_zone_keeps_its_width_in_horizons() {
     let mut source = Source::new("plate", PLATE);
     for o in [
         "coupling=blending",
-        "zones.transition.box.min=[0.4, -1]",
-        "zones.transition.box.max=[1.6, 2]",
-        "zones.nonlocal.box.min=[0.7, -1]",
-        "zones.nonlocal.box.max=[1.3, 2]",
+        "zones.transition.box.min=[0.25, -1]",
+        "zones.transition.box.max=[1.75, 2]",
+        "zones.nonlocal.box.min=[0.75, -1]",
+        "zones.nonlocal.box.max=[1.25, 2]",
     ] {
         source.push_override(o).unwrap();
     }
@@ -113,8 +113,8 @@ fn a_transition_zone_keeps_its_width_in_horizons() {
     assert_eq!(
         transition(0.5),
         [
-            "zones.transition.box.min=[5.5e-1, -1e0]",
-            "zones.transition.box.max=[1.45e0, 2e0]"
+            "zones.transition.box.min=[5e-1, -1e0]",
+            "zones.transition.box.max=[1.5e0, 2e0]"
         ]
     );
     assert_eq!(transition(1.0), Vec::<String>::new());
