@@ -88,7 +88,7 @@ enum Command {
         #[command(flatten)]
         scene: SceneArguments,
         /// Seconds that runs with other spacings may take, which the error is predicted from; by default a second, or 0.15 of the predicted time.
-        #[arg(long, value_name = "SECONDS")]
+        #[arg(long, value_name = "SECONDS", value_parser = seconds)]
         pilots: Option<f64>,
         /// Print the prediction as JSON.
         #[arg(long)]
@@ -254,6 +254,14 @@ fn main() -> ExitCode {
             eprintln!("{report:?}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// A time that something may take.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if seconds > 0.0 && f64::is_finite(seconds) => Ok(seconds),
+        _ => Err("seconds are a number above zero".to_owned()),
     }
 }
 

@@ -208,3 +208,18 @@ fn one_sided_families_are_warned_of() {
         }
     }
 }
+
+/// Seconds that are none are refused, not taken for very few.
+#[test]
+fn pilots_take_a_time_above_zero() {
+    for seconds in ["nan", "-1", "0", "inf"] {
+        let mut binary = Command::cargo_bin("bondline").unwrap();
+        let pilots = format!("--pilots={seconds}");
+        let refused = binary
+            .args(["check", "examples/coupled_bar.toml", &pilots])
+            .assert()
+            .failure();
+        let text = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(text.contains("above zero"), "{seconds}: {text}");
+    }
+}

@@ -73,27 +73,19 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
         file: CheckpointFile,
         saved: Option<Saved>,
     ) -> Result<Ready<'r, 'm, D>, RunError> {
-        let Self {
-            model,
-            rest,
-            spec,
-            moving,
-            choices,
-            timings,
-            watch,
-        } = self;
+        let (model, rest, spec) = (self.model, self.rest, self.spec);
         let held = held(model, &rest.conditions)?;
         let begin = start(model, &rest.initial);
-        choices.push(Choice {
-            choice: format!("{} in rows and bonds", bytes_text(moving.bytes as u64)),
+        self.choices.push(Choice {
+            choice: format!("{} in rows and bonds", bytes_text(self.moving.bytes as u64)),
             why: "read once per step".to_owned(),
         });
         let known = saved.as_ref().map(|saved| saved.pace);
-        let (mut moving, pace) = paced(spec, growing, moving, &held, known, choices)?;
-        watch.lap(timings, "stable step");
+        let (mut moving, pace) = paced(spec, growing, self.moving, &held, known, self.choices)?;
+        self.watch.lap(self.timings, "stable step");
         let drive = driven(model, rest, &begin.u, &pace, spec)?;
         if drive.evaluates_everywhere() {
-            choices.push(Choice {
+            self.choices.push(Choice {
                 choice: "loads evaluated at every place and step".to_owned(),
                 why: "an expression holds both t and a coordinate; written as two conditions, each with one, it would cost nothing"
                     .to_owned(),
@@ -123,7 +115,7 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             drive,
             edge,
             zone: zone.or_else(|| rest.follow.as_ref().map(|_| Zone::first(model))),
-            told: choices.len(),
+            told: self.choices.len(),
             taken: (0, 0.0),
             resumed,
             due: false,
@@ -135,15 +127,7 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
     /// # Errors
     /// [`RunError`] if no stable step is found, or nothing is there that new sites could follow.
     pub fn after_switch(self, between: Between<'r, D>) -> Result<Ready<'r, 'm, D>, RunError> {
-        let Self {
-            model,
-            rest,
-            spec,
-            moving,
-            choices,
-            timings,
-            watch,
-        } = self;
+        let (model, rest, spec) = (self.model, self.rest, self.spec);
         let Between {
             told,
             timings: before,
@@ -156,23 +140,24 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             taken,
             ..
         } = between;
-        choices.truncate(told);
+        self.choices.truncate(told);
         let held = held(model, &rest.conditions)?;
-        let system = moving.system.as_ref();
+        let system = self.moving.system.as_ref();
         let pace = repaced(spec, system, &held, pace, leaving.state())?;
-        watch.lap(timings, "stable step");
+        self.watch.lap(self.timings, "stable step");
         let begin = start(model, &rest.initial);
         let drive = driven(model, rest, &begin.u, &pace, spec)?;
         let (state, switch) = leaving.arrive(model, system, &drive)?;
         recorder.move_to(&Sampler::new(model));
         recorder.energy_at_start += switch.left();
-        watch.lap(timings, "state carried over");
-        let own = std::mem::replace(timings, before);
+        self.watch.lap(self.timings, "state carried over");
+        let own = std::mem::replace(self.timings, before);
         for stage in &own.stages {
-            timings.add(&format!("zone changes: {}", stage.name), stage.seconds);
+            self.timings
+                .add(&format!("zone changes: {}", stage.name), stage.seconds);
         }
         Ok(Ready {
-            moving,
+            moving: self.moving,
             recorder,
             state,
             pace,
