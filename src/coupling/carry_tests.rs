@@ -171,6 +171,7 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
         critical_stretch: None,
         no_fail: &|_| false,
         contact: None,
+        storage: crate::peridynamics::kernel::Storage::Double,
         broken: None,
     };
     let mut problem = problem(plate(0.0), layouts[0], Box::<Truncated>::default());

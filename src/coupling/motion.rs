@@ -17,7 +17,7 @@ use crate::{
     peridynamics::{
         Families, PdBody,
         contact::ContactError,
-        kernel::{BondPass, KernelError, Kinematics},
+        kernel::{BondPass, KernelError, Kinematics, Storage},
     },
     system::{BlockCsr, Breakage, Dynamic, Symmetry},
     tensor::Vector,
@@ -50,6 +50,8 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
     /// Contact of points that no bond joins; none if they may pass through each other.
     pub contact: Option<ContactBehaviour>,
+    /// How the weights of bonds are kept; in four bytes, they are listed one by one.
+    pub storage: Storage,
     /// Bonds that are broken from the start, in a motion that goes on from another layout.
     pub broken: Option<&'a BrokenBonds<D>>,
 }

@@ -322,6 +322,7 @@ fn crack_beside_the_seam(coupling: Box<dyn crate::coupling::Coupling<2>>) -> Run
         critical_stretch: Some(Critical::Uniform(critical)),
         no_fail: &outside,
         contact: None,
+        storage: crate::peridynamics::kernel::Storage::Double,
         broken: None,
     };
     let mut motion = Motion::new(

@@ -23,6 +23,7 @@ pub(super) fn behaviour<const D: usize>(
         critical_stretch: critical_stretch.map(Critical::Uniform),
         no_fail: &|_| false,
         contact: None,
+        storage: crate::peridynamics::kernel::Storage::Double,
         broken: None,
     }
 }

@@ -4,7 +4,7 @@ use super::check;
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::{Fracture, Law, Material};
 use super::region::{Region, region};
-use super::spec::{BondsSpec, ContactSpec, EdgeSpec, SceneSpec};
+use super::spec::{BondsSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec};
 use crate::mesh::Mesh;
 
 /// How bonds deform and break. A scene that names neither fracture nor contact has none, and pays for none.
@@ -12,6 +12,8 @@ use crate::mesh::Mesh;
 pub struct Breaking<const D: usize> {
     /// How the force of a bond depends on the displacement.
     pub bonds: BondsSpec,
+    /// How the weights of bonds are kept in motion.
+    pub precision: PrecisionSpec,
     /// When bonds of the peridynamic material break; never if there is none.
     pub fracture: Option<Fracture>,
     /// Regions in which no bond breaks.
@@ -91,8 +93,25 @@ pub(crate) fn breaking<const D: usize>(
     for (name, shape) in &spec.no_fail {
         no_fail.push(region(&format!("no-fail.{name}"), shape, mesh)?);
     }
+    let precision = spec
+        .peridynamics
+        .as_ref()
+        .and_then(|p| p.precision.as_ref());
+    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    if let (Some(precision), None | Some(SolveSpec::Static(_))) = (precision, solve) {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            "`peridynamics.precision` is set, and nothing moves".to_owned(),
+        )
+        .label(
+            precision.span(),
+            "of bonds that are passed over in every step",
+        )
+        .help("add [solve.explicit], or remove it"));
+    }
     Ok(Breaking {
         bonds,
+        precision: precision.map_or(PrecisionSpec::Double, |p| *p.get_ref()),
         fracture,
         no_fail,
         at_edge: spec

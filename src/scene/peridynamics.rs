@@ -364,6 +364,7 @@ y = 0.01
                     critical_stretch: Some(Critical::Uniform(1.0)),
                     no_fail: &|_| false,
                     contact: None,
+                    storage: crate::peridynamics::kernel::Storage::Double,
                     broken: None,
                 };
                 let operator = solved.operator;

@@ -140,8 +140,11 @@ impl<const D: usize> MovingBody<D> {
                 no_fail: &no_fail,
             }),
             precracked: broken.as_ref().map(|b| b as _),
-            layout: Layout::Automatic,
-            storage: Storage::Double,
+            layout: match behaviour.storage {
+                Storage::Double => Layout::Automatic,
+                Storage::Single => Layout::List,
+            },
+            storage: behaviour.storage,
         })?;
         let contact = match behaviour.contact {
             Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {

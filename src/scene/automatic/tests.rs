@@ -273,6 +273,7 @@ fn a_scene_allocates_what_it_needs() {
             critical_stretch: critical_stretch.map(Critical::Uniform),
             no_fail: &|_| false,
             contact: None,
+            storage: crate::peridynamics::kernel::Storage::Double,
             broken: None,
         };
         let symmetry = coupling.symmetry();

@@ -5,13 +5,13 @@ use crate::coupling::motion::{
 };
 use crate::coupling::{BrokenBonds, Coupling, Interface, Model, Operator, PointSource};
 use crate::observe::summary::Choice;
-use crate::peridynamics::kernel::Kinematics;
+use crate::peridynamics::kernel::{Kinematics, Storage};
 use crate::progress::Progress;
 use crate::scene::definite;
 use crate::scene::initial::{Initial, InitialKind};
 use crate::scene::materials::Fracture;
 use crate::scene::run::{self, Rest, RunError};
-use crate::scene::spec::BondsSpec;
+use crate::scene::spec::{BondsSpec, PrecisionSpec};
 use crate::solve::explicit::State;
 use crate::system::{Dynamic, LinearMotion};
 
@@ -43,6 +43,16 @@ pub(super) fn dynamic<'a, const D: usize>(
     let (bonds, kinematics) = match breaking.bonds {
         BondsSpec::Exact => ("geometrically exact bonds", Kinematics::Exact),
         BondsSpec::Linear => ("bonds linear in the displacement", Kinematics::Linear),
+    };
+    let storage = match breaking.precision {
+        PrecisionSpec::Double => Storage::Double,
+        PrecisionSpec::Single => {
+            choices.push(Choice {
+                choice: "weights of bonds in four bytes".to_owned(),
+                why: "precision = \"single\": each bond is listed, also where the points fill a lattice, which needs no list".to_owned(),
+            });
+            Storage::Single
+        }
     };
     let stretches = critical_stretch.as_ref().map(|critical| match critical {
         Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
@@ -76,6 +86,7 @@ pub(super) fn dynamic<'a, const D: usize>(
                 approach: c.radius_factor,
                 stiffness: c.stiffness_factor,
             }),
+            storage,
             broken,
         },
     );

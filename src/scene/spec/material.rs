@@ -186,6 +186,10 @@ pub struct PeridynamicsSpec {
     #[serde(default)]
     #[schemars(with = "Option<super::motion::BondsSpec>")]
     pub bonds: Option<toml::Spanned<super::motion::BondsSpec>>,
+    /// How the weights of bonds are kept in motion.
+    #[serde(default)]
+    #[schemars(with = "Option<super::motion::PrecisionSpec>")]
+    pub precision: Option<toml::Spanned<super::motion::PrecisionSpec>>,
     /// Whether the mesh's own boundary (a hole, a notch) cuts bonds.
     #[serde(default)]
     pub surfaces: SurfacesSpec,

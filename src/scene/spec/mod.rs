@@ -29,7 +29,7 @@ pub use mesh::{
 };
 pub use motion::{
     BeyondLimitSpec, BondsSpec, ContactSpec, EdgeSpec, ExplicitSpec, InitialFieldSpec, InitialSpec,
-    LoadStepSpec, QuasiStaticSpec, SolveSpec, TipSpec,
+    LoadStepSpec, PrecisionSpec, QuasiStaticSpec, SolveSpec, TipSpec,
 };
 pub use region::{
     AutoSpec, BallSpec, BodySpec, BoxSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec,

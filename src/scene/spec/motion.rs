@@ -138,6 +138,17 @@ pub enum BondsSpec {
     Linear,
 }
 
+/// How the weights of bonds are kept in motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PrecisionSpec {
+    /// In eight bytes, or not at all where the points fill a lattice.
+    #[default]
+    Double,
+    /// One by one, in four bytes: forces are off by about 1e-8 of themselves.
+    Single,
+}
+
 /// What is done when damage reaches the edge of the nonlocal zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

@@ -215,6 +215,7 @@ fn run_crack(
         critical_stretch: Some(Critical::Uniform(CRITICAL)),
         no_fail: &never,
         contact: None,
+        storage: crate::peridynamics::kernel::Storage::Double,
         broken: None,
     };
     let mut motion = Motion::new(
