@@ -7,7 +7,7 @@
 //! | `laws.rs` | Poisson ratios, m from 1 to 12, continuity through whole m |
 //! | `shapes.rs` | thin cells, small families, zones of one point, fragments, cracks through the seam |
 //! | `contrast.rs` | a body that is far stiffer beyond the seam |
-//! | `steps.rs` | time steps on either side of the limit, a million of them |
+//! | `steps.rs` | time steps on either side of the limit, a million of them, bonds in four bytes |
 //!
 //! Spectra of all couplings, m and kernels are the suite `spectrum`.
 
