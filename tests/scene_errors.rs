@@ -199,6 +199,21 @@ fn expression_in_time() {
 }
 
 #[test]
+fn precision_of_what_stands_still() {
+    let e = wrong(
+        "horizon = \"3/10\"",
+        "horizon = \"3/10\"\nprecision = \"single\"",
+    );
+    check(
+        &e,
+        SceneErrorKind::Conflict,
+        "\"single\"",
+        "`peridynamics.precision` is set, and nothing moves",
+        "[solve.explicit]",
+    );
+}
+
+#[test]
 fn variable_where_a_constant_belongs() {
     let e = error("spacing = 0.1", "spacing = \"x\"");
     check(

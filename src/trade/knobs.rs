@@ -34,20 +34,21 @@ pub(crate) enum Change {
 /// A choice with its settings, but that of the scene itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Knob {
-    /// Its name: `coupling`, `horizon`, `m`, `elements`, `padding`, `step-fraction`, or a key of the scene.
+    /// Its name: one of [`KNOBS`], or a key of the scene.
     pub name: String,
     /// What else it can be set to.
     pub settings: Vec<Setting>,
 }
 
 /// Names of the knobs that are turned without being asked for, where they apply.
-pub const KNOBS: [&str; 6] = [
+pub const KNOBS: [&str; 7] = [
     "coupling",
     "horizon",
     "m",
     "elements",
     "padding",
     "step-fraction",
+    "precision",
 ];
 
 /// Spacings of versions of a scene over its own.
@@ -72,6 +73,8 @@ pub(crate) struct Base {
     /// Bonds that may break.
     pub can_break: bool,
     pub moves: bool,
+    /// It moves in time.
+    explicit: bool,
 }
 
 /// A generated mesh: the table's name, its corners, its axes.
@@ -113,10 +116,8 @@ impl Base {
             MaterialSpec::Lps(m) => m.fracture_energy.is_some() || m.critical_stretch.is_some(),
             _ => false,
         };
-        let moves = !matches!(
-            spec.solve.as_ref().map(|s| s.get_ref()),
-            None | Some(SolveSpec::Static(_))
-        );
+        let solve = spec.solve.as_ref().map(|s| s.get_ref());
+        let moves = !matches!(solve, None | Some(SolveSpec::Static(_)));
         let transition = spec.zones.transition.as_ref().map(|t| t.get_ref());
         Self {
             joining: spec.coupling.as_ref().map_or(
@@ -154,6 +155,7 @@ impl Base {
                 || spec.materials.values().any(breaks),
             can_break: spec.materials.values().any(breaks),
             moves,
+            explicit: matches!(solve, Some(SolveSpec::Explicit(_))),
         }
     }
 
@@ -223,9 +225,13 @@ impl Base {
             "padding" if self.nonlocal.is_some() && self.horizon.is_some() => [-1.0, 1.0, 2.0]
                 .map(|f| setting(format!("padding {f:+} horizons"), Change::Padding(f)))
                 .into(),
-            "step-fraction" if self.moves => vec![setting(
+            "step-fraction" if self.explicit => vec![setting(
                 "step-fraction = 0.5".to_owned(),
                 Change::Keys(vec!["solve.explicit.step-fraction=0.5".to_owned()]),
+            )],
+            "precision" if self.moves && self.horizon.is_some() => vec![setting(
+                "precision = single".to_owned(),
+                Change::Keys(vec!["peridynamics.precision=single".to_owned()]),
             )],
             _ => Vec::new(),
         }
