@@ -210,13 +210,23 @@ impl<const D: usize> Placement<'_, D> {
         let samples = if D == 3 { 4 } else { 8 };
         let whole = h.powi(D as i32);
         type Found<const D: usize> = (Vector<D>, f64, f64, Zone, Option<(u32, Vec<f64>)>);
-        let found: Vec<Vec<Found<D>>> = (0..total.div_ceil(BLOCK))
+        // points, and the volume of the region that voids take
+        let found: Vec<(Vec<Found<D>>, f64)> = (0..total.div_ceil(BLOCK))
             .into_par_iter()
             .map(|block| {
                 let mut list = Vec::new();
+                let mut emptied = 0.0;
                 for index in block * BLOCK..((block + 1) * BLOCK).min(total) {
                     let x = position(index);
-                    if !near[index] || self.in_void(&x) {
+                    if !near[index] {
+                        continue;
+                    }
+                    if self.in_void(&x) {
+                        let mut inside = 0;
+                        let count = samples_of::<D>(if edge[index] { samples } else { 1 }, |o| {
+                            inside += usize::from(in_region(&(x + o * h)).is_some());
+                        });
+                        emptied += whole * inside as f64 / count as f64;
                         continue;
                     }
                     let located = elements.locate(mesh, &x, tolerance);
@@ -235,18 +245,20 @@ impl<const D: usize> Placement<'_, D> {
                     let (mut volume, mut share) =
                         (whole, if located.is_none() { whole } else { 0.0 });
                     if edge[index] {
-                        let (mut body, mut here) = (0, 0);
+                        let (mut body, mut here, mut gone) = (0, 0, 0);
                         let count = samples_of::<D>(samples, |offset| {
                             let s = x + offset * h;
+                            let inside = in_region(&s).is_some();
                             if self.in_void(&s) {
+                                gone += usize::from(inside);
                                 return;
                             }
-                            let inside = in_region(&s).is_some();
                             here += usize::from(inside);
                             body += usize::from(inside || elements.holds(mesh, &s, tolerance));
                         });
                         volume = whole * body as f64 / count as f64;
                         share = whole * here as f64 / count as f64;
+                        emptied += whole * gone as f64 / count as f64;
                     }
                     if volume > 0.0 {
                         let element = located.map(|l| match roles[l.cell] {
@@ -256,21 +268,18 @@ impl<const D: usize> Placement<'_, D> {
                         list.push((x, volume, share, zone, element));
                     }
                 }
-                list
+                (list, emptied)
             })
             .collect();
         let mut cloud = PointCloud::empty(h, self.region);
         cloud.is_lattice = true;
-        let points: f64 = found.iter().flatten().map(|f| f.2).sum();
+        let region = self.region - found.iter().map(|(_, emptied)| emptied).sum::<f64>();
+        let found: Vec<Found<D>> = found.into_iter().flat_map(|(list, _)| list).collect();
+        let points: f64 = found.iter().map(|f| f.2).sum();
         // what sampling misses on curved edges is spread over the points whose cells the body's surface cuts
-        let cut: f64 = found
-            .iter()
-            .flatten()
-            .filter(|f| f.1 < whole)
-            .map(|f| f.2)
-            .sum();
+        let cut: f64 = found.iter().filter(|f| f.1 < whole).map(|f| f.2).sum();
         let scale = if cut > 0.0 {
-            1.0 + (self.region - points) / cut
+            1.0 + (region - points) / cut
         } else {
             1.0
         };
@@ -279,7 +288,7 @@ impl<const D: usize> Placement<'_, D> {
         } else {
             1.0
         };
-        for (x, volume, share, zone, element) in found.into_iter().flatten() {
+        for (x, volume, share, zone, element) in found {
             let factor = if volume < whole { scale } else { 1.0 };
             cloud.volumes.points += share * factor;
             cloud.push(x, volume * factor, self.horizon(&x), zone, element);
@@ -406,11 +415,17 @@ mod tests {
         },
         peridynamics::{BondBased, BondWeights, Micromodulus, PartialVolume},
         progress::Silent,
+        shape::Shape,
         tensor::Tensor4,
     };
 
-    /// Volumes of the region and of its points.
-    fn volumes(mesh: Mesh<2>, zones: Vec<Zone>, points: PointSource<2>, horizon: f64) -> [f64; 2] {
+    fn model(
+        mesh: Mesh<2>,
+        zones: Vec<Zone>,
+        points: PointSource<2>,
+        horizon: f64,
+        voids: Vec<Shape<2>>,
+    ) -> Model<2> {
         let cells = mesh.cell_count();
         let coupling: Box<dyn crate::coupling::Coupling<2>> = if zones.contains(&Zone::Local) {
             Box::new(Splice)
@@ -430,13 +445,17 @@ mod tests {
                 weights: BondWeights::Plain,
                 volumes: PartialVolume::Full,
                 barriers: Vec::new(),
-                voids: Vec::new(),
+                voids,
                 surfaces: Surfaces::Uncut,
             }),
             coupling,
         };
-        let (model, _) = Model::new(problem, &Silent).expect("a model");
-        let v = model.volumes();
+        Model::new(problem, &Silent).expect("a model").0
+    }
+
+    /// Volumes of the region and of its points.
+    fn volumes(mesh: Mesh<2>, zones: Vec<Zone>, points: PointSource<2>, horizon: f64) -> [f64; 2] {
+        let v = model(mesh, zones, points, horizon, Vec::new()).volumes();
         [v.region, v.points]
     }
 
@@ -493,6 +512,49 @@ mod tests {
                 (region - exact / 2.0).abs() < 1e-12 && (sum - exact / 2.0).abs() < 1e-12,
                 "{points:?}: {sum}"
             );
+        }
+    }
+
+    #[test]
+    fn a_void_leaves_the_volumes_of_points_that_stay() {
+        // points on the edges of the mesh have half a cell, with a void in the middle, or at an edge, or without
+        let spacing = 0.1;
+        let of = |voids: Vec<Shape<2>>| {
+            let axis = || Axis::Uniform {
+                min: -1.0,
+                max: 1.0,
+                cells: 20,
+            };
+            let mesh = rectangle(axis(), axis()).mesh().expect("a mesh");
+            let zones = vec![Zone::Nonlocal; mesh.cell_count()];
+            let origin = Vector::zeros();
+            let points = PointSource::Lattice { spacing, origin };
+            model(mesh, zones, points, 0.3, voids)
+        };
+        let whole = of(Vec::new());
+        let key = |x: &Vector<2>| ((x / spacing).map(f64::round)).map(|k| k as i64);
+        let cloud = |m: &Model<2>| {
+            let cloud = &m.body().expect("points").cloud;
+            let each = cloud.position.iter().map(key).zip(cloud.volume.clone());
+            each.collect::<Vec<_>>()
+        };
+        for (low, high) in [([-0.43, -0.23], [0.17, 0.37]), ([0.57, -0.33], [2.0, 0.33])] {
+            let void = Shape::Box {
+                min: low.into(),
+                max: high.into(),
+            };
+            let holed = of(vec![void.clone()]);
+            let before = cloud(&whole);
+            let after = cloud(&holed);
+            assert!(after.len() < before.len());
+            for (at, volume) in after {
+                let x = at.map(|k| k as f64 * spacing);
+                let (_, old) = before.iter().find(|(b, _)| *b == at).expect("stays");
+                // but where the void cuts the half cell of a point at the edge
+                if void.signed_distance(&x) > spacing {
+                    assert!((volume / old - 1.0).abs() < 1e-12, "{at}: {volume} {old}");
+                }
+            }
         }
     }
 
