@@ -10,6 +10,7 @@ use crate::{
         CellRole, FitDegree, Interface, ModelError, Site, SiteKind, derivative, points::PointCloud,
     },
     mesh::Mesh,
+    shape::Barriers,
     tensor::Vector,
 };
 
@@ -22,6 +23,8 @@ pub(super) struct Sites<'a, const D: usize> {
     pub sites: &'a [Site<D>],
     /// The site of each node, `u32::MAX` for one that is none.
     pub node_site: &'a [u32],
+    /// Cracks and voids: no node follows what lies behind them.
+    pub barriers: &'a Barriers<D>,
 }
 
 /// Positions sorted into bins, to find those near a node without looking at all of them.
@@ -107,7 +110,7 @@ pub(super) fn fit_nodes<const D: usize>(
             let x = at.mesh.nodes[n];
             let distance = |k: &usize| (positions[*k] - x).norm();
             let widest = (6.0 * cloud.spacing).max(3.0 * largest);
-            let within = |radius: f64| -> Vec<usize> {
+            let all_within = |radius: f64| -> Vec<usize> {
                 let mut found: Vec<usize> = bins
                     .around(&x, radius)
                     .filter(|k| distance(k) <= radius)
@@ -115,9 +118,18 @@ pub(super) fn fit_nodes<const D: usize>(
                 found.sort_unstable();
                 found
             };
-            if let Some(&k) = within(1e-9 * cloud.spacing).first() {
+            if let Some(&k) = all_within(1e-9 * cloud.spacing).first() {
                 return Ok(vec![(data[k].0, 1.0)]);
             }
+            let is_beside = at.barriers.near(&x, widest);
+            let hidden = |k: &usize| is_beside && at.barriers.cuts(&x, &positions[*k]);
+            // on the crack itself a node has no side
+            let is_on = is_beside && all_within(widest).iter().all(hidden);
+            let within = |radius: f64| {
+                let mut found = all_within(radius);
+                found.retain(|k| is_on || !hidden(k));
+                found
+            };
             let start = if with_nodes {
                 largest
             } else {
@@ -127,8 +139,8 @@ pub(super) fn fit_nodes<const D: usize>(
                 for factor in [1.0, 1.3, 1.7, 2.2, 3.0] {
                     let radius = start * factor * (1.0 + 1e-9);
                     let chosen = within(radius.min(widest));
-                    let at: Vec<Vector<D>> = chosen.iter().map(|&k| positions[k]).collect();
-                    if let Some(weights) = derivative::fit(&x, &at, degree) {
+                    let seen: Vec<Vector<D>> = chosen.iter().map(|&k| positions[k]).collect();
+                    if let Some(weights) = derivative::fit(&x, &seen, degree) {
                         return Ok(chosen
                             .iter()
                             .zip(weights)

@@ -16,6 +16,7 @@ use crate::{
     mesh::{CellShape, Mesh},
     peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody},
     progress::Progress,
+    shape::Barriers,
     system::BlockCsr,
     tensor::{Tensor4, Vector},
 };
@@ -344,6 +345,7 @@ impl<const D: usize> Model<D> {
                 roles: &self.roles,
                 sites: &self.sites,
                 node_site,
+                barriers: &Barriers::new(p.barriers.clone()),
             },
             coupling.interface(),
             &cloud,

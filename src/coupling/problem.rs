@@ -169,7 +169,7 @@ pub enum ModelError {
         position: Vec<f64>,
     },
     /// A node at the seam cannot be fitted.
-    #[error("node {node} at ({}) lies at the seam, but the {found} sites around it do not determine an affine fit: make the peridynamic zone at least three points thick there", join(.position))]
+    #[error("node {node} at ({}) lies at the seam, but the {found} sites around it that no crack or void hides do not determine an affine fit: make the peridynamic zone at least three points thick there", join(.position))]
     Fit {
         /// Number of the node.
         node: u32,

@@ -1,5 +1,7 @@
 //! The displacement anywhere in a coupled model: from finite elements, or from the peridynamic points around.
 
+use std::sync::OnceLock;
+
 use rustc_hash::FxHashMap;
 
 use crate::{
@@ -15,11 +17,19 @@ const AROUND: f64 = 1.6;
 /// As far, where cracks hide some of them.
 const ASIDE: f64 = 2.4;
 
+/// As far, where nodes beside the seam have to help.
+const FAR: f64 = 4.0;
+
+/// Sites by cells one spacing wide.
+type Bins<const D: usize> = FxHashMap<[i64; D], Vec<u32>>;
+
 /// Finds displacements at any position of the body.
 pub struct Sampler<'a, const D: usize> {
     model: &'a Model<D>,
     elements: Locator<D>,
-    bins: FxHashMap<[i64; D], Vec<u32>>,
+    points: Bins<D>,
+    /// Nodes of elements, sorted when first asked for.
+    nodes: OnceLock<Bins<D>>,
     barriers: Barriers<D>,
 }
 
@@ -39,25 +49,18 @@ impl<'a, const D: usize> Sampler<'a, D> {
             &model.mesh,
             (0..model.mesh.cell_count()).filter(|&c| model.is_element(c)),
         );
-        let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
-        for (s, site) in model.sites.iter().enumerate() {
-            if matches!(site.kind, SiteKind::Point(_)) {
-                bins.entry(bin(&site.position, model.spacing()))
-                    .or_default()
-                    .push(s as u32);
-            }
-        }
         let barriers = model.peridynamics.as_ref();
         Self {
             model,
             elements,
-            bins,
+            points: bins(model, |kind| matches!(kind, SiteKind::Point(_))),
+            nodes: OnceLock::new(),
             barriers: Barriers::new(barriers.map_or(Vec::new(), |p| p.barriers.clone())),
         }
     }
 
     /// The displacement at `x` \[m\]: a site's own where one lies there, else by shape functions, else by an affine fit to the points within 1.6 spacings, or 2.4 beside a crack or a void, behind which no point counts.
-    /// `None` outside of the body.
+    /// Where these lie in one line (or plane), nodes of elements within 2.4 or 4 spacings help, or the nearest point stands alone. `None` outside of the body.
     pub fn displacement(&self, x: &Vector<D>, u: &[f64]) -> Option<Vector<D>> {
         let weights = self.weights(x)?;
         let of_site = |s: u32| Vector::<D>::from_fn(|a, _| u[s as usize * D + a]);
@@ -67,9 +70,10 @@ impl<'a, const D: usize> Sampler<'a, D> {
     /// The sites, with their weights, that the displacement at `x` \[m\] follows; the same for velocities. `None` outside of the body.
     pub fn weights(&self, x: &Vector<D>) -> Option<Vec<(u32, f64)>> {
         let h = self.model.spacing();
-        let near = self.points_near(x, AROUND);
+        let near = self.near(&self.points, x, AROUND);
         let position = |s: u32| self.model.sites[s as usize].position;
-        if let Some(&s) = near.iter().find(|&&s| (position(s) - x).norm() <= 1e-9 * h) {
+        let distance = |s: u32| (position(s) - x).norm();
+        if let Some(&s) = near.iter().find(|&&s| distance(s) <= 1e-9 * h) {
             return Some(vec![(s, 1.0)]);
         }
         if let Some(located) = self.elements.locate(&self.model.mesh, x, 1e-9) {
@@ -85,18 +89,30 @@ impl<'a, const D: usize> Sampler<'a, D> {
             let weights = derivative::fit(x, &data, FitDegree::Affine)?;
             Some(points.into_iter().zip(weights).collect())
         };
+        let with_nodes = |spacings: f64| {
+            let is_node = |kind: &SiteKind| matches!(kind, SiteKind::Node(_));
+            let nodes = self.nodes.get_or_init(|| bins(self.model, is_node));
+            let mut sites = self.near(&self.points, x, spacings);
+            sites.extend(self.near(nodes, x, spacings));
+            fitted(self.seen(x, sites))
+        };
         let seen = self.seen(x, near.clone());
-        if seen.len() == near.len() {
-            return fitted(near);
-        }
+        let nearest = seen.iter().copied();
+        let nearest = nearest.min_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+        let Some(nearest) = nearest else {
+            return fitted(self.seen(x, self.near(&self.points, x, ASIDE)))
+                .or_else(|| fitted(near));
+        };
         fitted(seen)
-            .or_else(|| fitted(self.seen(x, self.points_near(x, ASIDE))))
-            .or_else(|| fitted(near))
+            .or_else(|| fitted(self.seen(x, self.near(&self.points, x, ASIDE))))
+            .or_else(|| with_nodes(ASIDE))
+            .or_else(|| with_nodes(FAR))
+            .or_else(|| Some(vec![(nearest, 1.0)]))
     }
 
     /// Those of the points that no crack and no void hides from `x`.
     fn seen(&self, x: &Vector<D>, mut points: Vec<u32>) -> Vec<u32> {
-        let reach = ASIDE * self.model.spacing();
+        let reach = FAR * self.model.spacing();
         if self.barriers.near(x, reach) {
             let position = |s: u32| &self.model.sites[s as usize].position;
             points.retain(|&s| !self.barriers.cuts(x, position(s)));
@@ -110,7 +126,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
             return Some(Carrier::Element(located.cell));
         }
         let distance = |s: &u32| (self.model.sites[*s as usize].position - x).norm();
-        let near = self.points_near(x, AROUND);
+        let near = self.near(&self.points, x, AROUND);
         let seen = self.seen(x, near.clone());
         (if seen.is_empty() { near } else { seen })
             .into_iter()
@@ -118,8 +134,8 @@ impl<'a, const D: usize> Sampler<'a, D> {
             .map(|s| Carrier::Point(s as usize))
     }
 
-    /// Points within so many spacings.
-    fn points_near(&self, x: &Vector<D>, spacings: f64) -> Vec<u32> {
+    /// Sites within so many spacings.
+    fn near(&self, bins: &Bins<D>, x: &Vector<D>, spacings: f64) -> Vec<u32> {
         let h = self.model.spacing();
         if h <= 0.0 {
             return Vec::new();
@@ -134,7 +150,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
                 rest /= width;
                 centre[i] + k as i64 - reach as i64
             });
-            for &s in self.bins.get(&key).into_iter().flatten() {
+            for &s in bins.get(&key).into_iter().flatten() {
                 if (self.model.sites[s as usize].position - x).norm() <= spacings * h {
                     found.push(s);
                 }
@@ -142,6 +158,21 @@ impl<'a, const D: usize> Sampler<'a, D> {
         }
         found
     }
+}
+
+/// Sites of some kinds by where they lie; none where there are no points.
+fn bins<const D: usize>(model: &Model<D>, wanted: impl Fn(&SiteKind) -> bool) -> Bins<D> {
+    let h = model.spacing();
+    let mut bins = Bins::default();
+    if h > 0.0 {
+        for (s, site) in model.sites.iter().enumerate() {
+            if wanted(&site.kind) {
+                let list: &mut Vec<u32> = bins.entry(bin(&site.position, h)).or_default();
+                list.push(s as u32);
+            }
+        }
+    }
+    bins
 }
 
 fn bin<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {

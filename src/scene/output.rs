@@ -9,11 +9,13 @@ use super::validate::{Output, Scene, Tip};
 use super::value::Text;
 use crate::fem::Locator;
 use crate::mesh::Mesh;
+use crate::shape::Shape;
 
 /// The outputs of a scene whose files are named `name` by default.
 pub(super) fn output<const D: usize>(
     spec: &SceneSpec,
     mesh: &Mesh<D>,
+    voids: &[Shape<D>],
     name: &str,
 ) -> Result<Output<D>, SceneError> {
     let o = &spec.output;
@@ -53,6 +55,14 @@ pub(super) fn output<const D: usize>(
             )
             .label(probe.at.span.clone(), "outside")
             .help(extent(mesh)));
+        }
+        if voids.iter().any(|v| v.signed_distance(&at) < -tolerance) {
+            return Err(SceneError::new(
+                SceneErrorKind::Empty,
+                format!("`{place}` = {:?} lies in a void", at.as_slice()),
+            )
+            .label(probe.at.span.clone(), "nothing moves there")
+            .help("move it out of all [voids]"));
         }
         probes.push((key.value.clone(), at));
     }

@@ -302,6 +302,54 @@ y = 0.01
     }
 
     #[test]
+    fn a_single_layer_of_points_between_seam_and_void_or_crack_is_sampled() {
+        // a splice has points within the zone only: one layer of them at x = 0.375 beside a hole of the points, or a piece cut off, that begins at 0.4
+        let text = r#"
+kinematics = "plane-stress"
+coupling = "splice"
+[mesh.rectangle]
+min = [0, 0]
+max = [1, 1]
+x = { cells = 24 }
+y = { cells = 24 }
+[materials.plate.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = "2/24"
+points.lattice = { spacing = "1/24" }
+[zones.nonlocal]
+box = { min = [0.3329, 0.3329], max = [0.6671, 0.6671] }
+[voids.hole.inside]
+box = { min = [0.4, 0.4], max = [0.6, 0.6] }
+[conditions.bottom.displacement]
+on = "bottom"
+x = 0
+y = 0
+[conditions.top.displacement]
+on = "top"
+x = 0
+y = 0.01
+"#;
+        // whatever the displacement is, between two sites of a layer and the seam it lies between theirs
+        solve_with(plate_of(text, &[]).unwrap(), &Silent, |_, solved| {
+            let sampler = Sampler::new(solved.model);
+            let at = |x: f64, y: f64| {
+                let u = sampler.displacement(&Vector::<2>::new(x, y), solved.displacement);
+                u.expect("in the body")[1]
+            };
+            let y = 0.51;
+            let (seam, layer) = (at(8.0 / 24.0, y), at(9.0 / 24.0, y));
+            let between = at(0.36, y);
+            let wanted = seam + (0.36 - 8.0 / 24.0) * 24.0 * (layer - seam);
+            assert!((between - wanted).abs() < 1e-4, "{between} {wanted}");
+            Ok(Vec::new())
+        })
+        .unwrap();
+        let probe = plate_of(text, &["output.probes.in={at=[0.5,0.5]}"]).unwrap_err();
+        assert!(probe.message().contains("lies in a void"), "{probe}");
+    }
+
+    #[test]
     fn partial_volumes_reach_scenes_and_the_seam_stays_exact() {
         // plane stress, E = 2 and nu = 1/4
         let typed = [2.0 / (1.0 - 0.0625), 0.5 / (1.0 - 0.0625)];

@@ -353,7 +353,7 @@ fn scene<const D: usize>(
             &mesh,
             |c| cell_material[c] == peridynamic,
         )?;
-        let output = output::output(spec, &mesh, name)?;
+        let output = output::output(spec, &mesh, &voids, name)?;
         Ok(Scene {
             title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
             kinematics,
