@@ -466,12 +466,20 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
     }
 
     fn bonded(&self, i: usize, j: usize) -> bool {
-        let (Some(here), Some(there)) = (self.cell(i), self.cell(j)) else {
+        let Some(here) = self.cell(i) else {
             return false;
         };
-        let delta = there as isize - here as isize;
         let offsets = &self.stencil.offsets;
         let g = self.place[i] as usize / LANES;
+        let Some(there) = self.cell(j) else {
+            // a point without a family, in elements: it has a cell, but no place
+            let mut is_bonded = false;
+            self.each(&self.stencil.intact, g, here % LANES, |_, cell| {
+                is_bonded |= self.stencil.point_of[cell] == j as u32;
+            });
+            return is_bonded;
+        };
+        let delta = there as isize - here as isize;
         // a flat distance is that of one step only: rows are padded by the reach of the stencil
         offsets
             .iter()
