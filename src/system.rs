@@ -242,6 +242,24 @@ impl BlockCsr {
         y
     }
 
+    /// Adds so large a part of its diagonal to the matrix; rows that share their blocks share them still.
+    pub fn raise_diagonal(&mut self, part: f64) {
+        let d = self.block;
+        let mut done = vec![false; self.values.len() / (d * d).max(1)];
+        for i in 0..self.rows() {
+            let (columns, _) = self.row(i);
+            let Ok(place) = columns.binary_search(&(i as u32)) else {
+                continue;
+            };
+            let block = self.start(i) + place;
+            if !std::mem::replace(&mut done[block], true) {
+                for a in 0..d {
+                    self.values[block * d * d + a * (d + 1)] *= 1.0 + part;
+                }
+            }
+        }
+    }
+
     /// `Σ_b |K_ab|` of every scalar row.
     pub fn row_sums(&self) -> Vec<f64> {
         let d = self.block;

@@ -178,6 +178,34 @@ fn an_error_that_is_not_predicted_has_a_reason() {
 
 /// Elements with a partial stress at free sides are warned of, by `check` and by `run`; a splice has none.
 #[test]
+fn cracks_beside_the_seam_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    // the zone reaches two horizons beyond the slit, whose place a crack takes; then one
+    let crack = "cracks.slit.segment={from=[-0.1,0],to=[0.1,0]}";
+    let near = [
+        crack,
+        "zones.nonlocal.box.min=[-0.15,-0.05]",
+        "zones.nonlocal.box.max=[0.15,0.05]",
+    ];
+    for (coupling, overrides, expected) in [
+        ("coupling=splice", &[crack][..], false),
+        ("coupling=splice", &near[..], true),
+        ("coupling=truncated", &near[..], false),
+        ("coupling.partial-stress.form=meshfree", &near[..], true),
+    ] {
+        let mut overrides = overrides.to_vec();
+        overrides.push(coupling);
+        let found = json("check", SLIT_PLATE, &overrides, folder.path());
+        let warnings = found["warnings"].to_string();
+        assert_eq!(
+            warnings.contains("a crack or void lies 1.00 horizons from the seam at (-1.5000e-1, "),
+            expected,
+            "{coupling}: {warnings}"
+        );
+    }
+}
+
+#[test]
 fn one_sided_families_are_warned_of() {
     let folder = tempfile::tempdir().unwrap();
     let coarse = [

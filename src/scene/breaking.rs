@@ -107,7 +107,7 @@ pub(crate) fn breaking<const D: usize>(
             precision.span(),
             "of bonds that are passed over in every step",
         )
-        .help("add [solve.explicit], or remove it"));
+        .help("add [solve.explicit] or [solve.quasi-static], or remove it"));
     }
     Ok(Breaking {
         bonds,

@@ -10,7 +10,7 @@ use crate::scene::run::RunError;
 use crate::solve::FreeDofs;
 use crate::solve::direct::{Analysis, DirectError, DirectParams, Factor};
 use crate::solve::ordering::Ordering;
-use crate::system::{BlockCsr, Symmetry};
+use crate::system::Symmetry;
 use crate::tensor::padded;
 
 /// What is added to the matrix, as a part of its diagonal: far above what round-off leaves of the motions of a free body (6e-13), and no mode that it hides grows by more than e² in 100 000 steps.
@@ -59,7 +59,7 @@ pub(super) fn check<const D: usize>(
         pairwise: ratio.pairwise,
     };
     let mut matrix = model.assemble(operator, progress);
-    shift(&mut matrix);
+    matrix.raise_diagonal(SHIFT);
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
     let free = FreeDofs::from_prescribed(&vec![None; matrix.dofs()], D);
     let params = DirectParams {
@@ -92,24 +92,6 @@ pub(super) fn check<const D: usize>(
         }
         Err(error @ DirectError::TooLarge { .. }) => {
             Err(refused(format!("nothing shows that it has none: {error}")))
-        }
-    }
-}
-
-/// Adds a part of its diagonal to a matrix; rows that share their blocks share them still.
-fn shift(matrix: &mut BlockCsr) {
-    let d = matrix.block;
-    let mut done = vec![false; matrix.values.len() / (d * d).max(1)];
-    for i in 0..matrix.rows() {
-        let (columns, _) = matrix.row(i);
-        let Ok(place) = columns.binary_search(&(i as u32)) else {
-            continue;
-        };
-        let block = matrix.start(i) + place;
-        if !std::mem::replace(&mut done[block], true) {
-            for a in 0..d {
-                matrix.values[block * d * d + a * (d + 1)] *= 1.0 + SHIFT;
-            }
         }
     }
 }

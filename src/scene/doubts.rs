@@ -1,9 +1,17 @@
 //! What of a model makes its results doubtful, and is told by `check` and by `run`.
 
-use crate::coupling::{CellRole, Model};
+use super::spec::Joining;
+use crate::coupling::{CellRole, Model, Zone};
+use crate::shape::Barrier;
+
+/// All doubts about a model.
+pub(super) fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String> {
+    let all = [one_sided(model), crack_beside_seam(model, joining)];
+    all.into_iter().flatten().collect()
+}
 
 /// What partial stress does where its elements meet the surface of the body: measured in `docs/bars.md`.
-pub(super) fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
+fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
     if D == 1 || !model.roles.contains(&CellRole::StressElement) {
         return None;
     }
@@ -18,3 +26,49 @@ pub(super) fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
         )
     })
 }
+
+/// Cracks and voids so near to the seam that what is computed on this side of it lacks bonds: `bondline verify extremes`, "Cracks beside the seam".
+fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: Joining) -> Option<String> {
+    let p = model.peridynamics.as_ref()?;
+    let horizons = match joining.name {
+        "splice" => SPLICE,
+        "partial-stress" if model.roles.contains(&CellRole::StressElement) => STRESS_ELEMENTS,
+        "partial-stress" => MESHFREE,
+        _ => return None,
+    };
+    if p.barriers.is_empty() {
+        return None;
+    }
+    let mut is_outside = vec![false; model.mesh.nodes.len()];
+    let cells = (0..model.mesh.cell_count()).filter(|&c| model.zones[c] != Zone::Nonlocal);
+    for c in cells {
+        let nodes = model.mesh.cell(c);
+        nodes.iter().for_each(|&n| is_outside[n as usize] = true);
+    }
+    let outside = model.mesh.nodes.iter().zip(is_outside);
+    let nearest = outside
+        .filter(|(_, is_outside)| *is_outside)
+        .flat_map(|(x, _)| {
+            let distance = |b: &Barrier<D>| b.shape().signed_distance(x).max(0.0) / (p.horizon)(x);
+            p.barriers.iter().map(move |b| (distance(b), x))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (nearest.0 < horizons * (1.0 + 1e-3)).then(|| {
+        let place: Vec<String> = nearest.1.iter().map(|x| format!("{x:.4e}")).collect();
+        format!(
+            "a crack or void lies {:.2} horizons from the seam at ({}), where {} wants more than {horizons}: displacements are off by a few per cent to all of their size (docs/methods.md); enlarge [zones.nonlocal], or use coupling.truncated",
+            nearest.0,
+            place.join(", "),
+            joining.name
+        )
+    })
+}
+
+/// Horizons from crack to seam up to which a splice errs.
+pub(crate) const SPLICE: f64 = 1.0;
+
+/// As [`SPLICE`], of partial stress in elements.
+pub(crate) const STRESS_ELEMENTS: f64 = 1.4;
+
+/// As [`SPLICE`], of meshfree partial stress.
+pub(crate) const MESHFREE: f64 = 1.9;

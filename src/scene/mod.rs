@@ -32,7 +32,7 @@ mod conditions;
 mod converge;
 mod cost;
 mod definite;
-mod doubts;
+pub(crate) mod doubts;
 mod error;
 mod expression;
 mod follow;

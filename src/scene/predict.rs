@@ -11,13 +11,14 @@ use serde::Serialize;
 
 use super::accuracy::ErrorPrediction;
 use super::cost::{made_up, output_seconds};
-use super::doubts;
+use super::doubts::doubts;
 use super::loads;
 use super::motion;
-use super::run::{self, RunError, Solved};
+use super::run::{self, Rest, RunError, Solved};
 use super::solve::Solve;
 use super::spec::{Joining, ZonesNeeded};
 use super::validate::Scene;
+use crate::assembly::Pattern;
 use crate::coupling::edge::Edge;
 use crate::coupling::{Model, PointSource, SiteKind, Zone};
 use crate::mesh::Mesh;
@@ -35,6 +36,7 @@ use crate::solve::direct::Analysis;
 use crate::solve::ordering::SiteGraph;
 use crate::solve::rehearsal::{rehearse, seconds_per_scalar};
 use crate::solve::statics::{MethodUsed, StaticError, expected_method};
+use crate::solve::symbolic::FactorCost;
 use crate::system::Symmetry;
 use crate::tensor::padded;
 
@@ -136,6 +138,52 @@ const HIERARCHY: f64 = 2.1;
 /// Bytes of program and buffers that a run touches after its model is laid out; measured.
 const PROGRAM: u64 = 3_700_000;
 
+/// How a stiffness that is not assembled yet will be solved with.
+pub(super) struct Planned {
+    pub analysis: Analysis,
+    pub cost: FactorCost,
+    pub method: MethodUsed,
+    /// Bytes of the stiffness.
+    pub stiffness: u64,
+    /// Bytes of the factors, or of the multigrid hierarchy.
+    pub solver: u64,
+}
+
+impl Planned {
+    pub fn of<const D: usize>(
+        model: &Model<D>,
+        pattern: &Pattern,
+        free: &FreeDofs,
+        rest: &Rest<D>,
+        symmetry: Symmetry,
+    ) -> Result<Self, RunError> {
+        let nonzeros = pattern.stored * D * D;
+        let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+        let params = run::params(&rest.solver);
+        let graph = SiteGraph::from_pattern(&pattern.row_offsets, &pattern.columns, free);
+        let analysis =
+            Analysis::of_graph(graph, &positions, params.ordering).map_err(StaticError::from)?;
+        let cost = analysis.cost(symmetry);
+        let method = expected_method(&params, symmetry, &cost, nonzeros);
+        let solver = match method {
+            MethodUsed::Cholesky => analysis.bytes() + (cost.bytes as f64 * CHOLESKY) as u64,
+            MethodUsed::Lu => analysis.bytes() + (cost.bytes as f64 * LU) as u64,
+            // coarse levels share no rows
+            _ => analysis
+                .bytes()
+                .max((HIERARCHY * (nonzeros * 8 + pattern.stored * 4) as f64) as u64),
+        };
+        let stiffness = pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8;
+        Ok(Self {
+            analysis,
+            cost,
+            method,
+            stiffness: stiffness as u64,
+            solver,
+        })
+    }
+}
+
 /// Predicts a run.
 ///
 /// # Errors
@@ -169,14 +217,14 @@ pub(crate) fn predict<const D: usize>(
     choices.push(rest.coupling(joining));
     let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
-    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let params = run::params(&rest.solver);
-    let graph = SiteGraph::from_pattern(&pattern.row_offsets, &pattern.columns, &free);
-    let analysis =
-        Analysis::of_graph(graph, &positions, params.ordering).map_err(StaticError::from)?;
-    let cost = analysis.cost(symmetry);
+    let Planned {
+        analysis,
+        cost,
+        method,
+        stiffness,
+        solver,
+    } = Planned::of(&model, &pattern, &free, &rest, symmetry)?;
     watch.lap(&mut timings, "conditions and ordering");
-    let method = expected_method(&params, symmetry, &cost, nonzeros);
     let factorised = matches!(method, MethodUsed::Cholesky | MethodUsed::Lu);
     progress.finish();
 
@@ -211,16 +259,6 @@ pub(crate) fn predict<const D: usize>(
         choices.extend(run::volumes_choice(&model));
     }
 
-    let stiffness =
-        (pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8) as u64;
-    let solver = match method {
-        MethodUsed::Cholesky => analysis.bytes() + (cost.bytes as f64 * CHOLESKY) as u64,
-        MethodUsed::Lu => analysis.bytes() + (cost.bytes as f64 * LU) as u64,
-        // coarse levels share no rows
-        _ => analysis
-            .bytes()
-            .max((HIERARCHY * (nonzeros * 8 + pattern.stored * 4) as f64) as u64),
-    };
     let output_bytes = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
     let memory = vec![
         Share {
@@ -339,7 +377,7 @@ pub(super) fn warnings<const D: usize>(
             }
         }
     }
-    list.extend(doubts::one_sided(model));
+    list.extend(doubts(model, joining));
     if prediction.sizes.bonds > MANY_BONDS {
         list.push(format!(
             "{} bonds: shrink the nonlocal zone or the horizon over spacing",

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::breaking::Breaking;
 use super::conditions::Condition;
 use super::definite::{self, Ratio};
-use super::doubts::one_sided;
+use super::doubts::doubts;
 use super::follow::Follow;
 use super::initial::Initial;
 use super::loads::{loads, supports};
@@ -259,7 +259,7 @@ pub fn solve_with<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: one_sided(model).into_iter().collect(),
+        warnings: doubts(model, joining),
         iterations: info.iterations,
         factor_nonzeros: info.factor_nnz,
         residual: info.relative_residual,

@@ -9,6 +9,7 @@
 
 use crate::progress::Progress;
 use crate::solve::FreeDofs;
+use crate::solve::krylov::LinearMap;
 use crate::solve::multifrontal::{Assembly, NodeFactor};
 use crate::solve::ordering::{Ordering, OrderingError, SiteGraph};
 use crate::solve::symbolic::{FactorCost, Symbolic};
@@ -345,6 +346,12 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + tail
+}
+
+impl LinearMap for Factor {
+    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(&self.solve(x));
+    }
 }
 
 #[cfg(test)]

@@ -58,16 +58,14 @@ pub enum KrylovError {
     /// A direction with `p·A p ≤ 0`, or a preconditioner with `r·M r ≤ 0`.
     #[error(
         "conjugate gradients met a direction of no or negative energy at iteration {iteration}; the matrix is not \
-         symmetric positive definite, use GMRES or the direct method"
+         symmetric positive definite"
     )]
     Indefinite {
         /// Iteration at which it was met.
         iteration: usize,
     },
     /// The tolerance was not reached.
-    #[error(
-        "the relative residual is {residual:.1e} after {iterations} iterations; use the direct method"
-    )]
+    #[error("the relative residual is {residual:.1e} after {iterations} iterations")]
     NotConverged {
         /// Relative residual reached.
         residual: f64,

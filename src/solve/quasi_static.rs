@@ -4,10 +4,13 @@
 //! as they stand, and bonds beyond their critical stretch break, until none does. Two ways to equilibrium:
 //!
 //! * **Secant**: `u ← u + K⁻¹ (f − F(u))` with the tangent at rest, broken bonds left out; conjugate gradients or GMRES by its symmetry,
-//!   preconditioned by the row sums. One iteration where `F` is linear.
+//!   preconditioned by the factors of the tangent before bonds broke, or by the row sums. One iteration where `F` is linear; where it gets stuck, relaxation goes on.
 //! * **Relaxation**: the motion `M̃ ü + c M̃ u̇ = f − F(u)` in steps of one, with fictitious masses `m̃_a = ¼ Σ_b |K_ab|` that make the step stable, and
 //!   the damping that is critical for the mode in motion, `c = 2 √(v·ΔF / v·M̃ v)` (\[Underwood1983\], with the increment in place of the displacement). It needs
-//!   no solve, and pieces that are torn off do not trouble it.
+//!   no solve, and needs eigenvalues that are real and not negative.
+//!
+//! Pieces that are torn off trouble neither: what acts on them is in balance. Where all is torn apart no force is left to measure a residual by; so it
+//! is measured by the largest of the load step too, and is done at the round-off of the displacement.
 
 use std::ops::ControlFlow;
 
@@ -39,7 +42,8 @@ pub enum Equilibrium {
 pub struct QuasiStaticParams {
     /// How equilibrium is found.
     pub equilibrium: Equilibrium,
-    /// `‖f − F‖₂` on free dofs to be reached, relative to the norm of all internal and external forces.
+    /// `‖f − F‖₂` on free dofs to be reached, relative to the norm of all internal and external forces, or of those in equilibrium before bonds broke
+    /// in this load step.
     pub tolerance: f64,
     /// Products with the stiffness, or passes over the bonds, for one equilibrium.
     pub max_iterations: usize,
@@ -126,7 +130,7 @@ pub enum QuasiStaticError {
     },
     /// No equilibrium.
     #[error(
-        "load step {step} at time {time} found no equilibrium: the residual is {residual:.1e} of the forces after {iterations} iterations, largest at site {site}; take smaller load steps, or equilibrium = \"relaxation\""
+        "load step {step} at time {time} found no equilibrium: the residual is {residual:.1e} of the forces after {iterations} iterations, largest at site {site}; {remedy}"
     )]
     NoEquilibrium {
         /// The load step.
@@ -136,6 +140,22 @@ pub enum QuasiStaticError {
         /// Relative residual.
         residual: f64,
         /// Iterations spent.
+        iterations: usize,
+        /// Where the residual is largest.
+        site: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// Damped motion that grows.
+    #[error(
+        "load step {step} at time {time}: the relaxation ran away after {iterations} passes, fastest at site {site}: the stiffness has eigenvalues that are negative or complex, as that of partial stress at free sides; take method = \"implicit\", or another coupling"
+    )]
+    RanAway {
+        /// The load step.
+        step: u64,
+        /// Its time.
+        time: f64,
+        /// Passes so far.
         iterations: usize,
         /// Where the residual is largest.
         site: usize,
@@ -155,7 +175,7 @@ pub enum QuasiStaticError {
         broken: u64,
     },
     /// The linear solve failed.
-    #[error("load step {step} at time {time}: {source}")]
+    #[error("load step {step} at time {time} found no equilibrium: {source}; {remedy}")]
     Linear {
         /// The load step.
         step: u64,
@@ -163,6 +183,8 @@ pub enum QuasiStaticError {
         time: f64,
         /// Why.
         source: KrylovError,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A number is not finite.
     #[error(
@@ -202,9 +224,25 @@ impl LinearMap for Diagonal<'_> {
     }
 }
 
+/// Round-off of displacements, over them: forces within it of balance cannot come nearer.
+const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
+
+/// Where there is a load, as much of it as round-off may leave: a body that nothing holds moves until round-off hides any load.
+const HIDDEN: f64 = 1e-6;
+
+/// What supports that move would meet if nothing else moved, times this, counts as force: about what an intact body a thousand spacings long resists with.
+const MOVED: f64 = 1e-3;
+
+/// A relaxation whose residual grows by so much will not come back.
+const RAN_AWAY: f64 = 1e6;
+
+/// What to do where a load acts.
+const UNBORNE: &str = "a load that nothing bears has none: hold the body, take smaller load steps, or prescribe displacements instead of forces";
+
 /// The work space of a run.
 struct Run<'a> {
     system: &'a mut dyn Dynamic,
+    near: Option<&'a dyn LinearMap>,
     params: QuasiStaticParams,
     free: FreeDofs,
     load: Vec<f64>,
@@ -212,11 +250,39 @@ struct Run<'a> {
     residual: Vec<f64>,
     /// `1/Σ_b |K_ab|`.
     inverse: Vec<f64>,
+    /// Norm of the forces in the last equilibrium of this load step.
+    balanced: f64,
     step: u64,
     time: f64,
 }
 
+/// `‖f − F‖₂` on free dofs.
+#[derive(Clone, Copy)]
+struct Residual {
+    size: f64,
+    /// The forces that it is measured by.
+    scale: f64,
+    /// What it has to come to.
+    enough: f64,
+}
+
+impl Residual {
+    fn is_enough(self) -> bool {
+        self.size <= self.enough
+    }
+
+    fn relative(self) -> f64 {
+        if self.scale > 0.0 {
+            self.size / self.scale
+        } else {
+            0.0
+        }
+    }
+}
+
 /// Runs load steps at `times`, those that `state` has done left out; after each, `observe` may stop.
+///
+/// `near` is an inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves the secant iterations.
 ///
 /// # Errors
 /// [`QuasiStaticError`], each with load step, time, place and remedy.
@@ -224,6 +290,7 @@ pub fn run(
     system: &mut dyn Dynamic,
     drive: &dyn Drive,
     params: QuasiStaticParams,
+    near: Option<&dyn LinearMap>,
     times: &[f64],
     state: &mut LoadState,
     observe: &mut dyn FnMut(&LoadStep<'_>) -> ControlFlow<()>,
@@ -252,11 +319,13 @@ pub fn run(
     let mut work = Run {
         inverse: vec![0.0; dofs],
         system,
+        near,
         params,
         free: FreeDofs::from_prescribed(&held, block),
         load: vec![0.0; dofs],
         force: vec![0.0; dofs],
         residual: vec![0.0; dofs],
+        balanced: 0.0,
         step: state.step,
         time: 0.0,
     };
@@ -264,11 +333,21 @@ pub fn run(
     let mut info = QuasiStaticInfo::default();
     for &time in times.iter().skip(state.step as usize) {
         (work.step, work.time) = (state.step, time);
+        work.balanced = 0.0;
+        if let Some(&before) = times[..state.step as usize].last() {
+            drive.load_into(before, &mut work.load);
+            work.balanced = work.evaluate(&state.u)?.scale;
+        }
         drive.load_into(time, &mut work.load);
         drive.displacement_into(time, &mut values);
+        work.find_row_sums();
+        let mut moved = 0.0;
         for (&k, v) in prescribed.iter().zip(&values) {
-            state.u[k as usize] = *v;
+            let u = &mut state.u[k as usize];
+            moved += work.resisted(k as usize, v - *u);
+            *u = *v;
         }
+        work.balanced = work.balanced.max(MOVED * moved.sqrt());
         let (mut broken, mut rounds, mut iterations) = (0, 0, 0);
         let residual = loop {
             let (count, residual) = work.equilibrium(&mut state.u)?;
@@ -315,27 +394,64 @@ pub fn run(
 impl Run<'_> {
     /// Finds equilibrium with bonds held; returns iterations and relative residual.
     fn equilibrium(&mut self, u: &mut [f64]) -> Result<(usize, f64), QuasiStaticError> {
-        // broken bonds have left the rows
-        for (inverse, sum) in self.inverse.iter_mut().zip(self.system.row_sums()) {
-            *inverse = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-        }
-        match self.params.equilibrium {
-            Equilibrium::Secant => self.by_secant(u),
-            Equilibrium::Relaxation => self.by_relaxation(u),
+        self.find_row_sums();
+        let (iterations, residual) = match self.params.equilibrium {
+            Equilibrium::Secant => match self.by_secant(u) {
+                // where bonds have turned far from rest, or hang together by single bonds, its tangent leads nowhere
+                Err(
+                    stuck @ (QuasiStaticError::NoEquilibrium { .. }
+                    | QuasiStaticError::Linear { .. }),
+                ) => match self.by_relaxation(u) {
+                    Ok(found) => found,
+                    Err(late @ QuasiStaticError::NoEquilibrium { .. }) if !self.is_loaded() => {
+                        return Err(late);
+                    }
+                    Err(_) => return Err(stuck),
+                },
+                found => found?,
+            },
+            Equilibrium::Relaxation => self.by_relaxation(u)?,
+        };
+        self.balanced = residual.scale;
+        Ok((iterations, residual.relative()))
+    }
+
+    /// Broken bonds have left the rows; a bond that turns resists where it did not at rest, so that a site has one number.
+    fn find_row_sums(&mut self) {
+        let sums = self.system.row_sums();
+        let block = self.free.block();
+        for (inverse, sums) in self.inverse.chunks_mut(block).zip(sums.chunks(block)) {
+            let sum = sums.iter().copied().fold(0.0, f64::max);
+            inverse.fill(if sum > 0.0 { 1.0 / sum } else { 0.0 });
         }
     }
 
-    /// `f − F` on free dofs; returns its relative norm.
-    fn evaluate(&mut self, u: &[f64]) -> Result<f64, QuasiStaticError> {
+    /// `(u Σ_b |K_ab|)²`.
+    fn resisted(&self, dof: usize, u: f64) -> f64 {
+        let inverse = self.inverse[dof];
+        if inverse > 0.0 {
+            (u / inverse).powi(2)
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether a load acts.
+    fn is_loaded(&self) -> bool {
+        self.load.iter().any(|f| *f != 0.0)
+    }
+
+    /// `f − F` on free dofs, and its norm.
+    fn evaluate(&mut self, u: &[f64]) -> Result<Residual, QuasiStaticError> {
         self.system
             .internal_force_into(u, &mut self.force, Breakage::Held);
         for ((r, f), k) in self.residual.iter_mut().zip(&self.load).zip(&self.force) {
             *r = f - k;
         }
         self.free.clear_prescribed(&mut self.residual);
-        let scale = norm(&self.force) + norm(&self.load);
+        let forces = norm(&self.force) + norm(&self.load);
         let size = norm(&self.residual);
-        if !(size.is_finite() && scale.is_finite()) {
+        if !(size.is_finite() && forces.is_finite()) {
             let bad = |k: &usize| !(self.force[*k].is_finite() && self.load[*k].is_finite());
             let dof = (0..u.len()).find(bad).unwrap_or(0);
             return Err(QuasiStaticError::NotFinite {
@@ -344,31 +460,51 @@ impl Run<'_> {
                 site: dof / self.free.block(),
             });
         }
-        Ok(if scale > 0.0 { size / scale } else { 0.0 })
+        let resisted: f64 = (0..u.len()).map(|k| self.resisted(k, u[k])).sum();
+        let mut round_off = ROUND_OFF * resisted.sqrt();
+        if self.is_loaded() {
+            round_off = round_off.min(HIDDEN * norm(&self.load));
+        }
+        let scale = forces.max(self.balanced);
+        Ok(Residual {
+            size,
+            scale,
+            enough: (self.params.tolerance * scale).max(round_off),
+        })
     }
 
-    fn no_equilibrium(&self, residual: f64, iterations: usize) -> QuasiStaticError {
+    /// The site at which the residual is largest.
+    fn worst(&self) -> usize {
         let size = |k: usize| self.residual[k].abs();
         let worst =
             (0..self.residual.len()).fold(0, |best, k| if size(k) > size(best) { k } else { best });
+        worst / self.free.block()
+    }
+
+    fn no_equilibrium(&self, residual: Residual, iterations: usize) -> QuasiStaticError {
         QuasiStaticError::NoEquilibrium {
             step: self.step,
             time: self.time,
-            residual,
+            residual: residual.relative(),
             iterations,
-            site: worst / self.free.block(),
+            site: self.worst(),
+            remedy: if self.is_loaded() {
+                UNBORNE
+            } else {
+                "take smaller load steps, or allow more iterations or a larger residual (max-iterations, tolerance)"
+            },
         }
     }
 
-    fn by_secant(&mut self, u: &mut [f64]) -> Result<(usize, f64), QuasiStaticError> {
+    fn by_secant(&mut self, u: &mut [f64]) -> Result<(usize, Residual), QuasiStaticError> {
         let mut iterations = 0;
         let mut residual = self.evaluate(u)?;
-        while residual > self.params.tolerance {
+        while !residual.is_enough() {
             if iterations >= self.params.max_iterations {
                 return Err(self.no_equilibrium(residual, iterations));
             }
             let params = KrylovParams {
-                tolerance: (0.1 * self.params.tolerance / residual).clamp(1e-13, 1e-2),
+                tolerance: (0.1 * residual.enough / residual.size).clamp(1e-13, 1e-2),
                 max_iterations: self.params.max_iterations - iterations,
                 ..KrylovParams::default()
             };
@@ -376,41 +512,61 @@ impl Run<'_> {
                 system: &*self.system,
                 free: &self.free,
             };
-            let weights = Diagonal(&self.inverse);
+            let diagonal = Diagonal(&self.inverse);
+            let near = self.near.unwrap_or(&diagonal);
+            let remedy = match (self.is_loaded(), self.near) {
+                (true, _) => {
+                    "a load that nothing bears has none: hold the body, or prescribe displacements instead of forces"
+                }
+                (_, None) => {
+                    "take solver.method = \"direct\", whose factors lead the iteration, or smaller load steps"
+                }
+                _ => "take smaller load steps",
+            };
             let solved = match self.system.symmetry() {
                 Symmetry::Symmetric => {
-                    conjugate_gradients(&tangent, &weights, &self.residual, &params, &Silent)
+                    conjugate_gradients(&tangent, near, &self.residual, &params, &Silent)
                 }
-                Symmetry::Unsymmetric => {
-                    gmres(&tangent, &weights, &self.residual, &params, &Silent)
-                }
+                Symmetry::Unsymmetric => gmres(&tangent, near, &self.residual, &params, &Silent),
             };
             let (correction, info) = solved.map_err(|source| QuasiStaticError::Linear {
                 step: self.step,
                 time: self.time,
                 source,
+                remedy,
             })?;
             iterations += info.iterations.max(1);
             add_scaled(1.0, &correction, u);
-            let before = residual;
+            let before = residual.size;
             residual = self.evaluate(u)?;
-            // no nearer: round-off, or a tangent at rest too far from the present one
-            if residual > 0.999 * before {
-                return Err(self.no_equilibrium(residual, iterations));
+            // no nearer: a tangent at rest too far from the present one
+            if !residual.is_enough() && residual.size > 0.999 * before {
+                let error = self.no_equilibrium(residual, iterations);
+                add_scaled(-1.0, &correction, u);
+                return Err(error);
             }
         }
         Ok((iterations, residual))
     }
 
-    fn by_relaxation(&mut self, u: &mut [f64]) -> Result<(usize, f64), QuasiStaticError> {
+    fn by_relaxation(&mut self, u: &mut [f64]) -> Result<(usize, Residual), QuasiStaticError> {
         let mut residual = self.evaluate(u)?;
+        let first = residual.size;
         let mut last = self.force.clone();
         // `1/m̃`, a tenth heavier than the limit: geometry may stiffen bonds
         let inverse: Vec<f64> = self.inverse.iter().map(|s| s * 4.0 / 1.1).collect();
         let mut v = vec![0.0; u.len()];
         let mut damping = 0.0;
         let mut iterations = 0;
-        while residual > self.params.tolerance {
+        while !residual.is_enough() {
+            if residual.size > RAN_AWAY * first {
+                return Err(QuasiStaticError::RanAway {
+                    step: self.step,
+                    time: self.time,
+                    iterations,
+                    site: self.worst(),
+                });
+            }
             if iterations >= self.params.max_iterations {
                 return Err(self.no_equilibrium(residual, iterations));
             }

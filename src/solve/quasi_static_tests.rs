@@ -80,7 +80,7 @@ fn go(
         ..QuasiStaticParams::default()
     };
     let mut state = LoadState::at_rest(system.mass().len() * system.block());
-    run(system, drive, params, times, &mut state, &mut |s| {
+    run(system, drive, params, None, times, &mut state, &mut |s| {
         observe(s);
         ControlFlow::Continue(())
     })
@@ -314,6 +314,7 @@ fn runs_resume_and_trouble_is_named() {
             &mut bundle,
             &Grip::Displacement,
             params,
+            None,
             &times,
             &mut state,
             &mut |_| ControlFlow::Continue(()),
@@ -328,6 +329,7 @@ fn runs_resume_and_trouble_is_named() {
             &mut bundle,
             &Grip::Displacement,
             params,
+            None,
             &times,
             &mut state,
             &mut |s| {
@@ -353,6 +355,7 @@ fn runs_resume_and_trouble_is_named() {
         &mut bundle,
         &Grip::Displacement,
         params,
+        None,
         &[1.0],
         &mut short,
         &mut none,
@@ -366,6 +369,7 @@ fn runs_resume_and_trouble_is_named() {
         &mut bundle,
         &Grip::Displacement,
         params,
+        None,
         &[3.0],
         &mut state,
         &mut none,
@@ -385,7 +389,15 @@ fn runs_resume_and_trouble_is_named() {
         middle: 13,
     };
     let mut state = LoadState::at_rest(40);
-    let error = run(&mut system, &drive, few, &[1.0], &mut state, &mut none);
+    let error = run(
+        &mut system,
+        &drive,
+        few,
+        None,
+        &[1.0],
+        &mut state,
+        &mut none,
+    );
     assert!(
         matches!(
             error,
@@ -397,6 +409,7 @@ fn runs_resume_and_trouble_is_named() {
         &mut system,
         &drive,
         few,
+        None,
         &[f64::NAN],
         &mut LoadState::at_rest(40),
         &mut none,

@@ -10,7 +10,7 @@ use crate::system::{BlockCsr, Symmetry};
 
 mod methods;
 
-pub use methods::expected_method;
+pub use methods::{expected_method, factors};
 
 /// A static problem; borrowed, so that assembling it is the caller's to time.
 ///

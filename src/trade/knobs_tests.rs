@@ -55,12 +55,23 @@ fn every_setting_makes_a_scene() {
 fn what_moves_has_knobs_of_its_own() {
     let named = |solve: &str| {
         let mut source = Source::new("plate", PLATE);
-        source.push_override("materials.plate.bond-based.density=1").unwrap();
+        source
+            .push_override("materials.plate.bond-based.density=1")
+            .unwrap();
         source.push_override(solve).unwrap();
         let knobs = Base::of(&SceneSpec::parse(&source).unwrap()).knobs();
         for setting in knobs.iter().flat_map(|k| &k.settings) {
             if let Change::Keys(keys) = &setting.change {
-                admitted(&[&["materials.plate.bond-based.density=1".to_owned(), solve.to_owned()], &keys[..]].concat());
+                admitted(
+                    &[
+                        &[
+                            "materials.plate.bond-based.density=1".to_owned(),
+                            solve.to_owned(),
+                        ],
+                        &keys[..],
+                    ]
+                    .concat(),
+                );
             }
         }
         let more = knobs.into_iter().map(|k| k.name).skip(5);

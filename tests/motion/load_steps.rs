@@ -1,6 +1,6 @@
 //! Loads that grow step by step.
 
-use crate::{BREAKING, column, run, same, table, write};
+use crate::{BREAKING, bondline, column, run, same, table, write};
 
 #[test]
 fn load_steps_end_where_the_static_solve_does_by_either_method() {
@@ -51,6 +51,115 @@ fn load_steps_end_where_the_static_solve_does_by_either_method() {
         assert!(
             (work / stored - 1.0).abs() < 1e-6,
             "{method}: {work} {stored}"
+        );
+    }
+}
+
+/// Partial stress has eigenvalues that are negative: relaxation runs away and says so, factors of the stiffness lead to the static solution.
+#[test]
+fn load_steps_of_partial_stress_are_led_by_factors() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = BREAKING
+        .replace(
+            "[solve.explicit]\nduration = 60\noutputs = 6\nhistory-interval = 1\n",
+            "",
+        )
+        .replace(" * min(1, t / 8)", "")
+        .replace("tips.notch = { direction = [0, -1], threshold = 0.2 }", "")
+        .replace("damage-at-edge = \"warn\"\n", "")
+        .replace("[no-fail.base]\nbox = { min = [3, 0], max = [9, 1] }\n", "")
+        .replace("critical-stretch = 0.002\n", "")
+        .replace("[coupling.splice]", "[coupling.partial-stress]")
+        .replace("x = \"-0.004", "y = 0\nx = \"-0.004");
+    write(folder.path(), "still.toml", &still);
+    let transition = ["--set", "zones.transition.around=1.6"];
+    run(
+        folder.path(),
+        &[&["still.toml"][..], &transition[..]].concat(),
+    );
+    let expected = table(&folder.path().join("out/still_probes.csv")).1[0].clone();
+    let load = format!("{still}[solve.quasi-static]\nsteps = 1\n");
+    write(folder.path(), "load.toml", &load);
+    let arguments = [&["load.toml"][..], &transition[..]].concat();
+    let said = run(folder.path(), &arguments);
+    assert!(said.contains("lead the iteration"), "{said}");
+    let history = folder.path().join("out/load_history.csv");
+    for (column_name, at) in [("middle_ux", 2), ("middle_uy", 3)] {
+        let u = column(&history, column_name);
+        let u = u.last().unwrap();
+        assert!((u - expected[at]).abs() < 1e-7 * 0.004, "{u} {expected:?}");
+    }
+    let relaxed = [
+        &arguments[..],
+        &["--set", "solve.quasi-static.method=relaxation"],
+    ]
+    .concat();
+    let refused = bondline(folder.path())
+        .arg("run")
+        .args(relaxed)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        !refused.status.success() && said.contains("ran away"),
+        "{said}"
+    );
+}
+
+/// Back to where it began, nothing is left to measure a residual by but what was there before; and a body that nothing holds is not at rest anywhere.
+#[test]
+fn load_steps_return_to_zero_and_refuse_a_body_that_nothing_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |coupling: &str, held: &str, pull: &str| {
+        format!(
+            "kinematics = \"plane-strain\"\n{coupling}\n[mesh.rectangle]\nmin = [0, 0]\nmax = [1, 1]\nx = {{ cells = 12 }}\ny = {{ cells = 12 }}\n\
+             [materials.body.bond-based]\nyoungs-modulus = 1\ndensity = 1\n[conditions.bottom.displacement]\non = \"bottom\"\n{held}\n{pull}\n\
+             [solve.quasi-static]\nsteps = 4\n[output]\nvtu = false\nprobes.middle = {{ at = [0.5, 0.51] }}\n"
+        )
+    };
+    let points = "[peridynamics]\nhorizon = 0.17\npoints.lattice.spacing = \"1/12\"\n";
+    let zone = "[zones.nonlocal]\nbox = { min = [0.3, 0.3], max = [0.7, 0.7] }\n";
+    let there_and_back =
+        "[conditions.top.displacement]\non = \"top\"\nx = 0\ny = \"0.01*(1-abs(2*t-1))\"";
+    for coupling in ["splice", "truncated", "nonlocal", "local"] {
+        for method in ["implicit", "relaxation"] {
+            let mut text = scene(
+                &format!("coupling = \"{coupling}\""),
+                "x = 0\ny = 0",
+                there_and_back,
+            );
+            if coupling != "local" {
+                text += points;
+            }
+            if ["splice", "truncated"].contains(&coupling) {
+                text += zone;
+            }
+            write(folder.path(), "back.toml", &text);
+            let method = format!("solve.quasi-static.method={method}");
+            run(folder.path(), &["back.toml", "--set", &method]);
+            let u = column(&folder.path().join("out/back_history.csv"), "middle_uy");
+            assert!(
+                u[2] > 4e-3 && u[4].abs() < 1e-8,
+                "{coupling}, {method}: {u:?}"
+            );
+        }
+    }
+    let text = scene(
+        "coupling = \"local\"",
+        "y = 0",
+        "[conditions.top.traction]\non = \"top\"\nx = 1e-4",
+    );
+    write(folder.path(), "free.toml", &text);
+    for method in ["auto", "krylov"] {
+        let set = format!("solver.method={method}");
+        let refused = bondline(folder.path())
+            .args(["run", "free.toml", "--set", &set])
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(
+            !refused.status.success() && said.contains("found no equilibrium"),
+            "{method}: {said}"
         );
     }
 }

@@ -18,7 +18,7 @@ use crate::observe::summary::{
     Ended, MotionSummary, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
 use crate::progress::Progress;
-use crate::scene::doubts::one_sided;
+use crate::scene::doubts::doubts;
 use crate::scene::run::{self, Rest, RunError, Solved};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
@@ -404,7 +404,7 @@ fn leg<'r, const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: one_sided(model).into_iter().collect(),
+        warnings: doubts(model, joining),
         motion: Some(MotionSummary {
             ended,
             steps: state.step,

@@ -6,6 +6,7 @@ use super::drive::SceneDrive;
 use super::explicit::{moment, sizes};
 use super::laid_out::{LaidOut, breaks, laid_out};
 use super::pace::{held, paced};
+use super::quasi_static::may_factorise;
 use super::record::Recorder;
 use super::system::start;
 use crate::coupling::Sampler;
@@ -14,12 +15,15 @@ use crate::observe::series::Series;
 use crate::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
 use crate::scene::cost::{TrialFolder, file_seconds, made_up};
-use crate::scene::predict::{MotionPrediction, OUTPUT_BYTES, Prediction, Share, warnings};
+use crate::scene::predict::{MotionPrediction, OUTPUT_BYTES, Planned, Prediction, Share, warnings};
 use crate::scene::run::{self, RunError, Solved};
 use crate::scene::solve::{Explicit as Spec, QuasiStatic};
+use crate::scene::spec::LoadStepSpec;
 use crate::scene::validate::{Output, Scene};
 use crate::scene::write::OverSites;
+use crate::solve::FreeDofs;
 use crate::solve::explicit::{Explicit, ExplicitParams};
+use crate::solve::statics::MethodUsed;
 
 /// Steps are taken for a tenth of the run to tell what one costs, for this long at most \[s\].
 const TRIED_FOR: f64 = 0.5;
@@ -242,6 +246,7 @@ pub(crate) fn load_steps<const D: usize>(
         let held = held(laid_out.model, &laid_out.rest.conditions)?;
         progress.finish();
         let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);
+        factors(&laid_out, spec, &held, &mut prediction, progress)?;
         prediction.warnings = warnings(laid_out.model, laid_out.joining, &prediction);
         prediction.warnings.push(format!(
             "the time of {} load steps is not in the estimate: it depends on the bonds that break",
@@ -249,4 +254,37 @@ pub(crate) fn load_steps<const D: usize>(
         ));
         Ok(prediction)
     })
+}
+
+/// Memory and operations of the factors that lead the iteration, if there are any.
+fn factors<const D: usize>(
+    laid_out: &LaidOut<'_, D>,
+    spec: &QuasiStatic,
+    held: &[u32],
+    prediction: &mut Prediction,
+    progress: &dyn Progress,
+) -> Result<(), RunError> {
+    let symmetry = prediction.symmetry;
+    if spec.method == LoadStepSpec::Relaxation
+        || !may_factorise(laid_out.model, laid_out.rest.solver.method, symmetry)
+    {
+        return Ok(());
+    }
+    let mut prescribed = vec![None; prediction.sizes.dofs];
+    held.iter()
+        .for_each(|&dof| prescribed[dof as usize] = Some(0.0));
+    let free = FreeDofs::from_prescribed(&prescribed, D);
+    let pattern = laid_out.model.pattern(laid_out.operator, progress);
+    let plan = Planned::of(laid_out.model, &pattern, &free, laid_out.rest, symmetry)?;
+    if !matches!(plan.method, MethodUsed::Cholesky | MethodUsed::Lu) {
+        return Ok(());
+    }
+    prediction.method = Some(plan.method);
+    prediction.factor_nonzeros = plan.cost.factor_nnz;
+    prediction.operations = plan.cost.flops;
+    for (name, bytes) in [("stiffness", plan.stiffness), ("solver", plan.solver)] {
+        prediction.memory.push(Share { name, bytes });
+        prediction.peak_memory_bytes += bytes;
+    }
+    Ok(())
 }

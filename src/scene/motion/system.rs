@@ -46,13 +46,7 @@ pub(super) fn dynamic<'a, const D: usize>(
     };
     let storage = match breaking.precision {
         PrecisionSpec::Double => Storage::Double,
-        PrecisionSpec::Single => {
-            choices.push(Choice {
-                choice: "weights of bonds in four bytes".to_owned(),
-                why: "precision = \"single\": each bond is listed, also where the points fill a lattice, which needs no list".to_owned(),
-            });
-            Storage::Single
-        }
+        PrecisionSpec::Single => Storage::Single,
     };
     let stretches = critical_stretch.as_ref().map(|critical| match critical {
         Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
@@ -114,6 +108,22 @@ pub(super) fn dynamic<'a, const D: usize>(
                 choices.push(Choice {
                     choice: bonds.to_owned(),
                     why: breaks + at_seam,
+                });
+            }
+            if storage == Storage::Single {
+                let (choice, why) = match model.body() {
+                    Some(_) => (
+                        "weights of bonds in four bytes",
+                        "precision = \"single\": each bond is listed, also where the points fill a lattice, which needs no list",
+                    ),
+                    None => (
+                        "precision = \"single\" changes nothing",
+                        "there are no bonds",
+                    ),
+                };
+                choices.push(Choice {
+                    choice: choice.to_owned(),
+                    why: why.to_owned(),
                 });
             }
             Ok(Moving {

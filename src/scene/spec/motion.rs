@@ -75,7 +75,7 @@ pub struct QuasiStaticSpec {
     /// How each step is solved.
     #[serde(default)]
     pub method: LoadStepSpec,
-    /// Out-of-balance force at which a step is solved, relative to the applied force; 1e-8 if left out.
+    /// Out-of-balance force at which a step is solved, relative to the largest forces of this load step and at the end of the last; 1e-8 if left out.
     #[serde(default)]
     pub tolerance: Option<Number>,
     /// Most products with the tangent (implicit) or passes over the bonds (relaxation) of one equilibrium; 50000 if left out.

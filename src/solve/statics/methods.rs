@@ -117,6 +117,41 @@ pub fn expected_method(
     }
 }
 
+/// Factors of `K` to lead an iteration whose operator is near it: where `params` ask for a factorisation, or `Auto` finds it cheap.
+///
+/// There are none of a symmetric `K` that has negative eigenvalues, for those of LU would not be symmetric.
+///
+/// # Errors
+/// [`StaticError`] if the order cannot be computed, or factors that are asked for would not fit.
+pub fn factors(
+    problem: &StaticProblem<'_>,
+    params: &StaticParams,
+    progress: &dyn Progress,
+) -> Result<Option<(Factor, DirectInfo)>, StaticError> {
+    let matrix = problem.stiffness;
+    let free = FreeDofs::from_prescribed(problem.prescribed, matrix.block.max(1));
+    let is_auto = params.method == Method::Auto;
+    if params.method == Method::Krylov || is_auto && matrix.nonzeros() > ANALYSED {
+        return Ok(None);
+    }
+    progress.stage("ordering", None);
+    let analysis = Analysis::new(matrix, &free, problem.positions, params.ordering)?;
+    let cost = analysis.cost(problem.symmetry);
+    if is_auto && !factorises(&cost, matrix.nonzeros(), params.memory_limit) {
+        return Ok(None);
+    }
+    let params = DirectParams {
+        symmetry: problem.symmetry,
+        smallest_pivot: 0.0,
+        memory_limit: params.memory_limit,
+    };
+    match Factor::new(matrix, &free, analysis, &params, progress) {
+        Ok(done) => Ok(Some(done)),
+        Err(error @ DirectError::TooLarge { .. }) => Err(StaticError::TooLarge(error)),
+        Err(DirectError::NotPositive { .. } | DirectError::Singular { .. }) => Ok(None),
+    }
+}
+
 fn krylov(
     problem: &StaticProblem<'_>,
     free: &FreeDofs,
