@@ -62,7 +62,13 @@ fn extremes_pass_or_are_refused() {
     assert_eq!(refused("another material"), 16);
     assert_eq!(refused("as long as it is wide"), 2);
     assert_eq!(refused("larger than the stable step"), 4);
+    assert_eq!(refused("ran away"), 1);
     assert!(count(&tables, "lengths 1e-9", Verdict::Pass) == 14);
+    // five couplings and peridynamics alone
+    assert_eq!(count(&tables, "void in its place", Verdict::Pass), 6);
+    assert_eq!(count(&tables, "left over", Verdict::Pass), 6);
+    assert_eq!(count(&tables, "same in 1D", Verdict::Pass), 6);
+    assert_eq!(count(&tables, "one that rests", Verdict::Pass), 5);
 }
 
 #[test]

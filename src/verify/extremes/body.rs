@@ -4,8 +4,9 @@ use std::path::Path;
 
 use crate::{
     coupling::Sampler,
+    observe::summary::MotionSummary,
     progress::Silent,
-    scene::{AnyScene, RunError, Scene, Source, solve_with},
+    scene::{AnyScene, RunError, Scene, Solved as Solution, Source, solve_with},
     tensor::{Vector, padded},
 };
 
@@ -205,6 +206,41 @@ fn of<const D: usize>(scene: Scene<D>) -> Result<Solved, RunError> {
     found.residual = summary.residual;
     found.bonds = summary.sizes.bonds;
     Ok(found)
+}
+
+/// Runs a scene that moves, or is loaded step by step; its files are of no further use.
+///
+/// # Errors
+/// As [`solve`].
+pub fn moved(source: &Source) -> Result<MotionSummary, String> {
+    let mut scene = AnyScene::from_source(source, Path::new(""), "extreme")
+        .map_err(|e| e.message().to_owned())?;
+    let folder = std::env::temp_dir().join(format!("bondline-extremes-{}", std::process::id()));
+    scene.set_output_directory(folder.clone());
+    let summary = scene.run(&Silent).map_err(|e| e.to_string());
+    // what lies there is of no further use
+    let _ = std::fs::remove_dir_all(&folder);
+    summary?.motion.ok_or_else(|| "nothing moved".to_owned())
+}
+
+/// Solves a plane scene at rest, and hands out what samples its displacement.
+///
+/// # Errors
+/// As [`solve`].
+pub fn sampled(text: &str, mut see: impl FnMut(&Sampler<'_, 2>, &[f64])) -> Result<(), String> {
+    let source = Source::new("extreme.toml", text);
+    let scene = AnyScene::from_source(&source, Path::new(""), "extreme")
+        .map_err(|e| e.message().to_owned())?;
+    let AnyScene::Plane(scene) = scene else {
+        return Err("no plane scene".to_owned());
+    };
+    let see = |_: &_, solved: &Solution<'_, 2>| {
+        see(&Sampler::new(solved.model), solved.displacement);
+        Ok(Vec::new())
+    };
+    solve_with(*scene, &Silent, see)
+        .map(|_| ())
+        .map_err(|e| e.to_string())
 }
 
 /// Solves a scene at rest.

@@ -3,9 +3,10 @@
 //! | file | what |
 //! |---|---|
 //! | `body.rs` | a scene made to measure, and what its run gives |
-//! | `scales.rs` | units, distance from the origin, size of displacements |
+//! | `scales.rs` | units, distance from the origin, size of displacements, bonds that turn |
 //! | `laws.rs` | Poisson ratios, m from 1 to 12, continuity through whole m |
 //! | `shapes.rs` | thin cells, small families, zones of one point, fragments, cracks through the seam |
+//! | `cracks.rs` | pieces cut off and bodies torn apart under a load, cracks beside the seam |
 //! | `contrast.rs` | a body that is far stiffer beyond the seam |
 //! | `steps.rs` | time steps on either side of the limit, a million of them, bonds in four bytes |
 //!
@@ -13,6 +14,7 @@
 
 mod body;
 mod contrast;
+mod cracks;
 mod laws;
 mod scales;
 mod shapes;
@@ -29,13 +31,17 @@ type Part = fn(Effort) -> Vec<Row>;
 
 /// Runs the suite. Quick: without the million steps, three dimensions only where nothing else tells.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let parts: [(&str, Part); 8] = [
+    let parts: [(&str, Part); 12] = [
         ("Units and places", scales::rows),
+        ("Bonds that turn", scales::exact),
         ("Poisson ratio of an LPS", laws::poisson),
         ("Horizon over spacing", laws::ratio),
         ("Cells and families", shapes::cells_and_families),
         ("Zones", shapes::zones),
         ("Fragments and cracks", shapes::fragments),
+        ("Pieces under a load", cracks::pieces),
+        ("Bodies torn apart", cracks::torn),
+        ("Cracks beside the seam", cracks::beside_seam),
         ("Stiffness beyond the seam", contrast::rows),
         ("Time steps", steps::rows),
     ];

@@ -1,12 +1,12 @@
 //! Time steps on either side of the stable one, and very many of them.
 
-use std::path::Path;
-
-use super::{body::Body, kept, refused};
+use super::{
+    body::{Body, moved},
+    kept, refused,
+};
 use crate::{
     observe::{report::Row, summary::MotionSummary},
-    progress::Silent,
-    scene::{AnyScene, Source},
+    scene::Source,
     verify::Effort,
 };
 
@@ -15,7 +15,7 @@ use crate::{
 pub const ENERGY_LIMIT: f64 = 0.1;
 
 /// A pulse in a bar.
-fn bar(coupling: &'static str, time: &str) -> String {
+fn pulse(coupling: &'static str, time: &str) -> Source {
     let mut body = Body {
         dimension: 1,
         cells: 60,
@@ -32,28 +32,13 @@ fn bar(coupling: &'static str, time: &str) -> String {
     let tail = rest.split_once("[solver]").map_or("", |t| t.1);
     let tail = tail.split_once('\n').map_or("", |t| t.1);
     let tail = tail.split_once('\n').map_or("", |t| t.1);
-    format!("{head}{tail}")
-}
-
-fn moved(text: &str) -> Result<MotionSummary, String> {
-    moved_of(&Source::new("extreme.toml", text))
-}
-
-fn moved_of(source: &Source) -> Result<MotionSummary, String> {
-    let mut scene = AnyScene::from_source(source, Path::new(""), "extreme")
-        .map_err(|e| e.message().to_owned())?;
-    let folder = std::env::temp_dir().join(format!("bondline-extremes-{}", std::process::id()));
-    scene.set_output_directory(folder.clone());
-    let summary = scene.run(&Silent).map_err(|e| e.to_string());
-    // what lies there is of no further use
-    let _ = std::fs::remove_dir_all(&folder);
-    summary?.motion.ok_or_else(|| "nothing moved".to_owned())
+    Source::new("extreme.toml", format!("{head}{tail}"))
 }
 
 pub(super) fn rows(effort: Effort) -> Vec<Row> {
     let mut rows = Vec::new();
     for coupling in ["local", "nonlocal", "truncated", "splice"] {
-        let stable = match moved(&bar(coupling, "duration = 0.01\n")) {
+        let stable = match moved(&pulse(coupling, "duration = 0.01\n")) {
             Ok(m) => m.stable_step.unwrap_or(f64::NAN),
             Err(why) => {
                 rows.push(kept(coupling, "stable step", Err(why), 0.0));
@@ -62,7 +47,7 @@ pub(super) fn rows(effort: Effort) -> Vec<Row> {
         };
         let at = |factor: f64, steps: f64| {
             let step = factor * stable;
-            moved(&bar(
+            moved(&pulse(
                 coupling,
                 &format!("duration = {:e}\nstep = {step:e}\n", steps * step),
             ))
@@ -113,7 +98,7 @@ fn precision() -> [Row; 2] {
                 .push_override(set)
                 .map_err(|e| e.message().to_owned())?;
         }
-        moved_of(&source)
+        moved(&source)
     };
     let both = run("peridynamics.precision=double")
         .and_then(|double| Ok((double, run("peridynamics.precision=single")?)));
