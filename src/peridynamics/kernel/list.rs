@@ -5,7 +5,9 @@ use rayon::prelude::*;
 use super::{
     BondForce, BondPass, BondSetup, Kinematics, Storage,
     bond::psi,
+    eights::{self, Sum},
     packed::{Neighbours, Weights},
+    sweep::Bits,
 };
 use crate::system::Breakage;
 
@@ -13,49 +15,38 @@ use crate::system::Breakage;
 const BLOCK: usize = 256;
 
 /// When bonds break, as a limit of `t`.
-enum Limit {
+pub(super) enum Limit {
     Never,
     Uniform(f64),
     PerBond(Vec<f64>),
 }
 
-impl Limit {
-    #[inline(always)]
-    fn get(&self, bond: usize) -> f64 {
-        match self {
-            Self::Never => f64::INFINITY,
-            Self::Uniform(t) => *t,
-            Self::PerBond(t) => t[bond],
-        }
-    }
-}
-
 /// Coefficients of the state-based law, per point.
-struct Solid {
+pub(super) struct Solid {
     /// `D/m`.
     dilatation: Vec<f64>,
     /// `(D k − (D+2) μ)/m`.
-    volumetric: Vec<f64>,
+    pub volumetric: Vec<f64>,
     /// `D (D+2) μ/m`.
-    deviatoric: Vec<f64>,
+    pub deviatoric: Vec<f64>,
     /// Dilatation of the pass at hand.
     theta: Vec<f64>,
 }
 
 /// A bond pass over lists: two (or four) bytes of neighbour, eight (or four) of weight and one bit per directed bond.
 pub(super) struct List<const D: usize> {
-    position: Vec<[f64; D]>,
-    volume: Vec<f64>,
-    row: Vec<bool>,
-    no_fail: Vec<bool>,
-    offsets: Vec<usize>,
-    neighbours: Neighbours,
-    weights: Weights,
-    limit: Limit,
+    pub position: Vec<[f64; D]>,
+    pub volume: Vec<f64>,
+    pub row: Vec<bool>,
+    pub no_fail: Vec<bool>,
+    pub offsets: Vec<usize>,
+    pub neighbours: Neighbours,
+    pub weights: Weights,
+    pub limit: Limit,
     kinematics: Kinematics,
-    solid: Option<Solid>,
+    pub solid: Option<Solid>,
     /// Start of each point's bits, which fill whole bytes.
-    bytes: Vec<usize>,
+    pub bytes: Vec<usize>,
     intact: Vec<u8>,
     reference: u64,
 }
@@ -98,12 +89,6 @@ pub(crate) fn stretched<const D: usize, const EXACT: bool>(
         length,
         direction,
     }
-}
-
-/// `1 − r/|ξ+η|`, linear: `ξ·η/r²`.
-#[inline(always)]
-fn shortening<const EXACT: bool>(t: f64) -> f64 {
-    if EXACT { t * psi(t) } else { 0.5 * t }
 }
 
 /// Extension over length, `(|ξ+η| − r)/r`, linear: `ξ·η/r²`.
@@ -237,47 +222,36 @@ impl<const D: usize> List<D> {
         self.intact[self.bytes[i] + k / 8] >> (k % 8) & 1 == 1
     }
 
-    /// Clears the bits of bonds beyond their limit; returns how many.
-    fn break_bonds<const EXACT: bool>(&mut self, u: &[f64]) -> u64 {
-        if matches!(self.limit, Limit::Never) {
-            return 0;
-        }
-        let mut intact = std::mem::take(&mut self.intact);
+    /// Sums over the intact bonds of every point, block by block; bits are cleared of bonds beyond their limit first, if they may break. Returns how many did.
+    fn add_up<const EXACT: bool>(
+        &self,
+        u: &[f64],
+        sum: Sum<'_>,
+        bits: Bits<'_>,
+        sums: &mut [f64],
+    ) -> u64 {
+        let width = sums.len() / self.points().max(1);
+        let mut rest = bits;
         let mut blocks = Vec::new();
-        let mut rest = intact.as_mut_slice();
-        for start in (0..self.points()).step_by(BLOCK) {
+        for (k, sums) in sums.chunks_mut(BLOCK * width.max(1)).enumerate() {
+            let start = k * BLOCK;
             let end = (start + BLOCK).min(self.points());
-            let (head, tail) = rest.split_at_mut(self.bytes[end] - self.bytes[start]);
-            blocks.push((start..end, head));
-            rest = tail;
-        }
-        let broken = blocks
-            .into_par_iter()
-            .map(|(range, bits)| {
-                let first = self.bytes[range.start];
-                let mut broken = 0;
-                for i in range {
-                    let here = vector(u, i);
-                    for bond in self.offsets[i]..self.offsets[i + 1] {
-                        let k = bond - self.offsets[i];
-                        let byte = &mut bits[self.bytes[i] - first + k / 8];
-                        let j = self.neighbours.get(i, bond);
-                        if *byte >> (k % 8) & 1 == 0 || self.no_fail[i] || self.no_fail[j] {
-                            continue;
-                        }
-                        let xi = self.xi(i, j);
-                        let s = stretched::<D, EXACT>(&xi, &here, &u[j * D..][..D]);
-                        if s.excess > self.limit.get(bond) * s.length {
-                            *byte &= !(1 << (k % 8));
-                            broken += 1;
-                        }
-                    }
+            let own;
+            (own, rest) = match rest {
+                Bits::Held(all) => (Bits::Held(all), Bits::Held(all)),
+                Bits::Breaking(bits) => {
+                    let (own, more) = bits.split_at_mut(self.bytes[end] - self.bytes[start]);
+                    (Bits::Breaking(own), Bits::Breaking(more))
                 }
-                broken
+            };
+            blocks.push((start..end, own, sums));
+        }
+        blocks
+            .into_par_iter()
+            .map(|(points, bits, sums)| {
+                eights::add_up::<D, EXACT>(self, points, u, sum, bits, sums)
             })
-            .sum();
-        self.intact = intact;
-        broken
+            .sum()
     }
 
     /// The sum over intact bonds of point `i` of `f(bond, j, ξ, t, direction)`.
@@ -307,61 +281,52 @@ impl<const D: usize> List<D> {
         sum * solid.dilatation[i]
     }
 
-    fn dilatations<const EXACT: bool>(&self, solid: &Solid, u: &[f64], theta: &mut [f64]) {
-        theta
-            .par_iter_mut()
-            .with_min_len(BLOCK)
-            .enumerate()
-            .for_each(|(i, theta)| *theta = self.dilatation::<EXACT>(solid, i, u));
-    }
-
-    fn forces<const EXACT: bool>(&self, theta: &[f64], u: &[f64], force: &mut [f64]) {
+    /// Dilatations and forces.
+    fn sweep<const EXACT: bool>(
+        &self,
+        u: &[f64],
+        theta: &mut [f64],
+        bits: Bits<'_>,
+        force: &mut [f64],
+    ) -> u64 {
+        let broken = match &self.solid {
+            None => self.add_up::<EXACT>(u, Sum::Pairwise, bits, force),
+            Some(c) => {
+                let extension =
+                    |bits, theta: &mut [f64]| self.add_up::<EXACT>(u, Sum::Extension, bits, theta);
+                let (broken, left) = match bits {
+                    Bits::Held(all) => (extension(Bits::Held(all), theta), all),
+                    Bits::Breaking(all) => (extension(Bits::Breaking(all), theta), &*all),
+                };
+                let factors = theta.par_iter_mut().zip(&c.dilatation);
+                factors.for_each(|(theta, factor)| *theta *= factor);
+                self.add_up::<EXACT>(u, Sum::State(theta), Bits::Held(left), force);
+                broken
+            }
+        };
         force
             .par_chunks_exact_mut(D)
             .with_min_len(BLOCK)
-            .enumerate()
-            .for_each(|(i, force)| {
-                let mut sum = [0.0; D];
-                if self.row[i] {
-                    self.each::<EXACT>(i, u, |bond, j, s| {
-                        let f = self.weights.get(bond)
-                            * self.volume[j]
-                            * match &self.solid {
-                                None => shortening::<EXACT>(s.t()),
-                                Some(c) => {
-                                    (c.volumetric[i] * theta[i]
-                                        + c.volumetric[j] * theta[j]
-                                        + (c.deviatoric[i] + c.deviatoric[j])
-                                            * extension::<EXACT>(s.t()))
-                                        * ratio::<EXACT>(s.t())
-                                }
-                            };
-                        for a in 0..D {
-                            sum[a] += f * s.direction[a];
-                        }
-                    });
-                }
-                for a in 0..D {
-                    force[a] = -self.volume[i] * sum[a];
-                }
-            });
+            .zip(&self.volume)
+            .for_each(|(force, volume)| force.iter_mut().for_each(|f| *f *= -volume));
+        broken
     }
 
     fn pass<const EXACT: bool>(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
-        let broken = match breakage {
-            Breakage::Allowed => self.break_bonds::<EXACT>(u),
-            Breakage::Held => 0,
+        let may_break = breakage == Breakage::Allowed && !matches!(self.limit, Limit::Never);
+        let mut theta = self.solid.as_mut().map(|c| std::mem::take(&mut c.theta));
+        let mut none = Vec::new();
+        let theta_of = theta.as_mut().unwrap_or(&mut none);
+        let broken = if may_break {
+            let mut intact = std::mem::take(&mut self.intact);
+            let broken = self.sweep::<EXACT>(u, theta_of, Bits::Breaking(&mut intact), force);
+            self.intact = intact;
+            broken
+        } else {
+            self.sweep::<EXACT>(u, theta_of, Bits::Held(&self.intact), force)
         };
-        let mut theta = Vec::new();
-        if let Some(solid) = &mut self.solid {
-            theta = std::mem::take(&mut solid.theta);
-        }
-        if let Some(solid) = &self.solid {
-            self.dilatations::<EXACT>(solid, u, &mut theta);
-        }
-        self.forces::<EXACT>(&theta, u, force);
-        if let Some(solid) = &mut self.solid {
-            solid.theta = theta;
+        if let (Some(c), Some(theta)) = (&mut self.solid, theta) {
+            c.theta = theta;
         }
         broken
     }
@@ -421,12 +386,8 @@ impl<const D: usize> BondPass<D> for List<D> {
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
-        let mut theta = Vec::new();
-        if let Some(solid) = &self.solid {
-            theta = vec![0.0; self.points()];
-            self.dilatations::<false>(solid, x, &mut theta);
-        }
-        self.forces::<false>(&theta, x, y);
+        let points = self.solid.as_ref().map_or(0, |_| self.points());
+        self.sweep::<false>(x, &mut vec![0.0; points], Bits::Held(&self.intact), y);
     }
 
     fn row_sums(&self) -> Vec<f64> {

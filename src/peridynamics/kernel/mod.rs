@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `setup.rs` | what a pass is made from, and the errors |
 //! | `bond.rs` | one bond: stretch, force and extension without cancellation |
-//! | `list.rs` | the pass over neighbour lists, for any cloud |
+//! | `list.rs`, `eights.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `packed.rs` | neighbours and weights of a list in few bytes |
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
 //! | `lattice_build.rs` | how that one is made |
@@ -18,6 +18,7 @@
 //! hence break together without telling each other. Every method gives the same bits for any number of threads.
 
 mod bond;
+mod eights;
 mod lanes;
 mod lattice;
 mod lattice_build;

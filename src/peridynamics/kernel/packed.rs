@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::lanes::LANES;
+
 /// Numbers of the neighbours, family by family and ascending within each.
 pub(super) enum Neighbours {
     /// No family spans more numbers than two bytes count: that of its first neighbour, and how far beyond it each lies.
@@ -39,6 +41,26 @@ impl Neighbours {
         }
     }
 
+    /// The neighbours of point `i` at the other ends of at most eight bonds; `i` itself beyond.
+    #[inline(always)]
+    pub fn eight(&self, i: usize, bonds: Range<usize>) -> [usize; LANES] {
+        let mut eight = [i; LANES];
+        match self {
+            Self::Near { first, beyond } => {
+                let first = first[i] as usize;
+                for (j, b) in eight.iter_mut().zip(&beyond[bonds]) {
+                    *j = first + usize::from(*b);
+                }
+            }
+            Self::Far(neighbours) => {
+                for (j, n) in eight.iter_mut().zip(&neighbours[bonds]) {
+                    *j = *n as usize;
+                }
+            }
+        }
+        eight
+    }
+
     /// The place of `j` in the family of `i`, which has these bonds.
     pub fn place(&self, i: usize, bonds: Range<usize>, j: usize) -> Option<usize> {
         match self {
@@ -72,6 +94,21 @@ impl Weights {
             Self::Double(w) => w[bond],
             Self::Single(w) => f64::from(w[bond]),
         }
+    }
+
+    /// Those of at most eight bonds, zero beyond.
+    #[inline(always)]
+    pub fn eight(&self, bonds: Range<usize>) -> [f64; LANES] {
+        let mut eight = [0.0; LANES];
+        match self {
+            Self::Double(w) => eight[..bonds.len()].copy_from_slice(&w[bonds]),
+            Self::Single(w) => {
+                for (e, w) in eight.iter_mut().zip(&w[bonds]) {
+                    *e = f64::from(*w);
+                }
+            }
+        }
+        eight
     }
 
     pub fn memory_bytes(&self) -> usize {
