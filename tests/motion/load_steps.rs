@@ -2,11 +2,9 @@
 
 use crate::{BREAKING, bondline, column, run, same, table, write};
 
-#[test]
-fn load_steps_end_where_the_static_solve_does_by_either_method() {
-    let folder = tempfile::tempdir().unwrap();
-    // nothing breaks: the loads are a tenth of those of the scene in time
-    let still = BREAKING
+/// The scene that breaks, at rest and whole: the loads are a tenth of those in time.
+fn still(coupling: &str) -> String {
+    BREAKING
         .replace(
             "[solve.explicit]\nduration = 60\noutputs = 6\nhistory-interval = 1\n",
             "",
@@ -16,9 +14,15 @@ fn load_steps_end_where_the_static_solve_does_by_either_method() {
         .replace("damage-at-edge = \"warn\"\n", "")
         .replace("[no-fail.base]\nbox = { min = [3, 0], max = [9, 1] }\n", "")
         .replace("critical-stretch = 0.002\n", "")
-        .replace("[coupling.splice]", "[coupling.truncated]")
+        .replace("[coupling.splice]", &format!("[coupling.{coupling}]"))
         // a body in equilibrium has to be held
-        .replace("x = \"-0.004", "y = 0\nx = \"-0.004");
+        .replace("x = \"-0.004", "y = 0\nx = \"-0.004")
+}
+
+#[test]
+fn load_steps_end_where_the_static_solve_does_by_either_method() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = still("truncated");
     write(folder.path(), "still.toml", &still);
     run(folder.path(), &["still.toml"]);
     let expected = table(&folder.path().join("out/still_probes.csv")).1[0].clone();
@@ -59,18 +63,7 @@ fn load_steps_end_where_the_static_solve_does_by_either_method() {
 #[test]
 fn load_steps_of_partial_stress_are_led_by_factors() {
     let folder = tempfile::tempdir().unwrap();
-    let still = BREAKING
-        .replace(
-            "[solve.explicit]\nduration = 60\noutputs = 6\nhistory-interval = 1\n",
-            "",
-        )
-        .replace(" * min(1, t / 8)", "")
-        .replace("tips.notch = { direction = [0, -1], threshold = 0.2 }", "")
-        .replace("damage-at-edge = \"warn\"\n", "")
-        .replace("[no-fail.base]\nbox = { min = [3, 0], max = [9, 1] }\n", "")
-        .replace("critical-stretch = 0.002\n", "")
-        .replace("[coupling.splice]", "[coupling.partial-stress]")
-        .replace("x = \"-0.004", "y = 0\nx = \"-0.004");
+    let still = still("partial-stress");
     write(folder.path(), "still.toml", &still);
     let transition = ["--set", "zones.transition.around=1.6"];
     run(
