@@ -251,3 +251,40 @@ fn pilots_take_a_time_above_zero() {
         assert!(text.contains("above zero"), "{seconds}: {text}");
     }
 }
+
+/// The error that a command ends with, and the seconds that it took.
+fn refused(command: &str, overrides: &[&str], folder: &std::path::Path) -> (String, f64) {
+    let mut binary = Command::cargo_bin("bondline").unwrap();
+    binary
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args([command, SLIT_PLATE]);
+    for set in overrides {
+        binary.args(["--set", set]);
+    }
+    if command == "run" {
+        binary.arg("--output").arg(folder);
+    }
+    let begun = std::time::Instant::now();
+    let output = binary.assert().failure().code(1).get_output().clone();
+    let seconds = begun.elapsed().as_secs_f64();
+    let words: Vec<String> = String::from_utf8_lossy(&output.stderr)
+        .split_whitespace()
+        .filter(|word| *word != "│")
+        .map(str::to_owned)
+        .collect();
+    (words.join(" "), seconds)
+}
+
+/// A spacing that is a hundred times too small would ask for terabytes. Before volumes were counted it ended, after minutes, in an allocation that failed.
+#[test]
+fn what_does_not_fit_is_refused_before_anything_is_laid_out() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["check", "run"] {
+        let set = ["peridynamics.points.lattice.spacing=1/12000"];
+        let (error, seconds) = refused(command, &set, folder.path());
+        for part in ["of memory", "bonds", "points", "spacing of", "--memory"] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        assert!(seconds < 2.0, "{seconds} s");
+    }
+}

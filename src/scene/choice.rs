@@ -66,10 +66,17 @@ fn as_text(path: &[&str]) -> bool {
     matches!(path, ["coupling"] | ["solve"] | ["zones"])
 }
 
-/// Writes `over` into `base`, table by table.
-pub(crate) fn merge<'i>(base: &mut DeTable<'i>, over: DeTable<'i>, path: &mut Vec<String>) {
+/// Writes `over` into `base`, table by table along the `depth` keys that were typed. What stands behind the last of them is a value: a table there
+/// replaces the one of `base`.
+pub(crate) fn merge<'i>(
+    base: &mut DeTable<'i>,
+    over: DeTable<'i>,
+    depth: usize,
+    path: &mut Vec<String>,
+) {
     for (key, mut value) in over {
         path.push(key.get_ref().to_string());
+        let typed = path.len() >= depth && value.get_ref().is_table();
         // `zones` is no table of exactly one key, but its name stands for all of it
         let named = value.get_ref().is_str() && *path == ["zones"];
         text_to_table(&mut value, path);
@@ -77,8 +84,10 @@ pub(crate) fn merge<'i>(base: &mut DeTable<'i>, over: DeTable<'i>, path: &mut Ve
             (Some(old), DeValue::Table(new)) => {
                 text_to_table(old, path);
                 match old.get_mut() {
-                    DeValue::Table(old) if !(named || chooses_otherwise(path, old, new)) => {
-                        merge(old, std::mem::take(new), path);
+                    DeValue::Table(old)
+                        if !(typed || named || chooses_otherwise(path, old, new)) =>
+                    {
+                        merge(old, std::mem::take(new), depth, path);
                         false
                     }
                     _ => true,

@@ -16,6 +16,7 @@
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
+//! | `budget.rs` | the memory that a run may take, and the refusal of what needs more before anything is laid out |
 //! | `predict.rs`, `cost.rs` | what a run will need, without solving; what its outputs will cost |
 //! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
 //! | `converge.rs` | one scene at several refinements |
@@ -26,6 +27,7 @@ pub mod accuracy;
 mod automatic;
 mod bodies;
 mod breaking;
+mod budget;
 mod check;
 mod choice;
 mod conditions;
@@ -60,6 +62,7 @@ mod zones;
 
 pub use accuracy::{CheckError, ErrorPrediction, check};
 pub use breaking::{Breaking, Contact};
+pub use budget::{memory_budget, set_memory_budget};
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use converge::{ConvergeError, ConvergeParams, Converged, Level, Refinement, converge};
 pub use error::{SceneError, SceneErrorKind};

@@ -10,6 +10,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::accuracy::ErrorPrediction;
+use super::budget;
 use super::cost::{made_up, output_seconds};
 use super::doubts::doubts;
 use super::loads;
@@ -159,7 +160,12 @@ impl Planned {
     ) -> Result<Self, RunError> {
         let nonzeros = pattern.stored * D * D;
         let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-        let params = run::params(&rest.solver);
+        let mut params = run::params(&rest.solver);
+        let stored = pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8;
+        // a run holds the stiffness by then
+        params.memory_limit = params
+            .memory_limit
+            .map(|left| left.saturating_sub(stored as u64));
         let graph = SiteGraph::from_pattern(&pattern.row_offsets, &pattern.columns, free);
         let analysis =
             Analysis::of_graph(graph, &positions, params.ordering).map_err(StaticError::from)?;
@@ -173,12 +179,11 @@ impl Planned {
                 .bytes()
                 .max((HIERARCHY * (nonzeros * 8 + pattern.stored * 4) as f64) as u64),
         };
-        let stiffness = pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8;
         Ok(Self {
             analysis,
             cost,
             method,
-            stiffness: stiffness as u64,
+            stiffness: stored as u64,
             solver,
         })
     }
@@ -325,6 +330,7 @@ pub(crate) fn predict<const D: usize>(
         motion: None,
     };
     prediction.warnings = warnings(&model, joining, &prediction);
+    budget::holds(&prediction)?;
     Ok(prediction)
 }
 
@@ -384,19 +390,6 @@ pub(super) fn warnings<const D: usize>(
             grouped(prediction.sizes.bonds)
         ));
     }
-    if let Some(available) = available_memory()
-        && prediction.peak_memory_bytes > available
-    {
-        list.push(format!(
-            "the run needs {}, {} are free: {}coarsen the model",
-            bytes_text(prediction.peak_memory_bytes),
-            bytes_text(available),
-            match prediction.motion {
-                Some(_) => "",
-                None => "use solver.method = \"krylov\", or ",
-            }
-        ));
-    }
     list
 }
 
@@ -432,14 +425,6 @@ fn transition_width<const D: usize>(mesh: &Mesh<D>, zones: &[Zone]) -> Option<f6
         }
     }
     narrowest.is_finite().then_some(narrowest)
-}
-
-/// Bytes that the system can still give; `None` where it does not tell.
-fn available_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024)
 }
 
 impl fmt::Display for Prediction {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::breaking::Breaking;
+use super::budget;
 use super::conditions::Condition;
 use super::definite::{self, Ratio};
 use super::doubts::doubts;
@@ -94,6 +95,22 @@ pub enum RunError {
         what: &'static str,
         /// What to do instead.
         remedy: &'static str,
+    },
+    /// The scene needs more memory than there is.
+    #[error(
+        "the scene needs about {needed} of memory, {there} are there: {largest} ({sizes}); {remedy}"
+    )]
+    Memory {
+        /// What it needs.
+        needed: String,
+        /// The budget, [`memory_budget`](super::memory_budget).
+        there: String,
+        /// The three largest items.
+        largest: String,
+        /// What was counted.
+        sizes: String,
+        /// What to do.
+        remedy: String,
     },
     /// A condition meets no site.
     #[error("the condition `{condition}` meets no site of the model; {remedy}")]
@@ -488,7 +505,7 @@ pub(super) fn params(solver: &Solver) -> StaticParams {
         ordering: solver.ordering,
         tolerance: solver.tolerance,
         max_iterations: solver.max_iterations,
-        ..StaticParams::default()
+        memory_limit: budget::memory_left(),
     }
 }
 

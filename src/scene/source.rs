@@ -120,6 +120,7 @@ impl Source {
             choice::merge(
                 root.get_mut(),
                 self.parse(piece)?.into_inner(),
+                keys(&piece.text),
                 &mut Vec::new(),
             );
         }
@@ -178,6 +179,21 @@ impl Source {
             .shown_in(self)
         })
     }
+}
+
+/// How many keys stand before the `=` of an override, `a."b.c".d=1` has three.
+fn keys(text: &str) -> usize {
+    let path = format!("{}=0", &text[..text.find('=').unwrap_or(text.len())]);
+    let Ok(parsed) = DeTable::parse(&path) else {
+        return usize::MAX;
+    };
+    let mut count = 0;
+    let mut table = Some(parsed.get_ref());
+    while let Some((_, value)) = table.and_then(|t| t.iter().next()) {
+        count += 1;
+        table = value.get_ref().as_table();
+    }
+    count
 }
 
 fn plain_table(table: &DeTable<'_>) -> toml::Table {

@@ -21,7 +21,7 @@ use super::solve::Solve;
 use super::source::{Source, Span};
 use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
 use super::{
-    automatic, bodies, breaking, follow, initial, joined, obstacles, output, solve, zones,
+    automatic, bodies, breaking, budget, follow, initial, joined, obstacles, output, solve, zones,
 };
 use crate::coupling::Zone;
 use crate::material::Kinematics;
@@ -229,6 +229,7 @@ impl AnyScene {
         options: &RunOptions<'_>,
         progress: &dyn Progress,
     ) -> Result<RunSummary, RunError> {
+        self.fits()?;
         match self {
             Self::Bar(s) => run::run(*s, options, progress),
             Self::Plane(s) => run::run(*s, options, progress),
@@ -241,10 +242,20 @@ impl AnyScene {
     /// # Errors
     /// [`RunError`], each with place and remedy.
     pub fn predict(self, progress: &dyn Progress) -> Result<Prediction, RunError> {
+        self.fits()?;
         match self {
             Self::Bar(s) => predict::predict(*s, progress),
             Self::Plane(s) => predict::predict(*s, progress),
             Self::Solid(s) => predict::predict(*s, progress),
+        }
+    }
+
+    /// Refuses what needs more memory than there is, before anything of it is laid out.
+    fn fits(&self) -> Result<(), RunError> {
+        match self {
+            Self::Bar(s) => budget::fits(s),
+            Self::Plane(s) => budget::fits(s),
+            Self::Solid(s) => budget::fits(s),
         }
     }
 

@@ -14,6 +14,7 @@ use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::series::Series;
 use crate::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
+use crate::scene::budget;
 use crate::scene::cost::{TrialFolder, file_seconds, made_up};
 use crate::scene::predict::{MotionPrediction, OUTPUT_BYTES, Planned, Prediction, Share, warnings};
 use crate::scene::run::{self, RunError, Solved};
@@ -229,6 +230,7 @@ fn steps<const D: usize>(
         ..prediction(&laid_out, held.len(), files, Some(state_bytes))
     };
     prediction.warnings = warnings(model, laid_out.joining, &prediction);
+    budget::holds(&prediction)?;
     Ok(prediction)
 }
 
@@ -252,6 +254,7 @@ pub(crate) fn load_steps<const D: usize>(
             "the time of {} load steps is not in the estimate: it depends on the bonds that break",
             spec.steps
         ));
+        budget::holds(&prediction)?;
         Ok(prediction)
     })
 }
