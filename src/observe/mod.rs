@@ -10,6 +10,7 @@
 //! | `csv.rs` | values along a line or at probes, row by row |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs` | what one run did: sizes, choices, timings, balance |
+//! | `proof.rs` | what was shown about a model before it was solved |
 //! | `switch.rs` | changes of the nonlocal zone during a run |
 //! | `progress.rs` | a bar on standard error, if that is a terminal |
 //! | `figure.rs`, `map.rs` | line plots and coloured fields as SVG |
@@ -23,6 +24,7 @@ pub mod file;
 pub mod history;
 pub mod map;
 pub mod progress;
+pub mod proof;
 pub mod report;
 pub mod series;
 pub mod summary;

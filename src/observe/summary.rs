@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::proof::Proof;
 use super::report::{aligned, number};
 use super::switch::{self, Switch};
 
@@ -193,6 +194,9 @@ pub struct RunSummary {
     pub reactions: Vec<Reaction>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
     pub energy: Option<f64>,
+    /// What was shown about the model before it was solved.
+    #[serde(skip_serializing_if = "Proof::is_empty")]
+    pub proof: Proof,
     /// What may be inaccurate.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -407,6 +411,7 @@ impl fmt::Display for RunSummary {
                 components(&r.force)
             )?;
         }
+        write!(f, "{}", self.proof)?;
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }

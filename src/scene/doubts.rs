@@ -2,12 +2,23 @@
 
 use super::spec::Joining;
 use crate::coupling::{CellRole, Model, Zone};
+use crate::observe::proof::{Proof, Severity};
 use crate::shape::Barrier;
 
 /// All doubts about a model.
 pub(super) fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String> {
     let all = [one_sided(model), crack_beside_seam(model, joining)];
     all.into_iter().flatten().collect()
+}
+
+/// The warnings of a proof, then all doubts.
+pub(super) fn warnings<const D: usize>(
+    model: &Model<D>,
+    joining: Joining,
+    proof: &Proof,
+) -> Vec<String> {
+    let proved = proof.messages(Severity::Warning).map(str::to_owned);
+    proved.chain(doubts(model, joining)).collect()
 }
 
 /// What partial stress does where its elements meet the surface of the body: measured in `docs/bars.md`.

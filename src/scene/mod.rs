@@ -17,6 +17,7 @@
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
 //! | `budget.rs` | the memory that a run may take, and the refusal of what needs more before anything is laid out |
+//! | `proof/` | what is shown about a model before it is solved |
 //! | `predict.rs`, `cost.rs` | what a run will need, without solving; what its outputs will cost |
 //! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
 //! | `converge.rs` | one scene at several refinements |
@@ -49,6 +50,7 @@ mod output;
 mod parse;
 mod peridynamics;
 mod predict;
+mod proof;
 mod region;
 mod run;
 mod solve;

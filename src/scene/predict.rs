@@ -15,6 +15,7 @@ use super::cost::{made_up, output_seconds};
 use super::doubts::doubts;
 use super::loads;
 use super::motion;
+use super::proof::{self, Subject};
 use super::run::{self, Rest, RunError, Solved};
 use super::solve::Solve;
 use super::spec::{Joining, ZonesNeeded};
@@ -23,6 +24,7 @@ use crate::assembly::Pattern;
 use crate::coupling::edge::Edge;
 use crate::coupling::{Model, PointSource, SiteKind, Zone};
 use crate::mesh::Mesh;
+use crate::observe::proof::{Proof, Severity};
 use crate::observe::report::{aligned, number};
 use crate::observe::summary::{
     Choice, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
@@ -81,6 +83,9 @@ pub struct Prediction {
     pub total_seconds: f64,
     /// What the scene asks for or leaves open.
     pub choices: Vec<Choice>,
+    /// What was shown about the model before it was solved.
+    #[serde(skip_serializing_if = "Proof::is_empty")]
+    pub proof: Proof,
     /// What will be costly or inaccurate.
     pub warnings: Vec<String>,
     /// How far results will be from those of a finer model, where runs with other spacings tell; see [`check`](fn@super::check).
@@ -217,6 +222,18 @@ pub(crate) fn predict<const D: usize>(
     loads::loads(&model, &rest.conditions, 0.0)?;
     let (prescribed, _) = loads::supports(&model, &rest.conditions, 0.0)?;
     let free = FreeDofs::from_prescribed(&prescribed, D);
+    let proof = proof::prove(
+        &Subject {
+            model: &model,
+            coupling: coupling.as_ref(),
+            operator: operator.as_ref(),
+            rest: &rest,
+            stiffness: None,
+        },
+        progress,
+    )?;
+    proof::hold(&proof)?;
+    watch.lap(&mut timings, "proof");
     let mut choices = rest.choices.clone();
     choices.extend(rest.placed.iter().cloned());
     choices.push(rest.coupling(joining));
@@ -324,6 +341,7 @@ pub(crate) fn predict<const D: usize>(
         total_seconds: timings.total(),
         timings,
         choices,
+        proof,
         warnings: Vec::new(),
         error: None,
         no_error: None,
@@ -384,6 +402,8 @@ pub(super) fn warnings<const D: usize>(
         }
     }
     list.extend(doubts(model, joining));
+    let proof = &prediction.proof;
+    list.extend(proof.messages(Severity::Warning).map(str::to_owned));
     if prediction.sizes.bonds > MANY_BONDS {
         list.push(format!(
             "{} bonds: shrink the nonlocal zone or the horizon over spacing",
@@ -456,7 +476,7 @@ impl fmt::Display for Prediction {
         for c in &self.choices {
             writeln!(f, "chosen: {} ({})", c.choice, c.why)?;
         }
-        writeln!(f)?;
+        writeln!(f, "{}", self.proof)?;
         for share in &self.memory {
             writeln!(
                 f,

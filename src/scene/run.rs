@@ -6,13 +6,14 @@ use super::breaking::Breaking;
 use super::budget;
 use super::conditions::Condition;
 use super::definite::{self, Ratio};
-use super::doubts::doubts;
+use super::doubts::warnings;
 use super::follow::Follow;
 use super::initial::Initial;
 use super::loads::{loads, supports};
 use super::materials::{Law, Material};
 use super::motion::{self, RunOptions};
 use super::peridynamics::Points;
+use super::proof::{self, Subject};
 use super::solve::Solve;
 use super::spec::{Joining, SurfacesSpec, WeightsSpec};
 use super::validate::{Output, Scene, Solver};
@@ -23,6 +24,7 @@ use crate::coupling::{
 };
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointError, Fingerprint};
+use crate::observe::proof::Proof;
 use crate::observe::summary::{
     Choice, Reaction, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
@@ -88,6 +90,9 @@ pub enum RunError {
     /// The state cannot be carried over to other zones.
     #[error(transparent)]
     Carry(#[from] CarryError),
+    /// A check of the model failed, so that no result of it can be trusted.
+    #[error("{0}")]
+    Unproven(String),
     /// Something that is planned and not there yet.
     #[error("{what}: {remedy}")]
     Later {
@@ -187,10 +192,30 @@ pub fn solve_with<const D: usize>(
     let mut choices: Vec<Choice> = rest.made().cloned().collect();
     definite::check(model, operator.as_ref(), rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
+    let mut proof = Proof::default();
+    let mut prove = |stiffness: &BlockCsr| -> Result<f64, RunError> {
+        let mut clock = Stopwatch::start();
+        let mut taken = Timings::default();
+        proof = proof::prove(
+            &Subject {
+                model,
+                coupling,
+                operator: operator.as_ref(),
+                rest: &rest,
+                stiffness: Some(stiffness),
+            },
+            progress,
+        )?;
+        proof::hold(&proof)?;
+        clock.lap(&mut taken, "proof");
+        Ok(taken.total())
+    };
     let computed;
     let equilibrium = match &kept {
         Some(k) => {
+            let seconds = prove(&k.equilibrium.stiffness)?;
             k.equilibrium.timings.add_to(&mut timings);
+            timings.add("proof", seconds);
             &k.equilibrium
         }
         None => {
@@ -204,6 +229,7 @@ pub fn solve_with<const D: usize>(
                     time: 0.0,
                 },
                 Timings::default(),
+                prove,
                 progress,
             )?;
             computed.timings.add_to(&mut timings);
@@ -276,7 +302,8 @@ pub fn solve_with<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: doubts(model, joining),
+        warnings: warnings(model, joining, &proof),
+        proof,
         iterations: info.iterations,
         factor_nonzeros: info.factor_nnz,
         residual: info.relative_residual,
@@ -330,13 +357,14 @@ pub(crate) struct Equilibrium {
     pub timings: Timings,
 }
 
-/// Assembles and solves.
+/// Assembles, hands the stiffness to `prove`, which tells the seconds that it took, and solves.
 ///
 /// # Errors
 /// [`RunError`] for a condition that meets no site, and for a system without a solution.
 pub(super) fn equilibrium<const D: usize>(
     at: &At<'_, D>,
     mut timings: Timings,
+    prove: impl FnOnce(&BlockCsr) -> Result<f64, RunError>,
     progress: &dyn Progress,
 ) -> Result<Equilibrium, RunError> {
     let mut watch = Stopwatch::start();
@@ -349,6 +377,7 @@ pub(super) fn equilibrium<const D: usize>(
     let mut choices = Vec::new();
     let symmetry = symmetry(at.coupling, || stiffness.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");
+    timings.add("proof", prove(&stiffness)?);
     let solution = statics::solve(
         &StaticProblem {
             stiffness: &stiffness,

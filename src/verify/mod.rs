@@ -18,6 +18,7 @@
 //! | `choices` | what `accuracy` chooses in small scenes, against finer runs |
 //! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
+//! | `meshes` | scenes as people type them, on meshes that fit nothing |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
 //! | `wave` | energy and momentum over 100 000 steps |
@@ -39,6 +40,7 @@ pub mod extremes;
 pub mod fields;
 pub mod horizons;
 pub mod layers;
+pub mod meshes;
 pub mod page;
 pub mod partial_volumes;
 pub mod patch;
@@ -156,6 +158,11 @@ pub const SUITES: &[Suite] = &[
         name: "reflection",
         about: "what a seam sends back of a pulse, by its width, method, m and side",
         run: reflection::run,
+    },
+    Suite {
+        name: "meshes",
+        about: "scenes as people type them, on meshes that fit nothing: loads, affine fields, order, motion, fracture",
+        run: meshes::run,
     },
     Suite {
         name: "extremes",

@@ -18,7 +18,7 @@ use crate::observe::summary::{
     Ended, MotionSummary, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
 use crate::progress::Progress;
-use crate::scene::doubts::doubts;
+use crate::scene::doubts::warnings;
 use crate::scene::run::{self, Rest, RunError, Solved};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
@@ -146,6 +146,7 @@ fn leg<'r, const D: usize>(
         operator,
         moving,
         mut choices,
+        proof,
         mut timings,
         mut watch,
         ..
@@ -404,7 +405,8 @@ fn leg<'r, const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: doubts(model, joining),
+        warnings: warnings(model, joining, &proof),
+        proof,
         motion: Some(MotionSummary {
             ended,
             steps: state.step,

@@ -6,8 +6,10 @@ use super::system::{Moving, dynamic};
 use super::{RunOptions, StartFrom};
 use crate::coupling::{BrokenBonds, Model, Operator, Problem};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
+use crate::observe::proof::Proof;
 use crate::observe::summary::{Choice, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
+use crate::scene::proof::{self, Subject};
 use crate::scene::run::{self, Rest, RunError};
 use crate::scene::spec::Joining;
 use crate::scene::validate::Scene;
@@ -23,6 +25,8 @@ pub(super) struct LaidOut<'a, const D: usize> {
     pub rest: &'a Rest<D>,
     pub moving: Moving<'a>,
     pub choices: Vec<Choice>,
+    /// What was shown about the model.
+    pub proof: Proof,
     /// Memory that the program held when sites and bonds were there.
     pub bytes: u64,
     pub timings: Timings,
@@ -93,6 +97,18 @@ pub(super) fn lay_out<const D: usize, T>(
         progress,
     )?;
     watch.lap(&mut timings, "rows and bonds");
+    let proof = proof::prove(
+        &Subject {
+            model: &model,
+            coupling: coupling.as_ref(),
+            operator: operator.as_ref(),
+            rest,
+            stiffness: None,
+        },
+        progress,
+    )?;
+    proof::hold(&proof)?;
+    watch.lap(&mut timings, "proof");
     let done = then(LaidOut {
         title,
         joining,
@@ -102,6 +118,7 @@ pub(super) fn lay_out<const D: usize, T>(
         rest,
         moving,
         choices,
+        proof,
         bytes,
         timings,
         watch,

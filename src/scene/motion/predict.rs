@@ -92,6 +92,7 @@ fn prediction<const D: usize>(
         total_seconds: laid_out.timings.total(),
         timings: laid_out.timings.clone(),
         choices,
+        proof: laid_out.proof.clone(),
         warnings: Vec::new(),
         error: None,
         no_error: None,

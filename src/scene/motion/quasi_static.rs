@@ -16,7 +16,7 @@ use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
 use crate::observe::summary::{Choice, Ended, MotionSummary, RunSummary, peak_memory_bytes};
 use crate::progress::Progress;
-use crate::scene::doubts::doubts;
+use crate::scene::doubts::warnings;
 use crate::scene::loads;
 use crate::scene::run::{self, Rest, RunError, Solved};
 use crate::scene::solve::QuasiStatic as Spec;
@@ -62,6 +62,7 @@ fn load_steps<const D: usize>(
         rest,
         mut moving,
         mut choices,
+        proof,
         mut timings,
         mut watch,
         ..
@@ -246,7 +247,8 @@ fn load_steps<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: doubts(model, joining),
+        warnings: warnings(model, joining, &proof),
+        proof,
         iterations: info.iterations,
         motion: Some(MotionSummary {
             ended,

@@ -1,0 +1,61 @@
+//! Proof of a model before it is solved: what must hold whatever the load is checked on the model at hand, and told, warned of, or refused.
+//!
+//! | file | what is shown |
+//! |---|---|
+//! | `loads.rs` | mass, total and first moment of each load against integrals over the mesh; supports held everywhere |
+//! | `affine.rs` | the force of every affine field, row by row, against that of its constant stress |
+//! | `quadratic.rs` | the force of quadratic fields beside the seam |
+//! | `growth.rs` | whether a mode of the motion grows |
+//!
+//! A check is one file with one function and one line in [`prove`]. What it returns is plain data ([`Part`]), so the summary, `check` and `--json` know of it without another line.
+//! Limits stand in `docs/proof.md`, each beside the measurement that chose it.
+
+mod affine;
+mod loads;
+mod quadratic;
+
+use super::run::{Rest, RunError};
+use crate::coupling::{Coupling, Model, Operator};
+use crate::observe::proof::{Part, Proof, Severity};
+use crate::progress::Progress;
+use crate::system::BlockCsr;
+
+/// What is to be proved: a model laid out, with its conditions.
+#[expect(dead_code, reason = "each check reads what it needs")]
+pub(super) struct Subject<'a, const D: usize> {
+    pub model: &'a Model<D>,
+    pub coupling: &'a dyn Coupling<D>,
+    pub operator: &'a dyn Operator<D>,
+    pub rest: &'a Rest<D>,
+    /// The assembled stiffness, where the run has one; else rows come from the operator.
+    pub stiffness: Option<&'a BlockCsr>,
+}
+
+/// Runs every check that the scene calls for.
+///
+/// # Errors
+/// [`RunError`] of a check that cannot be made.
+pub(super) fn prove<const D: usize>(
+    subject: &Subject<'_, D>,
+    progress: &dyn Progress,
+) -> Result<Proof, RunError> {
+    let parts: [Option<Part>; 3] = [
+        loads::part(subject)?,
+        affine::part(subject, progress)?,
+        quadratic::part(subject)?,
+    ];
+    Ok(Proof {
+        parts: parts.into_iter().flatten().collect(),
+    })
+}
+
+/// Refuses what a proof does not hold for.
+///
+/// # Errors
+/// [`RunError::Unproven`] with the first refusal.
+pub(super) fn hold(proof: &Proof) -> Result<(), RunError> {
+    match proof.messages(Severity::Refusal).next() {
+        Some(message) => Err(RunError::Unproven(message.to_owned())),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,21 @@
+//! Scenes as people type them, defaults included, on meshes that fit nothing: loads, affine fields, order, motion and fracture.
+//!
+//! | file | what |
+//! |---|---|
+//! | `scene.rs` | a scene as text, run in a folder of its own, and what it summed up |
+//!
+//! A row passes, or the scene is refused with its reason, and both are counted. Nothing here builds a model by another way than a scene does.
+
+pub mod scene;
+
+use super::Effort;
+use crate::{observe::report::Table, progress::Progress};
+
+/// Every table of the suite.
+pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let tables: &[fn(Effort, &dyn Progress) -> Vec<Table>] = &[];
+    tables
+        .iter()
+        .flat_map(|table| table(effort, progress))
+        .collect()
+}
