@@ -67,6 +67,9 @@ impl Common {
         let volume = &body.cloud.volume;
         let (i, j) = (s.i as usize, s.j as usize);
         for (side, (end, weight)) in s.ends.iter().zip(s.hands).enumerate() {
+            if weight == 0.0 {
+                continue;
+            }
             let weight = weight * s.piece.share;
             let (own, other) = if side == 0 { (s.i, s.j) } else { (s.j, s.i) };
             match end {
@@ -117,7 +120,8 @@ pub(super) fn divergence<const D: usize>(
 pub(super) fn stiffness_of_point<const D: usize>(segments: &Segments<'_, D>, i: u32) -> f64 {
     let body = segments.body;
     let state = body.state(i as usize);
-    state.map_or(0.0, |s| s.modulus.get(0, 0, 0, 0)) * body.cloud.volume[i as usize]
+    let changed = segments.volume.get(&i).copied().unwrap_or(1.0);
+    state.map_or(0.0, |s| s.modulus.get(0, 0, 0, 0)) * body.cloud.volume[i as usize] / changed
 }
 
 impl<const D: usize> Dilatations<D> {

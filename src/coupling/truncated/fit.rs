@@ -16,6 +16,7 @@ use super::{
     edges::Strings,
     segments::{End, Segments},
     sparse_change::Conditions,
+    squares::fit_factors,
 };
 use crate::{
     coupling::{ModelError, SiteKind},
@@ -25,7 +26,7 @@ use crate::{
 };
 
 /// Least factor of the energy of a piece; the largest was 4 where this one was asked for.
-const FLOOR: f64 = 0.1;
+pub(super) const FLOOR: f64 = 0.1;
 
 /// Largest factor of an energy for which it is shown that none helps.
 const MOST_FACTOR: f64 = 1e3;
@@ -34,10 +35,10 @@ const MOST_FACTOR: f64 = 1e3;
 const FOLLOWS: f64 = 1e-10;
 
 /// What may be missing after a fit.
-const MET: f64 = 1e-10;
+pub(super) const MET: f64 = 1e-10;
 
 /// What coordinates far from the origin leave of a force that is zero: some ulps of them over the spacing.
-fn rounding<const D: usize>(segments: &Segments<'_, D>) -> f64 {
+pub(super) fn rounding<const D: usize>(segments: &Segments<'_, D>) -> f64 {
     let (low, high) = segments.model.mesh.bounds();
     let farthest = low.abs().max().max(high.abs().max());
     8.0 * f64::EPSILON * farthest / segments.model.spacing()
@@ -46,23 +47,23 @@ fn rounding<const D: usize>(segments: &Segments<'_, D>) -> f64 {
 const NONE: u32 = u32::MAX;
 
 /// Something whose energy may change: a piece, or a whole bond between points that have pieces.
-enum Part {
+pub(super) enum Part {
     Piece(usize),
     Bond(u32, u32),
 }
 
 /// What a part is made of.
-struct Shape<const D: usize> {
-    xi: Vector<D>,
+pub(super) struct Shape<const D: usize> {
+    pub xi: Vector<D>,
     /// Its length as a fraction of the bond.
-    length: f64,
+    pub length: f64,
     /// How much of the bond it is.
-    share: f64,
-    difference: Vec<(u32, f64)>,
+    pub share: f64,
+    pub difference: Vec<(u32, f64)>,
 }
 
 impl Part {
-    fn shape<const D: usize>(&self, segments: &Segments<'_, D>) -> Shape<D> {
+    pub fn shape<const D: usize>(&self, segments: &Segments<'_, D>) -> Shape<D> {
         match *self {
             Self::Piece(k) => {
                 let s = &segments.cut[k];
@@ -85,14 +86,14 @@ impl Part {
         }
     }
 
-    fn points<const D: usize>(&self, segments: &Segments<'_, D>) -> (u32, u32) {
+    pub fn points<const D: usize>(&self, segments: &Segments<'_, D>) -> (u32, u32) {
         match *self {
             Self::Piece(k) => (segments.cut[k].i, segments.cut[k].j),
             Self::Bond(i, j) => (i, j),
         }
     }
 
-    fn end<const D: usize>(&self, segments: &Segments<'_, D>, side: usize) -> End {
+    pub fn end<const D: usize>(&self, segments: &Segments<'_, D>, side: usize) -> End {
         match *self {
             Self::Piece(k) => segments.cut[k].ends[side].clone(),
             Self::Bond(i, j) => End::Point([i, j][side]),
@@ -210,7 +211,10 @@ pub(super) fn fit<const D: usize>(
             strings.holds(*site) || m.iter().all(|m| m.abs() <= (FOLLOWS + rounding) * scale)
         })
     };
-    if follows(&missing) {
+    let state = state_of(segments)?;
+    let is_negative = state.is_some_and(|s| s.modulus.get(0, 0, 0, 0) < 0.0);
+    let follows = follows(&missing);
+    if follows && (!is_negative || segments.passing.whole.len() > 1) {
         return Ok(false);
     }
     if segments.passing.whole.len() > 1 {
@@ -219,7 +223,22 @@ pub(super) fn fit<const D: usize>(
             remedy: "let the faces follow the lattices (element edges a whole number of spacings long), or use one lattice",
         });
     }
-    let mut left = f64::INFINITY;
+    let mut trial = segments.clone();
+    let mut left = fit_factors(&mut trial, state.is_some());
+    if left <= MET + rounding {
+        trial.is_squares = state.is_some();
+        *segments = trial;
+        return Ok(true);
+    }
+    if follows {
+        return Ok(false);
+    }
+    let Some(state) = state else {
+        return Err(ModelError::Seam {
+            what: "positive factors",
+            residual: left,
+        });
+    };
     // a lattice with few bonds may need a second layer of points
     for _ in 0..2 {
         let parts = parts(segments);
@@ -237,14 +256,12 @@ pub(super) fn fit<const D: usize>(
                     Part::Bond(i, j) => segments.changed.entry((i, j)).or_default().scale += c,
                 }
             }
-            if let Some(state) = state_of(segments)? {
-                let rest = state_change(segments, &parts, &nodes, state);
-                if rest > MET + rounding {
-                    return Err(ModelError::Seam {
-                        what: "shares of the dilatation",
-                        residual: rest,
-                    });
-                }
+            let rest = state_change(segments, &parts, &nodes, state);
+            if rest > MET + rounding {
+                return Err(ModelError::Seam {
+                    what: "shares of the dilatation",
+                    residual: rest,
+                });
             }
             return Ok(true);
         }
@@ -257,7 +274,9 @@ pub(super) fn fit<const D: usize>(
 }
 
 /// Integrals of the gradient of the shape functions of the nodes at the seam over the elements around them, without nodes from whose faces bonds are missing.
-fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> FxHashMap<u32, Vector<D>> {
+pub(super) fn loaded_nodes<const D: usize>(
+    segments: &Segments<'_, D>,
+) -> FxHashMap<u32, Vector<D>> {
     let model = segments.model;
     let full = segments.passing.whole[0].bonds().count();
     let mut at_face = vec![false; model.sites.len()];
@@ -299,7 +318,7 @@ fn loaded_nodes<const D: usize>(segments: &Segments<'_, D>) -> FxHashMap<u32, Ve
 }
 
 /// The fourth moments of the lattice's pairwise part.
-fn pair_tensor<const D: usize>(segments: &Segments<'_, D>) -> Tensor4<D> {
+pub(super) fn pair_tensor<const D: usize>(segments: &Segments<'_, D>) -> Tensor4<D> {
     let h = segments.model.spacing();
     let mut tensor = Tensor4::zeros();
     for (offset, (pair, _)) in segments.passing.whole[0].bonds() {
@@ -310,15 +329,15 @@ fn pair_tensor<const D: usize>(segments: &Segments<'_, D>) -> Tensor4<D> {
 }
 
 /// Components of a symmetric tensor of third order in 3D.
-const MOST_TRIPLES: usize = 10;
+pub(super) const MOST_TRIPLES: usize = 10;
 
 /// The components `i ≤ j ≤ k` of a symmetric tensor of third order.
-fn triples<const D: usize>() -> impl Iterator<Item = [usize; 3]> {
+pub(super) fn triples<const D: usize>() -> impl Iterator<Item = [usize; 3]> {
     (0..D).flat_map(|i| (i..D).flat_map(move |j| (j..D).map(move |k| [i, j, k])))
 }
 
 /// The components of `factor ξ⊗ξ⊗ξ`, as many as [`triples`] gives.
-fn cube<const D: usize>(xi: &Vector<D>, factor: f64) -> [f64; MOST_TRIPLES] {
+pub(super) fn cube<const D: usize>(xi: &Vector<D>, factor: f64) -> [f64; MOST_TRIPLES] {
     let mut cube = [0.0; MOST_TRIPLES];
     for (c, [i, j, k]) in cube.iter_mut().zip(triples::<D>()) {
         *c = factor * xi[i] * xi[j] * xi[k];
@@ -327,12 +346,15 @@ fn cube<const D: usize>(xi: &Vector<D>, factor: f64) -> [f64; MOST_TRIPLES] {
 }
 
 /// `C_ijkl b_l`.
-fn third<const D: usize>(b: &Vector<D>, tensor: &Tensor4<D>) -> impl Iterator<Item = f64> {
+pub(super) fn third<const D: usize>(
+    b: &Vector<D>,
+    tensor: &Tensor4<D>,
+) -> impl Iterator<Item = f64> {
     triples::<D>().map(|[i, j, k]| (0..D).map(|l| tensor.get(i, j, k, l) * b[l]).sum())
 }
 
 /// All pieces, and the whole bonds between points at the seam.
-fn parts<const D: usize>(segments: &Segments<'_, D>) -> Vec<Part> {
+pub(super) fn parts<const D: usize>(segments: &Segments<'_, D>) -> Vec<Part> {
     let mut parts: Vec<Part> = (0..segments.cut.len()).map(Part::Piece).collect();
     for i in (0..segments.site.len()).filter(|&i| segments.at_seam[i]) {
         for &j in segments.body.families.of(i) {
@@ -382,7 +404,7 @@ fn pair_conditions<const D: usize>(
 }
 
 /// The smallest change, and the largest component that it leaves.
-fn finish(conditions: &Conditions, target: &[f64], floor: f64) -> (Vec<f64>, f64) {
+pub(super) fn finish(conditions: &Conditions, target: &[f64], floor: f64) -> (Vec<f64>, f64) {
     let change = conditions.least_change(target, floor);
     let left = conditions
         .sum(&change)
@@ -393,7 +415,7 @@ fn finish(conditions: &Conditions, target: &[f64], floor: f64) -> (Vec<f64>, f64
     (change, left)
 }
 
-fn points_at_seam<'b, const D: usize>(
+pub(super) fn points_at_seam<'b, const D: usize>(
     segments: &'b Segments<'_, D>,
 ) -> impl Iterator<Item = u32> + 'b {
     (0..segments.site.len() as u32).filter(|&p| segments.at_seam[p as usize])

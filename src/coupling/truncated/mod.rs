@@ -8,7 +8,8 @@
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
 //! | `states.rs` | those dilatations where pieces turn, stretch and break |
 //! | `edges.rs` | strings along the edges of a zone in 3D |
-//! | `fit.rs`, `sparse_change.rs` | factors of pieces where faces cut the lattice anywhere, and their smallest change |
+//! | `squares.rs` | factors of pieces where faces cut the lattice anywhere, and an LPS as a sum of squares |
+//! | `fit.rs`, `sparse_change.rs` | the same for an LPS with few bonds, shares of dilatations apart; the smallest change |
 //!
 //! The energy is that of the finite elements, of the bonds within the peridynamic zone, and of the pieces of all other bonds of the lattice, continued behind the faces, that lie within the zone:
 //!
@@ -28,6 +29,7 @@ mod parts;
 mod seam;
 mod segments;
 mod sparse_change;
+mod squares;
 mod states;
 
 pub use self::{fit::SeamConditions, moving::SeamBonds};
@@ -124,7 +126,7 @@ impl<const D: usize> Coupling<D> for Truncated {
             Some(common) => Dilatations::new(&segments, common, &listed),
             None => Dilatations::none(model.sites.len()),
         };
-        let squares = common.as_ref().is_none_or(|c| c.bulk >= 0.0);
+        let squares = segments.is_squares || common.as_ref().is_none_or(|c| c.bulk >= 0.0);
         let (whole, states) = match common {
             None => (Some(WholeBonds::of(segments)), None),
             Some(common) => (None, Some((segments, common))),

@@ -45,6 +45,7 @@ pub(super) struct Changed {
 }
 
 /// Which bonds are whole, and the pieces of those that are not.
+#[derive(Clone)]
 pub(super) struct Segments<'a, const D: usize> {
     pub model: &'a Model<D>,
     pub body: &'a PdBody<D>,
@@ -59,6 +60,10 @@ pub(super) struct Segments<'a, const D: usize> {
     pub at_seam: Vec<bool>,
     /// Whole bonds that a fit has changed, lower number first.
     pub changed: FxHashMap<(u32, u32), Changed>,
+    /// Factor of the volume of a point whose bonds a fit has changed, in the energy of its dilatation.
+    pub volume: FxHashMap<u32, f64>,
+    /// Whether a fit has made the energy of an LPS a sum of squares.
+    pub is_squares: bool,
 }
 
 impl<'a, const D: usize> Segments<'a, D> {
@@ -121,6 +126,8 @@ impl<'a, const D: usize> Segments<'a, D> {
             broken,
             at_seam,
             changed: FxHashMap::default(),
+            volume: FxHashMap::default(),
+            is_squares: false,
         }
     }
 
