@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+mod any_faces;
+
 /// A folder of its own for one test, with the files that its scene names; removed when dropped.
 pub struct Case {
     folder: tempfile::TempDir,

@@ -1,4 +1,4 @@
-//! An LPS below the Poisson ratio of a pairwise law beside truncated bonds: runs where the matrix is shown to be positive, or is refused.
+//! An LPS below the Poisson ratio of a pairwise law beside truncated bonds: a sum of squares where its pieces can be fitted; else it runs where the matrix is shown to be positive, or is refused.
 
 use crate::{bondline, run, write};
 
@@ -31,25 +31,53 @@ fn refused(folder: &std::path::Path, set: &[&str]) -> String {
     said.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// A part of the zone with a lattice of its own: the pieces at its faces are not fitted, and their dilatations are no sum of squares.
+const BODIES: [&str; 2] = [
+    "--set",
+    "zones.bodies.fine={inside={box={min=[0.4,0.4],max=[0.8,1.2]}},spacing=0.05,horizon=0.15}",
+];
+
+const EXPLICIT: [&str; 2] = ["--set", "solve.explicit={duration=0.2,outputs=0}"];
+
+/// Far below the pairwise ratio, and with long bonds, short pieces weigh too much.
+const FAR: [&str; 4] = [
+    "--set",
+    "materials.foam.lps.poisson-ratio=-0.9",
+    "--set",
+    "peridynamics.horizon=0.6",
+];
+
 #[test]
-fn a_ratio_below_the_pairwise_one_runs_where_the_matrix_is_positive_and_says_so() {
+fn one_lattice_has_a_seam_of_squares_at_every_ratio_and_its_bonds_may_break() {
+    let folder = tempfile::tempdir().unwrap();
+    write(
+        folder.path(),
+        "plate.toml",
+        &scene("-0.1", ", critical-stretch = 0.1"),
+    );
+    for set in [&[][..], &FAR] {
+        for explicit in [&[][..], &EXPLICIT] {
+            let said = run(
+                folder.path(),
+                &[&["plate.toml"][..], set, explicit].concat(),
+            );
+            // nothing has to be shown of it
+            assert!(!said.contains("the seam is stable"), "{said}");
+        }
+    }
+}
+
+#[test]
+fn several_lattices_run_where_the_matrix_is_positive_and_say_so() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), "plate.toml", &scene("-0.1", ""));
-    let explicit = ["--set", "solve.explicit={duration=0.2,outputs=0}"];
-    for set in [&[][..], &explicit] {
-        let said = run(folder.path(), &[&["plate.toml"][..], set].concat());
+    for set in [&[][..], &EXPLICIT] {
+        let said = run(folder.path(), &[&["plate.toml"][..], &BODIES, set].concat());
         assert!(said.contains("the seam is stable"), "{said}");
         assert!(said.contains("-0.1000 is below 0.2500"), "{said}");
     }
-    // far below it, and with long bonds, short pieces weigh too much
-    let far = [
-        "--set",
-        "materials.foam.lps.poisson-ratio=-0.9",
-        "--set",
-        "peridynamics.horizon=0.6",
-    ];
-    for set in [&[][..], &explicit] {
-        let said = refused(folder.path(), &[&far[..], set].concat());
+    for set in [&[][..], &EXPLICIT] {
+        let said = refused(folder.path(), &[&BODIES[..], &FAR, set].concat());
         for part in [
             "-0.9000 is below 0.2500",
             "has a negative eigenvalue (found near (",
@@ -59,33 +87,30 @@ fn a_ratio_below_the_pairwise_one_runs_where_the_matrix_is_positive_and_says_so(
         }
     }
     // above it nothing is asked
+    let above = ["--set", "materials.foam.lps.poisson-ratio=0.3"];
     let said = run(
         folder.path(),
-        &[
-            "plate.toml",
-            "--set",
-            "materials.foam.lps.poisson-ratio=0.3",
-        ],
+        &[&["plate.toml"][..], &BODIES, &above].concat(),
     );
     assert!(!said.contains("the seam is stable"), "{said}");
 }
 
 #[test]
-fn bonds_that_break_below_the_pairwise_ratio_are_refused_unless_those_of_the_seam_are_kept_whole() {
+fn bonds_of_several_lattices_that_break_below_the_pairwise_ratio_are_refused_unless_those_of_the_seam_are_kept_whole()
+ {
     let folder = tempfile::tempdir().unwrap();
     write(
         folder.path(),
         "plate.toml",
         &scene("0.1", ", critical-stretch = 0.1"),
     );
-    let explicit = ["--set", "solve.explicit={duration=0.2,outputs=0}"];
-    let said = refused(folder.path(), &explicit);
+    let said = refused(folder.path(), &[&BODIES[..], &EXPLICIT].concat());
     for part in ["0.1000 is below 0.2500", "cut-bonds = \"linear\"", "splice"] {
         assert!(said.contains(part), "{said}");
     }
     let kept = ["--set", "coupling={truncated={cut-bonds=\"linear\"}}"];
     run(
         folder.path(),
-        &[&["plate.toml"][..], &explicit, &kept].concat(),
+        &[&["plate.toml"][..], &BODIES, &EXPLICIT, &kept].concat(),
     );
 }

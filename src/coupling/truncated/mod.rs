@@ -8,6 +8,7 @@
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
 //! | `states.rs` | those dilatations where pieces turn, stretch and break |
 //! | `edges.rs` | strings along the edges of a zone in 3D |
+//! | `feet.rs` | other traces at the ends of pieces, where factors alone do not do |
 //! | `squares.rs` | factors of pieces where faces cut the lattice anywhere, and an LPS as a sum of squares |
 //! | `fit.rs`, `sparse_change.rs` | the same for an LPS with few bonds, shares of dilatations apart; the smallest change |
 //!
@@ -23,6 +24,7 @@
 
 mod dilatation;
 mod edges;
+mod feet;
 mod fit;
 mod moving;
 mod parts;

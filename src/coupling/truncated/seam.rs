@@ -129,6 +129,18 @@ pub(super) struct Foot {
     pub cells: Vec<u32>,
 }
 
+impl Foot {
+    /// Adds weights, times `by`, to the trace.
+    pub fn shift(&mut self, weights: &[(u32, f64)], by: f64) {
+        for &(site, w) in weights {
+            match self.trace.iter_mut().find(|t| t.0 == site) {
+                Some((_, own)) => *own += by * w,
+                None => self.trace.push((site, by * w)),
+            }
+        }
+    }
+}
+
 impl<'a, const D: usize> Seam<'a, D> {
     /// Collects the faces of one lattice of a model; `size` is about the length of its bonds, none of which is longer than `longest`.
     pub fn new(model: &'a Model<D>, lattice: usize, size: f64, longest: f64) -> Self {

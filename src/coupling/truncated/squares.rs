@@ -13,6 +13,7 @@
 use rustc_hash::FxHashMap;
 
 use super::{
+    feet::{Shift, shifts},
     fit::{
         FLOOR, MET, MOST_TRIPLES, Part, cube, finish, loaded_nodes, pair_tensor, parts,
         points_at_seam, rounding, third, triples,
@@ -24,6 +25,9 @@ use crate::tensor::Vector;
 
 /// Pieces shorter than this part of the spacing get less stiffness to begin with, or their `k/s` would make the stable step arbitrarily short. Half a spacing is the shortest piece where faces follow the lattice.
 const SHORT: f64 = 0.5;
+
+/// How much of a trace may change for the price at which a factor doubles.
+const SHIFTED: f64 = 0.5;
 
 /// What changes: the energy of a part, or that which one of its two ends gets of it.
 struct Column {
@@ -49,10 +53,17 @@ pub(super) fn fit_factors<const D: usize>(segments: &mut Segments<'_, D>, is_sta
         segments.cut.retain(|s| s.ends.iter().any(has_point));
     }
     let mut left = f64::INFINITY;
-    // a lattice with few bonds may need a second layer of points
-    for _ in 0..2 {
+    // a lattice with few bonds may need a second layer of points, faces that are small or meet at sharp corners other traces
+    for (is_wide, is_shifted) in [(false, false), (true, false), (true, true)] {
+        if is_wide && !is_shifted {
+            segments.widen();
+        }
         let parts = parts(segments);
         let columns = columns(segments, &parts, is_state);
+        let shifts = match is_shifted {
+            true => shifts(segments, &nodes, SHORT * segments.model.spacing()),
+            false => Vec::new(),
+        };
         let (conditions, target) = {
             let traction = |b: &Vector<D>| {
                 let mut of = [0.0; MOST_TRIPLES];
@@ -61,19 +72,25 @@ pub(super) fn fit_factors<const D: usize>(segments: &mut Segments<'_, D>, is_sta
                     .for_each(|(to, v)| *to = -v);
                 of
             };
-            system(segments, &parts, &columns, &nodes, traction)
+            system(segments, &parts, &columns, &shifts, &nodes, traction)
         };
         // without the floor first: where even that fails, nothing else has to be tried
         let (mut change, mut rest) = finish(&conditions, &target, f64::NEG_INFINITY);
-        if rest <= 1e-3 * scale && change.iter().any(|&c| c < FLOOR - 1.0) {
+        if rest <= 1e-3 * scale && change[..columns.len()].iter().any(|&c| c < FLOOR - 1.0) {
             (change, rest) = finish(&conditions, &target, FLOOR - 1.0);
         }
         left = rest / scale;
         if left <= enough {
             adopt(segments, &parts, &columns, &change);
+            for (shift, x) in shifts.iter().zip(&change[columns.len()..]) {
+                let piece = &mut segments.cut[shift.piece];
+                let by = SHIFTED * x / piece.scale;
+                if let End::Face(foot) = &mut piece.ends[shift.side] {
+                    foot.shift(&shift.weights, by);
+                }
+            }
             break;
         }
-        segments.widen();
     }
     left
 }
@@ -139,6 +156,7 @@ fn system<const D: usize>(
     segments: &Segments<'_, D>,
     parts: &[Part],
     columns: &[Column],
+    shifts: &[Shift],
     nodes: &FxHashMap<u32, Vector<D>>,
     traction: impl Fn(&Vector<D>) -> [f64; MOST_TRIPLES],
 ) -> (Conditions, Vec<f64>) {
@@ -203,6 +221,23 @@ fn system<const D: usize>(
                     target[c] += (1.0 - column.base * shape.length) * v;
                     c += 1;
                 }
+            }
+        }
+        conditions.close();
+    }
+    conditions.free_from_here();
+    for shift in shifts {
+        let part = Part::Piece(shift.piece);
+        let shape = part.shape(segments);
+        let sign = [-SHIFTED, SHIFTED][shift.side];
+        let size = sign * strength(segments, &part, None) * shape.share;
+        let cube = cube(&shape.xi, size);
+        for &(site, w) in &shift.weights {
+            let Some(&row) = rows.get(&site) else {
+                continue;
+            };
+            for (c, v) in cube.iter().take(count).enumerate() {
+                conditions.add(row + c, w * v);
             }
         }
         conditions.close();

@@ -1,0 +1,126 @@
+//! Changes of the traces at which pieces end.
+//!
+//! A piece that ends at `x` on a face follows `Σ w_a u(x_a)` over nodes `a`: any weights with `Σ w_a = 1` and `Σ w_a x_a = x` keep forces and moments in balance and every energy positive. So beside the shape functions of the
+//! face there is a space of weights over the nodes around, and a node that few pieces reach, of an element smaller than the spacing or at a sharp corner of the zone, gets its load by them.
+
+use rustc_hash::FxHashMap;
+
+use super::segments::{End, Segments};
+use crate::tensor::Vector;
+
+/// Nodes around an end, those of its trace included, beyond the D + 1 that an affine field determines.
+const MOST_BESIDE: usize = 6;
+
+/// Part of a direction that has to be new for it to count.
+const NEW: f64 = 0.1;
+
+/// A change of the trace at an end of a piece: sites and weights, orthogonal to all affine fields.
+pub(super) struct Shift {
+    pub piece: usize,
+    pub side: usize,
+    pub weights: Vec<(u32, f64)>,
+}
+
+/// A basis of the changes at the ends on faces of all pieces of at least the length `shortest`, by nodes of `nodes` within a horizon.
+pub(super) fn shifts<const D: usize>(
+    segments: &Segments<'_, D>,
+    nodes: &FxHashMap<u32, Vector<D>>,
+    shortest: f64,
+) -> Vec<Shift> {
+    let cloud = &segments.body.cloud;
+    let sites = &segments.model.sites;
+    let reach = cloud.horizon.iter().copied().fold(0.0, f64::max);
+    let key =
+        |x: &Vector<D>| -> [i64; D] { std::array::from_fn(|i| (x[i] / reach).floor() as i64) };
+    let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
+    let mut order: Vec<u32> = nodes.keys().copied().collect();
+    order.sort_unstable();
+    for &site in &order {
+        let of = bins.entry(key(&sites[site as usize].position)).or_default();
+        of.push(site);
+    }
+    let mut shifts = Vec::new();
+    for (piece, s) in segments.cut.iter().enumerate() {
+        let xi = segments.body.bond(s.i as usize, s.j as usize);
+        if (s.piece.to - s.piece.from) * xi.norm() < shortest {
+            continue;
+        }
+        for (side, end) in s.ends.iter().enumerate() {
+            let End::Face(foot) = end else { continue };
+            let at = [s.piece.from, s.piece.to][side];
+            let x = cloud.position[s.i as usize] + xi * at;
+            let trace: Vec<u32> = foot.trace.iter().map(|t| t.0).collect();
+            let mut near: Vec<(f64, u32)> = Vec::new();
+            let middle = key(&x);
+            for number in 0..3usize.pow(D as u32) {
+                let mut rest = number;
+                let bin = middle.map(|k| {
+                    let step = (rest % 3) as i64 - 1;
+                    rest /= 3;
+                    k + step
+                });
+                for &site in bins.get(&bin).into_iter().flatten() {
+                    let away = (sites[site as usize].position - x).norm();
+                    if away <= reach && !trace.contains(&site) {
+                        near.push((away, site));
+                    }
+                }
+            }
+            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let mut around = trace;
+            let room = (MOST_BESIDE + D + 1).saturating_sub(around.len());
+            around.extend(near.iter().take(room).map(|n| n.1));
+            let affine = |r: usize| -> Vec<f64> {
+                let of = |&site: &u32| match r {
+                    0 => 1.0,
+                    _ => (sites[site as usize].position[r - 1] - x[r - 1]) / reach,
+                };
+                around.iter().map(of).collect()
+            };
+            let mut basis: Vec<Vec<f64>> = Vec::new();
+            for r in 0..=D {
+                let whole = affine(r);
+                let size = norm(&whole);
+                if size > 0.0
+                    && let Some(row) =
+                        beside(whole.iter().map(|v| v / size).collect(), &basis, 1e-9)
+                {
+                    basis.push(row);
+                }
+            }
+            let affine_rows = basis.len();
+            for k in 0..around.len() {
+                let unit = (0..around.len()).map(|a| f64::from(a == k)).collect();
+                if let Some(new) = beside(unit, &basis, NEW) {
+                    basis.push(new);
+                }
+            }
+            shifts.extend(basis.split_off(affine_rows).into_iter().map(|v| Shift {
+                piece,
+                side,
+                weights: around.iter().copied().zip(v).collect(),
+            }));
+        }
+    }
+    shifts
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// The part of `v` beside all of `basis`, of the length 1; none if little is left. Twice, for round-off.
+fn beside(mut v: Vec<f64>, basis: &[Vec<f64>], least: f64) -> Option<Vec<f64>> {
+    for pass in 0..2 {
+        for b in basis {
+            let along: f64 = b.iter().zip(&v).map(|(b, v)| b * v).sum();
+            v.iter_mut().zip(b).for_each(|(v, b)| *v -= along * b);
+        }
+        let size = norm(&v);
+        if pass == 0 && size <= least {
+            return None;
+        }
+        v.iter_mut().for_each(|v| *v /= size);
+    }
+    Some(v)
+}
