@@ -161,6 +161,13 @@ impl<const D: usize> Row<D> {
         }
     }
 
+    /// Multiplies the row by a factor.
+    pub fn scale(&mut self, factor: f64) {
+        if factor != 1.0 {
+            self.blocks.iter_mut().for_each(|block| *block *= factor);
+        }
+    }
+
     /// The row times each of `u` (`D` numbers per site), which empties it: for rows that are needed once, without a matrix.
     pub fn take_products<const N: usize>(&mut self, u: [&[f64]; N]) -> [Vector<D>; N] {
         let mut sums = [Vector::zeros(); N];

@@ -41,6 +41,7 @@ pub mod problem;
 pub mod sample;
 pub mod single;
 pub mod splice;
+pub mod tributary;
 pub mod truncated;
 
 pub use balanced::Balanced;
@@ -55,6 +56,7 @@ pub use problem::{Lattice, ModelError, Peridynamics, PointSource, Problem, Scala
 pub use sample::{Carrier, Sampler};
 pub use single::{Local, Nonlocal};
 pub use splice::Splice;
+pub use tributary::Tributary;
 pub use truncated::{SeamBonds, Truncated};
 
 use crate::{assembly::Row, mesh::Mesh, peridynamics::BondLaw, system::Symmetry};

@@ -11,13 +11,14 @@ use crate::{
         lattices::{self, Grown, Passing},
         place::{self, Beyond},
         points::{PointCloud, Volumes},
+        tributary::Tributary,
     },
     fem,
     mesh::{CellShape, Mesh},
     peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody},
     progress::Progress,
     shape::Barriers,
-    system::BlockCsr,
+    system::{BlockCsr, Symmetry},
     tensor::{Tensor4, Vector},
 };
 
@@ -37,7 +38,7 @@ pub struct Site<const D: usize> {
     pub position: Vector<D>,
     /// Node or point.
     pub kind: SiteKind,
-    /// Volume that the site stands for \[m^D\]: the point's, or the integral of the node's shape function.
+    /// Volume of the part of the body that the site stands for \[m^D\], see [`Tributary`]: far from seams and surfaces that of the point's cell, or the integral of the node's shape function.
     pub volume: f64,
 }
 
@@ -69,6 +70,10 @@ pub struct Model<const D: usize> {
     passing: Option<Passing<D>>,
     spacing: f64,
     volumes: Volumes,
+    /// Whether rows are the gradient of an energy.
+    pub(super) has_energy: bool,
+    pub(super) tributary: Tributary,
+    pub(super) row_scale: Option<Vec<f64>>,
     /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
     pub(super) worked_out: OnceLock<Box<dyn Any + Send + Sync>>,
 }
@@ -116,6 +121,9 @@ impl<const D: usize> Model<D> {
             passing: None,
             spacing: 0.0,
             volumes: Volumes::default(),
+            has_energy: coupling.symmetry() == Symmetry::Symmetric,
+            tributary: Tributary::default(),
+            row_scale: None,
             worked_out: OnceLock::new(),
         };
         let has_points = model.roles.contains(&CellRole::Points);
@@ -154,6 +162,7 @@ impl<const D: usize> Model<D> {
                     .map(|&s| if s == NONE { vec![] } else { vec![(s, 1.0)] }),
             );
         }
+        model.share_out();
         Ok((model, coupling))
     }
 
@@ -557,13 +566,19 @@ impl<const D: usize> Model<D> {
         self.roles[cell] != CellRole::Points && self.mesh.shapes[cell] != CellShape::Vertex
     }
 
-    /// Assembles the stiffness.
+    /// Assembles the stiffness: the rows of the operator, each times its [`Model::row_scale`].
     pub fn assemble(&self, operator: &dyn super::Operator<D>, progress: &dyn Progress) -> BlockCsr {
         progress.stage("assembly", Some(self.sites.len() as u64));
+        let scale = self.row_scale();
         let matrix = assembly::assemble(
             self.sites.len(),
             |by| progress.advance(by),
-            |site, row| operator.add_row(site, row),
+            |site, row| {
+                operator.add_row(site, row);
+                if let Some(scale) = scale {
+                    row.scale(scale[site]);
+                }
+            },
         );
         progress.finish();
         matrix

@@ -12,8 +12,7 @@ use rayon::prelude::*;
 use self::{body::MovingBody, energy::ElementEnergy, rows::SiteRows};
 use crate::{
     assembly,
-    coupling::{BrokenBonds, Interface, Model, Operator, SeamBonds, SiteKind},
-    fem,
+    coupling::{BrokenBonds, Model, Operator, SeamBonds},
     peridynamics::{
         Families, PdBody,
         contact::ContactError,
@@ -234,43 +233,22 @@ fn reached<const D: usize>(body: &PdBody<D>, families: &Families, point: u32) ->
     family.map(|&j| body.cloud.volume[j as usize]).sum()
 }
 
-/// Lumped mass of every site \[kg\]: the integral of a node's shape function or the volume of a point, times the density.
-///
-/// Where elements overlap into the peridynamic zone a node has the mass of all cells around it, as its row has their stiffness. At the faces of [`Interface::Faces`] nothing overlaps: a node there has the mass of its elements. What
-/// of the zone no point carries, half of the cells of points that lie on a face, is shared by the nodes of the faces, so that all masses add up to that of the body.
+/// Lumped mass of every site \[kg\]: that of its part of the body. All masses add up to that of the body, their first moment too.
 pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) -> Vec<f64> {
-    let mut nodes = fem::lumped_mass(&model.mesh, |c| match model.node_takes(c) {
-        true => density(model.material_of_cell(c)),
-        false => 0.0,
-    });
-    let points = density(model.peridynamic_material());
-    if model.interface == Interface::Faces {
-        let zone = (0..model.mesh.cell_count()).filter(|&c| !model.node_takes(c));
-        let behind = fem::nodal_volumes(&model.mesh, zone);
-        let (mut at_faces, mut carried) = (0.0, 0.0);
-        for site in &model.sites {
-            match site.kind {
-                SiteKind::Node(n) => at_faces += behind[n as usize],
-                SiteKind::Point(_) => carried += site.volume,
-            }
-        }
-        // a point whose cell reaches out of the zone, at faces that cut the lattice anywhere, takes nothing from the nodes
-        let left = model.volumes().points - carried;
-        if left > 1e-9 * carried && at_faces > 0.0 {
-            let scale = points * left / at_faces;
-            for (mass, volume) in nodes.iter_mut().zip(&behind) {
-                *mass += scale * volume;
-            }
+    let own = model.peridynamic_material();
+    model.tributary().masses(own, density)
+}
+
+/// Scales what each row gives, where the rows of a model are scaled.
+fn scale_rows<const D: usize>(model: &Model<D>, values: &mut [f64]) {
+    let Some(scale) = model.row_scale() else {
+        return;
+    };
+    for (values, &factor) in values.chunks_exact_mut(D).zip(scale) {
+        if factor != 1.0 {
+            values.iter_mut().for_each(|v| *v *= factor);
         }
     }
-    model
-        .sites
-        .iter()
-        .map(|site| match site.kind {
-            SiteKind::Node(n) => nodes[n as usize],
-            SiteKind::Point(_) => points * site.volume,
-        })
-        .collect()
 }
 
 impl<const D: usize> Dynamic for Motion<'_, D> {
@@ -302,13 +280,15 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
         self.linear
             .multiply_into::<D>(u, bonds, &mut self.products, force);
-        let Some(seam) = &mut self.seam else {
-            return broken;
-        };
-        if broken > 0 {
-            seam.follow(body.pass.as_ref());
+        let mut of_seam = 0;
+        if let Some(seam) = &mut self.seam {
+            if broken > 0 {
+                seam.follow(body.pass.as_ref());
+            }
+            of_seam = seam.add_force(u, force, breakage);
         }
-        broken + seam.add_force(u, force, breakage)
+        scale_rows(self.model, force);
+        broken + of_seam
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
@@ -325,6 +305,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         if let Some(seam) = &self.seam {
             seam.add_tangent(x, y);
         }
+        scale_rows(self.model, y);
     }
 
     fn row_sums(&self) -> Vec<f64> {
@@ -355,6 +336,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         if let Some(seam) = &self.seam {
             seam.add_row_sums(&mut sums);
         }
+        scale_rows(self.model, &mut sums);
         sums
     }
 
@@ -364,11 +346,14 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             return 0.0;
         };
         let contact = contact.lock().unwrap_or_else(PoisonError::into_inner);
+        let scale = self.model.row_scale();
+        let factor = |site: usize| scale.map_or(1.0, |scale| scale[site]);
         body.bonds_of_site
             .iter()
             .zip(&self.mass)
-            .filter(|(point, _)| **point != NONE)
-            .map(|(&point, mass)| contact.stiffest(point as usize) / mass)
+            .enumerate()
+            .filter(|(_, (point, _))| **point != NONE)
+            .map(|(site, (&point, mass))| factor(site) * contact.stiffest(point as usize) / mass)
             .fold(0.0, f64::max)
     }
 
@@ -409,6 +394,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
                 }
                 if let Some(seam) = &self.seam {
                     seam.add_row(site, row);
+                }
+                if let Some(scale) = self.model.row_scale() {
+                    row.scale(scale[site]);
                 }
             },
         )

@@ -55,7 +55,7 @@ mod tet4;
 mod tri3;
 
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 
 pub use body::{FemError, assemble, check, internal_force, lumped_mass, nodal_volumes};
 pub use cell::{ReferenceCell, Rule, RulePoint};

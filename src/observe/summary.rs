@@ -158,6 +158,15 @@ pub struct Reaction {
     pub force: Vec<f64>,
 }
 
+/// The force that a condition applies.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Applied {
+    /// The condition, as the scene names it.
+    pub condition: String,
+    /// Sum of its forces on all sites at the end of the run, one component per dimension. Units: N (per thickness in 2D, per section in 1D).
+    pub force: Vec<f64>,
+}
+
 /// What one run did, for `run --json` and for people.
 ///
 /// Units: those of the scene; with SI units forces are in N and energies in J (per metre of thickness in 2D, per square
@@ -190,6 +199,8 @@ pub struct RunSummary {
     pub out_of_balance_force: Vec<f64>,
     /// Its norm over that of the applied (or reaction) forces.
     pub out_of_balance_relative: f64,
+    /// Forces of the loads.
+    pub applied: Vec<Applied>,
     /// Forces of the displacement conditions.
     pub reactions: Vec<Reaction>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
@@ -402,6 +413,14 @@ impl fmt::Display for RunSummary {
         }
         if let Some(energy) = self.energy {
             writeln!(f, "stored energy          {}", number(energy))?;
+        }
+        for a in &self.applied {
+            writeln!(
+                f,
+                "applied                {}: {}",
+                a.condition,
+                components(&a.force)
+            )?;
         }
         for r in &self.reactions {
             writeln!(

@@ -3,19 +3,23 @@
 use rayon::prelude::*;
 
 use super::conditions::{Condition, Prescribed, Support};
+use super::region::Region;
 use super::run::RunError;
-use crate::coupling::{Model, SiteKind};
+use crate::coupling::tributary::{Detail, Parts};
+use crate::coupling::{CellRole, Model, SiteKind};
 use crate::fem;
 use crate::mesh::Facet;
+use crate::mesh::boundary::BoundaryFacet;
+use crate::observe::summary::Applied;
 use crate::tensor::Vector;
 
-/// How far from a set a peridynamic point may lie, in its own spacings, to follow a condition on the set.
+/// How far from a set a peridynamic point may lie, in its own spacings, to be held with the set in any case.
 ///
-/// The first layer lies on the set or half a spacing away, at the corner of a square 0.71 of one; the second layer at least one.
+/// The first layer lies on the set or half a spacing away, at the corner of a square 0.71 of one; the second layer at least one. Where the first layer lies farther off, the points are held that the set's own places follow.
 const FIRST_LAYER: f64 = 0.75;
 
 /// For each node of the mesh its site, if it is one.
-fn site_of_node<const D: usize>(model: &Model<D>) -> Vec<Option<u32>> {
+pub(super) fn site_of_node<const D: usize>(model: &Model<D>) -> Vec<Option<u32>> {
     let mut site_of = vec![None; model.mesh.nodes.len()];
     for (site, s) in model.sites.iter().enumerate() {
         if let SiteKind::Node(n) = s.kind {
@@ -25,12 +29,8 @@ fn site_of_node<const D: usize>(model: &Model<D>) -> Vec<Option<u32>> {
     site_of
 }
 
-/// The points in the first layer along facets or nodes, with their spacing.
-fn first_layer<const D: usize>(
-    model: &Model<D>,
-    nodes: &[u32],
-    facets: &[Facet],
-) -> Vec<(usize, f64)> {
+/// The points in the first layer along facets or nodes.
+fn first_layer<const D: usize>(model: &Model<D>, nodes: &[u32], facets: &[Facet]) -> Vec<usize> {
     let mesh = &model.mesh;
     let (mut lo, mut hi) = (
         Vector::<D>::repeat(f64::INFINITY),
@@ -44,11 +44,8 @@ fn first_layer<const D: usize>(
         .into_par_iter()
         .filter_map(|site| {
             let s = &model.sites[site];
-            if !matches!(s.kind, SiteKind::Point(_)) {
-                return None;
-            }
-            let h = s.volume.powf(1.0 / D as f64);
-            let reach = FIRST_LAYER * h;
+            let (body, point) = model.point_of(site)?;
+            let reach = FIRST_LAYER * body.cloud.volume[point].powf(1.0 / D as f64);
             let x = &s.position;
             if (0..D).any(|k| x[k] < lo[k] - reach || x[k] > hi[k] + reach) {
                 return None;
@@ -60,9 +57,43 @@ fn first_layer<const D: usize>(
             } else {
                 facets.iter().any(|f| mesh.distance_to_facet(x, f) <= reach)
             };
-            near.then_some((site, h))
+            near.then_some(site)
         })
         .collect()
+}
+
+/// The points nearest to a set where it bounds the peridynamic zone: of each piece of its facets, a spacing wide, or of each node of a set without facets, the nearest of the points that it follows.
+pub(super) fn nearest_points<const D: usize>(
+    model: &Model<D>,
+    site_of: &[Option<u32>],
+    nodes: &[u32],
+    facets: &[Facet],
+) -> Vec<(Vector<D>, usize)> {
+    if model.body().is_none() {
+        return Vec::new();
+    }
+    let parts = if facets.is_empty() {
+        let free = nodes.iter().filter(|&&n| site_of[n as usize].is_none());
+        let free: Vec<Vector<D>> = free.map(|&n| model.mesh.nodes[n as usize]).collect();
+        Parts::of_places(model, &free)
+    } else {
+        let located = model.mesh.locate_facets(facets).unwrap_or_default();
+        let mut zone = located;
+        zone.retain(|f| !model.is_element(f.cell as usize));
+        Parts::of_facets(model, &zone, Detail::Centre)
+    };
+    let is_point = |s: u32| matches!(model.sites[s as usize].kind, SiteKind::Point(_));
+    let nearest = |(x, follows): (&Vector<D>, &[(u32, f64, Vector<D>)])| {
+        let distance = |s: u32| (model.sites[s as usize].position - x).norm();
+        let points = follows.iter().map(|f| f.0).filter(|&s| is_point(s));
+        let first = points.min_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)))?;
+        // a place on the seam is held with the nodes there
+        let on_node = follows
+            .iter()
+            .any(|f| !is_point(f.0) && distance(f.0) < distance(first));
+        (!on_node).then_some((*x, first as usize))
+    };
+    parts.places().filter_map(nearest).collect()
 }
 
 /// The condition that holds each dof, by its number: the last one that does.
@@ -91,10 +122,11 @@ pub(super) fn holders<const D: usize>(
         let sites: Vec<usize> = match support {
             Support::Set { nodes, facets, .. } => {
                 let on_nodes = nodes.iter().filter_map(|&n| site_of[n as usize]);
-                let layer = first_layer(model, nodes, facets);
+                let nearest = nearest_points(model, &site_of, nodes, facets);
                 on_nodes
                     .map(|s| s as usize)
-                    .chain(layer.into_iter().map(|(s, _)| s))
+                    .chain(first_layer(model, nodes, facets))
+                    .chain(nearest.into_iter().map(|(_, s)| s))
                     .collect()
             }
             Support::Inside(region) => (0..model.sites.len())
@@ -152,27 +184,23 @@ pub(super) fn supports<const D: usize>(
 
 /// What a load acts on; the force of any field follows from it without another search.
 #[derive(Clone, Debug)]
-enum Bearer {
-    /// Facets of finite elements, and points in the first layer with their shares of the area.
-    Surface {
-        facets: Vec<Facet>,
-        points: Vec<(usize, f64)>,
-    },
-    /// Cells, and points.
-    Body {
-        cells: Vec<usize>,
-        points: Vec<usize>,
-    },
+struct Bearer<const D: usize> {
+    condition: usize,
+    /// Facets of finite elements.
+    facets: Vec<Facet>,
+    /// Finite elements.
+    cells: Vec<usize>,
+    /// The rest, of which points have the load.
+    parts: Parts<D>,
+    detail: Detail,
 }
 
 /// The loads of a scene on the sites of its model.
 ///
-/// Every site takes the load of its own model: a node the consistent force of all cells around it, a point its volume
-/// times the body force, and in the first layer its share of the facets' area times the traction.
+/// By virtual work: a finite element gives its nodes their consistent forces, a part of the peridynamic zone or of its surface gives the sites that it follows the force on it. Total and first moment are those of the load itself.
 pub(super) struct Loads<'a, const D: usize> {
     model: &'a Model<D>,
-    site_of: Vec<Option<u32>>,
-    bearers: Vec<(usize, Bearer)>,
+    bearers: Vec<Bearer<D>>,
 }
 
 impl<'a, const D: usize> Loads<'a, D> {
@@ -183,43 +211,57 @@ impl<'a, const D: usize> Loads<'a, D> {
     pub fn new(model: &'a Model<D>, conditions: &[Condition<D>]) -> Result<Self, RunError> {
         let mut loads = Self {
             model,
-            site_of: site_of_node(model),
             bearers: Vec::new(),
         };
         for (number, condition) in conditions.iter().enumerate() {
-            let bearer = match &condition.prescribed {
-                Prescribed::Traction(facets) => surface(model, facets),
-                Prescribed::BodyForce(region) => Bearer::Body {
-                    cells: (0..model.mesh.cell_count())
-                        .filter(|&c| region.contains(&model.mesh.centroid(c), 0.0))
-                        .filter(|&c| model.node_takes(c))
-                        .collect(),
-                    points: (0..model.sites.len())
-                        .filter(|&s| {
-                            let site = &model.sites[s];
-                            matches!(site.kind, SiteKind::Point(_))
-                                && region.contains(&site.position, 0.0)
-                        })
-                        .collect(),
-                },
+            let detail = match condition.components.depends_on_position() {
+                true => Detail::Quadrature,
+                false => Detail::Centre,
+            };
+            let (facets, cells, parts) = match &condition.prescribed {
+                Prescribed::Traction(facets) => {
+                    let (own, zone) = split_facets(model, facets);
+                    let parts = Parts::of_facets(model, &zone, detail);
+                    (own, Vec::new(), parts)
+                }
+                Prescribed::BodyForce(region) => {
+                    let inside = cells_of(model, region);
+                    let own = (0..inside.len()).filter(|&c| inside[c] && model.is_element(c));
+                    let own = own.collect();
+                    let zone: Vec<bool> = (0..inside.len())
+                        .map(|c| inside[c] && model.roles[c] == CellRole::Points)
+                        .collect();
+                    let parts = match zone.contains(&true) {
+                        true => Parts::of_cells(model, &zone, detail),
+                        false => Parts::default(),
+                    };
+                    (Vec::new(), own, parts)
+                }
                 _ => continue,
+            };
+            let bearer = Bearer {
+                condition: number,
+                facets,
+                cells,
+                parts,
+                detail,
             };
             let mut met = false;
             loads.each(&bearer, |_| Vector::zeros(), |_, _| met = true);
             if !met {
                 return Err(RunError::Idle {
                     condition: condition.name.clone(),
-                    remedy: "name a set on the boundary of the body, or enlarge the shape",
+                    remedy: "name a set on the boundary of the body, or enlarge the shape: it acts on the cells whose centroid it holds",
                 });
             }
-            loads.bearers.push((number, bearer));
+            loads.bearers.push(bearer);
         }
         Ok(loads)
     }
 
     /// The conditions that load, by their numbers.
     pub fn conditions(&self) -> impl Iterator<Item = usize> + '_ {
-        self.bearers.iter().map(|(number, _)| *number)
+        self.bearers.iter().map(|b| b.condition)
     }
 
     /// Adds the force of one condition with the field `field` to `load`; returns the sum of what it added.
@@ -230,7 +272,7 @@ impl<'a, const D: usize> Loads<'a, D> {
         load: &mut [f64],
     ) -> Vector<D> {
         let mut sum = Vector::zeros();
-        for (_, bearer) in self.bearers.iter().filter(|(n, _)| *n == condition) {
+        for bearer in self.bearers.iter().filter(|b| b.condition == condition) {
             self.each(bearer, &field, |site, f| {
                 sum += f;
                 for k in 0..D {
@@ -244,85 +286,55 @@ impl<'a, const D: usize> Loads<'a, D> {
     /// Hands each site's force to `add`.
     fn each(
         &self,
-        bearer: &Bearer,
+        bearer: &Bearer<D>,
         field: impl Fn(&Vector<D>) -> Vector<D>,
         mut add: impl FnMut(usize, Vector<D>),
     ) {
         let mesh = &self.model.mesh;
         let mut on_node = |n: u32, f: Vector<D>| {
-            if let Some(site) = self.site_of[n as usize] {
-                add(site as usize, f);
+            // a node at the seam that is no site hands its force to those that it follows
+            for (site, w) in self.model.node_transfer.row(n as usize) {
+                add(site as usize, f * w);
             }
         };
-        match bearer {
-            Bearer::Surface { facets, points } => {
-                for facet in facets {
-                    for (n, f) in fem::traction_vector(mesh, facet, &field) {
-                        on_node(n, f);
-                    }
-                }
-                for &(site, share) in points {
-                    add(site, field(&self.model.sites[site].position) * share);
-                }
-            }
-            Bearer::Body { cells, points } => {
-                for &c in cells {
-                    for (n, f) in fem::body_force_vector(mesh, c, &field) {
-                        on_node(n, f);
-                    }
-                }
-                for &site in points {
-                    let s = &self.model.sites[site];
-                    add(site, field(&s.position) * s.volume);
-                }
+        for facet in &bearer.facets {
+            for (n, f) in fem::traction_vector(mesh, facet, &field) {
+                on_node(n, f);
             }
         }
+        for &c in &bearer.cells {
+            for (n, f) in fem::body_force_vector(mesh, c, &field) {
+                on_node(n, f);
+            }
+        }
+        bearer.parts.each(bearer.detail, field, add);
     }
 }
 
-/// The facets whose nodes take a traction, and the share of each point of the first layer in the area of those that no
-/// element carries.
-fn surface<const D: usize>(model: &Model<D>, facets: &[Facet]) -> Bearer {
+/// The cells that a body force acts on: those whose centroid its region holds.
+pub(super) fn cells_of<const D: usize>(model: &Model<D>, region: &Region<D>) -> Vec<bool> {
     let mesh = &model.mesh;
-    // a facet without a cell is an element's as far as anybody knows, and carries no point
-    let located = mesh.locate_facets(facets).ok();
-    let cell = |f: usize| located.as_ref().map(|l| l[f].cell as usize);
-    let on_nodes = (0..facets.len())
-        .filter(|&f| cell(f).is_none_or(|c| model.node_takes(c)))
-        .map(|f| facets[f].clone())
-        .collect();
-    let on_points: Vec<Facet> = located
-        .into_iter()
-        .flatten()
-        .filter(|f| !model.is_element(f.cell as usize))
-        .map(|f| f.nodes)
-        .collect();
-    Bearer::Surface {
-        facets: on_nodes,
-        points: shares(model, &on_points),
-    }
-}
-
-/// The share of each point of the first layer in the area of `on_points`.
-fn shares<const D: usize>(model: &Model<D>, on_points: &[Facet]) -> Vec<(usize, f64)> {
-    let mesh = &model.mesh;
-    let mut nodes: Vec<u32> = on_points.iter().flatten().copied().collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    if nodes.is_empty() {
-        return Vec::new();
-    }
-    let layer = first_layer(model, &nodes, on_points);
-    let area: f64 = on_points.iter().map(|f| fem::facet_area(mesh, f)).sum();
-    let face = |h: f64| h.powi(D as i32 - 1);
-    let sum: f64 = layer.iter().map(|(_, h)| face(*h)).sum();
-    layer
-        .into_iter()
-        .map(|(site, h)| (site, area * face(h) / sum))
+    (0..mesh.cell_count())
+        .map(|c| region.contains(&mesh.centroid(c), 0.0))
         .collect()
 }
 
-/// The applied force of each dof at time `t`, and the sum of the sizes of the forces of all conditions.
+/// Facets of finite elements, and those of cells that hold points.
+pub(super) fn split_facets<const D: usize>(
+    model: &Model<D>,
+    facets: &[Facet],
+) -> (Vec<Facet>, Vec<BoundaryFacet>) {
+    // a facet without a cell is an element's as far as anybody knows
+    let Ok(located) = model.mesh.locate_facets(facets) else {
+        return (facets.to_vec(), Vec::new());
+    };
+    let (own, zone): (Vec<_>, Vec<_>) = located
+        .into_iter()
+        .partition(|f| model.is_element(f.cell as usize));
+    (own.into_iter().map(|f| f.nodes).collect(), zone)
+}
+
+/// The applied force of each dof at time `t`, and that of each condition.
 ///
 /// # Errors
 /// As [`Loads::new`].
@@ -330,13 +342,18 @@ pub(super) fn loads<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
     t: f64,
-) -> Result<(Vec<f64>, f64), RunError> {
+) -> Result<(Vec<f64>, Vec<Applied>), RunError> {
     let loads = Loads::new(model, conditions)?;
     let mut load = vec![0.0; model.sites.len() * D];
-    let mut applied = 0.0;
+    let mut applied = Vec::new();
     for number in loads.conditions() {
-        let field = |x: &Vector<D>| conditions[number].components.vector(x, t);
-        applied += loads.add(number, field, &mut load).norm();
+        let condition = &conditions[number];
+        let field = |x: &Vector<D>| condition.components.vector(x, t);
+        let force = loads.add(number, field, &mut load);
+        applied.push(Applied {
+            condition: condition.name.clone(),
+            force: force.iter().copied().collect(),
+        });
     }
     Ok((load, applied))
 }

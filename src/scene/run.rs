@@ -26,7 +26,7 @@ use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointError, Fingerprint};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
-    Choice, Reaction, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
+    Applied, Choice, Reaction, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
 use crate::peridynamics::FractureError;
 use crate::peridynamics::{
@@ -245,7 +245,7 @@ pub fn solve_with<const D: usize>(
         solution,
         ..
     } = equilibrium;
-    let (symmetry, applied) = (*symmetry, *applied);
+    let symmetry = *symmetry;
     let info = &solution.info;
     watch = Stopwatch::start();
     choices.extend(equilibrium.choices.iter().cloned());
@@ -269,7 +269,9 @@ pub fn solve_with<const D: usize>(
         .iter()
         .enumerate()
         .for_each(|(dof, f)| balance[dof % D] += f);
-    let scale = reactions.iter().map(|r| r.norm()).fold(applied, f64::max);
+    let size = |a: &Applied| a.force.iter().map(|f| f * f).sum::<f64>().sqrt();
+    let all = applied.iter().map(size).sum::<f64>();
+    let scale = reactions.iter().map(|r| r.norm()).fold(all, f64::max);
     let zone_of_site = zone_of_site(model);
     let solved = Solved {
         model,
@@ -313,6 +315,7 @@ pub fn solve_with<const D: usize>(
         } else {
             0.0
         },
+        applied: applied.clone(),
         reactions: rest
             .conditions
             .iter()
@@ -347,8 +350,8 @@ pub(crate) struct Equilibrium {
     pub stiffness: BlockCsr,
     pub symmetry: Symmetry,
     pub load: Vec<f64>,
-    /// Sum of the sizes of the forces of all loads.
-    pub applied: f64,
+    /// The force of each load.
+    pub applied: Vec<Applied>,
     /// The condition that holds each dof.
     pub holder: Vec<Option<usize>>,
     pub solution: StaticSolution,

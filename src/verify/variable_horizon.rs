@@ -242,6 +242,9 @@ pub fn profile<const D: usize>(
             |row, &site| {
                 progress.advance(1);
                 operator.add_row(site, row);
+                if let Some(scale) = bar.row_scale() {
+                    row.scale(scale[site]);
+                }
                 // a row is minus the internal force
                 row.take_products([&fields[0], &fields[1]])
                     .map(|f| f / (-DENSITY * bar.sites[site].volume))

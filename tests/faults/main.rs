@@ -1,5 +1,9 @@
 //! Scenes that once gave a wrong answer without a word, by the binary: each gives the right one, is warned of with a number, or is refused.
 
+mod b;
+mod e;
+mod o;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -19,6 +19,7 @@ use crate::observe::summary::{
 };
 use crate::progress::Progress;
 use crate::scene::doubts::warnings;
+use crate::scene::loads;
 use crate::scene::run::{self, Rest, RunError, Solved};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
@@ -395,6 +396,7 @@ fn leg<'r, const D: usize>(
     let moment = moment(&motion, is_linear);
     let stored = moment.system.stored_energy(&moment.state.u);
     let state = moment.state;
+    let (_, applied) = loads::loads(model, &rest.conditions, state.time)?;
     let (switches, shares) = zone.map_or((Vec::new(), [0.0; 2]), |z| (z.switches, z.shares));
     Ok(Leg::Ended(Box::new(RunSummary {
         scene: title,
@@ -407,6 +409,7 @@ fn leg<'r, const D: usize>(
         peak_memory_bytes: peak_memory_bytes(),
         warnings: warnings(model, joining, &proof),
         proof,
+        applied,
         motion: Some(MotionSummary {
             ended,
             steps: state.step,

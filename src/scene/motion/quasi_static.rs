@@ -234,6 +234,7 @@ fn load_steps<const D: usize>(
     timings.add("load steps", seconds - (recorder.seconds - written));
     timings.add("output", recorder.seconds - written);
     let stored = moving.system.stored_energy(&state.u);
+    let (_, applied) = loads::loads(model, &rest.conditions, state.time)?;
     choices.push(Choice {
         choice: format!("{} products or passes", info.iterations),
         why: "of all load steps of this run".to_owned(),
@@ -249,6 +250,7 @@ fn load_steps<const D: usize>(
         peak_memory_bytes: peak_memory_bytes(),
         warnings: warnings(model, joining, &proof),
         proof,
+        applied,
         iterations: info.iterations,
         motion: Some(MotionSummary {
             ended,

@@ -2,10 +2,12 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `loads.rs` | masses, totals and first moments of loads |
 //! | `scene.rs` | a scene as text, run in a folder of its own, and what it summed up |
 //!
 //! A row passes, or the scene is refused with its reason, and both are counted. Nothing here builds a model by another way than a scene does.
 
+pub mod loads;
 pub mod scene;
 
 use super::Effort;
@@ -13,7 +15,7 @@ use crate::{observe::report::Table, progress::Progress};
 
 /// Every table of the suite.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let tables: &[fn(Effort, &dyn Progress) -> Vec<Table>] = &[];
+    let tables: &[fn(Effort, &dyn Progress) -> Vec<Table>] = &[loads::run];
     tables
         .iter()
         .flat_map(|table| table(effort, progress))

@@ -1,0 +1,183 @@
+//! The part of the body that each site stands for: its tributary volume, its mass, and the loads on it.
+//!
+//! | file | what |
+//! |---|---|
+//! | `simplex.rs` | cells of the mesh diced by the cells of a lattice |
+//! | `grid.rs` | places on a lattice, expressed through sites |
+//! | `around.rs` | places beside points at centroids |
+//! | `marks.rs` | the cells of a lattice that the edge of a region cuts |
+//! | `parts.rs` | a region of the zone, or of its surface, in parts that follow sites |
+//!
+//! The principle of virtual work gives all of it. The displacement of a finite element is `Σ N_a u_a`; a cell of the lattice that lies in the zone as a whole has that of its point; one that the seam, a surface or a void cuts has
+//! that of the place at its centre of gravity, `Σ w_s u_s` over the sites around. A force on a part goes to the sites by the transpose of these weights. They add up to one and are exact for affine fields, so the total of every load and
+//! its first moment are those of the integral over the mesh, and masses add up to that of the body.
+//!
+//! **Rows.** With an energy the stiffness knows of volumes, and nothing else has to change. A coupling by forces has rows that are equations at a place, each times a volume of its own: the hat of a node at the seam is whole,
+//! and so are the cells of points that reach into elements. They overlap. Such a row is scaled by its tributary volume over its own ([`Model::row_scale`]); the solution of a body force that is the same everywhere does not change, and
+//! sums over sites, of forces, masses and momentum, count every part of the body once. The own volume of a point is the part that it would have if its lattice went on in the elements, so that rows far from the seam, at surfaces
+//! too, stay as they are: there forces between points are equal and opposite.
+
+mod around;
+mod grid;
+mod marks;
+mod parts;
+mod simplex;
+
+pub use parts::{Detail, Moments, Parts};
+
+use crate::{
+    coupling::{CellRole, Model, PointSource, SiteKind},
+    fem,
+};
+
+/// The part of the body that each site stands for.
+#[derive(Clone, Debug, Default)]
+pub struct Tributary {
+    /// Volume of each site's part [m^D]; they add up to that of the mesh, less voids in the zone.
+    pub volume: Vec<f64>,
+    /// Mass of a unit density of each material: sparse, only of sites whose part is not of one material.
+    pub mixed: Vec<(u32, u16, f64)>,
+    /// Volume of the peridynamic zone, less voids \[m^D\].
+    pub zone: f64,
+}
+
+impl Tributary {
+    /// Lays out the parts of a model's sites.
+    pub(super) fn new<const D: usize>(model: &Model<D>) -> Self {
+        let mut volume = vec![0.0; model.sites.len()];
+        let mesh = &model.mesh;
+        let mut by_material: Vec<(u32, u16, f64)> = Vec::new();
+        let own = model.peridynamic_material();
+        // nodes by the cells around them; those that follow others pass on what they have
+        for c in (0..mesh.cell_count()).filter(|&c| model.is_element(c)) {
+            let material = model.material_of_cell(c);
+            fem::for_each_point(mesh, c, fem::Rule::Mass, |p| {
+                for (&n, shape) in mesh.cell(c).iter().zip(&p.shape) {
+                    for (site, w) in model.node_transfer.row(n as usize) {
+                        let share = w * shape * p.weight;
+                        volume[site as usize] += share;
+                        if material != own {
+                            by_material.push((site, material, share));
+                        }
+                    }
+                }
+            });
+        }
+        by_material.sort_by_key(|m| (m.0, m.1));
+        by_material.dedup_by(|next, kept| {
+            let same = (next.0, next.1) == (kept.0, kept.1);
+            if same {
+                kept.2 += next.2;
+            }
+            same
+        });
+        let holds: Vec<bool> = model.roles.iter().map(|&r| r == CellRole::Points).collect();
+        let mut zone = 0.0;
+        if holds.contains(&true) && model.body().is_some() {
+            let parts = Parts::of_cells(model, &holds, Detail::Centre);
+            parts.add_sizes(&mut volume);
+            zone = parts.total();
+        }
+        Self {
+            volume,
+            mixed: by_material,
+            zone,
+        }
+    }
+
+    /// Lumped mass of every site \[kg\]; `density` gives ρ [kg/m^D] of a material's number, `own` is that of the points.
+    pub fn masses(&self, own: u16, density: impl Fn(u16) -> f64) -> Vec<f64> {
+        let of_points = density(own);
+        let mut masses: Vec<f64> = self.volume.iter().map(|v| v * of_points).collect();
+        for &(site, material, volume) in &self.mixed {
+            masses[site as usize] += volume * (density(material) - of_points);
+        }
+        masses
+    }
+}
+
+impl<const D: usize> Model<D> {
+    /// The part of the body that each site stands for.
+    pub fn tributary(&self) -> &Tributary {
+        &self.tributary
+    }
+
+    /// What the row of each site is scaled by; none where rows are those of an energy, or all factors are one.
+    pub fn row_scale(&self) -> Option<&[f64]> {
+        self.row_scale.as_deref()
+    }
+
+    /// Finds the part of each site, and what rows are scaled by.
+    pub(super) fn share_out(&mut self) {
+        let tributary = Tributary::new(self);
+        if !self.has_energy && self.body().is_some() {
+            let factor = |(own, volume): (f64, &f64)| {
+                let ratio = volume / own;
+                match ratio.is_finite() && ratio > LEAST_SCALE {
+                    true if (ratio - 1.0).abs() <= 1e-11 => 1.0,
+                    true => ratio,
+                    // an equation that next to nothing of the body belongs to stays one
+                    false => LEAST_SCALE,
+                }
+            };
+            let own = self.row_volumes().into_iter();
+            let scale: Vec<f64> = own.zip(&tributary.volume).map(factor).collect();
+            self.row_scale = scale.iter().any(|&s| s != 1.0).then_some(scale);
+        }
+        for (site, volume) in self.sites.iter_mut().zip(&tributary.volume) {
+            site.volume = *volume;
+        }
+        self.tributary = tributary;
+    }
+
+    /// The volume that each row has as it is: of a node that of its hat, of a point that of its part if the lattice went on in the elements.
+    fn row_volumes(&self) -> Vec<f64> {
+        let mut own: Vec<f64> = self.sites.iter().map(|s| s.volume).collect();
+        let is_lattice = self
+            .peridynamics
+            .as_ref()
+            .is_some_and(|p| p.points != PointSource::Cells);
+        if !is_lattice {
+            return own;
+        }
+        let holds = |c: usize| self.roles[c] == CellRole::Points;
+        let own_cells = (0..self.mesh.cell_count()).filter(|&c| holds(c));
+        let nodes: Vec<u32> = own_cells
+            .flat_map(|c| self.mesh.cell(c).iter().copied())
+            .collect();
+        let (low, high) = self.mesh.bounds_of(&nodes);
+        let reach = NEAR * self.spacing();
+        let (low, high) = (low.add_scalar(-reach), high.add_scalar(reach));
+        let around: Vec<bool> = (0..self.mesh.cell_count())
+            .map(|c| {
+                let (from, to) = self.mesh.bounds_of(self.mesh.cell(c));
+                holds(c) || (0..D).all(|k| from[k] <= high[k] && to[k] >= low[k])
+            })
+            .collect();
+        let mut continued = vec![0.0; own.len()];
+        Parts::of_continued_lattice(self, &around).add_sizes(&mut continued);
+        for (own, (site, volume)) in own.iter_mut().zip(self.sites.iter().zip(continued)) {
+            if matches!(site.kind, SiteKind::Point(_)) && volume > 0.0 {
+                *own = volume;
+            }
+        }
+        own
+    }
+
+    /// Whether all sites that are points lie in the cells that `counts` names.
+    pub(super) fn holds_all_points(&self, counts: &[bool]) -> bool {
+        (self.roles.iter().zip(counts)).all(|(&role, &counts)| counts || role != CellRole::Points)
+    }
+
+    /// The number of points among the sites.
+    pub fn point_count(&self) -> usize {
+        let is_point = |s: &&super::Site<D>| matches!(s.kind, SiteKind::Point(_));
+        self.sites.iter().filter(is_point).count()
+    }
+}
+
+/// How far around the zone its lattice is continued, in spacings: farther than weights reach.
+const NEAR: f64 = 4.0;
+
+/// The least factor of a row: a site whose part nearly vanishes keeps an equation.
+const LEAST_SCALE: f64 = 1e-3;
