@@ -62,7 +62,7 @@ enum Command {
     #[command(
         after_help = "Any key of the scene can be set: --set mesh.rectangle.x.cells=240, --set coupling=local, \
                             --set 'conditions.top.displacement.y=\"1e-3*x\"'. A choice that differs replaces the whole table.\n\n\
-                            Exit status: 0 done, 1 wrong or impossible, 2 wrong arguments, 3 damage reached the edge of the nonlocal zone, 130 interrupted."
+                            Exit status: 0 done, 1 wrong or impossible, 2 wrong arguments, 3 stopped at a limit (damage at the edge of the nonlocal zone, energy gained without work, rotation), 130 interrupted."
     )]
     Run {
         #[command(flatten)]
@@ -304,7 +304,9 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                 .map_err(|e| miette::miette!("{e}"))?;
             let code = match summary.motion.as_ref().map(|m| m.ended) {
                 None | Some(Ended::Finished) => ExitCode::SUCCESS,
-                Some(Ended::DamageAtEdge) => ExitCode::from(AT_EDGE),
+                Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => {
+                    ExitCode::from(AT_EDGE)
+                }
                 Some(Ended::Interrupted) => ExitCode::from(INTERRUPTED),
             };
             if json {

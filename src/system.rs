@@ -74,6 +74,11 @@ pub trait Dynamic: Send + Sync {
         BlockCsr::default()
     }
 
+    /// The sites at which rows of the tangent may differ from their columns; all of them if the system does not know.
+    fn seam_sites(&self) -> Vec<u32> {
+        (0..self.mass().len() as u32).collect()
+    }
+
     /// Whether the tangent is symmetric, so that there is an energy to conserve.
     fn symmetry(&self) -> Symmetry;
 

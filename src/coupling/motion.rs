@@ -402,6 +402,13 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         )
     }
 
+    fn seam_sites(&self) -> Vec<u32> {
+        let sites = 0..self.mass.len() as u32;
+        sites
+            .filter(|&s| self.linear.has(s as usize) && !self.energy.is_inner(s))
+            .collect()
+    }
+
     fn symmetry(&self) -> Symmetry {
         self.symmetry
     }

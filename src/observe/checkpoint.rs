@@ -24,7 +24,7 @@ use super::file::{sync_folder, write_whole};
 const MAGIC: &[u8; 8] = b"bondline";
 
 /// The version of the format; a change of what is saved changes it.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Bytes before the state: letters, version, identity.
 const HEAD: usize = 8 + 4 + 8;

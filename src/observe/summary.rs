@@ -211,6 +211,9 @@ pub struct RunSummary {
     /// What may be inaccurate.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+    /// The largest rotation of a finite element, from 2 degrees on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<Rotation>,
     /// What became of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSummary>,
@@ -228,6 +231,80 @@ pub enum Ended {
     Interrupted,
     /// Damage reached the edge of the nonlocal zone.
     DamageAtEdge,
+    /// The motion gained more energy without work than the scene allows.
+    EnergyGained,
+    /// An element rotated more than the scene allows.
+    ElementsRotated,
+}
+
+/// Energy that a motion gained without work: what a coupling of unsymmetric stiffness feeds to it.
+///
+/// Parts are those of the largest energy so far, or of the work where that is larger.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EnergyGain {
+    /// The largest part; negative where energy was only lost.
+    pub largest: f64,
+    /// The step at which it was found.
+    pub step: u64,
+    /// The time of that step.
+    pub time: f64,
+    /// The part at which the run stops.
+    pub limit: f64,
+    /// Step and time at which it first went beyond 1 %.
+    pub first_told: Option<(u64, f64)>,
+}
+
+impl EnergyGain {
+    /// What a summary warns of, from 1 % on.
+    pub fn warning(&self) -> Option<String> {
+        let (step, time) = self.first_told?;
+        Some(format!(
+            "the motion gained {:.1} % of its largest energy without work by step {}, t = {} (1 % at step {step}, t = {}): the stiffness is not symmetric, and the seam feeds its modes; results from there on are not to be trusted: make the run shorter, or use coupling.truncated",
+            100.0 * self.largest,
+            self.step,
+            number(self.time),
+            number(time)
+        ))
+    }
+}
+
+/// The largest rotation of a finite element, where it matters: elements are linear.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rotation {
+    /// The angle in degrees.
+    pub degrees: f64,
+    /// The centre of the element.
+    pub place: Vec<f64>,
+    /// Step and time, of a run in time or under a load that grows.
+    pub when: Option<(u64, f64)>,
+    /// What linear elements add to lengths at this angle, `1/cos θ − 1`.
+    pub length_error: f64,
+    /// Energy of the misfit between elements and a zone of exact bonds, as a part of the largest energy of the run; none where bonds are linear as well, or nothing moves.
+    pub energy_error: Option<f64>,
+}
+
+impl Rotation {
+    /// What a summary warns of.
+    pub fn warning(&self) -> String {
+        let when = self.when.map_or_else(String::new, |(step, time)| {
+            format!(" at step {step}, t = {}", number(time))
+        });
+        let energy = match self.energy_error {
+            Some(part) if part < 1.0 => format!(
+                "; against the exact bonds of the nonlocal zone that takes an estimated {} % of the energy of the run",
+                number(100.0 * part)
+            ),
+            Some(_) => "; against the exact bonds of the nonlocal zone that takes all of the energy of the run"
+                .to_owned(),
+            None => String::new(),
+        };
+        format!(
+            "a finite element at ({}) has rotated by {:.1} degrees{when}: elements are linear, and rotated by so much they are {} % too large{energy}; where that matters let coupling = \"nonlocal\" carry what rotates",
+            components(&self.place),
+            self.degrees,
+            number(100.0 * self.length_error)
+        )
+    }
 }
 
 /// What became of a scene in time.
@@ -253,6 +330,8 @@ pub struct MotionSummary {
     pub external_work: f64,
     /// Energy at the start and work, less kinetic and stored energy: what broken bonds took, and what the seam did.
     pub missing_energy: f64,
+    /// Energy gained without work; none of a motion whose balance closes by construction.
+    pub energy_gain: Option<EnergyGain>,
     /// Bonds broken, each once for each direction.
     pub broken_bonds: u64,
     /// When damage reached the edge of the nonlocal zone, and where.
@@ -313,6 +392,18 @@ impl MotionSummary {
             Ended::DamageAtEdge => writeln!(
                 f,
                 "stopped                where damage reached that edge; zones.damage-at-edge = \"warn\" goes on"
+            ),
+            Ended::EnergyGained => {
+                let limit = self.energy_gain.map_or(0.0, |g| g.limit);
+                writeln!(
+                    f,
+                    "stopped                where energy gained without work passed {} % of the largest; solve.explicit.largest-energy-gain sets the part",
+                    number(100.0 * limit)
+                )
+            }
+            Ended::ElementsRotated => writeln!(
+                f,
+                "stopped                where an element rotated beyond largest-rotation"
             ),
         }
     }

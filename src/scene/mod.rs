@@ -52,6 +52,7 @@ mod peridynamics;
 mod predict;
 mod proof;
 mod region;
+mod rotation;
 mod run;
 mod solve;
 mod source;

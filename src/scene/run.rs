@@ -14,6 +14,7 @@ use super::materials::{Law, Material};
 use super::motion::{self, RunOptions};
 use super::peridynamics::Points;
 use super::proof::{self, Subject};
+use super::rotation::Rotations;
 use super::solve::Solve;
 use super::spec::{Joining, SurfacesSpec, WeightsSpec};
 use super::validate::{Output, Scene, Solver};
@@ -26,7 +27,7 @@ use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointError, Fingerprint};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
-    Applied, Choice, Reaction, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
+    Applied, Choice, Reaction, Rotation, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
 use crate::peridynamics::FractureError;
 use crate::peridynamics::{
@@ -66,6 +67,24 @@ pub enum RunError {
     /// The time step, or the model at any step, is not stable.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A mode of the coupled model doubles the energy within the run, whatever the step.
+    #[error(
+        "this model is unstable in time at any step: a mode largest at ({}) grows as exp({rate:e} t), by exp({gain:.1}) over the run (eigenvalue {real:e} + {imaginary:e} i of M⁻¹K, which should be real and positive); {remedy}; or let it begin with solve.explicit.growing-modes = \"warn\"", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+    )]
+    Grows {
+        /// Where the mode is largest.
+        place: Vec<f64>,
+        /// σ \[1/s\].
+        rate: f64,
+        /// σ times the duration of the run.
+        gain: f64,
+        /// Real part of its eigenvalue \[1/s²\].
+        real: f64,
+        /// Imaginary part.
+        imaginary: f64,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// The stiffest sites cannot take sub-steps.
     #[error(transparent)]
     SubCycling(#[from] SubCyclingError),
@@ -283,6 +302,12 @@ pub fn solve_with<const D: usize>(
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
+    let rotations = Rotations::new(model, true);
+    let rotation = rotations
+        .largest(u)
+        .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
+    let mut told = warnings(model, joining, &proof);
+    told.extend(rotation.as_ref().map(Rotation::warning));
     let summary = RunSummary {
         scene: name,
         dimension: D,
@@ -304,8 +329,9 @@ pub fn solve_with<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: warnings(model, joining, &proof),
+        warnings: told,
         proof,
+        rotation,
         iterations: info.iterations,
         factor_nonzeros: info.factor_nnz,
         residual: info.relative_residual,

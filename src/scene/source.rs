@@ -227,6 +227,10 @@ const WITHOUT_EFFECT: &[&[&str]] = &[
     &["title"],
     &["output", "directory"],
     &["zones", "damage-at-edge"],
+    &["solve", "explicit", "growing-modes"],
+    &["solve", "explicit", "largest-energy-gain"],
+    &["solve", "explicit", "largest-rotation"],
+    &["solve", "quasi-static", "largest-rotation"],
     &["solve", "explicit", "checkpoint-every"],
     &["solve", "quasi-static", "checkpoint-every"],
 ];

@@ -9,6 +9,7 @@ pub mod growth;
 pub mod krylov;
 mod multifrontal;
 pub mod multigrid;
+mod neighbourhood;
 pub mod ordering;
 pub mod quasi_static;
 pub mod rehearsal;

@@ -173,6 +173,12 @@ impl<'a> Scaled<'a> {
         x
     }
 
+    /// How large a mode is at a site, in displacements.
+    pub(super) fn size_at(&self, mode: &[f64], site: usize) -> f64 {
+        let d = self.system.block().max(1);
+        (site * d..(site + 1) * d).fold(0.0, |m: f64, k| m.max((mode[k] * self.root[k]).abs()))
+    }
+
     /// The site where a mode is largest, in displacements.
     pub(super) fn site_of(&self, mode: &[f64]) -> usize {
         let size = |k: usize| (mode[k] * self.root[k]).abs();

@@ -2,7 +2,12 @@
 
 mod b;
 mod e;
+mod f;
+mod g_growth;
+mod h;
 mod o;
+mod s;
+mod t;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -48,6 +48,11 @@ impl ElementEnergy {
         Self { inner, seam, rows }
     }
 
+    /// Whether the row of a site is that of finite elements alone.
+    pub fn is_inner(&self, site: u32) -> bool {
+        self.inner.binary_search(&site).is_ok()
+    }
+
     pub fn of<const D: usize>(&self, linear: &SiteRows, nodes: &Transfer, u: &[f64]) -> f64 {
         let inner: f64 = self
             .inner

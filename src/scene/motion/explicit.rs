@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::RunOptions;
+use super::guard::{Balance, Guard};
 use super::laid_out::{Begun, LaidOut, begun, breaks, lay_out, opened};
 use super::ready::{Before, Between, Ready};
 use super::record::{Breaks, EdgeReached, Moment, Saved};
@@ -15,7 +16,8 @@ use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::summary::{
-    Ended, MotionSummary, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
+    Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Sizes, Stopwatch, Timings,
+    peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::scene::doubts::warnings;
@@ -142,12 +144,13 @@ fn leg<'r, const D: usize>(
     let LaidOut {
         title,
         joining,
-        growing,
+        remedy,
+        proved,
         model,
         operator,
         moving,
         mut choices,
-        proof,
+        mut proof,
         mut timings,
         mut watch,
         ..
@@ -158,6 +161,8 @@ fn leg<'r, const D: usize>(
         rest,
         spec,
         moving,
+        remedy,
+        proved,
         choices: &mut choices,
         timings: &mut timings,
         watch: &mut watch,
@@ -170,6 +175,8 @@ fn leg<'r, const D: usize>(
         drive,
         mut edge,
         mut zone,
+        seen,
+        growth,
         told,
         taken: (taken_before, seconds_before),
         resumed,
@@ -177,13 +184,15 @@ fn leg<'r, const D: usize>(
     } = match from {
         From::Start(file, saved) => {
             let saved = saved.map(|saved| *saved);
-            before.at_start(growing, options.checkpoint_every, file, saved)?
+            before.at_start(options.checkpoint_every, file, saved)?
         }
         From::Switch(between) => before.after_switch(*between)?,
     };
     let breaks = breaks(moving.system.as_ref(), rest);
     let zones = run::zone_of_site(model);
     let is_linear = moving.is_linear;
+    let balance = proved.map_or(Balance::Watched, |_| Balance::Proved);
+    let mut guard = Guard::new(model, balance, spec, is_linear, pace.steps, seen);
     let eyes = match &rest.follow {
         Some(follow) => critical_stretch(model, rest)?
             .zip(model.body())
@@ -215,11 +224,13 @@ fn leg<'r, const D: usize>(
         let moment = moment(&motion, is_linear);
         if !resumed {
             recorder.begin(&moment);
-            recorder.row(&moment, place)?;
+            let energies = recorder.energies(&moment);
+            guard.look_at_energies(&moment, &energies);
+            recorder.row(&moment, energies, place)?;
             solved(&moment.state.u, &mut |s| recorder.output(&moment, s))?;
         }
         if due {
-            recorder.checkpoint(&moment, pace, edge, zone.clone())?;
+            recorder.checkpoint(&moment, pace, edge, zone.clone(), &guard.seen)?;
         }
     }
     // a checkpoint that an interrupt left behind, in the step in which the zone was to be looked at
@@ -287,23 +298,31 @@ fn leg<'r, const D: usize>(
                 edge = None;
             }
         }
+        let (before, after) = (pace.time(state.step - 1), pace.time(state.step));
+        let row_is_due = last || is_due(before, after, spec.history_interval);
+        let energies =
+            (row_is_due || guard.wants_energies(state.step)).then(|| recorder.energies(&moment));
+        let gained = energies.and_then(|e| guard.look_at_energies(&moment, &e));
+        let limit = guard.look_at_rotation(&moment, last).or(gained);
         if edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
             ended = Some(Ended::DamageAtEdge);
+        } else if limit.is_some() {
+            ended = limit;
         } else if options.interrupt.is_some_and(|i| i.load(Ordering::Relaxed)) && !last {
             ended = Some(Ended::Interrupted);
         }
-        let at_edge = ended == Some(Ended::DamageAtEdge);
+        let stops = ended.is_some_and(|e| e != Ended::Interrupted);
         if let (Some(_), Some(zone)) = (ended, &mut zone) {
             // the run that goes on from here looks again
             zone.looked = false;
             next = None;
         }
         let mut write = || -> Result<(), ObserveError> {
-            let (before, after) = (pace.time(state.step - 1), pace.time(state.step));
-            if last || at_edge || is_due(before, after, spec.history_interval) {
-                recorder.row(&moment, place)?;
+            if row_is_due || stops {
+                let energies = energies.unwrap_or_else(|| recorder.energies(&moment));
+                recorder.row(&moment, energies, place)?;
             }
-            if last || at_edge || is_due(before, after, spec.output_interval) {
+            if last || stops || is_due(before, after, spec.output_interval) {
                 solved(&state.u, &mut |s| recorder.output(&moment, s))?;
             }
             let leave = ended.is_some() || (last && recorder.keeps_state());
@@ -312,7 +331,7 @@ fn leg<'r, const D: usize>(
                     // of the state in the next layout
                     is_late = true;
                 } else {
-                    recorder.checkpoint(&moment, pace, edge, zone.clone())?;
+                    recorder.checkpoint(&moment, pace, edge, zone.clone(), &guard.seen)?;
                 }
             }
             Ok(())
@@ -368,7 +387,7 @@ fn leg<'r, const D: usize>(
             let next = Begun {
                 title,
                 joining,
-                growing,
+                remedy,
                 choices,
                 timings: Timings::default(),
                 watch: Stopwatch::start(),
@@ -384,6 +403,8 @@ fn leg<'r, const D: usize>(
                 pace,
                 edge,
                 zone,
+                seen: guard.seen,
+                growth,
                 taken,
             };
             return Ok(Leg::Switch(next, Box::new(between)));
@@ -397,6 +418,12 @@ fn leg<'r, const D: usize>(
     let stored = moment.system.stored_energy(&moment.state.u);
     let state = moment.state;
     let (_, applied) = loads::loads(model, &rest.conditions, state.time)?;
+    let energy_gain = guard.energy_gain();
+    let rotation = guard.rotation();
+    proof.parts.extend(growth);
+    let mut told = warnings(model, joining, &proof);
+    told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
+    told.extend(rotation.as_ref().map(Rotation::warning));
     let (switches, shares) = zone.map_or((Vec::new(), [0.0; 2]), |z| (z.switches, z.shares));
     Ok(Leg::Ended(Box::new(RunSummary {
         scene: title,
@@ -407,9 +434,10 @@ fn leg<'r, const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: warnings(model, joining, &proof),
+        warnings: told,
         proof,
         applied,
+        rotation,
         motion: Some(MotionSummary {
             ended,
             steps: state.step,
@@ -421,6 +449,7 @@ fn leg<'r, const D: usize>(
             stored_energy: stored,
             external_work: state.work,
             missing_energy: recorder.energy_at_start + state.work - moment.kinetic - stored,
+            energy_gain,
             broken_bonds: state.broken,
             edge_reached: edge.map(|e| {
                 let x = place(e.site as usize);

@@ -1,7 +1,6 @@
 //! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::record::{Breaks, Saved};
-use super::stability::Growing;
 use super::system::{Moving, dynamic};
 use super::{RunOptions, StartFrom};
 use crate::coupling::{BrokenBonds, Model, Operator, Problem};
@@ -9,7 +8,7 @@ use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Choice, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
-use crate::scene::proof::{self, Subject};
+use crate::scene::proof::{self, Subject, growth};
 use crate::scene::run::{self, Rest, RunError};
 use crate::scene::spec::Joining;
 use crate::scene::validate::Scene;
@@ -19,7 +18,9 @@ use crate::system::Dynamic;
 pub(super) struct LaidOut<'a, const D: usize> {
     pub title: String,
     pub joining: Joining,
-    pub growing: Growing,
+    pub remedy: &'static str,
+    /// What shows that no mode grows, if anything does.
+    pub proved: Option<&'static str>,
     pub model: &'a Model<D>,
     pub operator: &'a dyn Operator<D>,
     pub rest: &'a Rest<D>,
@@ -37,7 +38,7 @@ pub(super) struct LaidOut<'a, const D: usize> {
 pub(super) struct Begun {
     pub title: String,
     pub joining: Joining,
-    pub growing: Growing,
+    pub remedy: &'static str,
     pub choices: Vec<Choice>,
     pub timings: Timings,
     pub watch: Stopwatch,
@@ -48,7 +49,7 @@ pub(super) fn begun<const D: usize>(scene: Scene<D>) -> (Begun, Problem<D>, Rest
     let watch = Stopwatch::start();
     let title = scene.title.clone();
     let joining = scene.coupling.joining();
-    let growing = Growing::of(&scene.coupling);
+    let remedy = growth::remedy(&scene.coupling);
     let mut timings = Timings::default();
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
@@ -57,7 +58,7 @@ pub(super) fn begun<const D: usize>(scene: Scene<D>) -> (Begun, Problem<D>, Rest
     let begun = Begun {
         title,
         joining,
-        growing,
+        remedy,
         choices: rest.made().cloned().collect(),
         timings,
         watch,
@@ -77,7 +78,7 @@ pub(super) fn lay_out<const D: usize, T>(
     let Begun {
         title,
         joining,
-        growing,
+        remedy,
         mut choices,
         mut timings,
         mut watch,
@@ -96,6 +97,7 @@ pub(super) fn lay_out<const D: usize, T>(
         &mut choices,
         progress,
     )?;
+    let proved = growth::proved(&model, operator.as_ref(), moving.system.as_ref());
     watch.lap(&mut timings, "rows and bonds");
     let proof = proof::prove(
         &Subject {
@@ -112,7 +114,8 @@ pub(super) fn lay_out<const D: usize, T>(
     let done = then(LaidOut {
         title,
         joining,
-        growing,
+        remedy,
+        proved,
         model: &model,
         operator: operator.as_ref(),
         rest,

@@ -9,7 +9,7 @@
 //! | `ready.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
 //! | `quasi_static.rs` | the run under a load that grows |
 //! | `pace.rs` | the time step, with sub-cycling |
-//! | `stability.rs` | whether the motion stays bounded |
+//! | `guard.rs` | what is watched meanwhile: energy, rotation of elements |
 //! | `predict.rs` | what a run in time will need |
 //! | `watch.rs` | where a zone that follows the crack is wanted |
 //! | `switching.rs` | what a change of the zone carries over, and what it costs |
@@ -18,13 +18,13 @@
 mod cells;
 mod drive;
 mod explicit;
+mod guard;
 mod laid_out;
 mod pace;
 mod predict;
 mod quasi_static;
 mod ready;
 mod record;
-mod stability;
 mod switching;
 mod system;
 mod watch;

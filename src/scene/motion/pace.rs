@@ -1,12 +1,12 @@
 //! The time step of a run: the stable one of what moves, sub-cycled where the scene wants it.
 
 use super::record::StepChoice;
-use super::stability::{self, Growing};
 use super::system::Moving;
 use crate::coupling::Model;
-use crate::observe::{report::number, summary::Choice};
+use crate::observe::{proof::Part, report::number, summary::Choice};
 use crate::scene::conditions::Condition;
 use crate::scene::loads::holders;
+use crate::scene::proof::growth::{self, Asked};
 use crate::scene::run::RunError;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::BeyondLimitSpec;
@@ -21,12 +21,12 @@ use crate::system::Dynamic;
 /// [`RunError::Step`] for a step beyond the stable one or a motion that grows, [`RunError::SubCycling`].
 pub(super) fn paced<'a>(
     spec: &Spec,
-    growing: Growing,
+    asked: &Asked<'_>,
     moving: Moving<'a>,
     held: &[u32],
     known: Option<StepChoice>,
     choices: &mut Vec<Choice>,
-) -> Result<(Moving<'a>, StepChoice), RunError> {
+) -> Result<(Moving<'a>, StepChoice, Option<Part>), RunError> {
     let fine = match spec.sub_steps {
         None => None,
         Some(n) => match FineSites::find(moving.system.as_ref(), held, n) {
@@ -42,17 +42,17 @@ pub(super) fn paced<'a>(
         },
     };
     let Some(fine) = fine else {
-        let pace = match known {
-            Some(pace) => pace,
+        let (pace, growth) = match known {
+            Some(pace) => (pace, None),
             None => {
                 let system = moving.system.as_ref();
                 let limit = stable_step(system, held)?;
                 let pace = choose_step(spec, &limit, system, held, choices)?;
-                stability::check(growing, system, held, &pace, choices)?;
-                pace
+                let growth = growth::check(asked, system, held, (pace.step, pace.steps))?;
+                (pace, Some(growth))
             }
         };
-        return Ok((moving, pace));
+        return Ok((moving, pace, growth));
     };
     let (cycled, pace) = match known {
         Some(pace) => (SubCycled::new(moving.system, fine, pace.step), pace),
@@ -82,7 +82,17 @@ pub(super) fn paced<'a>(
         system: Box::new(cycled),
         is_linear: moving.is_linear,
     };
-    Ok((moving, pace))
+    // sub-steps are for symmetric models: what is proved of one holds of it
+    let growth = match known {
+        Some(_) => None,
+        None => Some(growth::check(
+            asked,
+            moving.system.as_ref(),
+            held,
+            (pace.step, pace.steps),
+        )?),
+    };
+    Ok((moving, pace, growth))
 }
 
 /// The time step after a change of what moves: the one before, or a shorter one if that is beyond the fraction of the stable step now.

@@ -17,6 +17,7 @@ use crate::progress::Progress;
 use crate::scene::budget;
 use crate::scene::cost::{TrialFolder, file_seconds, made_up};
 use crate::scene::predict::{MotionPrediction, OUTPUT_BYTES, Planned, Prediction, Share, warnings};
+use crate::scene::proof::growth::Asked;
 use crate::scene::run::{self, RunError, Solved};
 use crate::scene::solve::{Explicit as Spec, QuasiStatic};
 use crate::scene::spec::LoadStepSpec;
@@ -114,14 +115,21 @@ fn steps<const D: usize>(
 ) -> Result<Prediction, RunError> {
     let (model, rest) = (laid_out.model, laid_out.rest);
     let held = held(model, &rest.conditions)?;
-    let (moving, pace) = paced(
+    let asked = Asked {
+        remedy: laid_out.remedy,
+        proved: laid_out.proved,
+        policy: spec.growing_modes,
+        place: &|site| model.sites[site].position.iter().copied().collect(),
+    };
+    let (moving, pace, growth) = paced(
         spec,
-        laid_out.growing,
+        &asked,
         laid_out.moving,
         &held,
         None,
         &mut laid_out.choices,
     )?;
+    laid_out.proof.parts.extend(growth);
     laid_out.moving = moving;
     laid_out.watch.lap(&mut laid_out.timings, "stable step");
 
@@ -172,11 +180,13 @@ fn steps<const D: usize>(
     let shown = moment(&motion, is_linear);
     recorder.begin(&shown);
     let place = |site: usize| model.sites[site].position;
-    recorder.row(&shown, place)?;
+    let energies = recorder.energies(&shown);
+    recorder.row(&shown, energies, place)?;
     let opened = begun.elapsed().as_secs_f64();
     let begun = Instant::now();
     for _ in 0..ROWS {
-        recorder.row(&shown, place)?;
+        let energies = recorder.energies(&shown);
+        recorder.row(&shown, energies, place)?;
     }
     let per_row = begun.elapsed().as_secs_f64() / f64::from(ROWS);
     let per_file = if rest.output.vtu {

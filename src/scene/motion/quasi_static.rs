@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::RunOptions;
 use super::drive::SceneDrive;
 use super::explicit::sizes;
+use super::guard::Seen;
 use super::laid_out::{LaidOut, breaks, laid_out, opened, restore};
 use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
 use super::system::start;
@@ -14,10 +15,13 @@ use crate::coupling::{Model, Operator, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
-use crate::observe::summary::{Choice, Ended, MotionSummary, RunSummary, peak_memory_bytes};
+use crate::observe::summary::{
+    Choice, Ended, MotionSummary, Rotation, RunSummary, peak_memory_bytes,
+};
 use crate::progress::Progress;
 use crate::scene::doubts::warnings;
 use crate::scene::loads;
+use crate::scene::rotation::Rotations;
 use crate::scene::run::{self, Rest, RunError, Solved};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
@@ -156,6 +160,8 @@ fn load_steps<const D: usize>(
     let clock = Instant::now();
     let mut ended = Ended::Finished;
     let mut failed = None;
+    let rotations = Rotations::new(model, moving.is_linear);
+    let mut rotation = None;
     let mut observe = |seen: &LoadStep<'_>| -> ControlFlow<()> {
         drive.load_into(seen.time, &mut load);
         let mut now = seen.force.to_vec();
@@ -184,22 +190,32 @@ fn load_steps<const D: usize>(
         } else if options.interrupt.is_some_and(|i| i.load(Ordering::Relaxed)) && !last {
             ended = Ended::Interrupted;
         }
+        let found = rotations.largest(&state.u);
+        let limit = spec.largest_rotation.unwrap_or(f64::INFINITY);
+        if ended == Ended::Finished && found.as_ref().is_some_and(|r| r.degrees > limit) {
+            ended = Ended::ElementsRotated;
+        }
+        rotation = found.and_then(|r| {
+            let when = Some((state.step, state.time));
+            rotations.told(r.degrees, r.place, 0.0, 0.0, when)
+        });
         let moment = Moment::at_rest(&state, seen.system);
         let shown = begins
             || last
-            || ended == Ended::DamageAtEdge
+            || matches!(ended, Ended::DamageAtEdge | Ended::ElementsRotated)
             || state.step.is_multiple_of(spec.output_every as u64);
         let leave = ended != Ended::Finished || (last && recorder.keeps_state());
         let mut write = || -> Result<(), ObserveError> {
             if begins {
                 recorder.begin(&moment);
             }
-            recorder.row(&moment, place)?;
+            let energies = recorder.energies(&moment);
+            recorder.row(&moment, energies, place)?;
             if shown {
                 solved(&state.u, &mut |s| recorder.output(&moment, s))?;
             }
             if leave || (!begins && recorder.is_checkpoint_due(state.step)) {
-                recorder.checkpoint(&moment, pace, edge, None)?;
+                recorder.checkpoint(&moment, pace, edge, None, &Seen::default())?;
             }
             Ok(())
         };
@@ -239,6 +255,8 @@ fn load_steps<const D: usize>(
         choice: format!("{} products or passes", info.iterations),
         why: "of all load steps of this run".to_owned(),
     });
+    let mut told = warnings(model, joining, &proof);
+    told.extend(rotation.as_ref().map(Rotation::warning));
     Ok(RunSummary {
         scene: title,
         dimension: D,
@@ -248,9 +266,10 @@ fn load_steps<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: warnings(model, joining, &proof),
+        warnings: told,
         proof,
         applied,
+        rotation,
         iterations: info.iterations,
         motion: Some(MotionSummary {
             ended,
@@ -263,6 +282,7 @@ fn load_steps<const D: usize>(
             stored_energy: stored,
             external_work: state.work,
             missing_energy: recorder.energy_at_start + state.work - stored,
+            energy_gain: None,
             broken_bonds: state.broken,
             edge_reached: edge.map(|e| (e.time, place(e.site as usize).iter().copied().collect())),
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),

@@ -1,15 +1,17 @@
 //! What the steps with one layout of the zones begin with: at time zero, at a checkpoint, or where the zones have changed.
 
 use super::drive::SceneDrive;
+use super::guard::Seen;
 use super::laid_out::{breaks, restore};
 use super::pace::{held, paced, repaced};
 use super::record::{EdgeReached, Recorder, Saved, StepChoice, Zone};
-use super::stability::Growing;
 use super::switching::Leaving;
 use super::system::{Moving, start};
 use crate::coupling::{BrokenBonds, Model, Sampler};
 use crate::observe::checkpoint::{CheckpointFile, Pace};
+use crate::observe::proof::Part;
 use crate::observe::summary::{Choice, Stopwatch, Timings, bytes_text};
+use crate::scene::proof::growth::Asked;
 use crate::scene::run::{Rest, RunError};
 use crate::scene::solve::Explicit as Spec;
 use crate::solve::explicit::State;
@@ -30,6 +32,8 @@ pub(super) struct Between<'a, const D: usize> {
     pub pace: StepChoice,
     pub edge: Option<EdgeReached>,
     pub zone: Option<Zone>,
+    pub seen: Seen,
+    pub growth: Option<Part>,
     /// Steps taken by this program, and their seconds.
     pub taken: (u64, f64),
 }
@@ -43,6 +47,9 @@ pub(super) struct Ready<'r, 'm, const D: usize> {
     pub drive: SceneDrive<'m, D>,
     pub edge: Option<EdgeReached>,
     pub zone: Option<Zone>,
+    pub seen: Seen,
+    /// What is known of modes that grow; none of a run that goes on from a checkpoint.
+    pub growth: Option<Part>,
     pub told: usize,
     pub taken: (u64, f64),
     pub resumed: bool,
@@ -56,6 +63,10 @@ pub(super) struct Before<'a, 'r, 'm, const D: usize> {
     pub rest: &'r Rest<D>,
     pub spec: &'a Spec,
     pub moving: Moving<'m>,
+    /// What to do about modes that grow.
+    pub remedy: &'static str,
+    /// What shows that none does, if anything does.
+    pub proved: Option<&'static str>,
     pub choices: &'a mut Vec<Choice>,
     pub timings: &'a mut Timings,
     pub watch: &'a mut Stopwatch,
@@ -68,7 +79,6 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
     /// [`RunError`] if no stable step is found, or the checkpoint is that of another model.
     pub fn at_start(
         self,
-        growing: Growing,
         every: Option<Pace>,
         file: CheckpointFile,
         saved: Option<Saved>,
@@ -81,7 +91,14 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             why: "read once per step".to_owned(),
         });
         let known = saved.as_ref().map(|saved| saved.pace);
-        let (mut moving, pace) = paced(spec, growing, self.moving, &held, known, self.choices)?;
+        let asked = Asked {
+            remedy: self.remedy,
+            proved: self.proved,
+            policy: spec.growing_modes,
+            place: &|site| model.sites[site].position.iter().copied().collect(),
+        };
+        let (mut moving, pace, growth) =
+            paced(spec, &asked, self.moving, &held, known, self.choices)?;
         self.watch.lap(self.timings, "stable step");
         let drive = driven(model, rest, &begin.u, &pace, spec)?;
         if drive.evaluates_everywhere() {
@@ -103,9 +120,9 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
         )?;
         let resumed = saved.is_some();
         let edge = saved.as_ref().and_then(|s| s.edge);
-        let (state, zone) = match saved {
-            Some(saved) => (saved.state, saved.zone),
-            None => (begin, None),
+        let (state, zone, seen) = match saved {
+            Some(saved) => (saved.state, saved.zone, saved.seen),
+            None => (begin, None, Seen::default()),
         };
         Ok(Ready {
             moving,
@@ -115,6 +132,8 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             drive,
             edge,
             zone: zone.or_else(|| rest.follow.as_ref().map(|_| Zone::first(model))),
+            seen,
+            growth,
             told: self.choices.len(),
             taken: (0, 0.0),
             resumed,
@@ -137,6 +156,8 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             pace,
             edge,
             zone,
+            seen,
+            growth,
             taken,
             ..
         } = between;
@@ -164,6 +185,8 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             drive,
             edge,
             zone: zone.map(|z| z.after(switch, model)),
+            seen,
+            growth,
             told,
             taken,
             resumed: true,

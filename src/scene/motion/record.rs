@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
+use super::guard::Seen;
 use super::switching::{nonlocal, share};
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
@@ -38,6 +39,8 @@ pub(super) struct Saved {
     pub edge: Option<EdgeReached>,
     /// Where a zone that follows the crack stands; none of one that does not.
     pub zone: Option<Zone>,
+    /// What was seen of energy and rotation.
+    pub seen: Seen,
 }
 
 /// Where a zone that follows the crack stands.
@@ -177,6 +180,8 @@ pub(super) struct Row {
     pub stored: f64,
     /// Of loads and supports.
     pub work: f64,
+    /// Of broken bonds.
+    pub dissipated: f64,
     /// What the three leave over: energy of broken bonds, and what the seam takes.
     pub missing: f64,
 }
@@ -270,6 +275,22 @@ impl<'a, const D: usize> Recorder<'a, D> {
         self.energy_at_start = moment.kinetic + moment.system.stored_energy(&moment.state.u);
     }
 
+    /// The energies of a state.
+    pub fn energies(&self, moment: &Moment<'_>) -> Row {
+        let Moment { state, system, .. } = moment;
+        let stored = system.stored_energy(&state.u);
+        Row {
+            kinetic: moment.kinetic,
+            stored,
+            work: state.work,
+            dissipated: match self.breaks {
+                Breaks::Possibly => system.dissipated_energy().unwrap_or(0.0),
+                Breaks::Never => 0.0,
+            },
+            missing: self.energy_at_start + state.work - moment.kinetic - stored,
+        }
+    }
+
     /// Appends to the history and to the tables of tips.
     ///
     /// # Errors
@@ -277,28 +298,23 @@ impl<'a, const D: usize> Recorder<'a, D> {
     pub fn row(
         &mut self,
         moment: &Moment<'_>,
+        energies: Row,
         positions: impl Fn(usize) -> Vector<D>,
     ) -> Result<(), ObserveError> {
         let begun = Instant::now();
         let Moment { state, system, .. } = moment;
-        let stored = system.stored_energy(&state.u);
-        self.last = Row {
-            kinetic: moment.kinetic,
-            stored,
-            work: state.work,
-            missing: self.energy_at_start + state.work - moment.kinetic - stored,
-        };
+        self.last = energies;
         let mut row: Vec<Entry> = vec![
             (state.step as i64).into(),
             state.time.into(),
-            moment.kinetic.into(),
-            stored.into(),
+            energies.kinetic.into(),
+            energies.stored.into(),
             state.work.into(),
         ];
         row.extend(moment.discrete.map(Entry::from));
         if self.breaks == Breaks::Possibly {
-            row.push(moment.system.dissipated_energy().unwrap_or(0.0).into());
-            row.push(self.last.missing.into());
+            row.push(energies.dissipated.into());
+            row.push(energies.missing.into());
             row.push((state.broken as i64).into());
         }
         let mut momentum = [0.0; D];
@@ -394,6 +410,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         pace: StepChoice,
         edge: Option<EdgeReached>,
         zone: Option<Zone>,
+        seen: &Seen,
     ) -> Result<(), ObserveError> {
         let begun = Instant::now();
         let mut bytes = vec![self.history.mark()?];
@@ -411,6 +428,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             },
             edge,
             zone,
+            seen: seen.clone(),
         })?;
         self.last_checkpoint = Instant::now();
         self.seconds += begun.elapsed().as_secs_f64();

@@ -28,8 +28,9 @@ pub use mesh::{
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
-    BeyondLimitSpec, BondsSpec, ContactSpec, EdgeSpec, ExplicitSpec, InitialFieldSpec, InitialSpec,
-    LoadStepSpec, PrecisionSpec, QuasiStaticSpec, SolveSpec, TipSpec,
+    BeyondLimitSpec, BondsSpec, ContactSpec, EdgeSpec, ExplicitSpec, GrowingModesSpec,
+    InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec, SolveSpec,
+    TipSpec,
 };
 pub use region::{
     AutoSpec, BallSpec, BodySpec, BoxSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec,

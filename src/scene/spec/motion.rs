@@ -38,6 +38,15 @@ pub struct ExplicitSpec {
     /// Steps that the stiffest sites take in each step of all others; 1 if left out.
     #[serde(default)]
     pub sub_steps: Option<Count>,
+    /// What becomes of a run in which a mode doubles the energy; "refuse" if left out.
+    #[serde(default)]
+    pub growing_modes: GrowingModesSpec,
+    /// Energy gained without work, as a part of the largest energy, at which the run stops; 0.1 if left out.
+    #[serde(default)]
+    pub largest_energy_gain: Option<Number>,
+    /// Rotation of an element in degrees at which the run stops; none if left out.
+    #[serde(default)]
+    pub largest_rotation: Option<Number>,
     /// Number of VTU files after the first; 20 if left out, 0 for none but first and last.
     #[serde(default)]
     pub outputs: Option<Count>,
@@ -63,6 +72,17 @@ pub enum BeyondLimitSpec {
     Shorten,
 }
 
+/// What becomes of a run in which a mode of the coupled model doubles the energy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum GrowingModesSpec {
+    /// It does not begin.
+    #[default]
+    Refuse,
+    /// It begins with a warning.
+    Warn,
+}
+
 /// States of equilibrium under a load that grows step by step.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -81,6 +101,9 @@ pub struct QuasiStaticSpec {
     /// Most products with the tangent (implicit) or passes over the bonds (relaxation) of one equilibrium; 50000 if left out.
     #[serde(default)]
     pub max_iterations: Option<Count>,
+    /// Rotation of an element in degrees at which the run stops; none if left out.
+    #[serde(default)]
+    pub largest_rotation: Option<Number>,
     /// Number of VTU files after the first; one per step if left out.
     #[serde(default)]
     pub outputs: Option<Count>,

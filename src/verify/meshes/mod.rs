@@ -3,11 +3,13 @@
 //! | file | what |
 //! |---|---|
 //! | `loads.rs` | masses, totals and first moments of loads |
+//! | `motion.rs` | growth that the proof tells of beside that of the run; discrete energy |
 //! | `scene.rs` | a scene as text, run in a folder of its own, and what it summed up |
 //!
 //! A row passes, or the scene is refused with its reason, and both are counted. Nothing here builds a model by another way than a scene does.
 
 pub mod loads;
+mod motion;
 pub mod scene;
 
 use super::Effort;
@@ -15,7 +17,7 @@ use crate::{observe::report::Table, progress::Progress};
 
 /// Every table of the suite.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let tables: &[fn(Effort, &dyn Progress) -> Vec<Table>] = &[loads::run];
+    let tables: &[fn(Effort, &dyn Progress) -> Vec<Table>] = &[loads::run, motion::tables];
     tables
         .iter()
         .flat_map(|table| table(effort, progress))

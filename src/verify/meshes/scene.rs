@@ -67,6 +67,33 @@ pub fn run(text: &str, overrides: &[&str], files: &[(&str, &str)]) -> Result<Run
     scene.run(&Silent).map_err(|e| e.to_string())
 }
 
+/// Runs a scene in time to its end and returns a column of its history.
+///
+/// # Errors
+/// The message of a refusal, or of a history without the column.
+pub fn history(
+    text: &str,
+    overrides: &[&str],
+    files: &[(&str, &str)],
+    column: &str,
+) -> Result<Vec<f64>, String> {
+    let folder = Folder::with(files)?;
+    let scene = load(text, overrides, &folder)?;
+    scene.run(&Silent).map_err(|e| e.to_string())?;
+    let path = folder.path().join("out/scene_history.csv");
+    let table = std::fs::read_to_string(path).map_err(|e| e.to_string())?;
+    let mut lines = table.lines();
+    let header = lines.next().unwrap_or_default();
+    let place = header.split(',').position(|name| name == column);
+    let place = place.ok_or_else(|| format!("the history has no column {column}: {header}"))?;
+    lines
+        .map(|line| {
+            let entry = line.split(',').nth(place).unwrap_or_default();
+            entry.parse().map_err(|_| format!("`{entry}` is no number"))
+        })
+        .collect()
+}
+
 /// What `check` says of a scene, without its error prediction.
 ///
 /// # Errors
