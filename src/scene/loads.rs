@@ -76,6 +76,8 @@ pub(super) fn nearest_points<const D: usize>(
         let free = nodes.iter().filter(|&&n| site_of[n as usize].is_none());
         let free: Vec<Vector<D>> = free.map(|&n| model.mesh.nodes[n as usize]).collect();
         Parts::of_places(model, &free)
+    } else if !may_bound_zone(model, facets) {
+        return Vec::new();
     } else {
         let located = model.mesh.locate_facets(facets).unwrap_or_default();
         let mut zone = located;
@@ -319,11 +321,20 @@ pub(super) fn cells_of<const D: usize>(model: &Model<D>, region: &Region<D>) -> 
         .collect()
 }
 
+/// Whether any of the facets may belong to a cell that holds points: all of its nodes do. To find the cells themselves takes all facets of the mesh.
+pub(super) fn may_bound_zone<const D: usize>(model: &Model<D>, facets: &[Facet]) -> bool {
+    let at_zone = |facet: &Facet| facet.iter().all(|&n| model.touches_points(n));
+    facets.iter().any(at_zone)
+}
+
 /// Facets of finite elements, and those of cells that hold points.
 pub(super) fn split_facets<const D: usize>(
     model: &Model<D>,
     facets: &[Facet],
 ) -> (Vec<Facet>, Vec<BoundaryFacet>) {
+    if !may_bound_zone(model, facets) {
+        return (facets.to_vec(), Vec::new());
+    }
     // a facet without a cell is an element's as far as anybody knows
     let Ok(located) = model.mesh.locate_facets(facets) else {
         return (facets.to_vec(), Vec::new());

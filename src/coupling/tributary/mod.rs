@@ -164,6 +164,14 @@ impl<const D: usize> Model<D> {
         own
     }
 
+    /// Whether a node of the mesh belongs to a cell that holds points.
+    pub fn touches_points(&self, node: u32) -> bool {
+        let (offsets, cells) = self.node_cells();
+        let own = offsets[node as usize] as usize..offsets[node as usize + 1] as usize;
+        let holds = |&c: &u32| self.roles[c as usize] == CellRole::Points;
+        cells[own].iter().any(holds)
+    }
+
     /// Whether all sites that are points lie in the cells that `counts` names.
     pub(super) fn holds_all_points(&self, counts: &[bool]) -> bool {
         (self.roles.iter().zip(counts)).all(|(&role, &counts)| counts || role != CellRole::Points)

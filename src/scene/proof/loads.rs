@@ -10,7 +10,7 @@ use crate::mesh::boundary::BoundaryFacet;
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
 use crate::scene::conditions::{Components, Condition, Prescribed, Support};
-use crate::scene::loads::{Loads, cells_of, nearest_points, site_of_node};
+use crate::scene::loads::{Loads, cells_of, may_bound_zone, nearest_points, site_of_node};
 use crate::scene::run::RunError;
 use crate::system::Symmetry;
 use crate::tensor::Vector;
@@ -316,6 +316,10 @@ fn unbalanced<const D: usize>(model: &Model<D>, condition: &Condition<D>) -> Opt
             Support::Inside(_) => return None,
         },
     };
+    let has_stress = model.roles.contains(&CellRole::StressElement);
+    if !has_stress && !may_bound_zone(model, facets) {
+        return None;
+    }
     let mixes = |c: usize| match model.roles[c] {
         CellRole::Points => model.zones[c] != Zone::Nonlocal,
         CellRole::StressElement => true,

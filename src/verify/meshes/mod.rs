@@ -15,9 +15,12 @@ pub mod scene;
 use super::Effort;
 use crate::{observe::report::Table, progress::Progress};
 
+/// The tables of one file.
+type Tables = fn(Effort, &dyn Progress) -> Vec<Table>;
+
 /// Every table of the suite.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let tables: &[fn(Effort, &dyn Progress) -> Vec<Table>] = &[loads::run, motion::tables];
+    let tables: &[Tables] = &[loads::run, motion::tables];
     tables
         .iter()
         .flat_map(|table| table(effort, progress))
