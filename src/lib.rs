@@ -166,6 +166,7 @@ pub mod mesh;
 pub mod observe;
 pub mod peridynamics;
 pub mod progress;
+mod regular_file;
 pub mod scene;
 pub mod shape;
 pub mod solve;

@@ -1,10 +1,10 @@
 //! The command line: arguments to a scene, its run, a report and an exit code.
 
-use std::fmt::Display;
-use std::io::Write;
+mod command;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use bondline::observe::checkpoint::Pace;
@@ -21,11 +21,16 @@ use bondline::verify::{self, Effort};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Parser, Subcommand, ValueEnum};
 
+use command::interrupt::{self, INTERRUPTED};
+use command::memory::{self, Allocator};
+use command::terminal::{print, tell};
+use command::threads::{self, Oversubscribe};
+
+#[global_allocator]
+static ALLOCATOR: Allocator = Allocator;
+
 /// Exit status of a run that stopped where damage reached the edge of the nonlocal zone.
 const AT_EDGE: u8 = 3;
-
-/// Exit status of a run that was interrupted and left a checkpoint, as shells have it.
-const INTERRUPTED: u8 = 130;
 
 const EXAMPLES: &str = "Examples:
   bondline new plate.toml                     write a commented scene to start from
@@ -62,7 +67,7 @@ enum Command {
     #[command(
         after_help = "Any key of the scene can be set: --set mesh.rectangle.x.cells=240, --set coupling=local, \
                             --set 'conditions.top.displacement.y=\"1e-3*x\"'. A choice that differs replaces the whole table.\n\n\
-                            Exit status: 0 done, 1 wrong or impossible, 2 wrong arguments, 3 stopped at a limit (damage at the edge of the nonlocal zone, energy gained without work, rotation), 130 interrupted."
+                            Exit status: 0 done, 1 wrong or impossible, 2 wrong arguments, 3 stopped at a limit (damage at the edge of the nonlocal zone, energy gained without work, rotation), 4 memory exhausted, 130 interrupted."
     )]
     Run {
         #[command(flatten)]
@@ -76,6 +81,9 @@ enum Command {
         /// Number of threads; all cores if left out.
         #[arg(long, value_name = "N")]
         threads: Option<usize>,
+        /// Start more than four threads per core, if --threads says so.
+        #[arg(long)]
+        oversubscribe: bool,
         /// Write a checkpoint after so many steps, or so much time: 1000, 30s, 10min, 2h.
         #[arg(long, value_name = "PACE")]
         checkpoint_every: Option<Pace>,
@@ -145,6 +153,19 @@ enum Command {
     },
 }
 
+impl Command {
+    /// The most memory to use, if it is typed.
+    fn memory(&self) -> Option<u64> {
+        match self {
+            Self::Run { scene, .. } | Self::Check { scene, .. } | Self::Converge { scene, .. } => {
+                scene.memory
+            }
+            Self::Trade(arguments) => arguments.scene.memory,
+            Self::New { .. } | Self::Schema | Self::Verify { .. } => None,
+        }
+    }
+}
+
 #[derive(clap::Args)]
 struct SceneArguments {
     /// The scene, a TOML file.
@@ -152,6 +173,9 @@ struct SceneArguments {
     /// Set a key of the scene; the value is TOML, or else text.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// The most memory to use: 500MB, 4GiB; what is free if left out.
+    #[arg(long, value_name = "SIZE", value_parser = memory::size)]
+    memory: Option<u64>,
 }
 
 #[derive(clap::Args)]
@@ -251,7 +275,7 @@ fn main() -> ExitCode {
     match execute(Arguments::parse().command) {
         Ok(code) => code,
         Err(report) => {
-            eprintln!("{report:?}");
+            tell(format_args!("{report:?}"));
             ExitCode::FAILURE
         }
     }
@@ -266,21 +290,22 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 fn execute(command: Command) -> miette::Result<ExitCode> {
+    memory::limit(command.memory());
     match command {
         Command::Run {
             scene,
             json,
             output,
             threads,
+            oversubscribe,
             checkpoint_every,
             resume,
         } => {
-            if let Some(n) = threads {
-                rayon::ThreadPoolBuilder::new()
-                    .num_threads(n)
-                    .build_global()
-                    .map_err(|e| miette::miette!("cannot start {n} threads: {e}"))?;
-            }
+            let oversubscribe = match oversubscribe {
+                true => Oversubscribe::Allowed,
+                false => Oversubscribe::Refused,
+            };
+            threads::start(threads, oversubscribe)?;
             let mut scene = load(&scene)?;
             if let Some(directory) = output {
                 scene.set_output_directory(directory);
@@ -290,6 +315,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                     "a static scene has no checkpoints: leave out --resume and --checkpoint-every, or add [solve.explicit]"
                 ));
             }
+            let interrupt = scene.moves().then(interrupt::listen).transpose()?;
             let options = RunOptions {
                 start: if resume {
                     StartFrom::Checkpoint
@@ -297,7 +323,8 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                     StartFrom::Beginning
                 },
                 checkpoint_every,
-                interrupt: scene.moves().then(interrupt).transpose()?,
+                interrupt: interrupt.map(|i| &i.asked),
+                heeds: interrupt.map(|i| &i.heeded),
             };
             let summary = scene
                 .run_with(&options, &TerminalProgress::on_stderr())
@@ -363,7 +390,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             let name = format!("{}-{}", stem.to_string_lossy(), found.refinement.name());
             let csv = output.join(format!("{name}.csv"));
             found.write_csv(&csv).map_err(|e| miette::miette!("{e}"))?;
-            eprintln!("wrote {}", csv.display());
+            tell(format_args!("wrote {}", csv.display()));
             // levels that agree to round-off leave nothing to plot on logarithmic axes
             if found.orders().iter().any(Option::is_some) {
                 let svg = output.join(format!("{name}.svg"));
@@ -371,7 +398,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                     .plot()
                     .write(&svg)
                     .map_err(|e| miette::miette!("{e}"))?;
-                eprintln!("wrote {}", svg.display());
+                tell(format_args!("wrote {}", svg.display()));
             }
         }
         Command::New { path, template } => {
@@ -410,7 +437,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                     let start = Instant::now();
                     let tables = (suite.run)(effort, &progress);
                     let seconds = start.elapsed().as_secs_f64();
-                    eprintln!("{}: {seconds:.1} s", suite.name);
+                    tell(format_args!("{}: {seconds:.1} s", suite.name));
                     Outcome {
                         suite,
                         tables,
@@ -419,12 +446,12 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                 })
                 .collect();
             let total: f64 = outcomes.iter().map(|o| o.seconds).sum();
-            eprintln!("{} suite(s): {total:.1} s", outcomes.len());
+            tell(format_args!("{} suite(s): {total:.1} s", outcomes.len()));
             if let Some(path) = markdown {
                 std::fs::write(&path, page(&outcomes, effort)).map_err(|e| {
                     miette::miette!("cannot write {}: {e}; check the folder", path.display())
                 })?;
-                eprintln!("wrote {}", path.display());
+                tell(format_args!("wrote {}", path.display()));
             }
             let tables: Vec<report::Table> = outcomes.into_iter().flat_map(|o| o.tables).collect();
             let format = if json {
@@ -473,10 +500,12 @@ fn traded(arguments: TradeArguments) -> miette::Result<ExitCode> {
     };
     let program =
         std::env::current_exe().map_err(|e| miette::miette!("cannot find this program: {e}"))?;
+    let interrupt = interrupt::listen()?;
+    interrupt.heeded.store(true, Ordering::Relaxed);
     let found = trade::trade(
         &params,
         &program,
-        Some(interrupt()?),
+        Some(&interrupt.asked),
         &TerminalProgress::on_stderr(),
     )
     .map_err(|e| miette::miette!("{e}"))?;
@@ -503,18 +532,6 @@ fn traded(arguments: TradeArguments) -> miette::Result<ExitCode> {
     })
 }
 
-/// A flag that Ctrl-C or a termination sets; the second one ends the program at once.
-fn interrupt() -> miette::Result<&'static AtomicBool> {
-    static FLAG: AtomicBool = AtomicBool::new(false);
-    ctrlc::set_handler(|| {
-        if FLAG.swap(true, Ordering::Relaxed) {
-            std::process::exit(i32::from(INTERRUPTED));
-        }
-    })
-    .map_err(|e| miette::miette!("cannot watch for Ctrl-C: {e}"))?;
-    Ok(&FLAG)
-}
-
 fn suites() -> PossibleValuesParser {
     PossibleValuesParser::new(
         verify::SUITES
@@ -522,18 +539,6 @@ fn suites() -> PossibleValuesParser {
             .chain(verify::LONG_SUITES)
             .map(|s| PossibleValue::new(s.name).help(s.about)),
     )
-}
-
-/// Writes a line to standard output, which may be a full disk or a reader that has left.
-fn print(text: impl Display) -> miette::Result<()> {
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{text}")
-        .and_then(|()| out.flush())
-        .map_err(|e| {
-            miette::miette!(
-                "cannot write to standard output: {e}; free the disk, or send it elsewhere"
-            )
-        })
 }
 
 fn load(arguments: &SceneArguments) -> miette::Result<AnyScene> {

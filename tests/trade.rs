@@ -185,3 +185,95 @@ fn what_cannot_be_studied_is_said() {
         assert!(found.contains(wanted), "{arguments:?}: {found}");
     }
 }
+
+/// A mesh file of `cells` by `cells` squares in a unit square, in Gmsh 2.2, with the groups `bottom`, `top` and `body`.
+fn mesh(cells: usize) -> String {
+    let at = |i: usize, j: usize| j * (cells + 1) + i + 1;
+    let (mut nodes, mut elements, mut count) = (String::new(), String::new(), 0);
+    for j in 0..=cells {
+        for i in 0..=cells {
+            let (x, y) = (i as f64 / cells as f64, j as f64 / cells as f64);
+            nodes += &format!("{} {x} {y} 0\n", at(i, j));
+        }
+    }
+    let mut push = |text: String| {
+        count += 1;
+        elements += &format!("{count} {text}\n");
+    };
+    for (group, j) in [(1, 0), (2, cells)] {
+        for i in 0..cells {
+            push(format!("1 2 {group} {group} {} {}", at(i, j), at(i + 1, j)));
+        }
+    }
+    for j in 0..cells {
+        for i in 0..cells {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+            push(format!("3 2 3 3 {a} {b} {c} {d}"));
+        }
+    }
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n1 1 \"bottom\"\n1 2 \"top\"\n2 3 \"body\"\n$EndPhysicalNames\n\
+         $Nodes\n{}\n{nodes}$EndNodes\n$Elements\n{count}\n{elements}$EndElements\n",
+        (cells + 1) * (cells + 1)
+    )
+}
+
+/// Results of another mesh under the same name are not those of this one.
+#[test]
+fn another_mesh_in_the_same_file_is_another_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let generated =
+        "mesh.rectangle = { min = [0, 0], max = [1, 1], x = { cells = 20 }, y = { cells = 20 } }";
+    assert!(PLATE.contains(generated));
+    let scene = PLATE.replace(generated, "mesh.file = { path = \"m.msh\" }");
+    std::fs::write(folder.path().join("plate.toml"), scene).unwrap();
+    let study = |output: &str, vary: &str| {
+        let arguments = [
+            "trade",
+            "plate.toml",
+            "--vary",
+            vary,
+            "--quantity",
+            "reaction",
+            "--reference-set",
+            "coupling=nonlocal",
+            "--output",
+            output,
+        ];
+        bondline(folder.path(), &arguments)
+    };
+    let errors = |output: &str| -> Vec<f64> {
+        let found = json(&folder.path().join(output).join("trade.json"));
+        let cases = found["cases"].as_array().unwrap().clone();
+        let error = |c: &serde_json::Value| c["outcome"]["ran"]["errors"][0].as_f64().unwrap();
+        cases.iter().map(error).collect()
+    };
+    let vary = "mesh.file.path=[\"other.msh\"]";
+    let write =
+        |name: &str, cells: usize| std::fs::write(folder.path().join(name), mesh(cells)).unwrap();
+    write("m.msh", 20);
+    write("other.msh", 16);
+    let first = study("kept", vary);
+    assert!(first.status.success(), "{}", text(&first.stderr));
+    let before = errors("kept");
+    assert_eq!(before.len(), 2);
+    // a mesh that one case reads alone: that case runs again
+    write("other.msh", 24);
+    assert!(study("kept", vary).status.success());
+    assert!(study("fresh", vary).status.success());
+    let after = errors("kept");
+    assert_eq!(after, errors("fresh"));
+    assert!(
+        after[0] == before[0] && after[1] != before[1],
+        "{before:?} {after:?}"
+    );
+    // the mesh of the scene: nothing of the study holds
+    write("m.msh", 26);
+    let second = study("kept", vary);
+    assert!(!second.status.success());
+    let said = text(&second.stderr)
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
+    assert!(said.contains("another scene, mesh, reference"), "{said}");
+}

@@ -50,19 +50,26 @@ impl<const D: usize> Coupling<D> for Balanced {
     }
 }
 
-/// The share of the splice for the state part of the law, from the moments of the largest family.
+/// The share of the splice for the state part of the law, from the moments of the largest families together: of several that are equally large none is
+/// preferred, or else the numbering of points that lie on no lattice would decide.
 fn state_share<const D: usize>(body: &PdBody<D>, spacing: f64) -> f64 {
-    let largest = (0..body.families.len()).max_by_key(|&i| body.families.of(i).len());
-    let Some(i) = largest.filter(|&i| body.state(i).is_some()) else {
-        return 0.5;
-    };
-    let (_, omega) = body.kernel(i);
+    let size = |i: usize| body.families.of(i).len();
+    let largest = (0..body.families.len()).map(size).max().unwrap_or(0);
     let (mut second, mut fourth) = (0.0, 0.0);
-    for (&j, omega) in body.families.of(i).iter().zip(omega) {
-        let square = body.bond(i, j as usize).norm_squared();
-        let weight = omega * body.cloud.volume[j as usize];
-        second += weight * square;
-        fourth += weight * square * square;
+    for i in (0..body.families.len()).filter(|&i| size(i) == largest) {
+        if body.state(i).is_none() {
+            return 0.5;
+        }
+        let (_, omega) = body.kernel(i);
+        for (&j, omega) in body.families.of(i).iter().zip(omega) {
+            let square = body.bond(i, j as usize).norm_squared();
+            let weight = omega * body.cloud.volume[j as usize];
+            second += weight * square;
+            fourth += weight * square * square;
+        }
+    }
+    if second <= 0.0 {
+        return 0.5;
     }
     let length = 3.0 * fourth / ((D as f64 + 2.0) * second);
     let grid = spacing * spacing;

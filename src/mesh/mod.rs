@@ -5,7 +5,9 @@
 //! | `generate.rs` | line, rectangle and box with cut-outs and grading |
 //! | `read.rs` | one entry for all files, and what all readers share |
 //! | `gmsh.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
-//! | `vtk.rs` | VTK and VTU as meshio writes them |
+//! | `vtk.rs` | VTK files: cells, and groups of them by integers |
+//! | `vtu.rs`, `vtk_legacy.rs` | their two formats, `.vtu` and `.vtk` |
+//! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
 //! | `cutter.rs` | which bonds leave the mesh |
@@ -24,6 +26,10 @@ pub mod quality;
 pub mod read;
 mod spread;
 pub mod vtk;
+mod vtk_legacy;
+mod vtu;
+mod vtu_data;
+mod xml;
 
 pub use error::{MeshError, Place};
 

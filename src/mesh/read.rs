@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::axis_name;
 use super::{CellShape, Facet, Mesh, MeshError, Place, gmsh, vtk};
+use crate::regular_file;
 use crate::tensor::Vector;
 
 /// How far out of its plane a node of a 2D mesh may lie, as a fraction of the mesh's extent.
@@ -37,7 +38,7 @@ pub fn detect_dimension(path: &Path) -> Result<usize, MeshError> {
 }
 
 fn load(path: &Path) -> Result<Vec<u8>, MeshError> {
-    std::fs::read(path).map_err(|source| MeshError::Open {
+    regular_file::read(path).map_err(|source| MeshError::Open {
         path: path.into(),
         source,
     })
@@ -67,8 +68,6 @@ pub(super) enum Encoding {
     Text,
     /// By bytes.
     Binary,
-    /// Not at all: the parser beneath does not know them.
-    Opaque,
 }
 
 impl Source<'_> {
@@ -80,7 +79,6 @@ impl Source<'_> {
                 Place::Line(1 + before.iter().filter(|&&b| b == b'\n').count())
             }
             Encoding::Binary => Place::Byte(at),
-            Encoding::Opaque => Place::File,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! VTK files: XML unstructured grids (`.vtu`) and legacy ones (`.vtk`), as meshio and VTK itself write them.
+//! VTK files: XML unstructured grids (`.vtu`, read in `vtu.rs`) and legacy ones (`.vtk`, read in `vtk_legacy.rs`), as meshio and VTK itself write them.
 //!
 //! VTK has no named groups. An integer value per cell becomes a set `NAME_VALUE` for each of its values: meshio's
 //! `gmsh:physical` becomes `physical_1`, `physical_2`, … (its value 0 means "no group" and makes no set), and VTK's
@@ -7,16 +7,11 @@
 //! several components, or with more than 256 values per dimension are fields or numberings, not groups, and are skipped.
 
 use std::collections::{BTreeSet, HashMap};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::fmt;
 use std::path::Path;
 
-use vtkio::Vtk;
-use vtkio::model::{
-    Attribute, CellType, DataSet, IOBuffer, Piece, UnstructuredGridPiece, VertexNumbers,
-};
-
-use super::read::{Encoding, RawElement, RawMesh, RawNode, Source};
-use super::{CellShape, MeshError, Place};
+use super::read::{RawElement, RawMesh, RawNode, Source};
+use super::{CellShape, MeshError, vtk_legacy, vtu};
 
 /// More different values than this make an integer array a numbering, not a grouping.
 const MOST_GROUPS: usize = 256;
@@ -30,19 +25,170 @@ pub(super) enum Flavour {
     Xml,
 }
 
-/// Our shape for VTK's, or a remedy.
-fn shape(kind: CellType) -> Result<CellShape, &'static str> {
-    match kind {
-        CellType::Vertex => Ok(CellShape::Vertex),
-        CellType::Line => Ok(CellShape::Line2),
-        CellType::Triangle => Ok(CellShape::Tri3),
-        CellType::Quad => Ok(CellShape::Quad4),
-        CellType::Tetra => Ok(CellShape::Tet4),
-        CellType::Hexahedron => Ok(CellShape::Hex8),
-        _ => Err(
-            "supported are Vertex, Line, Triangle, Quad, Tetra and Hexahedron of first order: convert the mesh",
-        ),
+/// A number as a file stores it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Number {
+    Signed(i64),
+    Unsigned(u64),
+    Real(f64),
+}
+
+impl Number {
+    pub fn real(self) -> f64 {
+        match self {
+            Self::Signed(n) => n as f64,
+            Self::Unsigned(n) => n as f64,
+            Self::Real(x) => x,
+        }
     }
+
+    /// The number as an integer, if it is one that fits.
+    pub fn integer(self) -> Option<i64> {
+        match self {
+            Self::Signed(n) => Some(n),
+            Self::Unsigned(n) => i64::try_from(n).ok(),
+            Self::Real(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Signed(n) => n.fmt(f),
+            Self::Unsigned(n) => n.fmt(f),
+            Self::Real(x) => x.fmt(f),
+        }
+    }
+}
+
+/// The type of the numbers of an array.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Kind {
+    Integer { bytes: usize, signed: bool },
+    Real { bytes: usize },
+}
+
+impl Kind {
+    /// Bytes of a number.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Integer { bytes, .. } | Self::Real { bytes } => bytes,
+        }
+    }
+
+    pub fn is_integer(self) -> bool {
+        matches!(self, Self::Integer { .. })
+    }
+
+    /// The number in `word`, which holds [`Kind::bytes`] bytes.
+    pub fn number(self, word: &[u8], is_big_endian: bool) -> Number {
+        let mut own = [0u8; 8];
+        for (k, own) in own.iter_mut().enumerate().take(word.len()) {
+            // the least significant byte first
+            *own = match is_big_endian {
+                true => word[word.len() - 1 - k],
+                false => word[k],
+            };
+        }
+        let bits = u64::from_le_bytes(own);
+        match self {
+            Self::Real { bytes: 4 } => Number::Real(f64::from(f32::from_bits(bits as u32))),
+            Self::Real { .. } => Number::Real(f64::from_bits(bits)),
+            Self::Integer { signed: false, .. } => Number::Unsigned(bits),
+            Self::Integer {
+                bytes,
+                signed: true,
+            } => {
+                // the sign is in the highest bit of the word
+                let above = 64 - 8 * bytes as u32;
+                Number::Signed((bits << above) as i64 >> above)
+            }
+        }
+    }
+
+    /// A number written as text.
+    pub fn parse(self, text: &str) -> Option<Number> {
+        match self {
+            Self::Real { .. } => text.parse().ok().map(Number::Real),
+            Self::Integer { .. } => match text.parse() {
+                Ok(n) => Some(Number::Signed(n)),
+                Err(_) => text.parse().ok().map(Number::Unsigned),
+            },
+        }
+    }
+}
+
+/// The cells of a piece, and the points that they use.
+#[derive(Debug, Default)]
+pub(super) struct Grid {
+    /// Byte where it stands in the file.
+    pub at: usize,
+    /// Points in the file.
+    pub points: u64,
+    /// VTK's number for the type of each cell.
+    pub types: Vec<u8>,
+    /// Where the nodes of each cell end in `nodes`.
+    pub ends: Vec<u64>,
+    pub nodes: Vec<u64>,
+    /// Integer arrays with a number per cell.
+    pub cell_data: Vec<(String, Vec<i64>)>,
+    /// The points that cells use, by their number, and their coordinates.
+    used: Vec<u64>,
+    coordinates: Vec<[f64; 3]>,
+    /// Coordinates seen.
+    seen: u64,
+}
+
+impl Grid {
+    /// A piece at a byte of the file, of so many points.
+    pub fn new(at: usize, points: u64) -> Self {
+        Self {
+            at,
+            points,
+            ..Self::default()
+        }
+    }
+
+    /// From here on coordinates follow; only those of points that cells use are kept, however many there are.
+    pub fn begin_points(&mut self) {
+        self.used.clone_from(&self.nodes);
+        self.used.sort_unstable();
+        self.used.dedup();
+    }
+
+    /// Takes the next coordinate: x, y, z of the first point, of the second one, and so on.
+    pub fn push_coordinate(&mut self, x: f64) {
+        let (point, axis) = (self.seen / 3, (self.seen % 3) as usize);
+        self.seen += 1;
+        let next = self.coordinates.len() - usize::from(axis > 0 && self.is_open());
+        if self.used.get(next) == Some(&point) {
+            if axis == 0 {
+                self.coordinates.push([x, 0.0, 0.0]);
+            } else {
+                self.coordinates[next][axis] = x;
+            }
+        }
+    }
+
+    /// Whether the point at hand is one that is kept.
+    fn is_open(&self) -> bool {
+        let last = self.coordinates.len().checked_sub(1);
+        last.is_some_and(|k| self.used[k] == (self.seen - 1) / 3)
+    }
+}
+
+/// Our shape for VTK's, or its name and a remedy.
+fn shape(kind: u8) -> Option<CellShape> {
+    Some(match kind {
+        1 => CellShape::Vertex,
+        3 => CellShape::Line2,
+        5 => CellShape::Tri3,
+        9 => CellShape::Quad4,
+        10 => CellShape::Tet4,
+        12 => CellShape::Hex8,
+        _ => return None,
+    })
 }
 
 /// Parses a file.
@@ -51,177 +197,90 @@ pub(super) fn parse<'a>(
     bytes: &'a [u8],
     flavour: Flavour,
 ) -> Result<(RawMesh, Source<'a>), MeshError> {
-    let source = Source {
-        path: path.into(),
-        bytes,
-        encoding: Encoding::Opaque,
-    };
-    let syntax = |found: String, wanted: &str| MeshError::Syntax {
-        path: path.into(),
-        place: Place::File,
-        found,
-        wanted: wanted.into(),
-        remedy: "it may be truncated: write it again, for instance with meshio",
-    };
-    // the parser beneath unwraps in places; no file may end the run
-    let parsed = catch_unwind(AssertUnwindSafe(|| match flavour {
-        Flavour::Legacy => Vtk::parse_legacy_be(bytes),
-        Flavour::Xml => Vtk::parse_xml(bytes),
-    }))
-    .map_err(|_| syntax("a broken structure".into(), "a VTK unstructured grid"))?
-    .map_err(|e| syntax(format!("\"{e}\""), "a VTK unstructured grid"))?;
-    let DataSet::UnstructuredGrid { pieces, .. } = parsed.data else {
-        return Err(MeshError::Unsupported {
-            path: path.into(),
-            place: Place::File,
-            what: "a VTK data set other than an unstructured grid".into(),
-            remedy: "convert it to an unstructured grid",
-        });
+    let (grids, source) = match flavour {
+        Flavour::Legacy => {
+            let (grid, source) = vtk_legacy::parse(path, bytes)?;
+            (vec![grid], source)
+        }
+        Flavour::Xml => vtu::parse(path, bytes)?,
     };
     let mut raw = RawMesh::default();
-    for piece in pieces {
-        match piece {
-            Piece::Inline(piece) => add_piece(&mut raw, &piece, &source)
-                .map_err(|e| e.unwrap_or_else(|found| syntax(found, "one entry per cell")))?,
-            Piece::Source(..) | Piece::Loaded(_) => {
-                return Err(MeshError::Unsupported {
-                    path: path.into(),
-                    place: Place::File,
-                    what: "a grid spread over several files".into(),
-                    remedy: "merge its pieces into one .vtu file",
-                });
-            }
-        }
+    let mut first_node = 0;
+    for grid in &grids {
+        add_piece(&mut raw, grid, first_node, &source)?;
+        first_node = u64::saturating_add(first_node, grid.points);
     }
     Ok((raw, source))
 }
 
-/// What is wrong with a piece: an error, or what was found where an entry per cell should be.
-type PieceError = Result<MeshError, String>;
-
 fn add_piece(
     raw: &mut RawMesh,
-    piece: &UnstructuredGridPiece,
+    grid: &Grid,
+    first_node: u64,
     source: &Source,
-) -> Result<(), PieceError> {
-    let first_node = raw.nodes.len() as u64;
-    let points: Vec<f64> = piece
-        .points
-        .cast_into()
-        .ok_or_else(|| Err("points that are no numbers".to_owned()))?;
-    if !points.len().is_multiple_of(3) {
-        return Err(Err(format!(
-            "{} coordinates, not three per point",
-            points.len()
-        )));
-    }
-    for x in points.chunks_exact(3) {
+) -> Result<(), MeshError> {
+    for (point, &x) in grid.used.iter().zip(&grid.coordinates) {
         raw.nodes.push(RawNode {
-            tag: raw.nodes.len() as u64,
-            x: [x[0], x[1], x[2]],
-            at: 0,
+            tag: point.saturating_add(first_node),
+            x,
+            at: grid.at,
         });
     }
-    let types = &piece.cells.types;
-    let starts = cell_ranges(&piece.cells.cell_verts, types.len()).map_err(Err)?;
-    let mut shapes = Vec::with_capacity(types.len());
-    for (c, (&kind, nodes)) in types.iter().zip(&starts).enumerate() {
-        let element = raw.elements.len() as u64 + c as u64;
-        let shape = shape(kind).map_err(|remedy| {
-            Ok(MeshError::UnsupportedElement {
+    let first = raw.elements.len();
+    let mut shapes = Vec::with_capacity(grid.types.len());
+    let mut start = 0;
+    for (c, (&kind, &end)) in grid.types.iter().zip(&grid.ends).enumerate() {
+        let element = (first + c) as u64;
+        let Some(shape) = shape(kind) else {
+            return Err(MeshError::UnsupportedElement {
                 path: source.path.clone(),
-                place: Place::File,
+                place: source.place(grid.at),
                 element,
-                kind: kind as i64,
+                kind: i64::from(kind),
                 name: "by VTK's numbering",
-                remedy,
-            })
-        })?;
-        if nodes.len() != shape.node_count() {
-            return Err(Err(format!(
-                "cell {element} ({shape:?}) with {} nodes",
-                nodes.len()
-            )));
+                remedy: "supported are Vertex, Line, Triangle, Quad, Tetra and Hexahedron of first order: convert the mesh",
+            });
+        };
+        if end - start != shape.node_count() as u64 {
+            return Err(MeshError::Syntax {
+                path: source.path.clone(),
+                place: source.place(grid.at),
+                found: format!("cell {element} ({shape:?}) with {} nodes", end - start),
+                wanted: format!("{}", shape.node_count()),
+                remedy: "write the file again, for instance with VTK, ParaView or meshio",
+            });
         }
+        start = end;
         shapes.push(shape);
     }
-    let groups = group_numbers(raw, &piece.data.cell, &shapes);
-    for ((shape, nodes), group) in shapes.into_iter().zip(&starts).zip(groups) {
+    let groups = group_numbers(raw, &grid.cell_data, &shapes);
+    let mut start = 0;
+    for ((shape, &end), group) in shapes.into_iter().zip(&grid.ends).zip(groups) {
         raw.elements.push(RawElement {
             tag: raw.elements.len() as u64,
             shape,
             start: raw.element_nodes.len(),
             group,
-            at: 0,
+            at: grid.at,
         });
+        let nodes = &grid.nodes[start..end as usize];
         raw.element_nodes
-            .extend(nodes.iter().map(|n| n + first_node));
+            .extend(nodes.iter().map(|n| n.saturating_add(first_node)));
+        start = end as usize;
     }
     Ok(())
 }
 
-/// The nodes of each cell.
-fn cell_ranges(numbers: &VertexNumbers, cells: usize) -> Result<Vec<Vec<u64>>, String> {
-    let found = match numbers {
-        VertexNumbers::Legacy { vertices, .. } => {
-            let mut found = Vec::with_capacity(cells);
-            let mut rest = vertices.as_slice();
-            while let [count, tail @ ..] = rest {
-                let count = *count as usize;
-                if count > tail.len() {
-                    return Err("a list of cells that ends early".into());
-                }
-                found.push(tail[..count].iter().map(|&n| u64::from(n)).collect());
-                rest = &tail[count..];
-            }
-            found
-        }
-        VertexNumbers::XML {
-            connectivity,
-            offsets,
-        } => {
-            // files of version 5 and later start with a zero
-            let ends = if offsets.len() == cells + 1 {
-                &offsets[1..]
-            } else {
-                offsets
-            };
-            let mut start = 0;
-            let mut found = Vec::with_capacity(cells);
-            for &end in ends {
-                let nodes = connectivity.get(start..end as usize).ok_or_else(|| {
-                    format!("offset {end} into {} node numbers", connectivity.len())
-                })?;
-                found.push(nodes.to_vec());
-                start = end as usize;
-            }
-            found
-        }
-    };
-    if found.len() == cells {
-        return Ok(found);
-    }
-    Err(format!("{} cells with {cells} types", found.len()))
-}
-
-/// An integer array as numbers, if it is one.
-fn integers(data: &IOBuffer) -> Option<Vec<i64>> {
-    match data {
-        IOBuffer::F32(_) | IOBuffer::F64(_) | IOBuffer::Bit(_) => None,
-        _ => data.cast_into(),
-    }
-}
-
 /// For each cell the number of its list of groups.
-fn group_numbers(raw: &mut RawMesh, attributes: &[Attribute], shapes: &[CellShape]) -> Vec<u32> {
+fn group_numbers(raw: &mut RawMesh, data: &[(String, Vec<i64>)], shapes: &[CellShape]) -> Vec<u32> {
     let mut names: Vec<Vec<String>> = vec![Vec::new(); shapes.len()];
-    let mut add = |name: &str, data: &IOBuffer| {
-        let Some(values) = integers(data).filter(|v| v.len() == shapes.len()) else {
+    let mut add = |name: &str, values: &[i64]| {
+        if values.len() != shapes.len() {
             return;
-        };
+        }
         let distinct: BTreeSet<(usize, i64)> = shapes
             .iter()
-            .zip(&values)
+            .zip(values)
             .map(|(s, v)| (s.dimension(), *v))
             .collect();
         let many = (0..4).any(|d| {
@@ -249,20 +308,13 @@ fn group_numbers(raw: &mut RawMesh, attributes: &[Attribute], shapes: &[CellShap
                 .collect(),
         };
         for (names, value) in names.iter_mut().zip(values) {
-            if !(physical && value == 0) {
+            if !(physical && *value == 0) {
                 names.push(format!("{stem}_{value}"));
             }
         }
     };
-    for attribute in attributes {
-        match attribute {
-            Attribute::DataArray(array) => add(&array.name, &array.data),
-            Attribute::Field { data_array, .. } => {
-                data_array
-                    .iter()
-                    .for_each(|array| add(&array.name, &array.data));
-            }
-        }
+    for (name, values) in data {
+        add(name, values);
     }
     let mut known: HashMap<Vec<String>, u32> = HashMap::from([(Vec::new(), 0)]);
     names

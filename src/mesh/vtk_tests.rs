@@ -104,3 +104,170 @@ fn unsupported_cells_and_bad_numbers_are_named() {
         );
     }
 }
+
+/// Files that VTK itself wrote: a square of cells, of which some fill blocks of 32 768 bytes to the last one, whose size VTK gives as 0.
+#[test]
+fn files_of_vtk_are_read() {
+    let plate = read::<2>(&fixture("plate_vtk_zlib.vtu")).unwrap();
+    assert_eq!((plate.nodes.len(), plate.cell_count()), (1089, 1024));
+    assert!((check(&plate).unwrap().volume - 1.0).abs() < 1e-12);
+    // appended raw data with the most significant byte first, and 64-bit integers in an older format
+    for name in ["plate_vtk_raw.vtu", "plate_vtk_long.vtk"] {
+        let plate = read::<2>(&fixture(name)).unwrap();
+        assert_eq!((plate.nodes.len(), plate.cell_count()), (25, 16), "{name}");
+        assert!(
+            (check(&plate).unwrap().volume - 1.0).abs() < 1e-12,
+            "{name}"
+        );
+        let count = |set: &str| plate.cell_sets[set].len();
+        assert_eq!([count("part_0"), count("part_1")], [8, 8], "{name}");
+        assert_eq!(
+            [count("ids_0"), count("ids_1"), count("ids_2")],
+            [6, 5, 5],
+            "{name}"
+        );
+        // x is 0.5 at least in the cells of the second half
+        let second = &plate.cell_sets["part_1"];
+        assert!(
+            second.iter().all(|&c| plate.centroid(c as usize)[0] > 0.5),
+            "{name}"
+        );
+    }
+}
+
+/// A file whose one cell is right but for what is replaced in it.
+fn one_cell(changes: &[(&str, &str)]) -> String {
+    let mut text = "<VTKFile type=\"UnstructuredGrid\" header_type=\"UInt32\" compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid>\
+        <Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">\
+        0 0 0 1 0 0 1 1 0 0 1 0</DataArray></Points><Cells><DataArray type=\"Int64\" Name=\"connectivity\">0 1 2 3</DataArray>\
+        <DataArray type=\"Int64\" Name=\"offsets\">4</DataArray><DataArray type=\"UInt8\" Name=\"types\">9</DataArray></Cells>\
+        </Piece></UnstructuredGrid></VTKFile>"
+        .to_owned();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    text
+}
+
+#[test]
+fn wrong_arrays_are_named_with_their_line() {
+    use base64::Engine as _;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cell.vtu");
+    let found = |changes: &[(&str, &str)]| {
+        std::fs::write(&path, one_cell(changes)).unwrap();
+        read::<2>(&path)
+            .map(|m| m.cell_count())
+            .map_err(|e| e.to_string())
+    };
+    assert_eq!(found(&[]), Ok(1));
+    let offsets = "Name=\"offsets\">4";
+    let blocks = |numbers: &[u32]| {
+        let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+        let text = base64::engine::general_purpose::STANDARD.encode(bytes);
+        format!("Name=\"offsets\" format=\"binary\">{text}")
+    };
+    let huge = blocks(&[3, 0x8000_0000, 0, 1, 1, 1]);
+    let many = blocks(&[0xffff_ffff, 8, 0]);
+    let beyond = blocks(&[1, 8, 0, 0x7fff_ffff]);
+    let nothing = blocks(&[1, 8, 0, 0]);
+    for (from, to, wanted) in [
+        (offsets, "Name=\"offsets\">5", "but 5 expected"),
+        (
+            offsets,
+            "Name=\"offsets\">3",
+            "more numbers in the array `connectivity`",
+        ),
+        (
+            offsets,
+            "Name=\"offsets\">x",
+            "\"x\" in the array `offsets`",
+        ),
+        (offsets, "Name=\"offsets\">4 4", "more numbers"),
+        (offsets, "Name=\"offsets\">-4", "the offset -4 after 0"),
+        (
+            offsets,
+            "Name=\"offsets\" format=\"appended\" offset=\"9\">",
+            "no appended data",
+        ),
+        (offsets, "Name=\"ends\">4", "the array `offsets` expected"),
+        (offsets, huge.as_str(), "a header of 6442450944 bytes"),
+        (offsets, many.as_str(), "a header of 34359738360 bytes"),
+        (offsets, beyond.as_str(), "data that end early"),
+        (offsets, nothing.as_str(), "8 bytes (1 numbers)"),
+        (
+            "\"4\" Num",
+            "\"400000000000\" Num",
+            "1200000000000 expected",
+        ),
+        ("\"4\" Num", "\"-4\" Num", "a whole number"),
+        ("ZLib", "LZ4", "compressed by vtkLZ4DataCompressor"),
+        ("2 3</Data", "2 3</Daat", "the end of the tag that is open"),
+        ("</Cells>", "", "the end of the tag that is open"),
+    ] {
+        let message = match found(&[(from, to)]) {
+            Err(message) => message,
+            Ok(cells) => panic!("{to}: {cells} cells"),
+        };
+        assert!(message.contains(wanted), "{to}: {message}");
+        assert!(
+            message.contains("cell.vtu: line 1") && message.contains(';'),
+            "{message}"
+        );
+    }
+}
+
+/// What a file announces takes no memory: points and arrays that no cell uses are not kept.
+#[test]
+fn points_that_no_cell_uses_are_not_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cell.vtu");
+    let more = format!("0 1 0{}", " 7 7 7".repeat(100_000));
+    let text = one_cell(&[
+        ("0 1 0<", &format!("{more}<")),
+        ("Points=\"4\"", "Points=\"100004\""),
+    ]);
+    std::fs::write(&path, text).unwrap();
+    let mesh = read::<2>(&path).unwrap();
+    assert_eq!((mesh.nodes.len(), mesh.nodes.capacity()), (4, 4));
+}
+
+#[test]
+fn legacy_files_tell_lines_and_pass_over_what_is_no_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cell.vtk");
+    let text = "# vtk DataFile Version 3.0\none\nASCII\nDATASET UNSTRUCTURED_GRID\nFIELD FieldData 1\ntime 1 1 double\n0.5\n\
+        POINTS 4 float\n0 0 0\n1 0 0\n1 1 0\n0 1 0\nMETADATA\nINFORMATION 0\n\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n9\n\
+        POINT_DATA 4\nVECTORS u float\n0 0 0 0 0 0 0 0 0 0 0 nan\nCELL_DATA 1\nSCALARS part vtktypeint64\nLOOKUP_TABLE default\n7\n\
+        FIELD more 2\nid 1 1 long\n3\nstress 2 1 double\n1 2\n";
+    let found = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        read::<2>(&path).map_err(|e| e.to_string())
+    };
+    let mesh = found("one", "one").unwrap();
+    assert_eq!(mesh.cell_sets["part_7"], [0]);
+    assert_eq!(mesh.cell_sets["id_3"], [0]);
+    assert!(!mesh.cell_sets.keys().any(|k| k.starts_with("stress")));
+    for (from, to, wanted) in [
+        ("1 5\n4 0", "1 5\n4 x", "line 17: \"x\""),
+        ("CELLS 1 5", "CELLS 1 1000000000000", "a number expected"),
+        ("CELLS 1 5", "CELLS 2 5", "\"1 cells\", but 2"),
+        ("POINTS 4", "POINTS 99999999999999", "times 3 numbers"),
+        ("TYPES 1", "TYPES 2", "\"POINT_DATA\""),
+        ("vtktypeint64", "string", "an array of type `string`"),
+        (
+            "UNSTRUCTURED_GRID",
+            "POLYDATA",
+            "line 4: a VTK data set other",
+        ),
+        ("ASCII", "ASCI", "line 3: \"ASCI\""),
+    ] {
+        let message = found(from, to).unwrap_err();
+        assert!(
+            message.contains(wanted) && message.contains(';'),
+            "{to}: {message}"
+        );
+    }
+}

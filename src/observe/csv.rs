@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::ObserveError;
 use super::file::create_parent;
+use crate::regular_file;
 
 /// One entry of a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,10 +60,12 @@ impl CsvTable {
             });
         }
         create_parent(path)?;
-        let file = File::create(path).map_err(|source| ObserveError::Write {
-            path: path.to_path_buf(),
-            source,
-        })?;
+        let file = regular_file::may_be_written(path)
+            .and_then(|()| File::create(path))
+            .map_err(|source| ObserveError::Write {
+                path: path.to_path_buf(),
+                source,
+            })?;
         let mut table = Self {
             path: path.to_path_buf(),
             out: BufWriter::new(file),
@@ -83,7 +86,7 @@ impl CsvTable {
             path: path.to_path_buf(),
             source,
         };
-        let mut file = File::options().write(true).open(path).map_err(fail)?;
+        let mut file = regular_file::open(path, File::options().write(true)).map_err(fail)?;
         let found = file.metadata().map_err(fail)?.len();
         if found < bytes {
             return Err(ObserveError::Shortened {

@@ -72,22 +72,6 @@ pub(super) fn sync_folder(path: &Path) {
     }
 }
 
-/// Removes what killed runs left of files whose names begin with `name`.
-pub fn remove_parts(folder: &Path, name: &str) {
-    let beginning = format!(".{name}");
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        return;
-    };
-    for entry in entries.flatten() {
-        let file = entry.file_name();
-        let file = file.to_string_lossy();
-        if file.starts_with(&beginning) && file.ends_with(".part") {
-            // what cannot be removed does no harm
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

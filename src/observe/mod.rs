@@ -7,6 +7,7 @@
 //! | `series.rs` | VTU files over time and their PVD |
 //! | `history.rs` | tables that grow with a run, and are cut where it resumes |
 //! | `checkpoint.rs` | the state of a run, whole or not at all |
+//! | `claim.rs` | who writes into a folder, so that no two runs write the same files |
 //! | `csv.rs` | values along a line or at probes, row by row |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs` | what one run did: sizes, choices, timings, balance |
@@ -17,6 +18,7 @@
 //! | `file.rs` | whole files or none: written beside, then renamed |
 
 pub mod checkpoint;
+pub mod claim;
 pub mod csv;
 mod data_array;
 pub mod figure;
@@ -51,6 +53,14 @@ pub enum ObserveError {
         path: PathBuf,
         /// What the operating system said.
         source: std::io::Error,
+    },
+    /// Another run writes the same file.
+    #[error("another run writes {} ({by}); wait for it, or give another folder by --output or another output.name", path.display())]
+    Claimed {
+        /// The file.
+        path: PathBuf,
+        /// The process and its scene.
+        by: String,
     },
     /// The encoder refused the data.
     #[error("cannot encode {} as {format}: {message}; please report this with the scene", path.display())]

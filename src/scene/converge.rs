@@ -15,6 +15,7 @@ use crate::{
         report::{Columns, Row, Table},
     },
     progress::Progress,
+    regular_file,
     tensor::{Vector, padded},
 };
 
@@ -144,7 +145,7 @@ pub fn converge(
         return Err(ConvergeError::Params { levels, factor });
     }
     let scene_error = |e: SceneError| ConvergeError::Scene(Box::new(e));
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = regular_file::read_scene(path).map_err(|error| {
         scene_error(SceneError::new(
             SceneErrorKind::File,
             format!(

@@ -17,8 +17,11 @@ use std::fmt;
 
 use super::source::Span;
 
-/// The deepest nesting that is read; deeper input is refused before it exhausts the stack.
+/// The deepest nesting of brackets, signs and powers that is read; deeper input is refused before it exhausts the stack.
 const DEEPEST: usize = 64;
+
+/// The longest expression that is read \[bytes\]: a sum of some hundred thousand terms. It is evaluated at every place and step.
+const LONGEST: usize = 1 << 20;
 
 /// The number of the variable `t` beside those of the axes.
 const TIME: usize = 3;
@@ -63,6 +66,8 @@ enum Term {
     Variable(usize),
     Unary(Unary, Box<Term>),
     Binary(Binary, Box<Term>, Box<Term>),
+    /// Operators of one precedence, applied from left to right: as a list, so that a long sum nests no deeper than a short one.
+    Chain(Box<Term>, Vec<(Binary, Term)>),
     If(Box<[Term; 3]>),
 }
 
@@ -110,6 +115,16 @@ impl Expression {
             at: 0,
             depth: 0,
         };
+        if text.len() > LONGEST {
+            return Err(ExpressionError {
+                text: format!("{} …", text.chars().take(40).collect::<String>()),
+                at: text.chars().count(),
+                what: format!(
+                    "{} bytes are longer than the {LONGEST} that are read; use functions such as exp or if, or several conditions",
+                    text.len()
+                ),
+            });
+        }
         let root = parser.comparison()?;
         parser.skip_blanks();
         if parser.at < text.len() {
@@ -179,6 +194,9 @@ impl Term {
             Self::Variable(axis) => x[*axis],
             Self::Unary(f, a) => f(a.eval(x)),
             Self::Binary(f, a, b) => f(a.eval(x), b.eval(x)),
+            Self::Chain(first, rest) => rest
+                .iter()
+                .fold(first.eval(x), |left, (f, term)| f(left, term.eval(x))),
             Self::If(parts) => {
                 let chosen = if parts[0].eval(x) != 0.0 { 1 } else { 2 };
                 parts[chosen].eval(x)
@@ -192,6 +210,9 @@ impl Term {
             Self::Variable(a) => *a == axis,
             Self::Unary(_, a) => a.depends_on(axis),
             Self::Binary(_, a, b) => a.depends_on(axis) || b.depends_on(axis),
+            Self::Chain(first, rest) => {
+                first.depends_on(axis) || rest.iter().any(|(_, term)| term.depends_on(axis))
+            }
             Self::If(parts) => parts.iter().any(|p| p.depends_on(axis)),
         }
     }
@@ -252,35 +273,39 @@ impl Parser<'_> {
     }
 
     fn sum(&mut self) -> Result<Term, ExpressionError> {
-        let mut left = self.product()?;
+        let first = self.product()?;
+        let mut rest: Vec<(Binary, Term)> = Vec::new();
         while let Some(sign) = self.take(&["+", "-"]) {
             let f: Binary = if sign == "+" {
                 |a, b| a + b
             } else {
                 |a, b| a - b
             };
-            left = binary(f, left, self.product()?);
+            rest.push((f, self.product()?));
         }
-        Ok(left)
+        Ok(chain(first, rest))
     }
 
     fn product(&mut self) -> Result<Term, ExpressionError> {
-        let mut left = self.signed()?;
+        let first = self.signed()?;
+        let mut rest: Vec<(Binary, Term)> = Vec::new();
         while let Some(sign) = self.take(&["*", "/"]) {
             let f: Binary = if sign == "*" {
                 |a, b| a * b
             } else {
                 |a, b| a / b
             };
-            left = binary(f, left, self.signed()?);
+            rest.push((f, self.signed()?));
         }
-        Ok(left)
+        Ok(chain(first, rest))
     }
 
     fn signed(&mut self) -> Result<Term, ExpressionError> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            return Err(self.error("nested too deeply"));
+            return Err(self.error(format!(
+                "nested more than {DEEPEST} deep; take some brackets, signs or powers apart"
+            )));
         }
         let term = match self.take(&["+", "-"]) {
             Some("-") => Term::Unary(|a| -a, Box::new(self.signed()?)),
@@ -405,6 +430,17 @@ fn binary(f: Binary, a: Term, b: Term) -> Term {
     Term::Binary(f, Box::new(a), Box::new(b))
 }
 
+/// Terms that are joined from left to right.
+fn chain(first: Term, mut rest: Vec<(Binary, Term)>) -> Term {
+    if rest.len() > 1 {
+        return Term::Chain(Box::new(first), rest);
+    }
+    match rest.pop() {
+        Some((f, second)) => binary(f, first, second),
+        None => first,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::Expression;
@@ -470,5 +506,22 @@ mod tests {
         }
         assert!(Expression::parse(&"(".repeat(100_000)).is_err());
         assert!(Expression::parse(&"-".repeat(100_000)).is_err());
+    }
+
+    #[test]
+    fn long_sums_and_products_are_read_and_longer_text_is_refused_by_name() {
+        let sum = Expression::parse(&["0.5*x"; 50_000].join(" + ")).unwrap();
+        assert_eq!(sum.clone().eval(&[2.0, 0.0, 0.0]), 50_000.0);
+        assert!(sum.depends_on(0) && !sum.depends_on(1));
+        let product = format!("y{}", "*2/2".repeat(50_000));
+        assert_eq!(value(&product), 3.0);
+        // from left to right: 1 - 2 - 3 … and not 1 - (2 - 3 …)
+        assert_eq!(value(&format!("100{}", " - x".repeat(50))), 0.0);
+        let error = Expression::parse(&"1+".repeat(600_000)).unwrap_err();
+        assert!(error.to_string().len() < 400, "{error}");
+        assert!(error.what.contains("1200000 bytes"), "{error}");
+        let deep = format!("{}x{}", "(".repeat(65), ")".repeat(65));
+        let error = Expression::parse(&deep).unwrap_err();
+        assert!(error.what.contains("more than 64 deep"), "{error}");
     }
 }

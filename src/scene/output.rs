@@ -9,6 +9,8 @@ use super::validate::{Output, Scene, Tip};
 use super::value::Text;
 use crate::fem::Locator;
 use crate::mesh::Mesh;
+use crate::observe::ObserveError;
+use crate::observe::claim::{Claim, Files};
 use crate::shape::Shape;
 
 /// The outputs of a scene whose files are named `name` by default.
@@ -81,6 +83,51 @@ pub(super) fn output<const D: usize>(
         probes,
         tips,
     })
+}
+
+impl<const D: usize> Output<D> {
+    /// Keeps others from the files of a scene while it runs; nothing to keep where it writes none.
+    ///
+    /// # Errors
+    /// As [`Claim::take`].
+    pub(super) fn claim(&self, scene: &str, moves: bool) -> Result<Option<Claim>, ObserveError> {
+        let files = self.files(moves);
+        if files.files.is_empty() {
+            return Ok(None);
+        }
+        Claim::take(&self.directory, scene, &files).map(Some)
+    }
+
+    /// The files that a scene writes: at rest, or where it `moves`.
+    fn files(&self, moves: bool) -> Files {
+        let name = &self.name;
+        let mut ends: Vec<String> = Vec::new();
+        if moves {
+            ends.extend(
+                [
+                    "_history.csv",
+                    ".checkpoint",
+                    ".checkpoint.previous",
+                    ".pvd",
+                ]
+                .map(str::to_owned),
+            );
+            ends.extend(self.tips.iter().map(|t| format!("_tip_{}.csv", t.name)));
+        } else {
+            if self.vtu {
+                ends.push(".vtu".to_owned());
+            }
+            ends.extend(self.lines.iter().map(|(line, _)| format!("_{line}.csv")));
+            if !self.probes.is_empty() {
+                ends.push("_probes.csv".to_owned());
+            }
+        }
+        Files {
+            name: name.clone(),
+            files: ends.into_iter().map(|end| format!("{name}{end}")).collect(),
+            series: moves,
+        }
+    }
 }
 
 /// Refuses a name that would put a file into another folder.

@@ -169,7 +169,9 @@ pub fn run<const D: usize>(
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    if scene.solve != Solve::Static {
+    let moves = scene.solve != Solve::Static;
+    let _claim = scene.output.claim(&scene.title, moves)?;
+    if moves {
         return motion::run(scene, options, progress);
     }
     solve_with(scene, progress, |output, solved| {

@@ -135,6 +135,7 @@ impl Source {
     /// As [`Source::merged`].
     pub(crate) fn fingerprint(&self) -> Result<Fingerprint, SceneError> {
         let mut print = Fingerprint::default();
+        print.add(env!("CARGO_PKG_VERSION").as_bytes());
         add_table(self.merged()?.get_ref(), &mut Vec::new(), &mut print);
         Ok(print)
     }

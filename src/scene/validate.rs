@@ -30,6 +30,7 @@ use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::{Choice, RunSummary};
 use crate::peridynamics::Influence;
 use crate::progress::Progress;
+use crate::regular_file;
 use crate::shape::{Barrier, Shape};
 use crate::solve::ordering::Ordering;
 use crate::tensor::{Vector, padded};
@@ -280,7 +281,7 @@ pub(super) fn read<'p>(
     path: &'p Path,
     overrides: &[String],
 ) -> Result<(Source, &'p Path, String), SceneError> {
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = regular_file::read_scene(path).map_err(|error| {
         SceneError::new(
             SceneErrorKind::File,
             format!("cannot read the scene {}: {error}", path.display()),
@@ -415,6 +416,24 @@ fn add_mesh<const D: usize>(mesh: &Mesh<D>, print: &mut Fingerprint) {
     }
     for n in &mesh.connectivity {
         print.add(&n.to_le_bytes());
+    }
+    for shape in &mesh.shapes {
+        print.add(&[*shape as u8]);
+    }
+    // conditions, materials and zones are given by them
+    let numbers = |list: &[u32]| -> Vec<u8> { list.iter().flat_map(|n| n.to_le_bytes()).collect() };
+    for sets in [&mesh.cell_sets, &mesh.node_sets] {
+        for (name, set) in sets {
+            print.add(name.as_bytes());
+            print.add(&numbers(set));
+        }
+        print.add(b"end of sets");
+    }
+    for (name, facets) in &mesh.facet_sets {
+        print.add(name.as_bytes());
+        for facet in facets {
+            print.add(&numbers(facet));
+        }
     }
 }
 

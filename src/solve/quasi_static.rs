@@ -280,7 +280,7 @@ impl Residual {
     }
 }
 
-/// Runs load steps at `times`, those that `state` has done left out; after each, `observe` may stop.
+/// Runs load steps, those that `state` has done left out; `times` is the time of each by its number, none beyond the last. After each, `observe` may stop.
 ///
 /// `near` is an inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves the secant iterations.
 ///
@@ -291,7 +291,7 @@ pub fn run(
     drive: &dyn Drive,
     params: QuasiStaticParams,
     near: Option<&dyn LinearMap>,
-    times: &[f64],
+    times: &dyn Fn(u64) -> Option<f64>,
     state: &mut LoadState,
     observe: &mut dyn FnMut(&LoadStep<'_>) -> ControlFlow<()>,
 ) -> Result<QuasiStaticInfo, QuasiStaticError> {
@@ -331,10 +331,10 @@ pub fn run(
     };
     let mut values = vec![0.0; prescribed.len()];
     let mut info = QuasiStaticInfo::default();
-    for &time in times.iter().skip(state.step as usize) {
+    while let Some(time) = times(state.step) {
         (work.step, work.time) = (state.step, time);
         work.balanced = 0.0;
-        if let Some(&before) = times[..state.step as usize].last() {
+        if let Some(before) = state.step.checked_sub(1).and_then(times) {
             drive.load_into(before, &mut work.load);
             work.balanced = work.evaluate(&state.u)?.scale;
         }

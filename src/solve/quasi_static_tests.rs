@@ -67,6 +67,11 @@ impl Drive for Pulled {
     }
 }
 
+/// Load steps at these times.
+fn of(times: &[f64]) -> impl Fn(u64) -> Option<f64> {
+    |step| times.get(step as usize).copied()
+}
+
 fn go(
     system: &mut dyn Dynamic,
     drive: &dyn Drive,
@@ -80,10 +85,18 @@ fn go(
         ..QuasiStaticParams::default()
     };
     let mut state = LoadState::at_rest(system.mass().len() * system.block());
-    run(system, drive, params, None, times, &mut state, &mut |s| {
-        observe(s);
-        ControlFlow::Continue(())
-    })
+    run(
+        system,
+        drive,
+        params,
+        None,
+        &of(times),
+        &mut state,
+        &mut |s| {
+            observe(s);
+            ControlFlow::Continue(())
+        },
+    )
 }
 
 #[test]
@@ -315,7 +328,7 @@ fn runs_resume_and_trouble_is_named() {
             &Grip::Displacement,
             params,
             None,
-            &times,
+            &of(&times),
             &mut state,
             &mut |_| ControlFlow::Continue(()),
         )
@@ -330,7 +343,7 @@ fn runs_resume_and_trouble_is_named() {
             &Grip::Displacement,
             params,
             None,
-            &times,
+            &of(&times),
             &mut state,
             &mut |s| {
                 if s.state.step == stop {
@@ -356,7 +369,7 @@ fn runs_resume_and_trouble_is_named() {
         &Grip::Displacement,
         params,
         None,
-        &[1.0],
+        &of(&[1.0]),
         &mut short,
         &mut none,
     );
@@ -370,7 +383,7 @@ fn runs_resume_and_trouble_is_named() {
         &Grip::Displacement,
         params,
         None,
-        &[3.0],
+        &of(&[3.0]),
         &mut state,
         &mut none,
     );
@@ -394,7 +407,7 @@ fn runs_resume_and_trouble_is_named() {
         &drive,
         few,
         None,
-        &[1.0],
+        &of(&[1.0]),
         &mut state,
         &mut none,
     );
@@ -410,7 +423,7 @@ fn runs_resume_and_trouble_is_named() {
         &drive,
         few,
         None,
-        &[f64::NAN],
+        &of(&[f64::NAN]),
         &mut LoadState::at_rest(40),
         &mut none,
     );

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::TradeError;
 use super::measure::Measured;
+use crate::observe::claim;
 
 /// What a case cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -114,6 +115,12 @@ impl Runner<'_> {
             path: folder.to_path_buf(),
             source,
         };
+        if let Some((process, _)) = claim::holder(folder) {
+            return Err(TradeError::Busy {
+                path: folder.to_path_buf(),
+                process,
+            });
+        }
         if folder.exists() {
             std::fs::remove_dir_all(folder).map_err(file_error)?;
         }

@@ -37,7 +37,9 @@ pub(crate) use knobs::{Base, coordinates, corners, cutouts};
 pub(crate) use measure::Measured;
 
 use crate::observe::ObserveError;
+use crate::observe::claim::{Claim, Files};
 use crate::progress::Progress;
+use crate::regular_file;
 use crate::scene::spec::SolveSpec;
 use crate::scene::{SceneError, SceneSpec, Source, accuracy};
 use case::{Attempt, Runner};
@@ -120,6 +122,8 @@ pub struct Case {
     pub settings: Vec<String>,
     /// The keys that they set.
     pub overrides: Vec<String>,
+    /// A number for the bytes of the mesh file that it read, if it read one.
+    pub mesh: Option<u64>,
     /// How it ended.
     pub outcome: Outcome,
     /// Cost and error guessed before it ran, if others had run by then.
@@ -211,10 +215,18 @@ pub enum TradeError {
         quantity: String,
     },
     /// Two references.
-    #[error("the study in {} was made of another scene, reference or quantity; give another --output, or remove it", path.display())]
+    #[error("the study in {} was made of another scene, mesh, reference or quantity, or by another build of the program; give another --output, or remove it", path.display())]
     Another {
         /// Its record.
         path: PathBuf,
+    },
+    /// A case of an earlier study runs on.
+    #[error("process {process} still writes into {}: a case of a study that was killed; end it, wait for it, or give another --output", path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+        /// The process.
+        process: u32,
     },
     /// A file.
     #[error("{}: {source}; check the folder and the disk", path.display())]
@@ -261,12 +273,13 @@ pub fn trade(
     interrupt: Option<&AtomicBool>,
     progress: &dyn Progress,
 ) -> Result<Trade, TradeError> {
-    let text = std::fs::read_to_string(&params.scene).map_err(|source| TradeError::File {
+    let text = regular_file::read_scene(&params.scene).map_err(|source| TradeError::File {
         path: params.scene.clone(),
         source,
     })?;
     let scene_error = |e: SceneError| TradeError::Scene(Box::new(e));
-    let mut source = Source::new(params.scene.display().to_string(), text.clone());
+    let plain = Source::new(params.scene.display().to_string(), text.clone());
+    let mut source = plain.clone();
     for o in &params.overrides {
         source.push_override(o).map_err(scene_error)?;
     }
@@ -291,8 +304,18 @@ pub fn trade(
         interrupt,
     };
     let start = Instant::now();
+    let _claim = Claim::take(
+        &params.output,
+        &params.scene.display().to_string(),
+        &files(),
+    )?;
+    let program = record::program(program)?;
+    let with = |keys: &[String]| -> Vec<String> { common.iter().chain(keys).cloned().collect() };
+    let mesh = record::mesh(&plain, directory, &with(&keys));
     let head_of = |quantities: Vec<Quantity>, cost| Head {
+        program: program.clone(),
         scene: text.clone(),
+        mesh,
         overrides: common.clone(),
         reference: keys.clone(),
         quantities,
@@ -315,8 +338,7 @@ pub fn trade(
         }
         None => {
             progress.stage("reference", None);
-            let all: Vec<String> = common.iter().chain(&keys).cloned().collect();
-            let ran = match runner.run(&all, &folder, params.budget)? {
+            let ran = match runner.run(&with(&keys), &folder, params.budget)? {
                 Attempt::Ran(ran) => ran,
                 Attempt::Refused(why) => {
                     return Err(TradeError::Base {
@@ -349,6 +371,10 @@ pub fn trade(
             (ran.measured, head, Vec::new())
         }
     };
+    // what was found with another mesh is found again
+    let is_known =
+        |case: &Case| case.mesh == record::mesh(&plain, directory, &with(&case.overrides));
+    let cases: Vec<Case> = cases.into_iter().filter(is_known).collect();
     // anew, because a killed study may have left half a line at the end
     let record = new_record(&record_path, &head, &cases).map_err(|source| TradeError::File {
         path: record_path.clone(),
@@ -357,6 +383,8 @@ pub fn trade(
     let mut study = Study {
         params,
         runner,
+        plain,
+        directory,
         base,
         settings: knobs
             .into_iter()
@@ -386,6 +414,17 @@ pub fn trade(
         left,
         ended,
     })
+}
+
+/// What a study writes into its folder, and its cases below it.
+fn files() -> Files {
+    Files {
+        name: "trade".to_owned(),
+        files: ["cases.jsonl", "reference", "case"]
+            .map(str::to_owned)
+            .into(),
+        series: false,
+    }
 }
 
 fn chosen_knobs(base: &Base, params: &TradeParams) -> Result<Vec<Knob>, TradeError> {

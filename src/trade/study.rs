@@ -1,6 +1,6 @@
 //! Which case runs next: each setting alone, then what promises most.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -8,9 +8,10 @@ use super::case::{Attempt, Outcome, Runner};
 use super::effects::{Effects, most_promising};
 use super::knobs::{Base, Setting};
 use super::measure::{Measured, Quantity};
-use super::record::write_line;
+use super::record::{self, write_line};
 use super::{Case, TradeEnd, TradeError, TradeParams};
 use crate::progress::Progress;
+use crate::scene::Source;
 
 /// A combination is worth running if it promises this factor in cost or error over the front.
 const WORTH: f64 = 1.1;
@@ -19,6 +20,9 @@ const WORTH: f64 = 1.1;
 pub(super) struct Study<'a> {
     pub params: &'a TradeParams,
     pub runner: Runner<'a>,
+    /// The scene without overrides, and the folder that its paths count from.
+    pub plain: Source,
+    pub directory: &'a Path,
     pub base: Base,
     pub settings: Vec<(usize, Setting)>,
     pub common: Vec<String>,
@@ -99,7 +103,8 @@ impl Study<'_> {
             self.skipped.push(settings);
             return Ok(None);
         }
-        if self.cases.iter().any(|c| c.settings == settings) {
+        let is_this = |c: &Case| c.settings == settings && c.overrides == overrides;
+        if self.cases.iter().any(is_this) {
             return Ok(None);
         }
         let left = self.deadline.saturating_duration_since(Instant::now());
@@ -124,6 +129,7 @@ impl Study<'_> {
         ));
         let all: Vec<String> = self.common.iter().chain(&overrides).cloned().collect();
         let folder = self.params.output.join("case");
+        let mesh = record::mesh(&self.plain, self.directory, &all);
         let started = Instant::now();
         let outcome = match self.runner.run(&all, &folder, left.min(self.patience))? {
             Attempt::Interrupted => return Ok(Some(TradeEnd::Interrupted)),
@@ -154,6 +160,7 @@ impl Study<'_> {
         let case = Case {
             settings,
             overrides,
+            mesh,
             outcome,
             guessed,
         };

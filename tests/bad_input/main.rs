@@ -2,6 +2,7 @@
 //! the value and the remedy, and nothing panics.
 
 mod meshes;
+mod process;
 
 use std::path::Path;
 

@@ -52,6 +52,46 @@ fn kept_random_scenes() {
     replay("random_scene", entry::random_scene);
 }
 
+/// A genuine checkpoint goes on; with a byte altered, cut or repeated, and its checksum right, it goes on or is refused by name. So are arrays of VTU
+/// files that announce anything. `BONDLINE_ALTERED` says how many of each.
+#[test]
+fn altered_checkpoints_and_arrays_are_refused_by_name() {
+    let count = from_environment("BONDLINE_ALTERED", 150);
+    let whole = entry::genuine_checkpoint();
+    assert_eq!(entry::binary_file(&whole), Outcome::Solved);
+    let mut ends: BTreeMap<String, usize> = BTreeMap::new();
+    let mut note = |data: &[u8], what: &dyn Fn() -> String| {
+        let ended = catch_unwind(|| entry::binary_file(data));
+        let ended = ended.unwrap_or_else(|_| panic!("{}: {data:?}", what()));
+        *ends.entry(format!("{ended:?}")).or_default() += 1;
+    };
+    for number in 0..count {
+        let random = bytes(number);
+        let at = 1 + usize::from(u16::from_le_bytes([random[0], random[1]])) % (whole.len() - 1);
+        let mut altered = whole.clone();
+        match random[2] % 4 {
+            0 => altered[at] = random[3],
+            1 => altered.truncate(at),
+            2 => altered.insert(at, random[3]),
+            _ => altered[at] ^= 1 << (random[3] % 8),
+        }
+        note(&altered, &|| format!("checkpoint {number}, byte {at}"));
+        let length = usize::from(random[4]) % random.len();
+        let mut array = random[5..].to_vec();
+        array.truncate(2 + length);
+        // small numbers in the header let it through more often
+        if random[3].is_multiple_of(2) {
+            (2..array.len().min(26)).for_each(|k| array[k] &= if k % 4 == 2 { 31 } else { 0 });
+        }
+        array[0] &= !3;
+        note(&array, &|| format!("array {number}"));
+    }
+    for (end, times) in &ends {
+        println!("{times:7}  {end}");
+    }
+    assert!(peak_memory_bytes().is_none_or(|b| b < MOST_MEMORY));
+}
+
 /// A number from the environment, or what a plain `cargo test` takes.
 fn from_environment(key: &str, plain: u64) -> u64 {
     std::env::var(key).map_or(plain, |text| text.parse().expect("a whole number"))

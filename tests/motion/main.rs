@@ -12,6 +12,7 @@ mod growth;
 mod indefinite;
 mod keys;
 mod load_steps;
+mod neighbours;
 mod restarts;
 mod sub_steps;
 

@@ -1,5 +1,7 @@
 //! What drives a scene: its loads and prescribed motion as functions of time.
 
+use std::sync::{Mutex, PoisonError};
+
 use crate::coupling::Model;
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::loads::{Loads, displacement, holders};
@@ -26,8 +28,8 @@ pub(super) struct SceneDrive<'a, const D: usize> {
     holder: Vec<u32>,
     /// Displacement at time zero of each prescribed dof, from which a prescribed velocity begins.
     start: Vec<f64>,
-    /// The integral over time of each prescribed velocity, at every step, by condition and axis.
-    travelled: Vec<[Vec<f64>; D]>,
+    /// The way of each prescribed velocity that changes with time, by condition and axis.
+    ways: Vec<[Option<Way>; D]>,
     step: f64,
 }
 
@@ -82,9 +84,9 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             .enumerate()
             .filter_map(|(dof, h)| h.map(|h| (dof as u32, h as u32)))
             .unzip();
-        let travelled = conditions
+        let ways = conditions
             .iter()
-            .map(|c| std::array::from_fn(|axis| travelled(c, axis, step, steps)))
+            .map(|c| std::array::from_fn(|axis| Way::of(c, axis, step, steps)))
             .collect();
         Ok(Self {
             model,
@@ -96,7 +98,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             start: prescribed.iter().map(|&k| start[k as usize]).collect(),
             prescribed,
             holder,
-            travelled,
+            ways,
             step,
         })
     }
@@ -138,50 +140,87 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         }
     }
 
-    /// Displacement of a dof whose velocity is prescribed.
-    fn moved(&self, p: usize, dof: usize, time: f64) -> f64 {
+    /// Displacement of a dof whose velocity is prescribed; `ways` are those that change with time.
+    fn moved(&self, p: usize, dof: usize, time: f64, ways: &[[Option<f64>; D]]) -> f64 {
         let holder = self.holder[p] as usize;
-        let condition = &self.conditions[holder];
-        let changes = |e: &crate::scene::Expression| e.depends_on_time();
-        let way = if condition.components.0[dof % D]
-            .as_ref()
-            .is_some_and(changes)
-        {
-            let table = &self.travelled[holder][dof % D];
-            let index = (time / self.step + 1e-6).floor().max(0.0);
-            let known = table[(index as usize).min(table.len() - 1)];
-            // steps that have changed their size in between do not end where the table has its entries
-            let rest = time - index * self.step;
-            if rest > 1e-5 * self.step {
-                known + simpson(condition, dof % D, index * self.step, rest)
-            } else {
-                known
-            }
-        } else {
-            displacement(self.model, condition, dof, 0.0) * time
-        };
+        let way = ways[holder][dof % D]
+            .unwrap_or_else(|| displacement(self.model, &self.conditions[holder], dof, 0.0) * time);
         self.start[p] + way
+    }
+
+    /// The way of a condition along an axis from time zero to `time`, if its velocity changes with time.
+    fn way(&self, condition: usize, axis: usize, time: f64) -> Option<f64> {
+        let way = self.ways[condition][axis].as_ref()?;
+        let condition = &self.conditions[condition];
+        let index = (time / self.step + 1e-6).floor().max(0.0);
+        let known = way.after(index as u64, condition, axis);
+        // steps that have changed their size in between do not end where those of the way do
+        let rest = time - index * self.step;
+        Some(if rest > 1e-5 * self.step {
+            known + simpson(condition, axis, index * self.step, rest)
+        } else {
+            known
+        })
     }
 }
 
-/// The integral of a prescribed velocity that depends on time alone, at the beginning of each step and two beyond the last, by Simpson's rule.
-fn travelled<const D: usize>(
-    condition: &Condition<D>,
-    axis: usize,
+/// The integral of a prescribed velocity that depends on time alone, step by step by Simpson's rule, as far as it has been asked for.
+struct Way {
     step: f64,
+    /// Two beyond the last step: nothing moves on from there.
     steps: u64,
-) -> Vec<f64> {
-    let mut table = vec![0.0];
-    let expression = condition.components.0[axis].as_ref();
-    let velocity = matches!(condition.prescribed, Prescribed::Velocity(_));
-    if expression.is_some_and(|e| velocity && e.depends_on_time()) {
-        let mut way = 0.0;
-        for n in 0..steps + 2 {
-            way += simpson(condition, axis, n as f64 * step, step);
-            table.push(way);
-        }
+    known: Mutex<Known>,
+}
+
+/// What is known of a way: the sum after so many steps, and after every [`MARK`]-th step before.
+struct Known {
+    after: u64,
+    sum: f64,
+    marks: Vec<f64>,
+}
+
+/// Steps between sums that are kept: a run of any length keeps few of them, and none is far from the next.
+const MARK: u64 = 1024;
+
+impl Way {
+    fn of<const D: usize>(
+        condition: &Condition<D>,
+        axis: usize,
+        step: f64,
+        steps: u64,
+    ) -> Option<Self> {
+        let expression = condition.components.0[axis].as_ref()?;
+        let is_velocity = matches!(condition.prescribed, Prescribed::Velocity(_));
+        (is_velocity && expression.depends_on_time()).then(|| Self {
+            step,
+            steps: steps.saturating_add(2),
+            known: Mutex::new(Known {
+                after: 0,
+                sum: 0.0,
+                marks: vec![0.0],
+            }),
+        })
     }
-    table
+
+    /// The way after `step` steps: the same sum in the same order whatever was asked for before.
+    fn after<const D: usize>(&self, step: u64, condition: &Condition<D>, axis: usize) -> f64 {
+        let step = step.min(self.steps);
+        // sums are whole whoever panicked while holding them
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if step < known.after {
+            let mark = (step / MARK) as usize;
+            (known.after, known.sum) = (mark as u64 * MARK, known.marks[mark]);
+        }
+        while known.after < step {
+            known.sum += simpson(condition, axis, known.after as f64 * self.step, self.step);
+            known.after += 1;
+            if known.after == known.marks.len() as u64 * MARK {
+                let sum = known.sum;
+                known.marks.push(sum);
+            }
+        }
+        known.sum
+    }
 }
 
 /// The integral of a prescribed velocity over `step` from `t` on, by Simpson's rule.
@@ -217,9 +256,12 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
     }
 
     fn displacement_into(&self, time: f64, values: &mut [f64]) {
+        let ways: Vec<[Option<f64>; D]> = (0..self.conditions.len())
+            .map(|c| std::array::from_fn(|axis| self.way(c, axis, time)))
+            .collect();
         self.each_prescribed(time, values, |p, dof, condition, uniform| {
             match (&condition.prescribed, uniform) {
-                (Prescribed::Velocity(_), _) => self.moved(p, dof, time),
+                (Prescribed::Velocity(_), _) => self.moved(p, dof, time, &ways),
                 (_, Some(value)) => value,
                 (_, None) => displacement(self.model, condition, dof, time),
             }

@@ -264,6 +264,7 @@ fn leg<'r, const D: usize>(
     let mut told_at = Instant::now();
     let mut known_broken = u64::MAX;
     let mut is_late = false;
+    options.begin_steps();
     let mut observe = |motion: &Explicit<'_>| -> ControlFlow<()> {
         let moment = moment(motion, is_linear);
         let state = moment.state;

@@ -29,7 +29,7 @@ mod switching;
 mod system;
 mod watch;
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::predict::Prediction;
 use super::run::RunError;
@@ -58,6 +58,17 @@ pub struct RunOptions<'a> {
     pub checkpoint_every: Option<Pace>,
     /// Set by another thread to end the run after the step at hand, with a checkpoint.
     pub interrupt: Option<&'a AtomicBool>,
+    /// Set by the run from its first step on, when it looks at `interrupt` after every step; before, ending the process loses nothing.
+    pub heeds: Option<&'a AtomicBool>,
+}
+
+impl RunOptions<'_> {
+    /// Says that steps begin.
+    fn begin_steps(&self) {
+        if let Some(heeds) = self.heeds {
+            heeds.store(true, Ordering::Relaxed);
+        }
+    }
 }
 
 /// Predicts a run in time or under a load that grows.

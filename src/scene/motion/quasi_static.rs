@@ -152,7 +152,7 @@ fn load_steps<const D: usize>(
         loaded.u.clone_from(&state.u);
     }
     let first = state.step;
-    let times: Vec<f64> = (0..=spec.steps).map(|k| k as f64 * step).collect();
+    let times = |k: u64| (k <= pace.steps).then(|| k as f64 * step);
     watch.lap(&mut timings, "start");
     let written = recorder.seconds;
     progress.stage("load steps", Some(pace.steps));
@@ -162,6 +162,7 @@ fn load_steps<const D: usize>(
     let mut failed = None;
     let rotations = Rotations::new(model, moving.is_linear);
     let mut rotation = None;
+    options.begin_steps();
     let mut observe = |seen: &LoadStep<'_>| -> ControlFlow<()> {
         drive.load_into(seen.time, &mut load);
         let mut now = seen.force.to_vec();

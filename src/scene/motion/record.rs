@@ -11,7 +11,6 @@ use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
 use crate::observe::csv::Entry;
-use crate::observe::file::remove_parts;
 use crate::observe::history::History;
 use crate::observe::series::Series;
 use crate::observe::switch::Switch;
@@ -220,7 +219,6 @@ impl<'a, const D: usize> Recorder<'a, D> {
         pace: Option<Pace>,
         written: Option<&Written>,
     ) -> Result<Self, ObserveError> {
-        remove_parts(&output.directory, &output.name);
         let probes = probes(output, sampler);
         let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
         let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));

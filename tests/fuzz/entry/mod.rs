@@ -4,10 +4,12 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `binary.rs` | arrays of VTU files and states of checkpoints |
 //! | `examine.rs` | a scene to its end: what has to hold of it |
 //! | `random.rs` | bytes to a scene within the schema |
 //! | `size.rs` | which scenes are small enough to be run |
 
+mod binary;
 mod examine;
 mod random;
 mod size;
@@ -18,6 +20,8 @@ use arbitrary::Unstructured;
 use bondline::mesh::{MeshError, quality, read};
 use bondline::scene::{AnyScene, SceneSpec, Source};
 
+#[allow(unused_imports)] // each target calls its own
+pub use binary::{binary_file, genuine_checkpoint};
 pub use examine::Outcome;
 use examine::{examine, refused};
 

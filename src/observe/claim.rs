@@ -1,0 +1,326 @@
+//! Claims on output folders: who writes which files, so that no run takes another one's files for leftovers or writes over them.
+//!
+//! A claim is the file `.NAME.lock` in the folder, locked by the operating system while the run lasts. It lists the process, the scene and the files that
+//! belong to the run. The system lifts the lock when the process ends, however it ends, so a claim that is left behind by a killed run is known from
+//! one that holds. Where a file system knows no locks, nothing is claimed.
+
+use std::fs::{File, TryLockError};
+use std::io::{ErrorKind, Read as _, Seek as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use super::ObserveError;
+
+/// The files of one run in its folder.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Files {
+    /// The beginning of their names.
+    pub name: String,
+    /// Names, each in full.
+    pub files: Vec<String>,
+    /// Whether there are files `NAME_0000.vtu`, `NAME_0001.vtu`, … too.
+    pub series: bool,
+}
+
+impl Files {
+    /// Whether a file is one of these.
+    pub fn contains(&self, file: &str) -> bool {
+        self.files.iter().any(|own| own == file) || (self.series && self.is_of_series(file))
+    }
+
+    fn is_of_series(&self, file: &str) -> bool {
+        let number = file
+            .strip_prefix(&self.name)
+            .and_then(|rest| rest.strip_prefix('_'))
+            .and_then(|rest| rest.strip_suffix(".vtu"));
+        number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
+    }
+
+    /// A file that both would write.
+    fn shared(&self, other: &Self) -> Option<String> {
+        let both_in_series = self.series && other.series && self.name == other.name;
+        let of_series = || both_in_series.then(|| format!("{}_0000.vtu", self.name));
+        let theirs = other.files.iter().filter(|f| self.contains(f));
+        let mine = self.files.iter().filter(|f| other.contains(f));
+        theirs.chain(mine).next().cloned().or_else(of_series)
+    }
+}
+
+/// What a claim says.
+#[derive(Debug, Serialize, Deserialize)]
+struct Holder {
+    process: u32,
+    scene: String,
+    files: Files,
+}
+
+/// Files of a folder that nobody else writes while this lives.
+#[derive(Debug)]
+pub struct Claim {
+    /// The locked file; none where the file system knows no locks.
+    held: Option<(File, PathBuf)>,
+    /// Folders that were made for it, the deepest first.
+    made: Vec<PathBuf>,
+}
+
+/// A claim may be looked at by others for an instant.
+const LOOKS: u32 = 20;
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(10);
+
+impl Claim {
+    /// Claims `files` in `folder` for a scene, and removes what killed runs left of them half written.
+    ///
+    /// # Errors
+    /// [`ObserveError::Claimed`] if another run writes any of them, [`ObserveError::Folder`], [`ObserveError::Write`].
+    pub fn take(folder: &Path, scene: &str, files: &Files) -> Result<Self, ObserveError> {
+        let folder = match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        };
+        let made = folder
+            .ancestors()
+            .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
+            .map(Path::to_path_buf)
+            .collect();
+        let mut claim = Self { held: None, made };
+        let path = folder.join(format!(".{}.lock", files.name));
+        let fail = |source| ObserveError::Write {
+            path: path.clone(),
+            source,
+        };
+        let mut looks = 0;
+        let mut file = loop {
+            // another run that ends may remove the folder with its claim
+            std::fs::create_dir_all(folder).map_err(|source| ObserveError::Folder {
+                path: folder.to_path_buf(),
+                source,
+            })?;
+            let mut options = File::options();
+            let file = match options.read(true).write(true).create(true).open(&path) {
+                Err(e) if e.kind() == ErrorKind::NotFound && looks < LOOKS => {
+                    looks += 1;
+                    continue;
+                }
+                opened => opened.map_err(fail)?,
+            };
+            match file.try_lock() {
+                Ok(()) if is_at(&file, &path) => break file,
+                // removed by its owner between opening and locking
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) if looks < LOOKS => {
+                    looks += 1;
+                    std::thread::sleep(LOOK);
+                }
+                Err(TryLockError::WouldBlock) => {
+                    return Err(claimed(folder, &path, files.files.first().cloned()));
+                }
+                Err(TryLockError::Error(_)) => return Ok(claim),
+            }
+        };
+        let holder = Holder {
+            process: std::process::id(),
+            scene: scene.to_owned(),
+            files: files.clone(),
+        };
+        file.set_len(0)
+            .and_then(|()| file.rewind())
+            .and_then(|()| serde_json::to_writer(&file, &holder).map_err(std::io::Error::from))
+            .and_then(|()| file.flush())
+            .map_err(fail)?;
+        claim.held = Some((file, path.clone()));
+        // only now: of two that begin together, the later one sees the list of the other
+        for other in others(folder, &path) {
+            let shared = read(&other).and_then(|holder| holder.files.shared(files));
+            if let Some(shared) = shared
+                && is_held(&other)
+            {
+                return Err(claimed(folder, &other, Some(shared)));
+            }
+        }
+        remove_parts(folder, files);
+        Ok(claim)
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        if let Some((file, path)) = self.held.take() {
+            // while it is locked, so that it is ours; elsewhere than on Unix a file that is open stays
+            if cfg!(unix) {
+                let _ = std::fs::remove_file(path);
+            }
+            drop(file);
+        }
+        // a run that wrote nothing leaves no folder; one that holds anything stays
+        for folder in &self.made {
+            if std::fs::remove_dir(folder).is_err() {
+                break;
+            }
+        }
+    }
+}
+
+/// The process and scene of a claim that holds in a folder, if there is any.
+pub fn holder(folder: &Path) -> Option<(u32, String)> {
+    let held = others(folder, Path::new("")).into_iter();
+    let mut held = held
+        .filter(|path| is_held(path))
+        .filter_map(|path| read(&path));
+    held.next().map(|holder| (holder.process, holder.scene))
+}
+
+/// The claims in a folder but for `own`.
+fn others(folder: &Path, own: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_claim = |name: &str| name.starts_with('.') && name.ends_with(".lock");
+    let claims = entries.filter(|e| e.file_name().to_str().is_some_and(is_claim));
+    let paths = claims.map(|e| e.path());
+    paths.filter(|p| p.is_file() && p != own).collect()
+}
+
+/// Whether the process of a claim lives.
+fn is_held(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else {
+        return false;
+    };
+    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
+}
+
+fn read(path: &Path) -> Option<Holder> {
+    let mut text = String::new();
+    let file = File::open(path).ok()?;
+    file.take(1 << 20).read_to_string(&mut text).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+fn claimed(folder: &Path, claim: &Path, file: Option<String>) -> ObserveError {
+    let by = match read(claim) {
+        Some(holder) => format!("process {}, scene `{}`", holder.process, holder.scene),
+        None => "another process".to_owned(),
+    };
+    ObserveError::Claimed {
+        path: folder.join(file.unwrap_or_default()),
+        by,
+    }
+}
+
+/// Whether an open file is the one that lies at `path`.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let (Ok(own), Ok(there)) = (file.metadata(), std::fs::metadata(path)) else {
+        return false;
+    };
+    (own.dev(), own.ino()) == (there.dev(), there.ino())
+}
+
+/// Claims stay where they are.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// Removes what killed runs left of these files half written: `.FILE.PROCESS-NUMBER.part`.
+fn remove_parts(folder: &Path, files: &Files) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        if name
+            .to_str()
+            .and_then(of_part)
+            .is_some_and(|f| files.contains(f))
+        {
+            // what cannot be removed does no harm
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// The file that a part belongs to.
+fn of_part(name: &str) -> Option<&str> {
+    let inner = name.strip_prefix('.')?.strip_suffix(".part")?;
+    let (file, writer) = inner.rsplit_once('.')?;
+    let (process, number) = writer.split_once('-')?;
+    let is_number = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
+    (is_number(process) && is_number(number)).then_some(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moving(name: &str) -> Files {
+        Files {
+            name: name.to_owned(),
+            files: vec![format!("{name}.pvd"), format!("{name}_history.csv")],
+            series: true,
+        }
+    }
+
+    #[test]
+    fn a_name_that_begins_like_another_is_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let long = Claim::take(folder.path(), "long", &moving("branching_moving")).unwrap();
+        let parts = [
+            ".branching_moving_0001.vtu.17-3.part",
+            ".branching_0001.vtu.17-3.part",
+            ".branching_history.csv.17-12.part",
+            ".branching_0001.vtu.part",
+            ".branching_tip.csv.17-3.part",
+        ];
+        for part in parts {
+            std::fs::write(folder.path().join(part), b"half").unwrap();
+        }
+        let short = Claim::take(folder.path(), "short", &moving("branching")).unwrap();
+        let left = parts.map(|part| folder.path().join(part).exists());
+        assert_eq!(left, [true, false, false, true, true]);
+        // both stand, and a second one of either is refused
+        let error = Claim::take(folder.path(), "again", &moving("branching")).unwrap_err();
+        let said = error.to_string();
+        let process = format!("process {}, scene `short`", std::process::id());
+        assert!(
+            said.contains(&process) && said.contains("--output"),
+            "{said}"
+        );
+        drop((long, short));
+        assert!(!folder.path().join(".branching.lock").exists());
+        Claim::take(folder.path(), "again", &moving("branching")).unwrap();
+    }
+
+    #[test]
+    fn two_names_with_a_file_in_common_are_told_of_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let _moving = Claim::take(folder.path(), "moving", &moving("plate")).unwrap();
+        let still = |file: &str| Files {
+            name: "plate_0000".to_owned(),
+            files: vec![file.to_owned()],
+            series: false,
+        };
+        let error = Claim::take(folder.path(), "still", &still("plate_0000.vtu")).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.contains("plate_0000.vtu") && said.contains("scene `moving`"),
+            "{said}"
+        );
+        Claim::take(folder.path(), "still", &still("plate_0000_probes.csv")).unwrap();
+        // a claim whose process has ended, and what is no claim at all
+        std::fs::write(folder.path().join(".plate_0000.lock"), b"{").unwrap();
+        std::fs::write(folder.path().join(".cargo.lock"), b"x = 1").unwrap();
+        Claim::take(folder.path(), "still", &still("plate_0000.csv")).unwrap();
+    }
+
+    #[test]
+    fn folders_that_stay_empty_go() {
+        let folder = tempfile::tempdir().unwrap();
+        let deep = folder.path().join("a/b");
+        drop(Claim::take(&deep, "scene", &moving("x")).unwrap());
+        assert!(!folder.path().join("a").exists());
+        let claim = Claim::take(&deep, "scene", &moving("x")).unwrap();
+        std::fs::write(deep.join("x.pvd"), b"").unwrap();
+        drop(claim);
+        assert!(deep.join("x.pvd").exists());
+    }
+}
