@@ -183,6 +183,15 @@ impl<const D: usize> Row<D> {
         sums
     }
 
+    /// The columns of the row, in the order in which they came, which empties it.
+    pub fn take_columns(&mut self) -> Vec<u32> {
+        for &column in &self.columns {
+            self.slot[column as usize] = EMPTY;
+        }
+        self.blocks.clear();
+        std::mem::take(&mut self.columns)
+    }
+
     /// Empties the row into sorted columns and row-major blocks.
     fn drain_into(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f64>) {
         let mut order: Vec<u32> = (0..self.columns.len() as u32).collect();
@@ -266,6 +275,8 @@ pub struct Pattern {
     pub row_offsets: Vec<usize>,
     /// Column of each block that is not zero, ascending within a row.
     pub columns: Vec<u32>,
+    /// Product of the matrix with each of the vectors that were given.
+    pub products: Vec<Vec<f64>>,
 }
 
 /// Sums over the values of rows that are dropped.
@@ -276,6 +287,8 @@ struct Dropped {
     stored: usize,
     skew: f64,
     squares: f64,
+    /// Products of the rows with each of some vectors.
+    products: Vec<Vec<f64>>,
 }
 
 /// A number in [−1, 1) that depends on its arguments only.
@@ -290,7 +303,21 @@ fn noise(site: u32, component: usize, which: u64) -> f64 {
 
 impl<const D: usize> Row<D> {
     /// Empties the row of `site` into the columns of its non-zero blocks.
-    fn drain_pattern(&mut self, site: u32, columns: &mut Vec<u32>, sums: &mut Dropped) -> u64 {
+    fn drain_pattern(
+        &mut self,
+        site: u32,
+        fields: &[Vec<f64>],
+        columns: &mut Vec<u32>,
+        sums: &mut Dropped,
+    ) -> u64 {
+        for (u, product) in fields.iter().zip(&mut sums.products) {
+            let mut sum = Vector::<D>::zeros();
+            for (&column, block) in self.columns.iter().zip(&self.blocks) {
+                let start = column as usize * D;
+                sum += block * Vector::<D>::from_column_slice(&u[start..start + D]);
+            }
+            product.extend(sum.iter());
+        }
         let start = columns.len();
         let largest = self.blocks.iter().map(|b| b.amax()).fold(0.0, f64::max);
         // a sum over the blocks, so that their order does not matter; nine digits, so that round-off does not
@@ -324,9 +351,10 @@ impl<const D: usize> Row<D> {
     }
 }
 
-/// The pattern of the matrix that [`assemble`] would make; each row is computed and dropped.
+/// The pattern of the matrix that [`assemble`] would make, and its products with `fields` (`D` numbers per site each); each row is computed and dropped.
 pub fn pattern<const D: usize>(
     sites: usize,
+    fields: &[Vec<f64>],
     advance: impl Fn(u64) + Sync,
     add_row: impl Fn(usize, &mut Row<D>) + Sync,
 ) -> Pattern {
@@ -337,12 +365,15 @@ pub fn pattern<const D: usize>(
             |row, chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(sites);
                 let (mut ends, mut columns) = (Vec::new(), Vec::new());
-                let mut sums = Dropped::default();
+                let mut sums = Dropped {
+                    products: vec![Vec::new(); fields.len()],
+                    ..Dropped::default()
+                };
                 let count = range.len() as u64;
                 for site in range {
                     add_row(site, row);
                     let before = sums.stored;
-                    let mark = row.drain_pattern(site as u32, &mut columns, &mut sums);
+                    let mark = row.drain_pattern(site as u32, fields, &mut columns, &mut sums);
                     sums.marks.push((mark, sums.stored - before));
                     ends.push(columns.len());
                 }
@@ -353,6 +384,7 @@ pub fn pattern<const D: usize>(
         .collect();
     let mut pattern = Pattern {
         row_offsets: vec![0],
+        products: vec![Vec::new(); fields.len()],
         ..Pattern::default()
     };
     let mut sums = Dropped::default();
@@ -366,6 +398,9 @@ pub fn pattern<const D: usize>(
         let before = pattern.columns.len();
         pattern.row_offsets.extend(ends.iter().map(|e| before + e));
         pattern.columns.extend(columns);
+        for (all, own) in pattern.products.iter_mut().zip(part.products) {
+            all.extend(own);
+        }
         sums.stored += part.stored;
         sums.skew += part.skew;
         sums.squares += part.squares;
@@ -420,7 +455,16 @@ mod tests {
         for skew in [0.0, 1e-3] {
             let sites = 10_000;
             let matrix = assemble(sites, |_| (), ring(sites, skew));
-            let found = pattern(sites, |_| (), ring(sites, skew));
+            let field: Vec<f64> = (0..2 * sites).map(|k| (k as f64).sin()).collect();
+            let found = pattern(
+                sites,
+                std::slice::from_ref(&field),
+                |_| (),
+                ring(sites, skew),
+            );
+            for (a, b) in found.products[0].iter().zip(matrix.multiply(&field)) {
+                assert!((a - b).abs() < 1e-13, "{a} {b}");
+            }
             assert_eq!(matrix.rows(), sites);
             assert_eq!(found.row_offsets.len(), sites + 1);
             assert_eq!(found.stored * 4, matrix.nonzeros());

@@ -11,7 +11,7 @@ use crate::{
         isotropic_shell_factors, offsets::OffsetTable, partial_volume::lattice_shells,
     },
     shape::Barriers,
-    tensor::{Tensor4, Vector},
+    tensor::{Tensor, Tensor4, Vector},
 };
 
 /// Removes the bonds that barriers or facets cut; `reach` is the largest horizon.
@@ -92,7 +92,8 @@ pub(super) struct LatticeFactors<const D: usize> {
     /// By the bits of the horizon, ascending.
     tables: Vec<(u64, OffsetTable<f64, D>)>,
     spacing: f64,
-    is_lattice: bool,
+    /// Axes of the lattice, as columns; none for scattered points.
+    axes: Option<Tensor<D>>,
     volumes: PartialVolume,
 }
 
@@ -102,19 +103,20 @@ impl<const D: usize> LatticeFactors<D> {
         let mut factors = Self {
             tables: Vec::new(),
             spacing: cloud.spacing,
-            is_lattice: cloud.is_lattice,
+            axes: cloud.axes,
             volumes: p.volumes,
         };
         let isotropic = p.weights == BondWeights::Isotropic;
         if factors.has_partial_volumes() {
-            let regular = cloud.is_lattice && matches!(p.points, PointSource::Lattice { .. });
+            let regular =
+                cloud.is_axis_parallel() && matches!(p.points, PointSource::Lattice { .. });
             if !regular || p.weights == BondWeights::Fitted {
                 return Err(ModelError::Unsupported {
                     what: "a partial volume without a lattice, or with fitted weights",
                     remedy: "give peridynamics.points a lattice and isotropic or plain weights, or leave out peridynamics.volumes",
                 });
             }
-        } else if !cloud.is_lattice || !isotropic {
+        } else if cloud.axes.is_none() || !isotropic {
             return Ok(factors);
         }
         let mut horizons: Vec<u64> = cloud.horizon.iter().map(|d| d.to_bits()).collect();
@@ -145,9 +147,22 @@ impl<const D: usize> LatticeFactors<D> {
         Ok(factors)
     }
 
-    /// Whether the points are a lattice's.
+    /// Whether the points are a lattice's, whatever its axes.
     pub fn is_lattice(&self) -> bool {
-        self.is_lattice
+        self.axes.is_some()
+    }
+
+    /// Whether the points are those of a lattice along the coordinate axes.
+    pub fn is_axis_parallel(&self) -> bool {
+        self.axes == Some(Tensor::identity())
+    }
+
+    /// Integer offset of a bond, along the axes of the lattice.
+    fn offset(&self, xi: &Vector<D>) -> [i32; D] {
+        match &self.axes {
+            Some(axes) if !self.is_axis_parallel() => offset_of(&axes.tr_mul(xi), self.spacing),
+            _ => offset_of(xi, self.spacing),
+        }
     }
 
     /// Whether cells count in part.
@@ -170,7 +185,7 @@ impl<const D: usize> LatticeFactors<D> {
     pub fn factor(&self, horizon: f64, xi: &Vector<D>) -> Option<f64> {
         let bits = horizon.to_bits();
         let place = self.tables.binary_search_by_key(&bits, |t| t.0).ok()?;
-        let known = self.tables[place].1.of(&offset_of(xi, self.spacing));
+        let known = self.tables[place].1.of(&self.offset(xi));
         // an isotropic table lacks no bond of its family; a table of shares lacks those to cells of which nothing counts
         let other = if self.has_partial_volumes() { 0.0 } else { 1.0 };
         Some(known.unwrap_or(other))
@@ -182,9 +197,9 @@ impl<const D: usize> LatticeFactors<D> {
         p: &Peridynamics<D>,
         horizon: f64,
     ) -> Result<Option<WholeFamily<D>>, ModelError> {
-        if !self.is_lattice {
+        let Some(axes) = self.axes else {
             return Ok(None);
-        }
+        };
         let (lattice, _) =
             lattice_shells::<D>(self.volumes, horizon / self.spacing, TIE_TOLERANCE)?;
         let bonds: Vec<Vector<D>> = lattice
@@ -193,7 +208,7 @@ impl<const D: usize> LatticeFactors<D> {
             .flat_map(|s| {
                 s.offsets
                     .iter()
-                    .map(|k| Vector::from_fn(|i, _| f64::from(k[i]) * self.spacing))
+                    .map(|k| axes * Vector::<D>::from_fn(|i, _| f64::from(k[i]) * self.spacing))
             })
             .collect();
         let volumes = vec![self.spacing.powi(D as i32); bonds.len()];
@@ -221,7 +236,7 @@ impl<const D: usize> LatticeFactors<D> {
         let mut bonds: Vec<_> = bonds
             .iter()
             .zip(pair.iter().zip(&omega))
-            .map(|(xi, (&p, &w))| (offset_of(xi, self.spacing), (p, w)))
+            .map(|(xi, (&p, &w))| (self.offset(xi), (p, w)))
             .collect();
         bonds.sort_unstable_by_key(|b| b.0);
         Ok(Some(WholeFamily {

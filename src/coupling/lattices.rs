@@ -68,7 +68,7 @@ impl<const D: usize> Model<D> {
             .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
         let reaches: Vec<f64> = cloud.horizon.iter().map(|&d| p.reach(d)).collect();
         let one = reaches.first().filter(|d| reaches.iter().all(|r| r == *d));
-        let known = one.filter(|_| cloud.is_lattice).and_then(|reach| {
+        let known = one.filter(|_| cloud.is_axis_parallel()).and_then(|reach| {
             Families::search_lattice(&cloud.position, cloud.spacing, *reach, TIE_TOLERANCE)
         });
         let mut families = match known {
@@ -211,6 +211,8 @@ pub(super) fn whole_families<const D: usize>(
         .zip(horizons)
         .map(|(lattice, &horizon)| lattice.whole_family(p, horizon))
         .collect::<Result<Option<Vec<_>>, _>>()?;
+    // the faces that cut bonds follow the axes
+    let is_regular = is_regular && lattices.iter().all(LatticeFactors::is_axis_parallel);
     let (true, Some(whole)) = (is_regular, whole) else {
         return Err(ModelError::Unsupported {
             what: "a seam of truncated bonds without a regular lattice of one horizon and one weight per shell of bonds",

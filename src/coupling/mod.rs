@@ -10,7 +10,7 @@
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs` | shared: sites, families, what completes them | |
-//! | `lattices.rs` | shared: one lattice of points, or several that elements keep apart |
+//! | `lattices.rs`, `lattice_axes.rs` | shared: one lattice of points, or several that elements keep apart; its axes | |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `need.rs` | where the local model would be wrong, and where a bond could break | |
@@ -30,6 +30,7 @@ pub mod carry;
 pub mod derivative;
 pub mod edge;
 mod fit;
+mod lattice_axes;
 mod lattices;
 pub mod model;
 pub mod motion;

@@ -69,6 +69,7 @@ pub struct Model<const D: usize> {
     pub(super) interface: Interface,
     passing: Option<Passing<D>>,
     spacing: f64,
+    is_lattice: bool,
     volumes: Volumes,
     /// Whether rows are the gradient of an energy.
     pub(super) has_energy: bool,
@@ -120,6 +121,7 @@ impl<const D: usize> Model<D> {
             interface: coupling.interface(),
             passing: None,
             spacing: 0.0,
+            is_lattice: false,
             volumes: Volumes::default(),
             has_energy: coupling.symmetry() == Symmetry::Symmetric,
             tributary: Tributary::default(),
@@ -334,6 +336,7 @@ impl<const D: usize> Model<D> {
             factors.push(next.factors);
         }
         self.spacing = cloud.spacing;
+        self.is_lattice = factors[0].is_lattice();
         self.volumes = cloud.volumes;
 
         let mut point_site = vec![NONE; cloud.position.len()];
@@ -477,6 +480,36 @@ impl<const D: usize> Model<D> {
         self.spacing
     }
 
+    /// Whether the points are those of a lattice, whatever its axes.
+    pub fn is_lattice(&self) -> bool {
+        self.is_lattice
+    }
+
+    /// How far the families of points are from the constants of their material: relative differences of `C_1111`, mean and largest size, over the families that
+    /// weigh at least 0.95 of the heaviest one; none without points.
+    pub fn tensor_deviation(&self) -> Option<[f64; 2]> {
+        /// Families looked at: enough for a mean.
+        const SAMPLE: usize = 1000;
+        let body = self.body.as_ref()?;
+        let typed = self.peridynamics.as_ref()?.law.tensor().get(0, 0, 0, 0);
+        let weight = |i: usize| -> f64 {
+            let family = body.families.of(i).iter();
+            family.map(|&j| body.cloud.volume[j as usize]).sum()
+        };
+        let points = body.cloud.position.len();
+        let sample: Vec<(usize, f64)> = (0..points)
+            .step_by(points.div_ceil(SAMPLE).max(1))
+            .map(|i| (i, weight(i)))
+            .collect();
+        let heaviest = sample.iter().map(|s| s.1).fold(0.0, f64::max);
+        let full = sample.iter().filter(|s| s.1 >= 0.95 * heaviest);
+        let off: Vec<f64> = full
+            .map(|s| body.collapsed_tensor(s.0).get(0, 0, 0, 0) / typed - 1.0)
+            .collect();
+        let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
+        Some([mean, off.iter().fold(0.0, |m, e| m.max(e.abs()))])
+    }
+
     /// Volumes of the peridynamic zone and of the points in it.
     pub fn volumes(&self) -> Volumes {
         self.volumes
@@ -584,15 +617,17 @@ impl<const D: usize> Model<D> {
         matrix
     }
 
-    /// The pattern of the stiffness, without its values.
+    /// The pattern of the stiffness, without its values, and its products with `fields`.
     pub fn pattern(
         &self,
         operator: &dyn super::Operator<D>,
+        fields: &[Vec<f64>],
         progress: &dyn Progress,
     ) -> assembly::Pattern {
         progress.stage("pattern", Some(self.sites.len() as u64));
         let pattern = assembly::pattern(
             self.sites.len(),
+            fields,
             |by| progress.advance(by),
             |site, row| operator.add_row(site, row),
         );

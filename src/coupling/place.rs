@@ -4,11 +4,12 @@ use rayon::prelude::*;
 
 use crate::{
     coupling::{
-        CellRole, ModelError, Peridynamics, PointSource, Reach, Zone, fit::Bins, points::PointCloud,
+        CellRole, ModelError, Peridynamics, PointSource, Reach, Zone, fit::Bins,
+        lattice_axes::lattice_axes, points::PointCloud,
     },
     fem::{self, Locator},
     mesh::Mesh,
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// How far a lattice goes on where neither its own cells nor an element are.
@@ -141,14 +142,7 @@ impl<const D: usize> Placement<'_, D> {
         }
         let sites = cloud.element.iter().filter(|e| e.is_none()).count().max(1);
         cloud.spacing = (cloud.spacing / sites as f64).powf(1.0 / D as f64);
-        if let Some(first) = cloud.position.first().copied() {
-            let h = cloud.spacing;
-            cloud.is_lattice = cloud.position.iter().zip(&cloud.volume).all(|(x, v)| {
-                let k = (x - first) / h;
-                k.iter().all(|k| (k - k.round()).abs() < 1e-6)
-                    && (v / h.powi(D as i32) - 1.0).abs() < 1e-6
-            });
-        }
+        cloud.axes = lattice_axes(&cloud.position, &cloud.volume, cloud.spacing);
         cloud
     }
 
@@ -272,7 +266,7 @@ impl<const D: usize> Placement<'_, D> {
             })
             .collect();
         let mut cloud = PointCloud::empty(h, self.region);
-        cloud.is_lattice = true;
+        cloud.axes = Some(Tensor::identity());
         let region = self.region - found.iter().map(|(_, emptied)| emptied).sum::<f64>();
         let found: Vec<Found<D>> = found.into_iter().flat_map(|(list, _)| list).collect();
         let points: f64 = found.iter().map(|f| f.2).sum();

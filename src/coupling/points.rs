@@ -5,7 +5,7 @@ use rustc_hash::FxHashSet;
 use crate::{
     coupling::{Reach, Zone},
     peridynamics::Families,
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// Volumes of the peridynamic region and of the points in it \[m^D\].
@@ -29,8 +29,8 @@ pub(super) struct PointCloud<const D: usize> {
     /// The finite element that interpolates a point (or extrapolates one that lies in none), with its shape values; none for a point that is a site.
     pub element: Vec<Option<(u32, Vec<f64>)>>,
     pub spacing: f64,
-    /// Whether the points are some of a lattice's.
-    pub is_lattice: bool,
+    /// The axes of the square or cubic lattice that the points are some of, as columns; none for scattered points.
+    pub axes: Option<Tensor<D>>,
     pub volumes: Volumes,
 }
 
@@ -148,6 +148,11 @@ fn retain_by<T>(values: &mut Vec<T>, renumbered: &[u32]) {
 }
 
 impl<const D: usize> PointCloud<D> {
+    /// Whether the points are some of a lattice along the coordinate axes.
+    pub fn is_axis_parallel(&self) -> bool {
+        self.axes == Some(Tensor::identity())
+    }
+
     pub fn empty(spacing: f64, region: f64) -> Self {
         Self {
             position: Vec::new(),
@@ -156,7 +161,7 @@ impl<const D: usize> PointCloud<D> {
             zone: Vec::new(),
             element: Vec::new(),
             spacing,
-            is_lattice: false,
+            axes: None,
             volumes: Volumes {
                 region,
                 points: 0.0,

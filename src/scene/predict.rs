@@ -216,7 +216,9 @@ pub(crate) fn predict<const D: usize>(
     watch.lap(&mut timings, "sites and bonds");
     let laid_out = resident_memory_bytes().unwrap_or(0);
     let layout_peak = peak_memory_bytes().unwrap_or(0);
-    let pattern = model.pattern(operator.as_ref(), progress);
+    let fields = proof::affine_displacements(&model);
+    let pattern = model.pattern(operator.as_ref(), &fields, progress);
+    drop(fields);
     watch.lap(&mut timings, "assembly");
 
     loads::loads(&model, &rest.conditions, 0.0)?;
@@ -229,6 +231,8 @@ pub(crate) fn predict<const D: usize>(
             operator: operator.as_ref(),
             rest: &rest,
             stiffness: None,
+            system: None,
+            affine_forces: &pattern.products,
         },
         progress,
     )?;
@@ -272,11 +276,15 @@ pub(crate) fn predict<const D: usize>(
         choices.push(Choice {
             choice: format!("{:?} bond weights", p.weights),
             why: match p.weights {
-                BondWeights::Plain => "the papers' quadrature; its elastic tensor is not isotropic",
-                BondWeights::Isotropic => "the lattice carries the typed elastic constants",
-                BondWeights::Fitted => "each family carries the typed elastic constants",
-            }
-            .to_owned(),
+                BondWeights::Plain => {
+                    "the papers' quadrature; its elastic tensor is not isotropic".to_owned()
+                }
+                BondWeights::Isotropic if model.is_lattice() => {
+                    "the lattice carries the typed elastic constants".to_owned()
+                }
+                BondWeights::Isotropic => scattered(&model),
+                BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
+            },
         });
         choices.extend(run::volumes_choice(&model));
     }
@@ -427,6 +435,20 @@ fn shell_factors<const D: usize>(model: &Model<D>, horizon: f64) -> Option<(f64,
     let factors = isotropic_shell_factors(&lattice, h, &base, target).ok()?;
     let least = factors.iter().copied().fold(f64::INFINITY, f64::min);
     Some((least, factors.iter().copied().fold(0.0, f64::max)))
+}
+
+/// What isotropic weights do for points that are no lattice: nothing, and by how much families then miss the typed constants.
+fn scattered<const D: usize>(model: &Model<D>) -> String {
+    let missed = model
+        .tensor_deviation()
+        .map_or(String::new(), |[mean, worst]| {
+            format!(
+                ": C_1111 of their full families is {:+.1} % off in the mean and {:.0} % at most",
+                100.0 * mean,
+                100.0 * worst
+            )
+        });
+    format!("the points are no lattice, so bonds keep plain weights{missed}")
 }
 
 /// Greatest distance of a node of the transition zone from the nonlocal zone; none without either.

@@ -224,6 +224,8 @@ pub fn solve_with<const D: usize>(
                 operator: operator.as_ref(),
                 rest: &rest,
                 stiffness: Some(stiffness),
+                system: None,
+                affine_forces: &[],
             },
             progress,
         )?;

@@ -1,11 +1,15 @@
 //! Scenes that once gave a wrong answer without a word, by the binary: each gives the right one, is warned of with a number, or is refused.
 
+mod a;
 mod b;
 mod e;
 mod f;
 mod g_growth;
 mod h;
+mod i;
 mod o;
+mod q;
+mod r;
 mod s;
 mod t;
 
@@ -68,6 +72,19 @@ impl Case {
     pub fn read(&self, name: &str) -> String {
         std::fs::read_to_string(self.folder.path().join(name)).expect("the file is there")
     }
+}
+
+/// A message without the frame and the line breaks that it has on standard error.
+pub fn flat(text: &str) -> String {
+    let words = text.split_whitespace().filter(|w| *w != "│" && *w != "×");
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// The first number before a per cent sign.
+pub fn percent(text: &str) -> f64 {
+    let end = text.find(" %").expect("a percentage");
+    let start = text[..end].rfind(' ').map_or(0, |at| at + 1);
+    text[start..end].parse().expect("a number")
 }
 
 #[test]

@@ -106,6 +106,8 @@ pub(super) fn lay_out<const D: usize, T>(
             operator: operator.as_ref(),
             rest,
             stiffness: None,
+            system: Some(moving.system.as_ref()),
+            affine_forces: &[],
         },
         progress,
     )?;

@@ -288,7 +288,7 @@ fn factors<const D: usize>(
     held.iter()
         .for_each(|&dof| prescribed[dof as usize] = Some(0.0));
     let free = FreeDofs::from_prescribed(&prescribed, D);
-    let pattern = laid_out.model.pattern(laid_out.operator, progress);
+    let pattern = laid_out.model.pattern(laid_out.operator, &[], progress);
     let plan = Planned::of(laid_out.model, &pattern, &free, laid_out.rest, symmetry)?;
     if !matches!(plan.method, MethodUsed::Cholesky | MethodUsed::Lu) {
         return Ok(());

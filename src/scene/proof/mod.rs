@@ -4,6 +4,8 @@
 //! |---|---|
 //! | `loads.rs` | mass, total and first moment of each load against integrals over the mesh; supports held everywhere |
 //! | `affine.rs` | the force of every affine field, row by row, against that of its constant stress |
+//! | `classes.rs`, `fields.rs`, `surface.rs`, `patch.rs` | rows out of balance and what is told of them, the fields and their forces, the boundary of the body, the error of the stress around a row out of balance |
+//! | `symmetry.rs` | whether a stiffness that the coupling promises to be symmetric is |
 //! | `quadratic.rs` | the force of quadratic fields beside the seam |
 //! | `growth.rs` | whether a mode of the motion grows |
 //!
@@ -11,18 +13,24 @@
 //! Limits stand in `docs/proof.md`, each beside the measurement that chose it.
 
 mod affine;
+mod classes;
+mod fields;
 pub(super) mod growth;
 mod loads;
+mod patch;
 mod quadratic;
+mod surface;
+mod symmetry;
 
 use super::run::{Rest, RunError};
 use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::proof::{Part, Proof, Severity};
 use crate::progress::Progress;
-use crate::system::BlockCsr;
+use crate::system::{BlockCsr, Dynamic};
+
+pub(super) use self::affine::displacements as affine_displacements;
 
 /// What is to be proved: a model laid out, with its conditions.
-#[expect(dead_code, reason = "each check reads what it needs")]
 pub(super) struct Subject<'a, const D: usize> {
     pub model: &'a Model<D>,
     pub coupling: &'a dyn Coupling<D>,
@@ -30,6 +38,10 @@ pub(super) struct Subject<'a, const D: usize> {
     pub rest: &'a Rest<D>,
     /// The assembled stiffness, where the run has one; else rows come from the operator.
     pub stiffness: Option<&'a BlockCsr>,
+    /// What moves, in a scene that does; its tangent at rest has the rows.
+    pub system: Option<&'a dyn Dynamic>,
+    /// Forces of the fields of [`affine_displacements`], where they are known already.
+    pub affine_forces: &'a [Vec<f64>],
 }
 
 /// Runs every check that the scene calls for.
@@ -40,9 +52,10 @@ pub(super) fn prove<const D: usize>(
     subject: &Subject<'_, D>,
     progress: &dyn Progress,
 ) -> Result<Proof, RunError> {
-    let parts: [Option<Part>; 3] = [
+    let parts: [Option<Part>; 4] = [
         loads::part(subject)?,
         affine::part(subject, progress)?,
+        symmetry::part(subject),
         quadratic::part(subject)?,
     ];
     Ok(Proof {

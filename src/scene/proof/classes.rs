@@ -1,0 +1,183 @@
+//! Rows that affine fields leave out of balance: their classes, limits, and what is told of them.
+
+use crate::observe::proof::{Figure, Finding, Part, Severity};
+use crate::observe::report::number;
+
+/// Limits of this part of the proof; `docs/proof.md` has the measurements behind them.
+pub(super) mod limits {
+    /// Force per volume over stress per spacing up to which a row counts as exact: round-off is 1e-11 at most (`bondline verify patch`).
+    pub const EXACT: f64 = 1e-9;
+    /// Relative error of the stress at the seam, or among points, from which a run warns.
+    pub const WARN: f64 = 0.005;
+    /// And from which it is refused.
+    pub const REFUSE: f64 = 0.5;
+    /// As [`WARN`], at free surfaces and supports that cross the peridynamic zone.
+    pub const WARN_SURFACE: f64 = 0.02;
+    /// As [`REFUSE`], there: an incomplete family alone leaves less than 1.
+    pub const REFUSE_SURFACE: f64 = 2.0;
+    /// As [`REFUSE`], where points of a transition zone lie at a surface: what is local of their rows knows nothing of a boundary, and a patch shows a third of what the whole zone does.
+    pub const REFUSE_TRANSITION: f64 = 0.5;
+}
+
+/// Where rows that an affine field leaves out of balance lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum RowClass {
+    /// Elements and points meet in the row.
+    Seam,
+    /// Points alone, their families full of points.
+    Points,
+    /// A point of a transition zone whose family lacks points beyond a surface of the body.
+    Transition,
+    /// A family of the row lacks points beyond a free surface.
+    FreeSurface,
+    /// A family of the row lacks points beyond a surface whose normal displacement is prescribed.
+    Support,
+    /// A family of the row lacks points beyond a surface with a traction.
+    LoadedSurface,
+    /// A family of the row lacks points behind a crack or in a void.
+    Crack,
+    /// Elements and points meet in the row, and a family of it lacks points.
+    SeamAtSurface,
+}
+
+/// Rows of one class that affine fields leave out of balance.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unbalanced {
+    /// Where they lie.
+    pub class: RowClass,
+    /// How many.
+    pub rows: usize,
+    /// Largest force per volume, over the stress of the field per spacing.
+    pub residual: f64,
+    /// Where.
+    pub at: Vec<f64>,
+    /// Predicted error of the stress, over that of the field; signed where it is that of the component which the field has. None where it is not predicted.
+    pub stress_error: Option<f64>,
+    /// Where.
+    pub stress_at: Vec<f64>,
+}
+
+/// What the proof has shown, as data.
+pub(super) fn told(fields: usize, residual: f64, rows: usize, unbalanced: &[Unbalanced]) -> Part {
+    let figure = |name: String, value: f64| Figure { name, value };
+    let mut figures = vec![
+        figure("fields".to_owned(), fields as f64),
+        figure("residual of rows in balance".to_owned(), residual),
+        figure("rows out of balance".to_owned(), rows as f64),
+    ];
+    let mut line = format!("affine fields pass the seam to {}", number(residual));
+    let mut kinds = Vec::new();
+    for class in unbalanced {
+        let name = class.class.name();
+        figures.push(figure(format!("rows {name}"), class.rows as f64));
+        figures.push(figure(format!("residual {name}"), class.residual));
+        let mut kind = format!("{} {name}", class.rows);
+        if let Some(error) = class.stress_error {
+            figures.push(figure(format!("stress error {name}"), error));
+            kind += &format!(", stress {:+.1} %", 100.0 * error);
+        }
+        kinds.push(kind);
+    }
+    if !kinds.is_empty() {
+        line += &format!(", but for {rows} rows: {}", kinds.join("; "));
+    }
+    Part {
+        name: "affine",
+        line,
+        figures,
+        findings: unbalanced.iter().filter_map(verdict).collect(),
+    }
+}
+
+impl RowClass {
+    /// Where such rows lie, in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Seam => "at the seam",
+            Self::Points => "among points",
+            Self::Transition => "of the transition zone at surfaces",
+            Self::FreeSurface => "at free surfaces",
+            Self::Support => "at supports",
+            Self::LoadedSurface => "at loaded surfaces",
+            Self::Crack => "at cracks and voids",
+            Self::SeamAtSurface => "where the seam meets surfaces",
+        }
+    }
+}
+
+/// What is told of a class of rows.
+fn verdict(rows: &Unbalanced) -> Option<Finding> {
+    let place = |x: &[f64]| {
+        let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
+        format!("({})", x.join(", "))
+    };
+    let (what, remedy, [warn, refuse]) = match rows.class {
+        RowClass::Seam => (
+            "at the seam",
+            "give peridynamics.points a lattice, or use coupling.truncated",
+            [limits::WARN, limits::REFUSE],
+        ),
+        RowClass::Points => (
+            "among the points, which are no lattice,",
+            "give peridynamics.points a lattice",
+            [limits::WARN, limits::REFUSE],
+        ),
+        RowClass::SeamAtSurface => (
+            "where the seam meets the surface of the body",
+            "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface",
+            [limits::WARN_SURFACE, limits::REFUSE_SURFACE],
+        ),
+        RowClass::Transition => (
+            "where the transition zone meets the surface of the body, which its rows know nothing of,",
+            "end the transition zone two horizons from the surface, or use coupling.truncated",
+            [limits::WARN_SURFACE, limits::REFUSE_TRANSITION],
+        ),
+        RowClass::FreeSurface | RowClass::LoadedSurface => (
+            "at a surface that crosses the peridynamic zone, where families lack points",
+            "zones.skin = \"free-surfaces\" puts elements there",
+            [limits::WARN_SURFACE, limits::REFUSE_SURFACE],
+        ),
+        RowClass::Support => (
+            "at a symmetry plane or support that crosses the peridynamic zone, where families lack points",
+            "zones.skin = \"free-surfaces\" puts elements there",
+            [limits::WARN_SURFACE, limits::REFUSE_SURFACE],
+        ),
+        RowClass::Crack => return None,
+    };
+    let Some(error) = rows.stress_error else {
+        // where another class speaks for it
+        if !matches!(rows.class, RowClass::Seam | RowClass::Points) {
+            return None;
+        }
+        return Some(Finding {
+            severity: Severity::Warning,
+            place: rows.at.clone(),
+            value: rows.residual,
+            limit: limits::EXACT,
+            message: format!(
+                "a uniform stress is out of balance {what} by {} of it per spacing near {}; {remedy}",
+                number(rows.residual),
+                place(&rows.at)
+            ),
+        });
+    };
+    if error.abs() < warn {
+        return None;
+    }
+    let (severity, limit) = if error.is_nan() || error.abs() >= refuse {
+        (Severity::Refusal, refuse)
+    } else {
+        (Severity::Warning, warn)
+    };
+    Some(Finding {
+        severity,
+        place: rows.stress_at.clone(),
+        value: error,
+        limit,
+        message: format!(
+            "a uniform stress comes out wrong by {:+.1} % of it {what} near {}; {remedy}",
+            100.0 * error,
+            place(&rows.stress_at)
+        ),
+    })
+}

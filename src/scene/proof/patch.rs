@@ -1,0 +1,216 @@
+//! The stress error of a row that an affine field leaves out of balance: the sites around it are released and solved for, everything else keeps the field.
+
+use rayon::prelude::*;
+
+use super::surface::{Boundary, FacetKind};
+use crate::assembly;
+use crate::coupling::{Model, Operator, SiteKind};
+use crate::fem;
+use crate::progress::Silent;
+use crate::solve::FreeDofs;
+use crate::solve::direct::{Analysis, DirectParams, Factor};
+use crate::solve::ordering::Ordering;
+use crate::system::{BlockCsr, Symmetry};
+use crate::tensor::{Tensor, Vector, padded};
+
+/// Most sites of a patch: in the plane some four horizons around its middle at m = 3, in space one and a half. With 300 in the plane the patch of a splice on scattered points came near to a singular one.
+const SITES: [usize; 3] = [200, 500, 250];
+
+/// What a patch is cut from.
+pub(super) struct Around<'a, const D: usize> {
+    pub model: &'a Model<D>,
+    pub operator: &'a dyn Operator<D>,
+    pub boundary: &'a Boundary<'a, D>,
+    /// Which dofs are prescribed.
+    pub held: &'a [bool],
+    /// How far families reach into each other at a site: sites nearer than this to a boundary lack bonds.
+    pub reach: f64,
+    /// The stress of a field is this large.
+    pub scale: f64,
+    /// The point that all fields leave in place.
+    pub centre: Vector<D>,
+}
+
+/// The largest error of the stress in a patch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StressError<const D: usize> {
+    /// Difference of a stress component from that of the field, over the largest component of the field; signed where it is that component.
+    pub relative: f64,
+    /// Where.
+    pub at: Vector<D>,
+}
+
+/// A field of a patch: its gradient, and by how much the displacement of a held dof differs from it.
+pub(super) struct PatchField<'a, const D: usize> {
+    pub gradient: Tensor<D>,
+    /// Nodal forces of the field's stress on element boundaries, `D` numbers per site; none if they are zero.
+    pub forces: &'a [f64],
+    pub mismatch: &'a (dyn Fn(usize) -> f64 + Sync),
+}
+
+/// Solves for the sites nearest to `place` under each of the fields.
+///
+/// `main` is the facet whose surface effect is asked for: sites near facets that neither lie in its plane nor hold their normal displacement keep the field, as do all near
+/// cracks. Without one, all sites near the boundary keep it. None if the patch has no unique solution.
+pub(super) fn stress_errors<const D: usize>(
+    around: &Around<'_, D>,
+    place: &Vector<D>,
+    main: Option<usize>,
+    fields: &[PatchField<'_, D>],
+) -> Option<Vec<StressError<D>>> {
+    let model = around.model;
+    let mut list: Vec<u32> = (0..model.sites.len() as u32).collect();
+    let distance = |s: &u32| (model.sites[*s as usize].position - place).norm_squared();
+    let count = SITES[D - 1].min(list.len());
+    if count < list.len() {
+        list.select_nth_unstable_by(count, |a, b| {
+            distance(a).total_cmp(&distance(b)).then(a.cmp(b))
+        });
+        list.truncate(count);
+    }
+    list.sort_unstable();
+    let rows = assembly::assemble_rows::<D>(
+        count,
+        model.sites.len(),
+        |_| (),
+        |r, row| around.operator.add_row(list[r] as usize, row),
+    );
+    let (matrix, free) = local(around, &rows, &list, main);
+    let positions: Vec<[f64; 3]> = list
+        .iter()
+        .map(|&s| padded(&model.sites[s as usize].position))
+        .collect();
+    let params = DirectParams {
+        symmetry: Symmetry::Unsymmetric,
+        ..DirectParams::default()
+    };
+    let analysis = Analysis::new(&matrix, &free, &positions, Ordering::default()).ok()?;
+    let (factor, _) = Factor::new(&matrix, &free, analysis, &params, &Silent).ok()?;
+    let affine = |g: &Tensor<D>| -> Vec<f64> {
+        let mut u = vec![0.0; model.sites.len() * D];
+        u.par_chunks_mut(D)
+            .zip(&model.sites)
+            .for_each(|(u, s)| u.copy_from_slice((g * (s.position - around.centre)).as_slice()));
+        u
+    };
+    let errors = fields.iter().map(|field| {
+        let mut u = affine(&field.gradient);
+        for (local, &s) in list.iter().enumerate() {
+            for a in 0..D {
+                let dof = s as usize * D + a;
+                if around.held[dof] && !free.is_free(local, a) {
+                    u[dof] += (field.mismatch)(dof);
+                }
+            }
+        }
+        let force = rows.multiply(&u);
+        let mut rhs = vec![0.0; count * D];
+        for (local, &s) in list.iter().enumerate() {
+            for a in (0..D).filter(|&a| free.is_free(local, a)) {
+                let wanted = field.forces.get(s as usize * D + a).copied().unwrap_or(0.0);
+                rhs[local * D + a] = wanted - force[local * D + a];
+            }
+        }
+        let change = factor.solve(&rhs);
+        for (local, &s) in list.iter().enumerate() {
+            for a in 0..D {
+                u[s as usize * D + a] += change[local * D + a];
+            }
+        }
+        largest(around, &list, &field.gradient, &u)
+    });
+    Some(errors.collect())
+}
+
+/// The rows of a patch among its own sites, and which of their dofs are released.
+fn local<const D: usize>(
+    around: &Around<'_, D>,
+    rows: &BlockCsr,
+    list: &[u32],
+    main: Option<usize>,
+) -> (BlockCsr, FreeDofs) {
+    let boundary = around.boundary;
+    let mut matrix = BlockCsr {
+        block: D,
+        row_offsets: vec![0],
+        ..BlockCsr::default()
+    };
+    let mut prescribed = Vec::with_capacity(list.len() * D);
+    for (r, &s) in list.iter().enumerate() {
+        let (columns, blocks) = rows.row(r);
+        for (c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+            if let Ok(place) = list.binary_search(c) {
+                matrix.columns.push(place as u32);
+                matrix.values.extend(block);
+            }
+        }
+        matrix.row_offsets.push(matrix.columns.len());
+        let x = &around.model.sites[s as usize].position;
+        let lies_in = |f: usize| {
+            let n = &boundary.normals[f];
+            main.is_some_and(|m| {
+                n.dot(&boundary.normals[m]) > 0.99 || boundary.kinds[f] == FacetKind::Held
+            })
+        };
+        let keeps = boundary.is_near_crack(x, around.reach)
+            || boundary.near(x, around.reach).any(|(f, _)| !lies_in(f));
+        let held = &around.held[s as usize * D..][..D];
+        prescribed.extend(held.iter().map(|h| (*h || keeps).then_some(0.0)));
+    }
+    (matrix, FreeDofs::from_prescribed(&prescribed, D))
+}
+
+/// The largest difference of the stress of points and elements of a patch from that of the field.
+fn largest<const D: usize>(
+    around: &Around<'_, D>,
+    list: &[u32],
+    gradient: &Tensor<D>,
+    u: &[f64],
+) -> StressError<D> {
+    let model = around.model;
+    let own = model.peridynamic_material();
+    let mut found = StressError {
+        relative: 0.0,
+        at: model.sites[list[0] as usize].position,
+    };
+    let mut compare = |stress: Tensor<D>, exact: Tensor<D>, at: Vector<D>| {
+        let difference = (stress - exact) / around.scale;
+        for i in 0..D {
+            for j in i..D {
+                let size = difference[(i, j)].abs();
+                if size.is_nan() || size > found.relative.abs() * (1.0 + 1e-9) {
+                    let sign = exact[(i, j)].abs() > 0.5 * around.scale;
+                    let signed = difference[(i, j)] * exact[(i, j)].signum();
+                    found = StressError {
+                        relative: if sign { signed } else { size },
+                        at,
+                    };
+                }
+            }
+        }
+    };
+    let of_points = (0..model.mesh.cell_count()).find(|&c| model.material_of_cell(c) == own);
+    let mut cells: Vec<usize> = Vec::new();
+    for &s in list {
+        let site = &model.sites[s as usize];
+        match (site.kind, model.point_of(s as usize), of_points) {
+            (SiteKind::Point(_), Some((body, p)), Some(c)) => {
+                let exact = model.tensor_of_cell(c).contract(gradient);
+                compare(body.partial_stress(p, u), exact, site.position);
+            }
+            _ => cells.extend(model.cells_of_site(s as usize).map(|(c, _)| c)),
+        }
+    }
+    cells.sort_unstable();
+    cells.dedup();
+    for c in cells.into_iter().filter(|&c| model.is_element(c)) {
+        let node = |n: usize| model.node_transfer.displacement::<D>(n, u);
+        let exact = model.tensor_of_cell(c).contract(gradient);
+        let stress = around.operator.cell_stress(c, u).unwrap_or_else(|| {
+            let g = fem::displacement_gradient_at_centre(&model.mesh, c, node);
+            model.tensor_of_cell(c).contract(&g)
+        });
+        compare(stress, exact, model.mesh.centroid(c));
+    }
+    found
+}

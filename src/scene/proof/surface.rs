@@ -1,0 +1,159 @@
+//! Free surfaces, supports, cracks and voids: how far a place lies from them, and what becomes of a facet there.
+
+use rustc_hash::FxHashMap;
+
+use crate::coupling::Model;
+use crate::mesh::boundary::BoundaryFacet;
+use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::shape::Barriers;
+use crate::tensor::Vector;
+
+/// What the conditions of a scene make of a facet of the outer boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum FacetKind {
+    /// No condition is on it.
+    Free,
+    /// The displacement along its normal is prescribed: a symmetry plane, or a clamp.
+    Held,
+    /// It has a traction.
+    Loaded,
+}
+
+/// The outer boundary of a body, sorted into bins.
+pub(super) struct Boundary<'a, const D: usize> {
+    model: &'a Model<D>,
+    pub facets: Vec<BoundaryFacet>,
+    pub kinds: Vec<FacetKind>,
+    pub normals: Vec<Vector<D>>,
+    bins: FxHashMap<[i64; D], Vec<u32>>,
+    reach: f64,
+    barriers: Barriers<D>,
+}
+
+impl<'a, const D: usize> Boundary<'a, D> {
+    /// Sorts the boundary of a model for questions of up to `reach` \[m\] about places in a box.
+    pub fn new(
+        model: &'a Model<D>,
+        conditions: &[Condition<D>],
+        reach: f64,
+        (low, high): (Vector<D>, Vector<D>),
+    ) -> Self {
+        let mesh = &model.mesh;
+        let mut facets = mesh.outer_facets();
+        facets.retain(|f| {
+            let (from, to) = mesh.bounds_of(&f.nodes);
+            (0..D).all(|k| from[k] <= high[k] + reach && to[k] >= low[k] - reach)
+        });
+        let unit = |f| mesh.facet_normal_area(f).normalize();
+        let normals: Vec<Vector<D>> = facets.iter().map(unit).collect();
+        let kinds = kinds(model, conditions, &facets, &normals);
+        let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
+        for (number, facet) in facets.iter().enumerate() {
+            let (low, high) = mesh.bounds_of(&facet.nodes);
+            let from = bin(&(low - Vector::repeat(reach)), reach);
+            let to = bin(&(high + Vector::repeat(reach)), reach);
+            let counts: [usize; D] = std::array::from_fn(|i| (to[i] - from[i] + 1) as usize);
+            for index in 0..counts.iter().product::<usize>() {
+                let mut rest = index;
+                let key = std::array::from_fn(|i| {
+                    let k = rest % counts[i];
+                    rest /= counts[i];
+                    from[i] + k as i64
+                });
+                bins.entry(key).or_default().push(number as u32);
+            }
+        }
+        let barriers = model.peridynamics.as_ref();
+        Self {
+            model,
+            facets,
+            kinds,
+            normals,
+            bins,
+            reach,
+            barriers: Barriers::new(barriers.map_or(Vec::new(), |p| p.barriers.clone())),
+        }
+    }
+
+    /// Facets nearer to `x` than `limit`, at most the reach, with their distances.
+    pub fn near<'s>(
+        &'s self,
+        x: &'s Vector<D>,
+        limit: f64,
+    ) -> impl Iterator<Item = (usize, f64)> + 's {
+        let list = self.bins.get(&bin(x, self.reach));
+        list.into_iter().flatten().filter_map(move |&f| {
+            let f = f as usize;
+            let distance = self.model.mesh.distance_to_facet(x, &self.facets[f].nodes);
+            (distance < limit).then_some((f, distance))
+        })
+    }
+
+    /// Whether a crack or a void is nearer to `x` than `limit`.
+    pub fn is_near_crack(&self, x: &Vector<D>, limit: f64) -> bool {
+        self.barriers.near(x, limit)
+    }
+}
+
+fn bin<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {
+    std::array::from_fn(|i| (x[i] / size).floor() as i64)
+}
+
+/// What the conditions make of each facet.
+fn kinds<const D: usize>(
+    model: &Model<D>,
+    conditions: &[Condition<D>],
+    facets: &[BoundaryFacet],
+    normals: &[Vector<D>],
+) -> Vec<FacetKind> {
+    let mesh = &model.mesh;
+    let mut kinds = vec![FacetKind::Free; facets.len()];
+    let (low, high) = mesh.bounds();
+    let tolerance = 1e-9 * (high - low).norm();
+    let mut sorted: FxHashMap<Vec<u32>, usize> = FxHashMap::default();
+    let key = |nodes: &[u32]| {
+        let mut key = nodes.to_vec();
+        key.sort_unstable();
+        key
+    };
+    for (number, facet) in facets.iter().enumerate() {
+        sorted.insert(key(&facet.nodes), number);
+    }
+    for condition in conditions {
+        if let Prescribed::Traction(loaded) = &condition.prescribed {
+            for nodes in loaded {
+                if let Some(&f) = sorted.get(&key(nodes)) {
+                    kinds[f] = FacetKind::Loaded;
+                }
+            }
+        }
+    }
+    for condition in conditions.iter().filter(|c| c.holds()) {
+        let mut on = vec![false; mesh.nodes.len()];
+        let on_all = matches!(condition.prescribed, Prescribed::Field(_));
+        match condition.support() {
+            Some(Support::Set { nodes, .. }) => nodes.iter().for_each(|&n| on[n as usize] = true),
+            Some(Support::Inside(region)) => {
+                for (on, x) in on.iter_mut().zip(&mesh.nodes) {
+                    *on = region.contains(x, tolerance);
+                }
+            }
+            None => {
+                if let Prescribed::Field(field) = &condition.prescribed {
+                    for (on, x) in on.iter_mut().zip(&mesh.nodes) {
+                        *on = field.at(x).is_some();
+                    }
+                }
+            }
+        }
+        for (f, facet) in facets.iter().enumerate() {
+            let n = &normals[f];
+            let along = (0..D).max_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs()));
+            let holds = on_all || along.is_some_and(|k| condition.components.0[k].is_some());
+            if holds && facet.nodes.iter().all(|&n| on[n as usize]) {
+                kinds[f] = FacetKind::Held;
+            }
+        }
+    }
+    kinds
+}
