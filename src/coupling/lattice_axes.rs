@@ -102,7 +102,7 @@ mod tests {
                 let turned = found.transpose() * axes;
                 let whole = turned.map(|t| (t - t.round()).abs()).max();
                 assert!(whole < 1e-6, "{degrees}: {found}");
-                assert_eq!(found == Tensor::identity(), degrees == 0.0);
+                assert_eq!(found == Tensor::<2>::identity(), degrees == 0.0);
             }
         }
         let rotated = aligning(&Vector::<3>::x(), &Vector::<3>::new(0.6, 0.0, 0.8));

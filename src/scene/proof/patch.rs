@@ -75,7 +75,7 @@ pub(super) fn stress_errors<const D: usize>(
         |_| (),
         |r, row| around.operator.add_row(list[r] as usize, row),
     );
-    let (matrix, free) = local(around, &rows, &list, main);
+    let (matrix, free, keeps) = local(around, &rows, &list, main);
     let positions: Vec<[f64; 3]> = list
         .iter()
         .map(|&s| padded(&model.sites[s as usize].position))
@@ -117,18 +117,18 @@ pub(super) fn stress_errors<const D: usize>(
                 u[s as usize * D + a] += change[local * D + a];
             }
         }
-        largest(around, &list, &field.gradient, &u)
+        largest(around, &list, &keeps, &field.gradient, &u)
     });
     Some(errors.collect())
 }
 
-/// The rows of a patch among its own sites, and which of their dofs are released.
+/// The rows of a patch among its own sites, which of their dofs are released, and which sites keep the field whatever the row asks for.
 fn local<const D: usize>(
     around: &Around<'_, D>,
     rows: &BlockCsr,
     list: &[u32],
     main: Option<usize>,
-) -> (BlockCsr, FreeDofs) {
+) -> (BlockCsr, FreeDofs, Vec<bool>) {
     let boundary = around.boundary;
     let mut matrix = BlockCsr {
         block: D,
@@ -136,6 +136,7 @@ fn local<const D: usize>(
         ..BlockCsr::default()
     };
     let mut prescribed = Vec::with_capacity(list.len() * D);
+    let mut all_keep = Vec::with_capacity(list.len());
     for (r, &s) in list.iter().enumerate() {
         let (columns, blocks) = rows.row(r);
         for (c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
@@ -154,16 +155,18 @@ fn local<const D: usize>(
         };
         let keeps = boundary.is_near_crack(x, around.reach)
             || boundary.near(x, around.reach).any(|(f, _)| !lies_in(f));
+        all_keep.push(keeps);
         let held = &around.held[s as usize * D..][..D];
         prescribed.extend(held.iter().map(|h| (*h || keeps).then_some(0.0)));
     }
-    (matrix, FreeDofs::from_prescribed(&prescribed, D))
+    (matrix, FreeDofs::from_prescribed(&prescribed, D), all_keep)
 }
 
 /// The largest difference of the stress of points and elements of a patch from that of the field.
 fn largest<const D: usize>(
     around: &Around<'_, D>,
     list: &[u32],
+    keeps: &[bool],
     gradient: &Tensor<D>,
     u: &[f64],
 ) -> StressError<D> {
@@ -191,8 +194,12 @@ fn largest<const D: usize>(
     };
     let of_points = (0..model.mesh.cell_count()).find(|&c| model.material_of_cell(c) == own);
     let mut cells: Vec<usize> = Vec::new();
-    for &s in list {
+    for (&s, keeps) in list.iter().zip(keeps) {
         let site = &model.sites[s as usize];
+        // what families that other surfaces cut show is no error of this row
+        if *keeps && matches!(site.kind, SiteKind::Point(_)) {
+            continue;
+        }
         match (site.kind, model.point_of(s as usize), of_points) {
             (SiteKind::Point(_), Some((body, p)), Some(c)) => {
                 let exact = model.tensor_of_cell(c).contract(gradient);
