@@ -242,7 +242,7 @@ fn unbalanced<const D: usize>(
             stress_error: None,
             stress_at: Vec::new(),
         };
-        if is_told {
+        if is_told || found.residual < limits::NEGLIGIBLE {
             return Some(found);
         }
         if let Some(e) = predicted(subject, &around, tensor, (class, place, facet), nodal) {

@@ -7,6 +7,8 @@ use crate::observe::report::number;
 pub(super) mod limits {
     /// Force per volume over stress per spacing up to which a row counts as exact: round-off is 1e-11 at most (`bondline verify patch`).
     pub const EXACT: f64 = 1e-9;
+    /// Up to this no error is predicted: a hundred spacings of such forces would add up to a fifth of [`WARN`].
+    pub const NEGLIGIBLE: f64 = 1e-5;
     /// Relative error of the stress at the seam, or among points, from which a run warns.
     pub const WARN: f64 = 0.005;
     /// And from which it is refused.
@@ -144,6 +146,9 @@ fn verdict(rows: &Unbalanced) -> Option<Finding> {
         ),
         RowClass::Crack => return None,
     };
+    if rows.residual < limits::NEGLIGIBLE {
+        return None;
+    }
     let Some(error) = rows.stress_error else {
         // where another class speaks for it
         if !matches!(rows.class, RowClass::Seam | RowClass::Points) {
