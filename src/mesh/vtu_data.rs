@@ -97,7 +97,7 @@ impl<'a> Data<'a> {
             if b.is_ascii_whitespace() {
                 continue;
             }
-            let is_after_padding = group.len() % 4 == 0 && group.last() == Some(&b'=');
+            let is_after_padding = group.len().is_multiple_of(4) && group.last() == Some(&b'=');
             if group.len() == 1 << 12 || is_after_padding {
                 end = k;
                 break;

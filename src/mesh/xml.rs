@@ -108,7 +108,7 @@ impl<'a> Xml<'a> {
     }
 }
 
-impl<'a> Tag<'a> {
+impl Tag<'_> {
     /// The value of an attribute.
     pub fn attribute(&self, name: &str) -> Option<Cow<'a, str>> {
         let mut rest = self.attributes;

@@ -28,7 +28,7 @@ pub fn binary_file(data: &[u8]) -> Outcome {
 
 /// A square of one or two cells; `which` array is made of `bytes`, and `how` says how the file is written and what it announces.
 fn vtu(which: u8, how: u8, bytes: &[u8]) -> Vec<u8> {
-    let bit = |k: u8| how >> k & 1 == 1;
+    let bit = |k: u8| (how >> k) & 1 == 1;
     let width = if bit(0) { 64 } else { 32 };
     let order = if bit(1) { "BigEndian" } else { "LittleEndian" };
     let compressor = if bit(2) {
