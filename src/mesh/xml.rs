@@ -108,7 +108,7 @@ impl<'a> Xml<'a> {
     }
 }
 
-impl Tag<'_> {
+impl<'a> Tag<'a> {
     /// The value of an attribute.
     pub fn attribute(&self, name: &str) -> Option<Cow<'a, str>> {
         let mut rest = self.attributes;
