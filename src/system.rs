@@ -39,6 +39,56 @@ pub enum Breakage {
     Held,
 }
 
+/// What breaking bonds has cost so far.
+///
+/// Units: \[J\] and \[m²\] (per thickness and \[m\] in 2D, per section and a number in 1D).
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Dissipation {
+    /// Energy that was stored just before less that stored just after bonds broke, at the same displacement.
+    pub energy: f64,
+    /// Area of the cracks that they left.
+    pub area: f64,
+}
+
+/// A displacement `u − back · v`, computed where it is asked for.
+///
+/// A step of an explicit motion that breaks bonds exchanges energy with them as if they had broken halfway: half of its impulse is that of the forces before, half that of the forces after. With `back = Δt/2` and the velocity at n + ½
+/// their energy there closes the balance to the order Δt².
+#[derive(Clone, Copy, Debug)]
+pub struct Halfway<'a> {
+    /// Displacement of all sites.
+    pub u: &'a [f64],
+    /// Their velocity; may be empty if `back` is zero.
+    pub v: &'a [f64],
+    /// Time back from `u` \[s\].
+    pub back: f64,
+}
+
+impl<'a> Halfway<'a> {
+    /// The displacement `u` itself.
+    pub fn at(u: &'a [f64]) -> Self {
+        Self {
+            u,
+            v: &[],
+            back: 0.0,
+        }
+    }
+
+    /// The number of one unknown.
+    #[inline]
+    pub fn of(&self, dof: usize) -> f64 {
+        match self.v.get(dof) {
+            Some(v) => self.u[dof] - self.back * v,
+            None => self.u[dof],
+        }
+    }
+
+    /// All numbers.
+    pub fn all(&self) -> Vec<f64> {
+        (0..self.u.len()).map(|dof| self.of(dof)).collect()
+    }
+}
+
 /// A system that moves: `M ü = f(t) − F(u)`, with lumped masses.
 ///
 /// Shapes: `u`, `force`, `x`, `y` and the row sums have [`Dynamic::block`] numbers per site. Units: \[m\], \[N\] (per area of a bar of unit section in 1D, per
@@ -85,9 +135,21 @@ pub trait Dynamic: Send + Sync {
     /// Energy stored in the bodies \[J\]; of a coupled system the sum of the bodies' own energies, which the motion conserves only as far as the seam does.
     fn stored_energy(&self, u: &[f64]) -> f64;
 
-    /// What breaking bonds has cost so far \[J\]; none if nothing can break.
-    fn dissipated_energy(&self) -> Option<f64> {
+    /// What breaking bonds has cost so far; none if nothing can break.
+    fn dissipation(&self) -> Option<Dissipation> {
         None
+    }
+
+    /// Puts an earlier account of [`Dynamic::dissipation`] in the place of this one: that of another layout of the same body.
+    fn set_dissipation(&mut self, _dissipation: Dissipation) {}
+
+    /// Adds to the account what the bonds cost that the last call of [`Dynamic::internal_force_into`] broke, with the energies of the displacement `at`.
+    /// Whoever lets bonds break calls this before anything else.
+    fn account_for_breaks(&mut self, _at: &Halfway<'_>) {}
+
+    /// The energy of [`Dynamic::dissipation`] \[J\].
+    fn dissipated_energy(&self) -> Option<f64> {
+        self.dissipation().map(|d| d.energy)
     }
 
     /// Damage of each site, `1 − Σ V of intact bonds / Σ V of all`; none if nothing can break.

@@ -510,6 +510,13 @@ impl<const D: usize> Model<D> {
         Some([mean, off.iter().fold(0.0, |m, e| m.max(e.abs()))])
     }
 
+    /// Spacing of the lattice of a point of the cloud \[m\], of several the point's own.
+    pub fn spacing_at(&self, point: u32) -> f64 {
+        self.passing
+            .as_ref()
+            .map_or(self.spacing, |passing| passing.whole_of(point).spacing)
+    }
+
     /// Volumes of the peridynamic zone and of the points in it.
     pub fn volumes(&self) -> Volumes {
         self.volumes

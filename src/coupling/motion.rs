@@ -18,11 +18,12 @@ use crate::{
         contact::ContactError,
         kernel::{BondPass, KernelError, Kinematics, Storage},
     },
-    system::{BlockCsr, Breakage, Dynamic, Symmetry},
+    system::{BlockCsr, Breakage, Dissipation, Dynamic, Halfway, Symmetry},
     tensor::Vector,
 };
 
 mod body;
+mod dissipation;
 mod energy;
 mod rows;
 
@@ -118,6 +119,8 @@ pub struct Motion<'a, const D: usize> {
     /// Bonds of the seam, if they are exact or break; the rows are those of the finite elements alone then.
     seam: Option<SeamBonds<D>>,
     energy: ElementEnergy,
+    /// What breaking bonds has cost so far.
+    spent: Dissipation,
 }
 
 impl<'a, const D: usize> Motion<'a, D> {
@@ -180,6 +183,7 @@ impl<'a, const D: usize> Motion<'a, D> {
             body,
             seam,
             energy,
+            spent: Dissipation::default(),
         })
     }
 
@@ -215,6 +219,37 @@ impl<'a, const D: usize> Motion<'a, D> {
             });
             body.pass.stored_energy(&points) + contact
         })
+    }
+
+    /// Whether bonds can break.
+    fn breaks(&self) -> bool {
+        self.body
+            .as_ref()
+            .is_some_and(|b| b.critical_stretch.is_some())
+    }
+
+    /// Puts the bonds of a state back; false, and nothing changed, if they are those of another model.
+    fn restore_bonds(&mut self, state: &[u64]) -> bool {
+        let Some(body) = &mut self.body else {
+            return state.is_empty();
+        };
+        let Some(seam) = &mut self.seam else {
+            return body.pass.restore_damage(state);
+        };
+        let of_pass = body.pass.damage_state().len();
+        let Some((of_pass, of_seam)) = state.split_at_checked(of_pass) else {
+            return false;
+        };
+        let held = seam.damage_state();
+        if !seam.restore_damage(of_seam) {
+            return false;
+        }
+        let fits = body.pass.restore_damage(of_pass);
+        if !fits {
+            // nothing is changed by a state that does not belong here
+            seam.restore_damage(&held);
+        }
+        fits
     }
 
     /// Bytes held by rows and bonds.
@@ -282,6 +317,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             .multiply_into::<D>(u, bonds, &mut self.products, force);
         let mut of_seam = 0;
         if let Some(seam) = &mut self.seam {
+            seam.begin_pass();
             if broken > 0 {
                 seam.follow(body.pass.as_ref());
             }
@@ -358,10 +394,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     }
 
     fn unbreakable(&self) -> Vec<bool> {
-        let breaks = self
-            .body
-            .as_ref()
-            .is_some_and(|b| b.critical_stretch.is_some());
+        let breaks = self.breaks();
         let at_seam = |site: usize| self.seam.as_ref().is_some_and(|s| s.touches(site));
         (0..self.mass.len())
             .map(|site| !breaks || (self.linear.has(site) && !at_seam(site)))
@@ -451,41 +484,18 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         elements + self.bond_energy(u)
     }
 
-    fn dissipated_energy(&self) -> Option<f64> {
-        let moving = self.body.as_ref()?;
-        let critical = moving.critical_stretch.as_ref()?;
-        let body = self.model.body()?;
-        let at_seam = self.seam.as_ref().map_or(0.0, SeamBonds::dissipated);
-        if moving.pass.broken() == 0 {
-            return Some(at_seam);
-        }
-        let cloud = &body.cloud;
-        let mut damage = vec![0.0; cloud.position.len()];
-        moving.pass.damage_into(&mut damage);
-        // each end of a bond has half of p r² (r s_c)² V_i V_j; of an LPS the pairwise part, its dilatation has no energy of single bonds
-        let energies: Vec<f64> = (0..damage.len())
-            .into_par_iter()
-            .with_min_len(256)
-            .map(|i| {
-                if damage[i] == 0.0 || moving.site_of_point[i] == NONE {
-                    return 0.0;
-                }
-                let pair = body.kernel(i).0;
-                let s = critical.at(cloud.horizon[i]);
-                let family = body.families.of(i).iter().zip(pair);
-                family
-                    // most stand, which is quickly seen
-                    .filter(|&(&j, _)| {
-                        !moving.pass.bonded(i, j as usize) && self.is_passed_over(i, j)
-                    })
-                    .map(|(&j, p)| {
-                        let r2 = body.bond(i, j as usize).norm_squared();
-                        0.5 * p * r2 * r2 * s * s * cloud.volume[i] * cloud.volume[j as usize]
-                    })
-                    .sum()
-            })
-            .collect();
-        Some(energies.iter().sum::<f64>() + at_seam)
+    fn dissipation(&self) -> Option<Dissipation> {
+        self.breaks().then_some(self.spent)
+    }
+
+    fn set_dissipation(&mut self, dissipation: Dissipation) {
+        self.spent = dissipation;
+    }
+
+    fn account_for_breaks(&mut self, at: &Halfway<'_>) {
+        let spent = self.of_last_breaks(at);
+        self.spent.energy += spent.energy;
+        self.spent.area += spent.area;
     }
 
     fn damage(&self) -> Option<Vec<f64>> {
@@ -557,28 +567,24 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         if let Some(seam) = &self.seam {
             state.extend(seam.damage_state());
         }
+        if self.breaks() {
+            state.extend([self.spent.energy, self.spent.area].map(f64::to_bits));
+        }
         state
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
-        let Some(body) = &mut self.body else {
-            return state.is_empty();
-        };
-        let Some(seam) = &mut self.seam else {
-            return body.pass.restore_damage(state);
-        };
-        let of_pass = body.pass.damage_state().len();
-        let Some((of_pass, of_seam)) = state.split_at_checked(of_pass) else {
+        let of_spent = if self.breaks() { 2 } else { 0 };
+        let Some(bonds) = state.len().checked_sub(of_spent) else {
             return false;
         };
-        let held = seam.damage_state();
-        if !seam.restore_damage(of_seam) {
-            return false;
-        }
-        let fits = body.pass.restore_damage(of_pass);
-        if !fits {
-            // nothing is changed by a state that does not belong here
-            seam.restore_damage(&held);
+        let (bonds, spent) = state.split_at(bonds);
+        let fits = self.restore_bonds(bonds);
+        if let (true, &[energy, area]) = (fits, spent) {
+            self.spent = Dissipation {
+                energy: f64::from_bits(energy),
+                area: f64::from_bits(area),
+            };
         }
         fits
     }

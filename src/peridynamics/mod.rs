@@ -11,6 +11,7 @@
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is; `bond_based.rs`, `lps.rs`, `correspondence.rs` | eq. (3.1), (5.16), section 7.2 |
 //! | `fracture.rs` | critical stretch from the fracture energy | \[Silling2005\] |
+//! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
 //! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |
@@ -19,6 +20,7 @@
 pub mod body;
 pub mod bond_based;
 pub mod contact;
+mod crack_area;
 pub mod correspondence;
 pub mod families;
 pub mod fracture;
@@ -38,6 +40,7 @@ pub mod weights;
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
+pub use crack_area::CrackArea;
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use fracture::{BondEnergy, FractureError};
 pub use influence::{Influence, Micromodulus};

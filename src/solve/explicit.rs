@@ -23,7 +23,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::system::{Breakage, Dynamic};
+use crate::system::{Breakage, Dynamic, Halfway};
 
 mod state;
 
@@ -106,7 +106,11 @@ impl<'a> Explicit<'a> {
         } else {
             Breakage::Held
         };
-        state.broken += system.internal_force_into(&state.u, &mut force, breakage);
+        let broken = system.internal_force_into(&state.u, &mut force, breakage);
+        if broken > 0 {
+            system.account_for_breaks(&Halfway::at(&state.u));
+        }
+        state.broken += broken;
         let inverse_mass: Vec<f64> = system.mass().iter().map(|m| 1.0 / m).collect();
         let mut motion = Explicit {
             system,
@@ -233,9 +237,17 @@ impl<'a> Explicit<'a> {
             self.drive.load_into(self.state.time, &mut self.load);
             Reading::Fresh
         };
-        self.state.broken +=
+        let broken =
             self.system
                 .internal_force_into(&self.state.u, &mut self.force, Breakage::Allowed);
+        if broken > 0 {
+            self.system.account_for_breaks(&Halfway {
+                u: &self.state.u,
+                v: &self.state.v,
+                back: 0.5 * dt,
+            });
+        }
+        self.state.broken += broken;
         self.look_ahead();
         for (p, &k) in self.prescribed.iter().enumerate() {
             let k = k as usize;

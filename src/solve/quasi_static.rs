@@ -358,6 +358,7 @@ pub fn run(
             if now == 0 {
                 break residual;
             }
+            work.system.account_for_breaks(&Halfway::at(&state.u));
             broken += now;
             rounds += 1;
             if rounds >= params.max_rounds {

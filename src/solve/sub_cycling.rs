@@ -384,8 +384,16 @@ impl Dynamic for SubCycled<'_> {
         self.system.stored_energy(u)
     }
 
-    fn dissipated_energy(&self) -> Option<f64> {
-        self.system.dissipated_energy()
+    fn dissipation(&self) -> Option<Dissipation> {
+        self.system.dissipation()
+    }
+
+    fn set_dissipation(&mut self, dissipation: Dissipation) {
+        self.system.set_dissipation(dissipation);
+    }
+
+    fn account_for_breaks(&mut self, at: &Halfway<'_>) {
+        self.system.account_for_breaks(at);
     }
 
     fn damage(&self) -> Option<Vec<f64>> {

@@ -48,6 +48,8 @@ pub struct SeamBonds<const D: usize> {
     /// The first bonds break here, the others in the body's pass.
     own: usize,
     intact: Vec<u8>,
+    /// Bonds that the last pass broke.
+    last: Vec<u32>,
     breaks: Option<Breaking>,
     kinematics: Kinematics,
     /// Sites at which parts end, and for each the parts with their weights.
@@ -69,9 +71,7 @@ pub struct SeamBonds<const D: usize> {
 
 /// When bonds break.
 struct Breaking {
-    /// Critical stretch of each bond.
-    critical: Vec<f64>,
-    /// What that is for t.
+    /// The value of t at the critical stretch of each bond.
     limit: Vec<f64>,
     never: Vec<bool>,
 }
@@ -96,6 +96,7 @@ impl<const D: usize> SeamBonds<D> {
             first: Vec::new(),
             own: 0,
             intact: Vec::new(),
+            last: Vec::new(),
             breaks: None,
             kinematics: Kinematics::Linear,
             sites: Vec::new(),
@@ -119,7 +120,6 @@ impl<const D: usize> SeamBonds<D> {
             let part = Part {
                 xi: xi.into(),
                 stiffness: spring.stiffness,
-                taken: spring.stiffness,
                 length,
                 bond: 0,
             };
@@ -152,8 +152,6 @@ impl<const D: usize> SeamBonds<D> {
                 let part = Part {
                     xi: body.bond(i as usize, j as usize).into(),
                     stiffness: plain * scale,
-                    // the body's pass tells of the plain bond
-                    taken: plain * (scale - 1.0),
                     length: 1.0,
                     bond: 0,
                 };
@@ -222,7 +220,6 @@ impl<const D: usize> SeamBonds<D> {
         let critical = critical.map(|of| self.bonds.iter().map(|b| of(b[0])).collect::<Vec<_>>());
         self.breaks = critical.map(|critical| Breaking {
             limit: critical.iter().map(|&s| kinematics.limit(s)).collect(),
-            critical,
             never: self
                 .bonds
                 .iter()
@@ -249,8 +246,10 @@ impl<const D: usize> SeamBonds<D> {
     /// Learns from the body's pass which of its bonds stand.
     pub(in crate::coupling) fn follow(&mut self, pass: &dyn BondPass<D>) {
         for (bond, [i, j]) in self.bonds.iter().enumerate().skip(self.own) {
-            if !pass.bonded(*i as usize, *j as usize) {
-                self.intact[bond / 8] &= !(1 << (bond % 8));
+            let bit = 1 << (bond % 8);
+            if self.intact[bond / 8] & bit != 0 && !pass.bonded(*i as usize, *j as usize) {
+                self.intact[bond / 8] &= !bit;
+                self.last.push(bond as u32);
             }
         }
     }
@@ -364,6 +363,7 @@ impl<const D: usize> SeamBonds<D> {
             let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
             if over[parts.clone()].contains(&true) && !breaks.never[bond] {
                 self.intact[bond / 8] &= !(1 << (bond % 8));
+                self.last.push(bond as u32);
                 pulls[parts.clone()].fill([0.0; D]);
                 elongation[parts].fill(0.0);
                 broken += 2;
@@ -484,12 +484,16 @@ impl<const D: usize> SeamBonds<D> {
 
     /// Energy of the parts that stand, and of the dilatations of the seam \[J\].
     pub(in crate::coupling) fn energy(&self, u: &[f64]) -> f64 {
+        self.energy_with(&self.intact, u)
+    }
+
+    fn energy_with(&self, intact: &[u8], u: &[f64]) -> f64 {
         let elongation: Vec<f64> = (0..self.parts.len())
             .into_par_iter()
             .with_min_len(CHUNK)
             .map(|p| {
                 let part = &self.parts[p];
-                if !self.stands(part.bond) {
+                if intact[part.bond as usize / 8] >> (part.bond % 8) & 1 == 0 {
                     return 0.0;
                 }
                 let d: Vector<D> = self.difference.displacement(p, u);
@@ -505,18 +509,34 @@ impl<const D: usize> SeamBonds<D> {
         parts + states.map_or(0.0, |s| s.energy(&s.pressures(u, &elongation)))
     }
 
-    /// What the broken parts took, each `s w` at the critical stretch \[J\].
-    pub(in crate::coupling) fn dissipated(&self) -> f64 {
-        let Some(breaks) = &self.breaks else {
-            return 0.0;
-        };
-        let broken = self.parts.iter().filter(|p| !self.stands(p.bond));
-        broken
-            .map(|p| {
-                let r2 = Vector::from(p.xi).norm_squared();
-                0.5 * p.taken * (p.length * breaks.critical[p.bond as usize] * r2).powi(2)
-            })
-            .sum()
+    /// Forgets what broke in the last pass.
+    pub(in crate::coupling) fn begin_pass(&mut self) {
+        self.last.clear();
+    }
+
+    /// Whether a bond of the seam broke in the last pass.
+    pub(in crate::coupling) fn has_broken(&self) -> bool {
+        !self.last.is_empty()
+    }
+
+    /// What the seam would store less at a displacement for the bonds that the last pass broke \[J\].
+    pub(in crate::coupling) fn lost_energy(&self, u: &[f64]) -> f64 {
+        let mut before = self.intact.clone();
+        for &bond in &self.last {
+            before[bond as usize / 8] |= 1 << (bond % 8);
+        }
+        self.energy_with(&before, u) - self.energy_with(&self.intact, u)
+    }
+
+    /// Bonds that broke here in the last pass and not in that of the body: their points, and which part of the bond each is.
+    pub(in crate::coupling) fn last_own(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
+        let own = self.last.iter().filter(|bond| (**bond as usize) < self.own);
+        own.map(|&bond| {
+            let bond = bond as usize;
+            let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
+            let share: f64 = self.parts[parts].iter().map(|part| part.length).sum();
+            (self.bonds[bond], share)
+        })
     }
 
     /// Adds to the damage of points, so far that of the bonds that the body's pass knows of, what they lost here; `of_bonds` is the volume that a point's whole bonds reach.

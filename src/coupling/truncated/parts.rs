@@ -12,8 +12,6 @@ pub(super) struct Part<const D: usize> {
     pub xi: [f64; D],
     /// `k/s`, of the energy `½ (k/s) (ξ·D)²` at rest.
     pub stiffness: f64,
-    /// As far as breaking it is paid for here.
-    pub taken: f64,
     /// s.
     pub length: f64,
     pub bond: u32,

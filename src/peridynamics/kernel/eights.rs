@@ -21,7 +21,7 @@ pub(super) enum Sum<'a> {
 }
 
 /// Sums of a run of points, one number each for [`Sum::Extension`], else one per component. Breaks what is beyond its limit first, if bits may change:
-/// theirs start with those of the first point. Returns how many broke.
+/// theirs start with those of the first point. Returns which broke, as point and bond.
 pub(super) fn add_up<const D: usize, const EXACT: bool>(
     list: &List<D>,
     points: Range<usize>,
@@ -29,7 +29,7 @@ pub(super) fn add_up<const D: usize, const EXACT: bool>(
     sum: Sum<'_>,
     bits: Bits<'_>,
     sums: &mut [f64],
-) -> u64 {
+) -> Vec<(u32, usize)> {
     dispatch(Points::<D, EXACT> {
         list,
         points,
@@ -124,10 +124,10 @@ fn extension<L: Lanes, const EXACT: bool>(l: L, t: L::V) -> L::V {
 }
 
 impl<const D: usize, const EXACT: bool> Work for Points<'_, D, EXACT> {
-    type Output = u64;
+    type Output = Vec<(u32, usize)>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self, l: L) -> u64 {
+    fn run<L: Lanes>(self, l: L) -> Vec<(u32, usize)> {
         let Self {
             list,
             points,
@@ -138,7 +138,7 @@ impl<const D: usize, const EXACT: bool> Work for Points<'_, D, EXACT> {
         } = self;
         let start = list.bytes[points.start];
         let width = if matches!(what, Sum::Extension) { 1 } else { D };
-        let mut broken = 0;
+        let mut broken = Vec::new();
         for (i, result) in points.zip(sums.chunks_exact_mut(width)) {
             let is_breaking = matches!(bits, Bits::Breaking(_)) && !list.no_fail[i];
             let is_summed = list.row[i] || matches!(what, Sum::Extension);
@@ -193,7 +193,8 @@ impl<const D: usize, const EXACT: bool> Work for Points<'_, D, EXACT> {
                         for (k, &j) in g.neighbours.iter().enumerate() {
                             gone &= !(u8::from(list.no_fail[j]) << k);
                         }
-                        broken += u64::from(gone.count_ones());
+                        let lanes = (0..LANES).filter(|k| gone >> k & 1 == 1);
+                        broken.extend(lanes.map(|k| (i as u32, first + k)));
                         mask &= !gone;
                         if let Bits::Breaking(own) = &mut bits {
                             own[place - start] = mask;

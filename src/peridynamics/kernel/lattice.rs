@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::{
     BondPass, Kinematics,
+    list::{extension, stretched},
     lanes::{LANES, Source, dispatch},
     stencil::{NONE, Stencil},
-    sweep::{Bits, CARE, FULL, Field, Task, job},
+    sweep::{Bits, Broken, CARE, FULL, Field, Task, job},
 };
 use crate::system::Breakage;
 
@@ -47,6 +48,8 @@ pub(super) struct Lattice<const D: usize> {
     pub(super) u: [Vec<f64>; D],
     pub(super) sums: Vec<[f64; LANES]>,
     pub(super) reference: u64,
+    /// What the last pass broke.
+    pub(super) broken: Vec<Broken>,
 }
 
 impl<const D: usize> Lattice<D> {
@@ -118,6 +121,7 @@ impl<const D: usize> Lattice<D> {
             .for_each(|(((groups, bits), flags), sums)| {
                 dispatch(Task::<D, EXACT, JOB> {
                     field,
+                    first: 0,
                     groups,
                     bits: Bits::Held(bits),
                     flags,
@@ -126,14 +130,14 @@ impl<const D: usize> Lattice<D> {
             });
     }
 
-    /// One sweep that may break bonds; returns how many.
+    /// One sweep that may break bonds; returns which.
     fn breaking_sweep<const EXACT: bool, const JOB: u8>(
         &self,
         field: &Field<'_, D>,
         intact: &mut [u8],
         flags: &mut [u8],
         sums: &mut [[f64; LANES]],
-    ) -> u64 {
+    ) -> Vec<Broken> {
         let stencil = self.stencil.offsets.len().max(1);
         let vectors = if JOB == job::MOMENTS { 2 } else { D };
         self.stencil
@@ -142,16 +146,22 @@ impl<const D: usize> Lattice<D> {
             .zip(intact.par_chunks_mut(TASK * stencil))
             .zip(flags.par_chunks_mut(TASK))
             .zip(sums.par_chunks_mut(TASK * vectors))
-            .map(|(((groups, bits), flags), sums)| {
+            .enumerate()
+            .map(|(task, (((groups, bits), flags), sums))| {
                 dispatch(Task::<D, EXACT, JOB> {
                     field,
+                    first: task * TASK,
                     groups,
                     bits: Bits::Breaking(bits),
                     flags,
                     sums,
                 })
             })
-            .sum()
+            // in the order of the tasks; lists without an entry take no memory
+            .reduce(Vec::new, |mut all, more| {
+                all.extend(more);
+                all
+            })
     }
 
     /// What the dilatations of a sweep make of `pull`.
@@ -202,7 +212,7 @@ impl<const D: usize> Lattice<D> {
             .map_or(Vec::new(), |s| std::mem::take(&mut s.pull));
         let may_break = breakage == Breakage::Allowed && self.limit < f64::INFINITY;
         let limit = if may_break { self.limit } else { f64::INFINITY };
-        let broken = {
+        self.broken = {
             let field = self.field(&field_u, &[], limit);
             let (i, f, s) = (&mut intact, &mut flags, &mut sums);
             match self.solid {
@@ -223,7 +233,69 @@ impl<const D: usize> Lattice<D> {
         if let Some(solid) = &mut self.solid {
             solid.pull = pull;
         }
-        broken
+        let lanes = self.broken.iter().map(|b| u64::from(b.lanes.count_ones()));
+        lanes.sum()
+    }
+
+    /// Directed bonds that the last pass broke: group, lane and offset, ascending.
+    fn last(&self) -> Vec<(usize, usize, usize)> {
+        let mut bonds = Vec::with_capacity(self.broken.len());
+        for b in &self.broken {
+            let lanes = (0..LANES).filter(|lane| b.lanes >> lane & 1 == 1);
+            bonds.extend(lanes.map(|lane| (b.group as usize, lane, b.offset as usize)));
+        }
+        bonds.sort_unstable();
+        bonds
+    }
+
+    /// Relative extension of the bond from a cell along an offset, and the relative volume of its far end.
+    fn extension<const EXACT: bool>(
+        &self,
+        at: &dyn Fn(usize) -> [f64; D],
+        cell: usize,
+        offset: usize,
+    ) -> (f64, f64) {
+        let o = &self.stencil.offsets[offset];
+        let there = (cell as isize + o.delta) as usize;
+        let point = |cell: usize| at(self.stencil.point_of[cell] as usize);
+        let s = stretched::<D, EXACT>(&o.xi, &point(cell), &point(there));
+        (extension::<EXACT>(s.t()), self.volume[there])
+    }
+
+    fn lost<const EXACT: bool>(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        let mut energy = 0.0;
+        for bonds in self.last().chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (g, lane, _) = bonds[0];
+            let cell = self.stencil.groups[g] as usize + lane;
+            let point = self.stencil.point_of[cell] as usize;
+            let volume = self.scale.get(point).copied().unwrap_or(self.unit);
+            if volume == 0.0 {
+                continue;
+            }
+            let moments = |offset: usize| {
+                let (e, v) = self.extension::<EXACT>(at, cell, offset);
+                let w = self.stencil.offsets[offset].moment * v * e;
+                (w, w * e)
+            };
+            let (mut first, mut second) = (0.0, 0.0);
+            for &(_, _, offset) in bonds {
+                let (a, b) = moments(offset);
+                (first, second) = (first + a, second + b);
+            }
+            energy += volume
+                * match &self.solid {
+                    None => 0.25 * second,
+                    Some(s) => {
+                        let mut left = 0.0;
+                        self.each(&self.stencil.intact, g, lane, |o, _| left += moments(o).0);
+                        let d = s.dilatation[g][lane];
+                        // ½ K′ θ² with θ = d Σ, where K′ d = volumetric
+                        let bulk = s.volumetric[g][lane] * d;
+                        0.5 * (bulk * first * (first + 2.0 * left) + s.deviatoric[cell] * second)
+                    }
+                };
+        }
+        energy
     }
 
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
@@ -463,6 +535,24 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
 
     fn broken(&self) -> u64 {
         self.reference - ones(&self.stencil.intact)
+    }
+
+    fn last_broken(&self) -> Vec<(u32, u32)> {
+        let point = |cell: usize| self.stencil.point_of[cell];
+        let last = self.last().into_iter();
+        last.map(|(g, lane, offset)| {
+            let cell = self.stencil.groups[g] as usize + lane;
+            let there = cell as isize + self.stencil.offsets[offset].delta;
+            (point(cell), point(there as usize))
+        })
+        .collect()
+    }
+
+    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        match self.kinematics {
+            Kinematics::Exact => self.lost::<true>(at),
+            Kinematics::Linear => self.lost::<false>(at),
+        }
     }
 
     fn bonded(&self, i: usize, j: usize) -> bool {

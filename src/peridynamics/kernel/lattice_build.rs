@@ -206,6 +206,7 @@ impl<const D: usize> Lattice<D> {
             sums: vec![[0.0; LANES]; groups * D.max(2)],
             reference,
             stencil,
+            broken: Vec::new(),
         };
         lattice.mark_full();
         Ok(lattice)

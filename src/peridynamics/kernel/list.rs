@@ -49,6 +49,8 @@ pub(super) struct List<const D: usize> {
     pub bytes: Vec<usize>,
     intact: Vec<u8>,
     reference: u64,
+    /// Points and bonds that the last pass broke, ascending.
+    last: Vec<(u32, usize)>,
 }
 
 /// What one bond gives.
@@ -208,6 +210,7 @@ impl<const D: usize> List<D> {
             bytes,
             intact,
             reference: families.neighbours.len() as u64,
+            last: Vec::new(),
         }
     }
 
@@ -222,14 +225,14 @@ impl<const D: usize> List<D> {
         self.intact[self.bytes[i] + k / 8] >> (k % 8) & 1 == 1
     }
 
-    /// Sums over the intact bonds of every point, block by block; bits are cleared of bonds beyond their limit first, if they may break. Returns how many did.
+    /// Sums over the intact bonds of every point, block by block; bits are cleared of bonds beyond their limit first, if they may break. Returns which did.
     fn add_up<const EXACT: bool>(
         &self,
         u: &[f64],
         sum: Sum<'_>,
         bits: Bits<'_>,
         sums: &mut [f64],
-    ) -> u64 {
+    ) -> Vec<(u32, usize)> {
         let width = sums.len() / self.points().max(1);
         let mut rest = bits;
         let mut blocks = Vec::new();
@@ -251,7 +254,11 @@ impl<const D: usize> List<D> {
             .map(|(points, bits, sums)| {
                 eights::add_up::<D, EXACT>(self, points, u, sum, bits, sums)
             })
-            .sum()
+            // in the order of the blocks
+            .reduce(Vec::new, |mut all, more| {
+                all.extend(more);
+                all
+            })
     }
 
     /// The sum over intact bonds of point `i` of `f(bond, j, ξ, t, direction)`.
@@ -288,7 +295,7 @@ impl<const D: usize> List<D> {
         theta: &mut [f64],
         bits: Bits<'_>,
         force: &mut [f64],
-    ) -> u64 {
+    ) -> Vec<(u32, usize)> {
         let broken = match &self.solid {
             None => self.add_up::<EXACT>(u, Sum::Pairwise, bits, force),
             Some(c) => {
@@ -317,7 +324,7 @@ impl<const D: usize> List<D> {
         let mut theta = self.solid.as_mut().map(|c| std::mem::take(&mut c.theta));
         let mut none = Vec::new();
         let theta_of = theta.as_mut().unwrap_or(&mut none);
-        let broken = if may_break {
+        self.last = if may_break {
             let mut intact = std::mem::take(&mut self.intact);
             let broken = self.sweep::<EXACT>(u, theta_of, Bits::Breaking(&mut intact), force);
             self.intact = intact;
@@ -328,7 +335,44 @@ impl<const D: usize> List<D> {
         if let (Some(c), Some(theta)) = (&mut self.solid, theta) {
             c.theta = theta;
         }
-        broken
+        self.last.len() as u64
+    }
+
+    fn lost<const EXACT: bool>(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        let mut energy = 0.0;
+        for bonds in self.last.chunk_by(|a, b| a.0 == b.0) {
+            let i = bonds[0].0 as usize;
+            if !self.row[i] {
+                continue;
+            }
+            let here = at(i);
+            let moments = |bond: usize| {
+                let j = self.neighbours.get(i, bond);
+                let s = stretched::<D, EXACT>(&self.xi(i, j), &here, &at(j));
+                let e = extension::<EXACT>(s.t());
+                let w = self.weights.get(bond) * s.length * self.volume[j] * e;
+                (w, w * e)
+            };
+            let (mut first, mut second) = (0.0, 0.0);
+            for &(_, bond) in bonds {
+                let (a, b) = moments(bond);
+                (first, second) = (first + a, second + b);
+            }
+            energy += self.volume[i]
+                * match &self.solid {
+                    None => 0.25 * second,
+                    Some(c) => {
+                        let family = self.offsets[i]..self.offsets[i + 1];
+                        let left: f64 = family
+                            .filter(|bond| self.stands(i, bond - self.offsets[i]))
+                            .map(|bond| moments(bond).0)
+                            .sum();
+                        let bulk = c.volumetric[i] * c.dilatation[i];
+                        0.5 * (bulk * first * (first + 2.0 * left) + c.deviatoric[i] * second)
+                    }
+                };
+        }
+        energy
     }
 
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
@@ -501,6 +545,19 @@ impl<const D: usize> BondPass<D> for List<D> {
             .map(|b| u64::from(b.count_ones()))
             .sum();
         self.reference - standing
+    }
+
+    fn last_broken(&self) -> Vec<(u32, u32)> {
+        let last = self.last.iter();
+        last.map(|&(i, bond)| (i, self.neighbours.get(i as usize, bond) as u32))
+            .collect()
+    }
+
+    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        match self.kinematics {
+            Kinematics::Exact => self.lost::<true>(at),
+            Kinematics::Linear => self.lost::<false>(at),
+        }
     }
 
     fn bonded(&self, i: usize, j: usize) -> bool {

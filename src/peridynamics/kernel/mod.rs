@@ -79,6 +79,13 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Directed bonds of the reference families that are broken.
     fn broken(&self) -> u64;
 
+    /// Directed bonds that the last pass broke, as a point and its neighbour, in a fixed order.
+    fn last_broken(&self) -> Vec<(u32, u32)>;
+
+    /// What the points with rows would store less at the displacement `at` of each point, for the bonds that the last pass broke:
+    /// their energy before less that after, all of these bonds removed at once \[J\]. Of a state-based law that is the change of dilatations too.
+    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64;
+
     /// Whether a bond of the reference families joins points `i` and `j`, both with a family, and stands; contact leaves such pairs to their bond.
     fn bonded(&self, i: usize, j: usize) -> bool;
 

@@ -43,9 +43,20 @@ pub(super) struct Field<'a, const D: usize> {
     pub no_fail: &'a [bool],
 }
 
+/// Bonds of one group along one offset that a sweep has broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Broken {
+    pub group: u32,
+    pub offset: u32,
+    /// One bit per lane.
+    pub lanes: u8,
+}
+
 /// Some groups and what belongs to them.
 pub(super) struct Task<'a, 'f, const D: usize, const EXACT: bool, const JOB: u8> {
     pub field: &'a Field<'f, D>,
+    /// Number of the first group.
+    pub first: usize,
     /// First cell of each group.
     pub groups: &'a [u32],
     /// One byte per group and offset.
@@ -234,7 +245,7 @@ unsafe fn group<
     sums
 }
 
-/// Breaks what is beyond its limit in one group; returns how many bonds.
+/// Breaks what is beyond its limit in one group, and lists it; returns whether anything broke.
 ///
 /// # Safety
 /// `cell` is that of a group of the field.
@@ -242,9 +253,10 @@ unsafe fn group<
 unsafe fn break_bonds<L: Lanes, const D: usize, const EXACT: bool>(
     l: L,
     field: &Field<'_, D>,
-    cell: usize,
+    (group, cell): (usize, usize),
     bits: &mut [u8],
-) -> u64 {
+    list: &mut Vec<Broken>,
+) -> bool {
     // SAFETY: as above
     let here: [L::V; D] = std::array::from_fn(|a| unsafe { field.u[a].at(l, cell, 0) });
     let kept =
@@ -254,26 +266,33 @@ unsafe fn break_bonds<L: Lanes, const D: usize, const EXACT: bool>(
     } else {
         kept(cell)
     };
-    let mut broken = 0;
-    for (bits, o) in bits.iter_mut().zip(field.offsets) {
+    let before = list.len();
+    for (offset, (bits, o)) in bits.iter_mut().zip(field.offsets).enumerate() {
         let (t, _) = unsafe { stretched::<L, D, EXACT>(l, field, o, cell, &here) };
         let mut over = l.above(t, l.splat(o.limit)) & *bits & !kept_here;
         if over != 0 && !field.no_fail.is_empty() {
             over &= !kept((cell as isize + o.delta) as usize);
         }
-        *bits &= !over;
-        broken += u64::from(over.count_ones());
+        if over != 0 {
+            *bits &= !over;
+            list.push(Broken {
+                group: group as u32,
+                offset: offset as u32,
+                lanes: over,
+            });
+        }
     }
-    broken
+    list.len() > before
 }
 
 impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, EXACT, JOB> {
-    type Output = u64;
+    type Output = Vec<Broken>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self, l: L) -> u64 {
+    fn run<L: Lanes>(self, l: L) -> Vec<Broken> {
         let Task {
             field,
+            first,
             groups,
             mut bits,
             flags,
@@ -284,7 +303,7 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
         let range = if EXACT { SERIES_RANGE } else { f64::INFINITY };
         let high = l.splat(range.min(field.limit));
         let low = l.splat(-range);
-        let mut broken = 0;
+        let mut broken = Vec::new();
         for (g, &cell) in groups.iter().enumerate() {
             let cell = cell as usize;
             let span = g * stencil..(g + 1) * stencil;
@@ -317,11 +336,12 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
                     && let Bits::Breaking(b) = &mut bits
                 {
                     // SAFETY: as above
-                    let lost =
-                        unsafe { break_bonds::<L, D, EXACT>(l, field, cell, &mut b[span.clone()]) };
-                    if lost > 0 {
+                    let lost = unsafe {
+                        let bits = &mut b[span.clone()];
+                        break_bonds::<L, D, EXACT>(l, field, (first + g, cell), bits, &mut broken)
+                    };
+                    if lost {
                         flags[g] &= !FULL;
-                        broken += lost;
                     }
                 }
                 let here = match &bits {
