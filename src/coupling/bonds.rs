@@ -9,6 +9,7 @@ use crate::{
     peridynamics::{
         BondWeights, Families, Family, PartialVolume, StatePart, TIE_TOLERANCE, collapsed_tensor,
         isotropic_shell_factors, offsets::OffsetTable, partial_volume::lattice_shells,
+        plane_energy,
     },
     shape::Barriers,
     tensor::{Tensor, Tensor4, Vector},
@@ -197,9 +198,18 @@ impl<const D: usize> LatticeFactors<D> {
         p: &Peridynamics<D>,
         horizon: f64,
     ) -> Result<Option<WholeFamily<D>>, ModelError> {
-        let Some(axes) = self.axes else {
-            return Ok(None);
-        };
+        self.is_lattice()
+            .then(|| self.regular_family(p, horizon))
+            .transpose()
+    }
+
+    /// The whole family of a point of a regular lattice of the same spacing and horizon: the lattice's own if the points are one.
+    pub fn regular_family(
+        &self,
+        p: &Peridynamics<D>,
+        horizon: f64,
+    ) -> Result<WholeFamily<D>, ModelError> {
+        let axes = self.axes.unwrap_or_else(Tensor::identity);
         let (lattice, _) =
             lattice_shells::<D>(self.volumes, horizon / self.spacing, TIE_TOLERANCE)?;
         let bonds: Vec<Vector<D>> = lattice
@@ -239,13 +249,13 @@ impl<const D: usize> LatticeFactors<D> {
             .map(|(xi, (&p, &w))| (self.offset(xi), (p, w)))
             .collect();
         bonds.sort_unstable_by_key(|b| b.0);
-        Ok(Some(WholeFamily {
+        Ok(WholeFamily {
             spacing: self.spacing,
             coefficients: OffsetTable::new(&bonds),
             bonds,
             state,
             tensor,
-        }))
+        })
     }
 
     /// The elastic tensor of the plain full lattice; none without a lattice.
@@ -276,6 +286,15 @@ pub(super) struct WholeFamily<const D: usize> {
 }
 
 impl<const D: usize> WholeFamily<D> {
+    /// `G0/s_c²` of a plane between two layers, [`plane_energy`].
+    pub fn plane_energy(&self) -> f64 {
+        let state = self
+            .state
+            .as_ref()
+            .map_or(0.0, |s| s.modulus.get(0, 0, 0, 0));
+        plane_energy(self.spacing, &self.bonds, state)
+    }
+
     /// All bonds by their integer offsets, in their order, with `p` and `ω`.
     pub fn bonds(&self) -> impl Iterator<Item = ([i32; D], (f64, f64))> + '_ {
         self.bonds.iter().copied()

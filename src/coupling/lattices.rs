@@ -181,6 +181,28 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
+    /// The horizon of each lattice with what a plane through it costs to open, over the square of the critical stretch ([`crate::peridynamics::plane_energy`]) \[m\], \[J/m²\].
+    /// Points that are no lattice count as one of their spacing.
+    ///
+    /// # Errors
+    /// [`ModelError::Family`] if the law has no coefficients there.
+    pub fn plane_energies(&self) -> Result<Vec<(f64, f64)>, ModelError> {
+        let Some(p) = &self.peridynamics else {
+            return Ok(Vec::new());
+        };
+        let of = |(factors, horizon): &(LatticeFactors<D>, f64)| {
+            let family = factors.regular_family(p, *horizon)?;
+            Ok((*horizon, family.plane_energy()))
+        };
+        self.factors.iter().map(of).collect()
+    }
+
+    /// Spacing of the lattice of a point of the cloud \[m\], of several the point's own.
+    pub fn spacing_at(&self, point: u32) -> f64 {
+        self.passing()
+            .map_or(self.spacing(), |passing| passing.whole_of(point).spacing)
+    }
+
     /// The lattice whose points a cell holds; none of an element.
     pub(super) fn lattice_of_cell(&self, cell: usize) -> Option<usize> {
         let points = self.peridynamics.as_ref().map(|p| &p.points)?;

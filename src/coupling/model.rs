@@ -6,7 +6,8 @@ use std::sync::OnceLock;
 use crate::{
     assembly::{self, Row, Transfer},
     coupling::{
-        CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Surfaces, Zone, bonds,
+        CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Surfaces, Zone,
+        bonds::{self, LatticeFactors},
         fit::{self, Sites},
         lattices::{self, Grown, Passing},
         place::{self, Beyond},
@@ -75,6 +76,8 @@ pub struct Model<const D: usize> {
     pub(super) has_energy: bool,
     pub(super) tributary: Tributary,
     pub(super) row_scale: Option<Vec<f64>>,
+    /// Bond factors and horizon of each lattice.
+    pub(super) factors: Vec<(LatticeFactors<D>, f64)>,
     /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
     pub(super) worked_out: OnceLock<Box<dyn Any + Send + Sync>>,
 }
@@ -126,6 +129,7 @@ impl<const D: usize> Model<D> {
             has_energy: coupling.symmetry() == Symmetry::Symmetric,
             tributary: Tributary::default(),
             row_scale: None,
+            factors: Vec::new(),
             worked_out: OnceLock::new(),
         };
         let has_points = model.roles.contains(&CellRole::Points);
@@ -415,6 +419,7 @@ impl<const D: usize> Model<D> {
         let body = PdBody::new(cloud, families, p.law.as_ref(), &weighting, ends)
             .map_err(|e| ModelError::family("the point", e))?;
         self.body = Some(body);
+        self.factors = factors.into_iter().zip(horizons).collect();
         Ok(())
     }
 
@@ -508,13 +513,6 @@ impl<const D: usize> Model<D> {
             .collect();
         let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
         Some([mean, off.iter().fold(0.0, |m, e| m.max(e.abs()))])
-    }
-
-    /// Spacing of the lattice of a point of the cloud \[m\], of several the point's own.
-    pub fn spacing_at(&self, point: u32) -> f64 {
-        self.passing
-            .as_ref()
-            .map_or(self.spacing, |passing| passing.whole_of(point).spacing)
     }
 
     /// Volumes of the peridynamic zone and of the points in it.

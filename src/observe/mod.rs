@@ -19,6 +19,7 @@
 
 pub mod checkpoint;
 pub mod claim;
+pub mod cracks;
 pub mod csv;
 mod data_array;
 pub mod figure;

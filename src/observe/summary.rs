@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::cracks::CrackSummary;
 use super::proof::Proof;
 use super::report::{aligned, number};
 use super::switch::{self, Switch};
@@ -197,7 +198,7 @@ pub struct RunSummary {
     pub residual: f64,
     /// Sum of all internal forces, one component per dimension; zero in a model without ghost forces at rest.
     pub out_of_balance_force: Vec<f64>,
-    /// Its norm over that of the applied (or reaction) forces.
+    /// Its norm over the sum of the norms of all applied nodal forces and nodal reactions.
     pub out_of_balance_relative: f64,
     /// Forces of the loads.
     pub applied: Vec<Applied>,
@@ -332,6 +333,9 @@ pub struct MotionSummary {
     pub missing_energy: f64,
     /// Energy gained without work; none of a motion whose balance closes by construction.
     pub energy_gain: Option<EnergyGain>,
+    /// What breaking bonds cost; none where none can break.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cracks: Option<CrackSummary>,
     /// Bonds broken, each once for each direction.
     pub broken_bonds: u64,
     /// When damage reached the edge of the nonlocal zone, and where.
@@ -345,7 +349,7 @@ pub struct MotionSummary {
 }
 
 impl MotionSummary {
-    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write(&self, dimension: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let share = self.stable_step.map_or_else(String::new, |stable| {
             format!(" ({:.1} % of the stable step)", 100.0 * self.step / stable)
         });
@@ -366,10 +370,19 @@ impl MotionSummary {
             ("kinetic energy", self.kinetic_energy),
             ("stored energy", self.stored_energy),
             ("external work", self.external_work),
-            ("energy not accounted", self.missing_energy),
         ] {
             writeln!(f, "{name:<22} {}", number(value))?;
         }
+        if let Some(cracks) = &self.cracks {
+            cracks.write(dimension, f)?;
+        }
+        // load steps leave out the motion of what breaks
+        let rest = match self.stable_step {
+            None if self.cracks.is_some() => "set free by breaking",
+            _ => "energy not accounted",
+        };
+        let dissipated = self.cracks.map_or(0.0, |c| c.dissipated_energy);
+        writeln!(f, "{rest:<22} {}", number(self.missing_energy - dissipated))?;
         if self.broken_bonds > 0 {
             writeln!(
                 f,
@@ -486,7 +499,7 @@ impl fmt::Display for RunSummary {
             writeln!(f, "peak memory            {}", bytes_text(bytes))?;
         }
         match &self.motion {
-            Some(motion) => motion.write(f)?,
+            Some(motion) => motion.write(self.dimension, f)?,
             None => {
                 writeln!(
                     f,
@@ -496,7 +509,7 @@ impl fmt::Display for RunSummary {
                 )?;
                 writeln!(
                     f,
-                    "out-of-balance force   {} relative to the applied force ({})",
+                    "out-of-balance force   {} relative to the sum of nodal loads and reactions ({})",
                     number(self.out_of_balance_relative),
                     components(&self.out_of_balance_force)
                 )?;

@@ -329,6 +329,36 @@ impl<const D: usize> PdBody<D> {
 
     /// The partial stress of point `j` under displacements `u` of the sites.
     pub fn partial_stress(&self, j: usize, u: &[f64]) -> Tensor<D> {
+        let state = self.state(j).map(|s| s.shape);
+        self.stress_of(j, u, |_| true, state)
+    }
+
+    /// The partial stress of point `j` by the bonds to neighbours that `stands` names, zero without any: force states keep the weights of the whole family, as in motion.
+    pub fn partial_stress_of(
+        &self,
+        j: usize,
+        u: &[f64],
+        stands: impl Fn(usize) -> bool,
+    ) -> Tensor<D> {
+        let (_, omega) = self.kernel(j);
+        let shape = (!self.pairwise).then(|| {
+            let family = self.families.of(j).iter().map(|&l| l as usize);
+            let standing = family.zip(omega).filter(|(l, _)| stands(*l));
+            standing.fold(Tensor::zeros(), |shape, (l, omega)| {
+                let xi = self.bond(j, l);
+                shape + xi * xi.transpose() * (omega * self.cloud.volume[l])
+            })
+        });
+        self.stress_of(j, u, stands, shape)
+    }
+
+    fn stress_of(
+        &self,
+        j: usize,
+        u: &[f64],
+        stands: impl Fn(usize) -> bool,
+        shape: Option<Tensor<D>>,
+    ) -> Tensor<D> {
         let transfer = &self.cloud.transfer;
         let (pair, omega) = self.kernel(j);
         let here: Vector<D> = transfer.displacement(j, u);
@@ -336,6 +366,9 @@ impl<const D: usize> PdBody<D> {
         let mut gradient = Tensor::zeros();
         for (k, &l) in self.families.of(j).iter().enumerate() {
             let l = l as usize;
+            if !stands(l) {
+                continue;
+            }
             let xi = self.bond(j, l);
             let eta = transfer.displacement::<D>(l, u) - here;
             let v = self.cloud.volume[l];
@@ -344,9 +377,8 @@ impl<const D: usize> PdBody<D> {
                 gradient += eta * xi.transpose() * (omega[k] * v);
             }
         }
-        if let Some(state) = self.state(j) {
-            stress +=
-                gradient * state.stabilisation + state.modulus.contract(&gradient) * state.shape;
+        if let (Some(state), Some(shape)) = (self.state(j), shape) {
+            stress += gradient * state.stabilisation + state.modulus.contract(&gradient) * shape;
         }
         stress
     }

@@ -20,8 +20,8 @@
 pub mod body;
 pub mod bond_based;
 pub mod contact;
-mod crack_area;
 pub mod correspondence;
+mod crack_area;
 pub mod families;
 pub mod fracture;
 mod grid;
@@ -42,7 +42,7 @@ pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
 pub use crack_area::CrackArea;
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
-pub use fracture::{BondEnergy, FractureError};
+pub use fracture::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use influence::{Influence, Micromodulus};
 pub use law::{BondLaw, Family, StatePart, collapsed_tensor};
 pub use lps::LinearPeridynamicSolid;

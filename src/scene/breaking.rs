@@ -4,7 +4,9 @@ use super::check;
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::{Fracture, Law, Material};
 use super::region::{Region, region};
-use super::spec::{BondsSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec};
+use super::spec::{
+    BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec,
+};
 use crate::mesh::Mesh;
 
 /// How bonds deform and break. A scene that names neither fracture nor contact has none, and pays for none.
@@ -16,6 +18,8 @@ pub struct Breaking<const D: usize> {
     pub precision: PrecisionSpec,
     /// When bonds of the peridynamic material break; never if there is none.
     pub fracture: Option<Fracture>,
+    /// How the critical stretch follows from a fracture energy.
+    pub calibration: CalibrationSpec,
     /// Regions in which no bond breaks.
     pub no_fail: Vec<Region<D>>,
     /// What is done when damage reaches the edge of the nonlocal zone.
@@ -71,6 +75,21 @@ pub(crate) fn breaking<const D: usize>(
             return Err(needless(edge.span(), "`zones.damage-at-edge` is set"));
         }
     }
+    let calibration = spec
+        .peridynamics
+        .as_ref()
+        .and_then(|p| p.calibration.as_ref());
+    if let (Some(typed), None | Some(Fracture::Stretch(_))) = (calibration, fracture) {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!(
+                "`peridynamics.calibration` is set, but the material `{}` has no fracture energy",
+                material.name
+            ),
+        )
+        .label(typed.span(), "of what?")
+        .help("give the material a fracture-energy, or remove this"));
+    }
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
     let bonds = match typed {
         Some(bonds) => {
@@ -113,6 +132,7 @@ pub(crate) fn breaking<const D: usize>(
         bonds,
         precision: precision.map_or(PrecisionSpec::Double, |p| *p.get_ref()),
         fracture,
+        calibration: calibration.map_or(CalibrationSpec::Lattice, |c| *c.get_ref()),
         no_fail,
         at_edge: spec
             .zones

@@ -332,6 +332,7 @@ pub(crate) fn predict<const D: usize>(
         displacement: &displacement,
         residual: &displacement,
         zone_of_site: &zones,
+        broken: &[],
     };
     timings.add("output", output_seconds(&rest.output, &made_up)?);
     let mut prediction = Prediction {

@@ -158,6 +158,8 @@ pub struct Solved<'a, const D: usize> {
     pub residual: &'a [f64],
     /// Which zone each site lies in.
     pub zone_of_site: &'a [Zone],
+    /// Bonds that broke in motion, by the sites of their ends, each once for each direction.
+    pub broken: &'a [(u32, u32)],
 }
 
 /// Runs a scene and writes its outputs.
@@ -292,9 +294,14 @@ pub fn solve_with<const D: usize>(
         .iter()
         .enumerate()
         .for_each(|(dof, f)| balance[dof % D] += f);
-    let size = |a: &Applied| a.force.iter().map(|f| f * f).sum::<f64>().sqrt();
-    let all = applied.iter().map(size).sum::<f64>();
-    let scale = reactions.iter().map(|r| r.norm()).fold(all, f64::max);
+    // the sizes of nodal forces: their sum vanishes where pressure or two faces pull against each other
+    let size = |forces: &[f64]| -> f64 {
+        let nodal = forces.chunks_exact(D);
+        nodal
+            .map(|f| Vector::<D>::from_column_slice(f).norm())
+            .sum()
+    };
+    let scale = size(load) + size(&solution.reactions);
     let zone_of_site = zone_of_site(model);
     let solved = Solved {
         model,
@@ -302,6 +309,7 @@ pub fn solve_with<const D: usize>(
         displacement: u,
         residual: &residual,
         zone_of_site: &zone_of_site,
+        broken: &[],
     };
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");

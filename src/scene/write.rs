@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 use super::run::Solved;
 use super::validate::Output;
@@ -96,6 +97,7 @@ struct Sample<const D: usize> {
 /// The solution at sites and between them.
 struct Solution<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
+    intact: Intact,
     sampler: Sampler<'a, D>,
     body: Locator<D>,
     tolerance: f64,
@@ -107,6 +109,7 @@ impl<'a, const D: usize> Solution<'a, D> {
         let (lo, hi) = model.mesh.bounds();
         Self {
             solved,
+            intact: Intact::of(solved),
             sampler: Sampler::new(model),
             body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
             tolerance: 1e-9 * (hi - lo).norm(),
@@ -132,7 +135,7 @@ impl<'a, const D: usize> Solution<'a, D> {
         let (gradient, zone) = match self.sampler.carrier(x)? {
             Carrier::Element(c) => (self.solved.element_gradient(c), self.solved.model.zones[c]),
             Carrier::Point(site) => (
-                self.solved.point_gradient(site),
+                self.solved.point_gradient(site, &self.intact),
                 self.solved.zone_of_site[site],
             ),
         };
@@ -141,6 +144,29 @@ impl<'a, const D: usize> Solution<'a, D> {
             gradient,
             zone,
         })
+    }
+}
+
+/// Which bonds between points stand.
+struct Intact(FxHashSet<(u32, u32)>);
+
+impl Intact {
+    fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
+        let sites = &solved.model.sites;
+        let point = |site: u32| match sites[site as usize].kind {
+            SiteKind::Point(p) => Some(p),
+            SiteKind::Node(_) => None,
+        };
+        let broken = solved.broken.iter();
+        Self(
+            broken
+                .filter_map(|&(i, j)| point(i).zip(point(j)))
+                .collect(),
+        )
+    }
+
+    fn stands(&self, i: usize, j: usize) -> bool {
+        self.0.is_empty() || !self.0.contains(&(i as u32, j as u32))
     }
 }
 
@@ -158,8 +184,8 @@ impl<const D: usize> Solved<'_, D> {
         fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
     }
 
-    /// Least-squares gradient over the nearest bonds of a point, weighted by 1/|ξ|²: sharper than over the whole family.
-    fn point_gradient(&self, site: usize) -> Tensor<D> {
+    /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.
+    fn point_gradient(&self, site: usize, intact: &Intact) -> Tensor<D> {
         let Some((body, p)) = self.model.point_of(site) else {
             return Tensor::zeros();
         };
@@ -168,6 +194,7 @@ impl<const D: usize> Solved<'_, D> {
             .families
             .of(p)
             .iter()
+            .filter(|&&j| intact.stands(p, j as usize))
             .map(|&j| (body.bond(p, j as usize), j as usize))
             .collect();
         let nearest = bonds
@@ -265,6 +292,7 @@ pub(super) fn snapshot<const D: usize>(
                 .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
         );
     }
+    let intact = Intact::of(solved);
     let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
         .into_par_iter()
         .filter(|&site| {
@@ -272,9 +300,9 @@ pub(super) fn snapshot<const D: usize>(
         })
         .map(|site| {
             let stress = model.point_of(site).map_or(Tensor::zeros(), |(body, p)| {
-                body.partial_stress(p, solved.displacement)
+                body.partial_stress_of(p, solved.displacement, |j| intact.stands(p, j))
             });
-            (site, strain(&solved.point_gradient(site)), stress)
+            (site, strain(&solved.point_gradient(site, &intact)), stress)
         })
         .collect();
     for (site, e, stress) in on_points {

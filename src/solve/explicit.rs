@@ -413,6 +413,11 @@ impl<'a> Explicit<'a> {
         self.energies
     }
 
+    /// The applied load on each prescribed dof, without the support's force \[N\].
+    pub fn applied(&self) -> &[f64] {
+        &self.applied
+    }
+
     /// What moves.
     pub fn system(&self) -> &dyn Dynamic {
         &*self.system

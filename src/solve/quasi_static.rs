@@ -19,12 +19,14 @@ use crate::{
     solve::{
         FreeDofs,
         explicit::Drive,
-        krylov::{
-            KrylovError, KrylovParams, LinearMap, add_scaled, conjugate_gradients, dot, gmres, norm,
-        },
+        krylov::{KrylovParams, LinearMap, add_scaled, conjugate_gradients, dot, gmres, norm},
     },
-    system::{Breakage, Dynamic, Symmetry},
+    system::{Breakage, Dynamic, Halfway, Symmetry},
 };
+
+mod error;
+
+pub use error::QuasiStaticError;
 
 /// How equilibrium is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -92,6 +94,10 @@ pub struct LoadStep<'a> {
     pub state: &'a LoadState,
     /// Internal force \[N\]: on prescribed dofs the force of the support plus the load.
     pub force: &'a [f64],
+    /// Applied load \[N\].
+    pub load: &'a [f64],
+    /// Work that loads and supports did in this step \[J\]: supports on the way to the first equilibrium, before a bond breaks, by the mean of the forces at its ends; loads all the way.
+    pub work: f64,
     /// Bonds broken in this step.
     pub broken: u64,
     /// How often bonds broke.
@@ -113,91 +119,6 @@ pub struct QuasiStaticInfo {
     pub broken: u64,
     /// Products with the stiffness, or passes over the bonds.
     pub iterations: usize,
-}
-
-/// Why a load step failed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum QuasiStaticError {
-    /// An input has the wrong length.
-    #[error("{what} has {found} entries, the model has {expected}: it belongs to another model")]
-    Shape {
-        /// Name of the input.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length needed.
-        expected: usize,
-    },
-    /// No equilibrium.
-    #[error(
-        "load step {step} at time {time} found no equilibrium: the residual is {residual:.1e} of the forces after {iterations} iterations, largest at site {site}; {remedy}"
-    )]
-    NoEquilibrium {
-        /// The load step.
-        step: u64,
-        /// Its time.
-        time: f64,
-        /// Relative residual.
-        residual: f64,
-        /// Iterations spent.
-        iterations: usize,
-        /// Where the residual is largest.
-        site: usize,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// Damped motion that grows.
-    #[error(
-        "load step {step} at time {time}: the relaxation ran away after {iterations} passes, fastest at site {site}: the stiffness has eigenvalues that are negative or complex, as that of partial stress at free sides; take method = \"implicit\", or another coupling"
-    )]
-    RanAway {
-        /// The load step.
-        step: u64,
-        /// Its time.
-        time: f64,
-        /// Passes so far.
-        iterations: usize,
-        /// Where the residual is largest.
-        site: usize,
-    },
-    /// Bonds never stop breaking.
-    #[error(
-        "bonds still break after {rounds} rounds of load step {step} at time {time}: {broken} so far; prescribe displacements instead of forces, or run it as explicit dynamics"
-    )]
-    NeverHolds {
-        /// The load step.
-        step: u64,
-        /// Its time.
-        time: f64,
-        /// Rounds spent.
-        rounds: usize,
-        /// Bonds broken in this step.
-        broken: u64,
-    },
-    /// The linear solve failed.
-    #[error("load step {step} at time {time} found no equilibrium: {source}; {remedy}")]
-    Linear {
-        /// The load step.
-        step: u64,
-        /// Its time.
-        time: f64,
-        /// Why.
-        source: KrylovError,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// A number is not finite.
-    #[error(
-        "load step {step} at time {time}: the force at site {site} is not a number; check loads and prescribed displacements there"
-    )]
-    NotFinite {
-        /// The load step.
-        step: u64,
-        /// Its time.
-        time: f64,
-        /// The first such site.
-        site: usize,
-    },
 }
 
 /// The tangent at rest on free dofs.
@@ -254,6 +175,34 @@ struct Run<'a> {
     balanced: f64,
     step: u64,
     time: f64,
+}
+
+/// The work of a load step.
+struct Account {
+    u: Vec<f64>,
+    /// Loads on free dofs, internal forces where supports hold.
+    acting: Vec<f64>,
+    work: f64,
+}
+
+impl Account {
+    fn of(run: &Run<'_>, u: &[f64]) -> Self {
+        Self {
+            u: u.to_vec(),
+            acting: run.acting(),
+            work: 0.0,
+        }
+    }
+
+    /// Adds what was done since the last equilibrium.
+    fn advance(&mut self, run: &Run<'_>, u: &[f64]) {
+        let now = run.acting();
+        for (k, now) in now.iter().enumerate() {
+            self.work += 0.5 * (self.acting[k] + now) * (u[k] - self.u[k]);
+        }
+        self.acting = now;
+        self.u.copy_from_slice(u);
+    }
 }
 
 /// `‖f − F‖₂` on free dofs.
@@ -334,9 +283,11 @@ pub fn run(
     while let Some(time) = times(state.step) {
         (work.step, work.time) = (state.step, time);
         work.balanced = 0.0;
+        let mut account = None;
         if let Some(before) = state.step.checked_sub(1).and_then(times) {
             drive.load_into(before, &mut work.load);
             work.balanced = work.evaluate(&state.u)?.scale;
+            account = Some(Account::of(&work, &state.u));
         }
         drive.load_into(time, &mut work.load);
         drive.displacement_into(time, &mut values);
@@ -352,6 +303,9 @@ pub fn run(
         let residual = loop {
             let (count, residual) = work.equilibrium(&mut state.u)?;
             iterations += count;
+            if let Some(account) = &mut account {
+                account.advance(&work, &state.u);
+            }
             let now = work
                 .system
                 .internal_force_into(&state.u, &mut work.force, Breakage::Allowed);
@@ -379,6 +333,8 @@ pub fn run(
             time,
             state,
             force: &work.force,
+            load: &work.load,
+            work: account.map_or(0.0, |account| account.work),
             broken,
             rounds,
             iterations,
@@ -435,6 +391,17 @@ impl Run<'_> {
         } else {
             0.0
         }
+    }
+
+    /// The forces that do work: loads on free dofs, internal forces where supports hold.
+    fn acting(&self) -> Vec<f64> {
+        let block = self.free.block();
+        (0..self.force.len())
+            .map(|k| match self.free.is_free(k / block, k % block) {
+                true => self.load[k],
+                false => self.force[k],
+            })
+            .collect()
     }
 
     /// Whether a load acts.

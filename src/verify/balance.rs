@@ -23,16 +23,13 @@ use crate::{
     verify::{
         Effort,
         enclosed::{Case, Cells, Enclosed, INFLUENCE, Law, Method, SPACING, Widths},
-        patch::{out_of_balance, relative_out_of_balance, spurious_force, widths},
+        patch::{out_of_balance, relative_out_of_balance, round_off, spurious_force, widths},
         tangents::momentum,
     },
 };
 
-/// Largest out-of-balance force of a method in exact equilibrium, over the force on a face.
+/// Largest out-of-balance force of a method in exact equilibrium, over the force on a face; where round-off alone may make more of it ([`round_off`]: 1e-11 at 400 spacings from the origin), that.
 pub const EQUILIBRIUM_LIMIT: f64 = 1e-12;
-
-/// The same for balanced rows, whose parts cancel only to the round-off of either: 400 spacings from the origin up to 2.2e-12.
-pub const BALANCED_LIMIT: f64 = 1e-11;
 
 /// Largest relative distance from the leading term.
 pub const LEADING_TERM_LIMIT: f64 = 0.01;
@@ -226,7 +223,12 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
                                     3 => "cubic, over the force on a face",
                                     _ => "quartic, over the force on a face",
                                 };
-                                Row::at_most(&name, quantity, force, equilibrium_limit(case.method))
+                                Row::at_most(
+                                    &name,
+                                    quantity,
+                                    force,
+                                    equilibrium_limit(&bar, degree),
+                                )
                             }
                             None => Row::info(&name, quantity, force),
                         }
@@ -257,11 +259,8 @@ fn is_in_balance(method: Method, degree: u32) -> bool {
     }
 }
 
-fn equilibrium_limit(method: Method) -> f64 {
-    match method {
-        Method::Truncated => EQUILIBRIUM_LIMIT,
-        _ => BALANCED_LIMIT,
-    }
+fn equilibrium_limit<const D: usize>(enclosed: &Enclosed<D>, degree: u32) -> f64 {
+    EQUILIBRIUM_LIMIT.max(round_off(enclosed, degree))
 }
 
 /// Largest spurious force of a single site for each method, relative to `C/h` times the area of a point, and the ratio of splice to smooth blending.
@@ -411,17 +410,19 @@ fn every_method_rows<const D: usize>(law: Law) -> Vec<Row> {
             let places: Vec<_> = e.positions().copied().collect();
             let (forces, moments) = momentum(&e.stiffness, &places);
             let exact = method == Method::Truncated;
-            let row = |quantity: &str, value: f64, limited: bool| match limited {
-                true => Row::at_most(&name, quantity, value.abs(), equilibrium_limit(method)),
-                false => Row::info(&name, quantity, value),
+            let row = |quantity: &str, value: f64, limit: Option<f64>| match limit {
+                Some(limit) => Row::at_most(&name, quantity, value.abs(), limit),
+                None => Row::info(&name, quantity, value),
             };
-            let mut rows = vec![row("forces", forces, exact)];
+            let sums = exact.then_some(EQUILIBRIUM_LIMIT);
+            let mut rows = vec![row("forces", forces, sums)];
             if D > 1 {
-                rows.push(row("moments", moments, exact));
+                rows.push(row("moments", moments, sums));
             }
             for (degree, quantity) in [(3, "cubic"), (4, "quartic")] {
                 let limited = exact || D == 1 && is_in_balance(method, degree);
-                rows.push(row(quantity, relative_out_of_balance(&e, degree), limited));
+                let limit = limited.then(|| equilibrium_limit(&e, degree));
+                rows.push(row(quantity, relative_out_of_balance(&e, degree), limit));
             }
             rows
         })

@@ -206,6 +206,29 @@ pub fn relative_out_of_balance<const D: usize>(enclosed: &Enclosed<D>, degree: u
     out_of_balance(enclosed, degree) / (stress * (2.0 * l).powi(D as i32 - 1))
 }
 
+/// What round-off may make of [`relative_out_of_balance`]: half a unit in the last place of each entry of the stiffness, times its displacement, all of one sign. A column of a seam in exact equilibrium sums to zero but for that, and at a place
+/// `x` its share grows as `(x/h)²` against the force on a face, which does not know of the spacing.
+pub fn round_off<const D: usize>(enclosed: &Enclosed<D>, degree: u32) -> f64 {
+    let k = &enclosed.stiffness;
+    let mut sizes = vec![0.0; k.rows()];
+    for i in 0..k.rows() {
+        let (columns, blocks) = k.row(i);
+        for (e, &c) in columns.iter().enumerate() {
+            let first = &blocks[e * D * D..][..D];
+            sizes[c as usize] += first.iter().map(|b| b.abs()).sum::<f64>();
+        }
+    }
+    let sum: f64 = sizes
+        .iter()
+        .zip(enclosed.positions())
+        .filter(|(_, x)| x[0] > 0.0)
+        .map(|(size, x)| size * x[0].powi(degree as i32))
+        .sum();
+    let l = enclosed.half;
+    let stress = enclosed.tensor.get(0, 0, 0, 0) * f64::from(degree) * l.powi(degree as i32 - 1);
+    0.5 * f64::EPSILON * sum / (stress * (2.0 * l).powi(D as i32 - 1))
+}
+
 /// The zones of a case: as narrow as the method's reach allows, so that the suite stays fast.
 pub fn widths<const D: usize>(method: Method, cells: Cells) -> Widths {
     let (nonlocal, transition, local) = match (D, cells, method) {

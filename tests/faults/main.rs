@@ -7,11 +7,14 @@ mod f;
 mod g_growth;
 mod h;
 mod i;
+mod k;
+mod n;
 mod o;
 mod q;
 mod r;
 mod s;
 mod t;
+mod u;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -66,6 +69,11 @@ impl Case {
         } else {
             Err(String::from_utf8_lossy(&output.stderr).into_owned())
         }
+    }
+
+    /// Where a file of the folder is.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
     }
 
     /// A file that the run wrote, by its name within the folder.

@@ -4,7 +4,6 @@ use rayon::prelude::*;
 
 use super::{
     BondPass, Kinematics,
-    list::{extension, stretched},
     lanes::{LANES, Source, dispatch},
     stencil::{NONE, Stencil},
     sweep::{Bits, Broken, CARE, FULL, Field, Task, job},
@@ -237,67 +236,6 @@ impl<const D: usize> Lattice<D> {
         lanes.sum()
     }
 
-    /// Directed bonds that the last pass broke: group, lane and offset, ascending.
-    fn last(&self) -> Vec<(usize, usize, usize)> {
-        let mut bonds = Vec::with_capacity(self.broken.len());
-        for b in &self.broken {
-            let lanes = (0..LANES).filter(|lane| b.lanes >> lane & 1 == 1);
-            bonds.extend(lanes.map(|lane| (b.group as usize, lane, b.offset as usize)));
-        }
-        bonds.sort_unstable();
-        bonds
-    }
-
-    /// Relative extension of the bond from a cell along an offset, and the relative volume of its far end.
-    fn extension<const EXACT: bool>(
-        &self,
-        at: &dyn Fn(usize) -> [f64; D],
-        cell: usize,
-        offset: usize,
-    ) -> (f64, f64) {
-        let o = &self.stencil.offsets[offset];
-        let there = (cell as isize + o.delta) as usize;
-        let point = |cell: usize| at(self.stencil.point_of[cell] as usize);
-        let s = stretched::<D, EXACT>(&o.xi, &point(cell), &point(there));
-        (extension::<EXACT>(s.t()), self.volume[there])
-    }
-
-    fn lost<const EXACT: bool>(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
-        let mut energy = 0.0;
-        for bonds in self.last().chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            let (g, lane, _) = bonds[0];
-            let cell = self.stencil.groups[g] as usize + lane;
-            let point = self.stencil.point_of[cell] as usize;
-            let volume = self.scale.get(point).copied().unwrap_or(self.unit);
-            if volume == 0.0 {
-                continue;
-            }
-            let moments = |offset: usize| {
-                let (e, v) = self.extension::<EXACT>(at, cell, offset);
-                let w = self.stencil.offsets[offset].moment * v * e;
-                (w, w * e)
-            };
-            let (mut first, mut second) = (0.0, 0.0);
-            for &(_, _, offset) in bonds {
-                let (a, b) = moments(offset);
-                (first, second) = (first + a, second + b);
-            }
-            energy += volume
-                * match &self.solid {
-                    None => 0.25 * second,
-                    Some(s) => {
-                        let mut left = 0.0;
-                        self.each(&self.stencil.intact, g, lane, |o, _| left += moments(o).0);
-                        let d = s.dilatation[g][lane];
-                        // ½ K′ θ² with θ = d Σ, where K′ d = volumetric
-                        let bulk = s.volumetric[g][lane] * d;
-                        0.5 * (bulk * first * (first + 2.0 * left) + s.deviatoric[cell] * second)
-                    }
-                };
-        }
-        energy
-    }
-
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
         let mut field_u = std::array::from_fn(|_| vec![0.0; self.stencil.point_of.len()]);
         Self::spread(&self.stencil.point_of, u, &mut field_u);
@@ -344,7 +282,7 @@ impl<const D: usize> Lattice<D> {
 
     /// Calls `f(offset, neighbour's cell)` for the standing bonds of lane `lane` of group `g`.
     #[inline(always)]
-    fn each(&self, bits: &[u8], g: usize, lane: usize, mut f: impl FnMut(usize, usize)) {
+    pub(super) fn each(&self, bits: &[u8], g: usize, lane: usize, mut f: impl FnMut(usize, usize)) {
         let stencil = self.stencil.offsets.len();
         let cell = self.stencil.groups[g] as usize + lane;
         for (o, bits) in bits[g * stencil..(g + 1) * stencil].iter().enumerate() {

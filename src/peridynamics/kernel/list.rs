@@ -24,7 +24,7 @@ pub(super) enum Limit {
 /// Coefficients of the state-based law, per point.
 pub(super) struct Solid {
     /// `D/m`.
-    dilatation: Vec<f64>,
+    pub dilatation: Vec<f64>,
     /// `(D k − (D+2) μ)/m`.
     pub volumetric: Vec<f64>,
     /// `D (D+2) μ/m`.
@@ -50,7 +50,7 @@ pub(super) struct List<const D: usize> {
     intact: Vec<u8>,
     reference: u64,
     /// Points and bonds that the last pass broke, ascending.
-    last: Vec<(u32, usize)>,
+    pub(super) last: Vec<(u32, usize)>,
 }
 
 /// What one bond gives.
@@ -215,13 +215,13 @@ impl<const D: usize> List<D> {
     }
 
     #[inline(always)]
-    fn xi(&self, i: usize, j: usize) -> [f64; D] {
+    pub(super) fn xi(&self, i: usize, j: usize) -> [f64; D] {
         let (a, b) = (&self.position[i], &self.position[j]);
         std::array::from_fn(|k| b[k] - a[k])
     }
 
     #[inline(always)]
-    fn stands(&self, i: usize, k: usize) -> bool {
+    pub(super) fn stands(&self, i: usize, k: usize) -> bool {
         self.intact[self.bytes[i] + k / 8] >> (k % 8) & 1 == 1
     }
 
@@ -336,43 +336,6 @@ impl<const D: usize> List<D> {
             c.theta = theta;
         }
         self.last.len() as u64
-    }
-
-    fn lost<const EXACT: bool>(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
-        let mut energy = 0.0;
-        for bonds in self.last.chunk_by(|a, b| a.0 == b.0) {
-            let i = bonds[0].0 as usize;
-            if !self.row[i] {
-                continue;
-            }
-            let here = at(i);
-            let moments = |bond: usize| {
-                let j = self.neighbours.get(i, bond);
-                let s = stretched::<D, EXACT>(&self.xi(i, j), &here, &at(j));
-                let e = extension::<EXACT>(s.t());
-                let w = self.weights.get(bond) * s.length * self.volume[j] * e;
-                (w, w * e)
-            };
-            let (mut first, mut second) = (0.0, 0.0);
-            for &(_, bond) in bonds {
-                let (a, b) = moments(bond);
-                (first, second) = (first + a, second + b);
-            }
-            energy += self.volume[i]
-                * match &self.solid {
-                    None => 0.25 * second,
-                    Some(c) => {
-                        let family = self.offsets[i]..self.offsets[i + 1];
-                        let left: f64 = family
-                            .filter(|bond| self.stands(i, bond - self.offsets[i]))
-                            .map(|bond| moments(bond).0)
-                            .sum();
-                        let bulk = c.volumetric[i] * c.dilatation[i];
-                        0.5 * (bulk * first * (first + 2.0 * left) + c.deviatoric[i] * second)
-                    }
-                };
-        }
-        energy
     }
 
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {

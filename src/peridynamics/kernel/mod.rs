@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `setup.rs` | what a pass is made from, and the errors |
 //! | `bond.rs` | one bond: stretch, force and extension without cancellation |
+//! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `list.rs`, `eights.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `packed.rs` | neighbours and weights of a list in few bytes |
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
@@ -18,6 +19,7 @@
 //! hence break together without telling each other. Every method gives the same bits for any number of threads.
 
 mod bond;
+mod breaks;
 mod eights;
 mod lanes;
 mod lattice;

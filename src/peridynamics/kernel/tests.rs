@@ -227,6 +227,21 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
                         "{name}"
                     );
                     assert!(lost > 0 && lost < pass.bonds() && lost % 2 == 0);
+                    // what broke took what was stored before less what is stored after, wherever points are
+                    let last = pass.last_broken();
+                    assert_eq!(last.len() as u64, lost, "{name}");
+                    assert!(
+                        last.iter()
+                            .all(|&(i, j)| breaks(&first, i as usize, j as usize))
+                    );
+                    for u in [&first, &second] {
+                        let of = |stands: &dyn Fn(usize, usize) -> bool| {
+                            naive(&case, law, Kinematics::Exact, u, stands).1
+                        };
+                        let taken = of(&|_, _| true) - of(&|i, j| !breaks(&first, i, j));
+                        let found = pass.lost_energy(&|i| std::array::from_fn(|a| u[i * D + a]));
+                        assert!((found - taken).abs() < 1e-11 * energy, "{name}");
+                    }
                     // once broken, a bond stays so
                     let state = pass.damage_state();
                     lost += pass.force_into(&second, &mut force, Breakage::Allowed);

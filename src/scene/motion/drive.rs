@@ -103,6 +103,14 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         })
     }
 
+    /// Each prescribed dof with the condition that holds it.
+    pub fn holders(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.prescribed
+            .iter()
+            .copied()
+            .zip(self.holder.iter().copied())
+    }
+
     /// Whether a load changes with place and time, so that it is evaluated everywhere at every step.
     pub fn evaluates_everywhere(&self) -> bool {
         !self.by_both.is_empty()

@@ -10,11 +10,12 @@ use super::laid_out::{Begun, LaidOut, begun, breaks, lay_out, opened};
 use super::ready::{Before, Between, Ready};
 use super::record::{Breaks, EdgeReached, Moment, Saved};
 use super::switching::{Leaving, share};
-use super::system::critical_stretch;
+use super::system::{PlaneEnergy, critical_stretch, plane_energy};
 use super::watch::{Watch, fastest_crack};
 use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
+use crate::observe::cracks::CrackSummary;
 use crate::observe::summary::{
     Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Sizes, Stopwatch, Timings,
     peak_memory_bytes,
@@ -27,6 +28,7 @@ use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::scene::validate::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams};
+use crate::system::Dynamic;
 
 /// How often whoever watches is told.
 const TOLD_EVERY: Duration = Duration::from_millis(200);
@@ -209,15 +211,17 @@ fn leg<'r, const D: usize>(
         ExplicitParams::with_step(pace.step),
         state,
     )?;
-    let solved = |u: &[f64], visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
-        visit(&Solved {
-            model,
-            operator,
-            displacement: u,
-            residual: &[],
-            zone_of_site: &zones,
-        })
-    };
+    let solved =
+        |moment: &Moment<'_>, visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
+            visit(&Solved {
+                model,
+                operator,
+                displacement: &moment.state.u,
+                residual: &[],
+                zone_of_site: &zones,
+                broken: &moment.broken_bonds(),
+            })
+        };
     let place = |site: usize| model.sites[site].position;
     let first = motion.state().step;
     {
@@ -227,7 +231,7 @@ fn leg<'r, const D: usize>(
             let energies = recorder.energies(&moment);
             guard.look_at_energies(&moment, &energies);
             recorder.row(&moment, energies, place)?;
-            solved(&moment.state.u, &mut |s| recorder.output(&moment, s))?;
+            solved(&moment, &mut |s| recorder.output(&moment, s))?;
         }
         if due {
             recorder.checkpoint(&moment, pace, edge, zone.clone(), &guard.seen)?;
@@ -324,7 +328,7 @@ fn leg<'r, const D: usize>(
                 recorder.row(&moment, energies, place)?;
             }
             if last || stops || is_due(before, after, spec.output_interval) {
-                solved(&state.u, &mut |s| recorder.output(&moment, s))?;
+                solved(&moment, &mut |s| recorder.output(&moment, s))?;
             }
             let leave = ended.is_some() || (last && recorder.keeps_state());
             if leave || recorder.is_checkpoint_due(state.step) {
@@ -397,6 +401,7 @@ fn leg<'r, const D: usize>(
                 told,
                 timings,
                 broken: BrokenBonds::of(model, &system.broken_bonds()),
+                spent: system.dissipation(),
                 leaving: Leaving::of(model, system, state),
                 nonlocal,
                 recorder,
@@ -417,6 +422,7 @@ fn leg<'r, const D: usize>(
 
     let moment = moment(&motion, is_linear);
     let stored = moment.system.stored_energy(&moment.state.u);
+    let plane = plane_energy(model, rest)?;
     let state = moment.state;
     let (_, applied) = loads::loads(model, &rest.conditions, state.time)?;
     let energy_gain = guard.energy_gain();
@@ -451,6 +457,7 @@ fn leg<'r, const D: usize>(
             external_work: state.work,
             missing_energy: recorder.energy_at_start + state.work - moment.kinetic - stored,
             energy_gain,
+            cracks: cracks(moment.system, plane),
             broken_bonds: state.broken,
             edge_reached: edge.map(|e| {
                 let x = place(e.site as usize);
@@ -469,6 +476,16 @@ fn leg<'r, const D: usize>(
     })))
 }
 
+/// What breaking bonds cost so far; none where none can break.
+pub(super) fn cracks(system: &dyn Dynamic, plane: Option<PlaneEnergy>) -> Option<CrackSummary> {
+    let spent = system.dissipation()?;
+    Some(CrackSummary {
+        plane_energy: plane.map(|p| p.of_plane),
+        fracture_energy: plane.and_then(|p| p.typed),
+        ..CrackSummary::new(spent.energy, spent.area)
+    })
+}
+
 pub(super) fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
     let energies = motion.energies();
     Moment {
@@ -476,6 +493,7 @@ pub(super) fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m
         system: motion.system(),
         kinetic: energies.kinetic,
         discrete: is_linear.then_some(energies.discrete),
+        supports: (motion.external_force(), motion.applied()),
     }
 }
 

@@ -170,6 +170,7 @@ fn steps<const D: usize>(
     let begun = Instant::now();
     let mut recorder = Recorder::new(
         &output,
+        &rest.conditions,
         &Sampler::new(model),
         breaks,
         is_linear,
@@ -198,6 +199,7 @@ fn steps<const D: usize>(
             displacement: &u,
             residual: &[],
             zone_of_site: &run::zone_of_site(model),
+            broken: &[],
         };
         let mut series = Series::new(folder.path(), "trial");
         let more = [OverSites::Vector("velocity", &u)];

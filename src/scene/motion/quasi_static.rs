@@ -6,11 +6,11 @@ use std::time::Instant;
 
 use super::RunOptions;
 use super::drive::SceneDrive;
-use super::explicit::sizes;
+use super::explicit::{cracks, sizes};
 use super::guard::Seen;
 use super::laid_out::{LaidOut, breaks, laid_out, opened, restore};
 use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
-use super::system::start;
+use super::system::{plane_energy, start};
 use crate::coupling::{Model, Operator, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
@@ -31,7 +31,7 @@ use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{self, Equilibrium, LoadState, LoadStep, QuasiStaticParams};
 use crate::solve::statics::{self, Method, StaticProblem};
-use crate::system::{Breakage, Symmetry};
+use crate::system::Symmetry;
 use crate::tensor::padded;
 
 /// Runs a scene under a load that grows.
@@ -112,6 +112,7 @@ fn load_steps<const D: usize>(
     let breaks = breaks(moving.system.as_ref(), rest);
     let mut recorder = Recorder::new(
         &rest.output,
+        &rest.conditions,
         &Sampler::new(model),
         breaks,
         false,
@@ -119,35 +120,31 @@ fn load_steps<const D: usize>(
         options.checkpoint_every.or(spec.checkpoint_every),
         saved.as_ref().map(|s| &s.written),
     )?;
+    recorder.hold(drive.holders());
     let zones = run::zone_of_site(model);
-    let solved = |u: &[f64], visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
-        visit(&Solved {
-            model,
-            operator,
-            displacement: u,
-            residual: &[],
-            zone_of_site: &zones,
-        })
-    };
+    let solved =
+        |moment: &Moment<'_>, visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
+            visit(&Solved {
+                model,
+                operator,
+                displacement: &moment.state.u,
+                residual: &[],
+                zone_of_site: &zones,
+                broken: &moment.broken_bonds(),
+            })
+        };
     let place = |site: usize| model.sites[site].position;
     let mut edge = saved.as_ref().and_then(|s| s.edge);
     let dofs = begin.u.len();
     let mut loaded = LoadState::at_rest(dofs);
     // fields, time, step, work, broken bonds: what a checkpoint keeps
     let mut state = begin;
-    let mut load = vec![0.0; dofs];
-    // the forces whose work a load step does: loads on free dofs, internal forces where supports hold
-    let mut forces = vec![0.0; dofs];
     if let Some(saved) = saved {
         state = saved.state;
         // the state at t = 0 counts as one of the driver's steps
         loaded.step = state.step + 1;
         loaded.u.clone_from(&state.u);
         loaded.broken = state.broken;
-        let system = moving.system.as_mut();
-        system.internal_force_into(&state.u, &mut forces, Breakage::Held);
-        drive.load_into(state.time, &mut load);
-        mix(&drive, &load, &mut forces);
     } else {
         loaded.u.clone_from(&state.u);
     }
@@ -164,16 +161,13 @@ fn load_steps<const D: usize>(
     let mut rotation = None;
     options.begin_steps();
     let mut observe = |seen: &LoadStep<'_>| -> ControlFlow<()> {
-        drive.load_into(seen.time, &mut load);
-        let mut now = seen.force.to_vec();
-        mix(&drive, &load, &mut now);
         let begins = seen.state.step == 1;
-        if !begins {
-            state.work += (0..dofs)
-                .map(|k| 0.5 * (forces[k] + now[k]) * (seen.state.u[k] - state.u[k]))
-                .sum::<f64>();
-        }
-        forces = now;
+        state.work += seen.work;
+        let loads: Vec<f64> = drive
+            .prescribed()
+            .iter()
+            .map(|&dof| seen.load[dof as usize])
+            .collect();
         state.step = seen.state.step - 1;
         state.time = seen.time;
         state.u.copy_from_slice(&seen.state.u);
@@ -200,7 +194,7 @@ fn load_steps<const D: usize>(
             let when = Some((state.step, state.time));
             rotations.told(r.degrees, r.place, 0.0, 0.0, when)
         });
-        let moment = Moment::at_rest(&state, seen.system);
+        let moment = Moment::at_rest(&state, seen.system, (seen.force, &loads));
         let shown = begins
             || last
             || matches!(ended, Ended::DamageAtEdge | Ended::ElementsRotated)
@@ -213,7 +207,7 @@ fn load_steps<const D: usize>(
             let energies = recorder.energies(&moment);
             recorder.row(&moment, energies, place)?;
             if shown {
-                solved(&state.u, &mut |s| recorder.output(&moment, s))?;
+                solved(&moment, &mut |s| recorder.output(&moment, s))?;
             }
             if leave || (!begins && recorder.is_checkpoint_due(state.step)) {
                 recorder.checkpoint(&moment, pace, edge, None, &Seen::default())?;
@@ -252,6 +246,7 @@ fn load_steps<const D: usize>(
     timings.add("output", recorder.seconds - written);
     let stored = moving.system.stored_energy(&state.u);
     let (_, applied) = loads::loads(model, &rest.conditions, state.time)?;
+    let plane = plane_energy(model, rest)?;
     choices.push(Choice {
         choice: format!("{} products or passes", info.iterations),
         why: "of all load steps of this run".to_owned(),
@@ -284,6 +279,7 @@ fn load_steps<const D: usize>(
             external_work: state.work,
             missing_energy: recorder.energy_at_start + state.work - stored,
             energy_gain: None,
+            cracks: cracks(moving.system.as_ref(), plane),
             broken_bonds: state.broken,
             edge_reached: edge.map(|e| (e.time, place(e.site as usize).iter().copied().collect())),
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),
@@ -351,13 +347,4 @@ fn factors<const D: usize>(
         ),
     });
     Ok(Some(factor))
-}
-
-/// Takes the loads on free dofs and leaves the internal forces where supports hold.
-fn mix<const D: usize>(drive: &SceneDrive<'_, D>, load: &[f64], forces: &mut [f64]) {
-    let mut mixed = load.to_vec();
-    for &dof in drive.prescribed() {
-        mixed[dof as usize] = forces[dof as usize];
-    }
-    forces.copy_from_slice(&mixed);
 }

@@ -15,6 +15,7 @@ use crate::scene::proof::growth::Asked;
 use crate::scene::run::{Rest, RunError};
 use crate::scene::solve::Explicit as Spec;
 use crate::solve::explicit::State;
+use crate::system::Dissipation;
 
 /// A run between two layouts of its zones.
 pub(super) struct Between<'a, const D: usize> {
@@ -24,6 +25,8 @@ pub(super) struct Between<'a, const D: usize> {
     pub timings: Timings,
     pub leaving: Leaving<D>,
     pub broken: BrokenBonds<D>,
+    /// What breaking them has cost.
+    pub spent: Option<Dissipation>,
     /// The cells that become nonlocal.
     pub nonlocal: Vec<bool>,
     pub recorder: Recorder<'a, D>,
@@ -109,8 +112,9 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             });
         }
         restore(moving.system.as_mut(), saved.as_ref(), &file)?;
-        let recorder = Recorder::new(
+        let mut recorder = Recorder::new(
             &rest.output,
+            &rest.conditions,
             &Sampler::new(model),
             breaks(moving.system.as_ref(), rest),
             moving.is_linear,
@@ -118,6 +122,7 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             every.or(spec.checkpoint_every),
             saved.as_ref().map(|s| &s.written),
         )?;
+        recorder.hold(drive.holders());
         let resumed = saved.is_some();
         let edge = saved.as_ref().and_then(|s| s.edge);
         let (state, zone, seen) = match saved {
@@ -145,7 +150,7 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
     ///
     /// # Errors
     /// [`RunError`] if no stable step is found, or nothing is there that new sites could follow.
-    pub fn after_switch(self, between: Between<'r, D>) -> Result<Ready<'r, 'm, D>, RunError> {
+    pub fn after_switch(mut self, between: Between<'r, D>) -> Result<Ready<'r, 'm, D>, RunError> {
         let (model, rest, spec) = (self.model, self.rest, self.spec);
         let Between {
             told,
@@ -159,8 +164,12 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
             seen,
             growth,
             taken,
+            spent,
             ..
         } = between;
+        if let Some(spent) = spent {
+            self.moving.system.set_dissipation(spent);
+        }
         self.choices.truncate(told);
         let held = held(model, &rest.conditions)?;
         let system = self.moving.system.as_ref();
@@ -170,6 +179,7 @@ impl<'r: 'm, 'm, const D: usize> Before<'_, 'r, 'm, D> {
         let drive = driven(model, rest, &begin.u, &pace, spec)?;
         let (state, switch) = leaving.arrive(model, system, &drive)?;
         recorder.move_to(&Sampler::new(model));
+        recorder.hold(drive.holders());
         recorder.energy_at_start += switch.left();
         self.watch.lap(self.timings, "state carried over");
         let own = std::mem::replace(self.timings, before);

@@ -14,6 +14,7 @@ use crate::observe::csv::Entry;
 use crate::observe::history::History;
 use crate::observe::series::Series;
 use crate::observe::switch::Switch;
+use crate::scene::conditions::Condition;
 use crate::scene::run::Solved;
 use crate::scene::validate::{Output, Tip};
 use crate::scene::write::{OverSites, Shown, snapshot};
@@ -156,16 +157,33 @@ pub(super) struct Moment<'a> {
     pub kinetic: f64,
     /// The energy that the scheme keeps, of linear systems.
     pub discrete: Option<f64>,
+    /// Forces of supports and loads together by dof, and of loads alone on each prescribed dof.
+    pub supports: (&'a [f64], &'a [f64]),
 }
 
 impl<'a> Moment<'a> {
     /// A state of equilibrium.
-    pub fn at_rest(state: &'a State, system: &'a dyn Dynamic) -> Self {
+    pub fn at_rest(
+        state: &'a State,
+        system: &'a dyn Dynamic,
+        supports: (&'a [f64], &'a [f64]),
+    ) -> Self {
         Self {
             state,
             system,
             kinetic: 0.0,
             discrete: None,
+            supports,
+        }
+    }
+}
+
+impl Moment<'_> {
+    /// Broken bonds by the sites of their ends, each once for each direction.
+    pub fn broken_bonds(&self) -> Vec<(u32, u32)> {
+        match self.state.broken {
+            0 => Vec::new(),
+            _ => self.system.broken_bonds(),
         }
     }
 }
@@ -190,6 +208,9 @@ pub(super) struct Recorder<'a, const D: usize> {
     output: &'a Output<D>,
     /// Sites and weights of each probe.
     probes: Vec<Vec<(u32, f64)>>,
+    /// Prescribed dofs with the condition that holds each, and which conditions hold any.
+    holders: Vec<(u32, u32)>,
+    holding: Vec<u32>,
     breaks: Breaks,
     history: History,
     tips: Vec<History>,
@@ -212,6 +233,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     /// [`ObserveError`] for files that cannot be made or cut.
     pub fn new(
         output: &'a Output<D>,
+        conditions: &[Condition<D>],
         sampler: &Sampler<'_, D>,
         breaks: Breaks,
         is_linear: bool,
@@ -224,7 +246,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
         let history = History::resumed(
             &path("history"),
-            history_header(output, breaks, is_linear),
+            history_header(output, conditions, breaks, is_linear),
             bytes(0),
         )?;
         let tips = output
@@ -250,6 +272,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(Self {
             output,
             probes,
+            holders: Vec::new(),
+            holding: holding(conditions).map(|(number, _)| number).collect(),
             breaks,
             history,
             tips,
@@ -266,6 +290,22 @@ impl<'a, const D: usize> Recorder<'a, D> {
     /// Finds the probes in another layout of the same body.
     pub fn move_to(&mut self, sampler: &Sampler<'_, D>) {
         self.probes = probes(self.output, sampler);
+    }
+
+    /// Learns which condition holds each prescribed dof.
+    pub fn hold(&mut self, holders: impl Iterator<Item = (u32, u32)>) {
+        self.holders = holders.collect();
+    }
+
+    /// Forces of the conditions that hold, by their components.
+    fn reactions(&self, (forces, loads): (&[f64], &[f64])) -> Vec<f64> {
+        let mut reactions = vec![0.0; self.holding.len() * D];
+        for (&(dof, holder), load) in self.holders.iter().zip(loads) {
+            if let Ok(place) = self.holding.binary_search(&holder) {
+                reactions[place * D + dof as usize % D] += forces[dof as usize] - load;
+            }
+        }
+        reactions
     }
 
     /// Begins the account of energy.
@@ -314,6 +354,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             row.push(energies.dissipated.into());
             row.push(energies.missing.into());
             row.push((state.broken as i64).into());
+            row.push(system.dissipation().map_or(0.0, |d| d.area).into());
         }
         let mut momentum = [0.0; D];
         for (v, m) in state.v.chunks_exact(D).zip(system.mass()) {
@@ -328,6 +369,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 }));
             }
         }
+        let reactions = self.reactions(moment.supports);
+        row.extend(reactions.into_iter().map(Entry::from));
         self.history.row(&row)?;
         if state.broken > 0 && !self.tips.is_empty() {
             self.tips(moment, positions)?;
@@ -461,8 +504,17 @@ fn probes<const D: usize>(output: &Output<D>, sampler: &Sampler<'_, D>) -> Vec<V
         .collect()
 }
 
+/// The conditions that hold something, with their numbers.
+fn holding<const D: usize>(
+    conditions: &[Condition<D>],
+) -> impl Iterator<Item = (u32, &Condition<D>)> {
+    let all = conditions.iter().enumerate();
+    all.filter(|(_, c)| c.holds()).map(|(n, c)| (n as u32, c))
+}
+
 fn history_header<const D: usize>(
     output: &Output<D>,
+    conditions: &[Condition<D>],
     breaks: Breaks,
     is_linear: bool,
 ) -> Vec<String> {
@@ -478,6 +530,7 @@ fn history_header<const D: usize>(
     }
     if breaks == Breaks::Possibly {
         header.extend(["dissipated_energy", "missing_energy", "broken_bonds"]);
+        header.push("crack_area");
     }
     let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();
     header.extend(AXES[..D].iter().map(|a| format!("momentum_{a}")));
@@ -485,6 +538,10 @@ fn history_header<const D: usize>(
         for field in ["u", "v"] {
             header.extend(AXES[..D].iter().map(|a| format!("{name}_{field}{a}")));
         }
+    }
+    for (_, condition) in holding(conditions) {
+        let name = &condition.name;
+        header.extend(AXES[..D].iter().map(|a| format!("{name}_reaction_{a}")));
     }
     header
 }

@@ -3,15 +3,16 @@
 use crate::coupling::motion::{
     BondBehaviour, ContactBehaviour, Critical, Motion, MotionError, masses,
 };
-use crate::coupling::{BrokenBonds, Coupling, Interface, Model, Operator, PointSource};
+use crate::coupling::{BrokenBonds, Coupling, Interface, Model, Operator};
 use crate::observe::summary::Choice;
+use crate::peridynamics::fracture;
 use crate::peridynamics::kernel::{Kinematics, Storage};
 use crate::progress::Progress;
 use crate::scene::definite;
 use crate::scene::initial::{Initial, InitialKind};
 use crate::scene::materials::Fracture;
 use crate::scene::run::{self, Rest, RunError};
-use crate::scene::spec::{BondsSpec, PrecisionSpec};
+use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
 use crate::system::{Dynamic, LinearMotion};
 
@@ -57,7 +58,13 @@ pub(super) fn dynamic<'a, const D: usize>(
         }
     });
     let breaks = match (stretches, breaking.fracture) {
-        (Some(s), Some(Fracture::Energy(g))) => format!("{s}, the fracture energy is {g:e}"),
+        (Some(s), Some(Fracture::Energy(g))) => {
+            let takes = match breaking.calibration {
+                CalibrationSpec::Lattice => "a plane of the lattice takes it",
+                CalibrationSpec::Continuum => "a continuous family takes it",
+            };
+            format!("{s}, the fracture energy is {g:e}: {takes}")
+        }
         (Some(s), _) => s,
         (None, _) => "no bond breaks: no fracture-energy, no critical-stretch".to_owned(),
     };
@@ -165,7 +172,7 @@ pub(super) fn critical_stretch<const D: usize>(
     model: &Model<D>,
     rest: &Rest<D>,
 ) -> Result<Option<Critical>, RunError> {
-    let (Some(fracture), Some(body), Some(p)) =
+    let (Some(fracture), Some(_), Some(p)) =
         (rest.breaking.fracture, model.body(), &model.peridynamics)
     else {
         return Ok(None);
@@ -174,21 +181,53 @@ pub(super) fn critical_stretch<const D: usize>(
         Fracture::Stretch(s) => return Ok(Some(Critical::Uniform(s))),
         Fracture::Energy(energy) => energy,
     };
-    let horizons = match &p.points {
-        PointSource::Lattices { lattices, .. } => lattices.iter().map(|l| l.horizon).collect(),
-        _ => vec![body.cloud.horizon[0]],
-    };
-    let mut list = Vec::with_capacity(horizons.len());
-    for horizon in horizons {
+    let mut list = Vec::new();
+    for (horizon, per_square) in model.plane_energies()? {
         let Some(bonds) = p.law.bond_energy(horizon) else {
             return Err(MotionError::Law { law: p.law.name() }.into());
         };
-        list.push((horizon, bonds.critical_stretch::<D>(energy, horizon)?));
+        list.push((
+            horizon,
+            match rest.breaking.calibration {
+                CalibrationSpec::Lattice => fracture::critical_stretch(energy, per_square)?,
+                CalibrationSpec::Continuum => bonds.critical_stretch::<D>(energy, horizon)?,
+            },
+        ));
     }
     Ok(Some(match list[..] {
         [(_, s)] => Critical::Uniform(s),
         _ => Critical::ByHorizon(list),
     }))
+}
+
+/// What a plane of the lattice costs to open at the stretch at which bonds break, per area, and the energy that was typed; none where nothing breaks, or where lattices differ.
+pub(super) fn plane_energy<const D: usize>(
+    model: &Model<D>,
+    rest: &Rest<D>,
+) -> Result<Option<PlaneEnergy>, RunError> {
+    let Some(critical) = critical_stretch(model, rest)? else {
+        return Ok(None);
+    };
+    let planes = model.plane_energies()?;
+    let [(horizon, per_square)] = planes[..] else {
+        return Ok(None);
+    };
+    Ok(Some(PlaneEnergy {
+        of_plane: critical.at(horizon).powi(2) * per_square,
+        typed: match rest.breaking.fracture {
+            Some(Fracture::Energy(energy)) => Some(energy),
+            _ => None,
+        },
+    }))
+}
+
+/// What opening a plane costs \[J/m²\].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlaneEnergy {
+    /// By the bonds of the lattice.
+    pub of_plane: f64,
+    /// As the scene has it.
+    pub typed: Option<f64>,
 }
 
 /// Displacement and velocity at time zero.

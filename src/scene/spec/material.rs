@@ -190,6 +190,10 @@ pub struct PeridynamicsSpec {
     #[serde(default)]
     #[schemars(with = "Option<super::motion::PrecisionSpec>")]
     pub precision: Option<toml::Spanned<super::motion::PrecisionSpec>>,
+    /// What a fracture energy is taken from; the lattice at hand if left out.
+    #[serde(default)]
+    #[schemars(with = "Option<super::motion::CalibrationSpec>")]
+    pub calibration: Option<toml::Spanned<super::motion::CalibrationSpec>>,
     /// Whether the mesh's own boundary (a hole, a notch) cuts bonds.
     #[serde(default)]
     pub surfaces: SurfacesSpec,

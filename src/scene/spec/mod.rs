@@ -28,9 +28,9 @@ pub use mesh::{
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
-    BeyondLimitSpec, BondsSpec, ContactSpec, EdgeSpec, ExplicitSpec, GrowingModesSpec,
-    InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec, SolveSpec,
-    TipSpec,
+    BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, ExplicitSpec,
+    GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec,
+    SolveSpec, TipSpec,
 };
 pub use region::{
     AutoSpec, BallSpec, BodySpec, BoxSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec,

@@ -172,6 +172,17 @@ pub enum PrecisionSpec {
     Single,
 }
 
+/// How the critical stretch follows from a fracture energy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CalibrationSpec {
+    /// A plane of the lattice, pulled apart bond by bond, takes it.
+    #[default]
+    Lattice,
+    /// The integral over a continuous family does, as in papers: the lattice takes a few per cent more or less.
+    Continuum,
+}
+
 /// What is done when damage reaches the edge of the nonlocal zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

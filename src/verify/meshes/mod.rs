@@ -5,11 +5,13 @@
 //! | `loads.rs` | masses, totals and first moments of loads |
 //! | `motion.rs` | growth that the proof tells of beside that of the run; discrete energy |
 //! | `affine.rs` | affine fields on eight families of meshes |
+//! | `fracture.rs` | planes pulled apart, balance of energy of bodies that break |
 //! | `scene.rs` | a scene as text, run in a folder of its own, and what it summed up |
 //!
 //! A row passes, or the scene is refused with its reason, and both are counted. Nothing here builds a model by another way than a scene does.
 
 pub mod affine;
+pub mod fracture;
 pub mod loads;
 mod motion;
 pub mod scene;
@@ -22,7 +24,13 @@ type Tables = fn(Effort, &dyn Progress) -> Vec<Table>;
 
 /// Every table of the suite.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let tables: &[Tables] = &[loads::run, motion::tables, affine::tables];
+    let tables: &[Tables] = &[
+        loads::run,
+        motion::tables,
+        affine::tables,
+        fracture::planes,
+        fracture::balances,
+    ];
     tables
         .iter()
         .flat_map(|table| table(effort, progress))

@@ -18,7 +18,7 @@ use crate::{
     progress::{Progress, Silent},
     shape::{Barrier, Shape},
     solve::statics::{self, StaticParams, StaticProblem},
-    system::{Breakage, Dynamic, Symmetry},
+    system::{Breakage, Dynamic, Halfway, Symmetry},
     tensor::{Vector, padded},
     verify::{
         Effort,
@@ -259,6 +259,8 @@ fn run_crack(
         kick(&mut v, &force);
         u.iter_mut().zip(&v).for_each(|(u, v)| *u += step * v);
         motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+        let back = 0.5 * step;
+        motion.account_for_breaks(&Halfway { u: &u, v: &v, back });
         kick(&mut v, &force);
         let arrived =
             |motion: &Motion<'_, 2>| tip(&motion.damage().unwrap_or_default(), 0.5) >= TIP;
