@@ -20,11 +20,11 @@ fn a_plane_pulled_apart_spends_the_fracture_energy() {
 
 #[test]
 fn the_energy_of_a_plate_that_breaks_is_accounted_for() {
-    for law in ["bond-based]", "lps]\npoisson-ratio = 0.35"] {
-        for coupling in ["nonlocal", "truncated"] {
-            let (gap, broken) = balance(coupling, law, 0.1).expect("it runs");
-            assert!(broken > 0 && gap.abs() < 1e-3, "{coupling} {law}: {gap}");
-        }
+    // of both laws, at three steps: `bondline verify meshes`
+    let law = "lps]\npoisson-ratio = 0.35";
+    for coupling in ["nonlocal", "truncated"] {
+        let (gap, broken) = balance(coupling, law, 0.1).expect("it runs");
+        assert!(broken > 0 && gap.abs() < 1e-3, "{coupling} {law}: {gap}");
     }
 }
 
@@ -88,6 +88,8 @@ vtu = false
     }
     let cracks = &summary["motion"]["cracks"];
     let of = |key: &str| cracks[key].as_f64().unwrap();
-    assert_eq!(of("dissipated_energy"), *dissipated.last().unwrap());
+    // the table has sixteen digits
+    let last = dissipated.last().unwrap();
+    assert!((of("dissipated_energy") / last - 1.0).abs() < 1e-14);
     assert!((of("energy_per_area") / of("plane_energy") - 1.0).abs() < 0.02);
 }
