@@ -506,7 +506,7 @@ fn horizon_below_the_spacing() {
         SceneErrorKind::WrongValue,
         "0.05",
         "below the spacing 0.1",
-        "three to six times",
+        "three to six spacings",
     );
     // only somewhere
     let e = wrong("\"3/10\"", "\"if(y > 0.9, 0.01, 0.3)\"");

@@ -9,6 +9,26 @@ use toml::de::{DeTable, DeValue};
 use super::error::{SceneError, SceneErrorKind};
 use super::spec::CouplingSpec;
 
+/// Keys of the top of a scene that often end up below the header of a table.
+const TOP: &[&str] = &[
+    "title",
+    "accuracy",
+    "kinematics",
+    "mesh",
+    "materials",
+    "peridynamics",
+    "zones",
+    "coupling",
+    "solve",
+    "conditions",
+    "initial",
+    "voids",
+    "cracks",
+    "no-fail",
+    "contact",
+    "solver",
+    "output",
+];
 const SHAPES: &[&str] = &[
     "any",
     "ball",
@@ -22,7 +42,20 @@ const SHAPES: &[&str] = &[
     "set",
     "without",
 ];
-const TRANSITIONS: &[&str] = &["any", "around", "ball", "box", "near", "set", "without"];
+const TRANSITIONS: &[&str] = &[
+    "any",
+    "around",
+    "ball",
+    "box",
+    "everywhere",
+    "near",
+    "point",
+    "polygon",
+    "polyline",
+    "segment",
+    "set",
+    "without",
+];
 const AXES: &[&str] = &["cells", "graded", "spacing"];
 const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
 const MATERIALS: &[&str] = &["bond-based", "correspondence", "lps"];
@@ -209,6 +242,10 @@ pub(crate) fn unknown(word: &str, place: &str, known: &[&str]) -> SceneError {
         format!("known here: {}", quoted(known))
     };
     let help = match super::error::closest(word, known.iter().copied()) {
+        // a line below a table's header belongs to that table
+        _ if !place.is_empty() && TOP.contains(&word) => format!(
+            "`{word}` belongs at the top of the scene: move the line above the first [table], or write it as [{word}]; {list}"
+        ),
         Some(near) => format!("did you mean `{near}`? {list}"),
         None => list,
     };

@@ -1,7 +1,11 @@
 //! The coupling of a scene: the one that is typed, or the one that suits it.
+//!
+//! Left to the program, it is `truncated` wherever that holds, for it alone is symmetric, in exact equilibrium and bounded in time. Where the scene shows that it
+//! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere or an LPS has a low
+//! Poisson's ratio, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
 
 use super::automatic::Placed;
-use super::error::SceneError;
+use super::error::{SceneError, SceneErrorKind};
 use super::materials::{Law, Material};
 use super::peridynamics::{self, Points};
 use super::source::Span;
@@ -17,8 +21,18 @@ use crate::tensor::Vector;
 /// How exactly, in spacings, faces have to follow the lattice.
 const FOLLOWS: f64 = 1e-6;
 
+/// What keeps `truncated` from a scene that names no coupling.
+enum Obstacle {
+    /// It cannot hold.
+    Certain(String),
+    /// The seam or the proof has to tell.
+    Possible(String),
+}
+
 /// A coupling, and why it was chosen if the scene names none.
 pub(super) struct Joined {
+    /// The coupling to go on with if this one turns out not to hold.
+    pub otherwise: Option<CouplingSpec>,
     pub coupling: CouplingSpec,
     pub joining: Joining,
     /// Where the scene names it, or its kinematics if it does not.
@@ -35,9 +49,11 @@ pub(super) fn joined<const D: usize>(
     found: &[Material<D>],
     mesh: &Mesh<D>,
     placed: Option<&Placed>,
+    instead: Option<&CouplingSpec>,
 ) -> Result<Joined, SceneError> {
     let of = |coupling: CouplingSpec, span: Span, why: Option<String>| Joined {
         joining: coupling.joining(),
+        otherwise: None,
         coupling,
         span,
         why,
@@ -53,11 +69,16 @@ pub(super) fn joined<const D: usize>(
             return Ok(only(coupling, "the zone that was placed holds every cell"));
         }
     }
+    if let Some(coupling) = instead {
+        let why = "the scene names none".to_owned();
+        return Ok(of(coupling.clone(), spec.kinematics.span(), Some(why)));
+    }
     if let Some(typed) = &spec.coupling {
         return Ok(of(typed.get_ref().clone(), typed.span(), None));
     }
     let span = spec.kinematics.span();
     let Some(p) = &spec.peridynamics else {
+        without_peridynamics(spec)?;
         let why = "the scene has no [peridynamics]".to_owned();
         return Ok(of(CouplingSpec::Local(NoOptionsSpec {}), span, Some(why)));
     };
@@ -73,16 +94,42 @@ pub(super) fn joined<const D: usize>(
         // only bonds that end on faces join bodies of different horizons
         return Ok(truncated);
     }
+    let splice = CouplingSpec::Splice(NoOptionsSpec {});
+    let is_placed = spec.zones.auto.is_some();
     Ok(match obstacle(spec, p, found, mesh, &truncated, placed)? {
         None => truncated,
-        Some(reason) => of(
-            CouplingSpec::Splice(NoOptionsSpec {}),
+        Some(Obstacle::Possible(reason)) if !is_placed => Joined {
+            otherwise: Some(splice),
+            why: Some(format!(
+                "the scene names none; symmetric and in exact equilibrium, though {reason}"
+            )),
+            ..truncated
+        },
+        Some(Obstacle::Certain(reason) | Obstacle::Possible(reason)) => of(
+            splice,
             span,
             Some(format!(
                 "the scene names none, and `truncated` is not for {reason}"
             )),
         ),
     })
+}
+
+/// Refuses a scene that draws a nonlocal zone and has no peridynamics to fill it with.
+fn without_peridynamics(spec: &SceneSpec) -> Result<(), SceneError> {
+    let (span, what) = match (&spec.zones.nonlocal, spec.zones.bodies.keys().next()) {
+        (Some(zone), _) => (zone.span(), "zones.nonlocal".to_owned()),
+        (None, Some(name)) => (name.span.clone(), format!("zones.bodies.{name}")),
+        (None, None) => return Ok(()),
+    };
+    Err(SceneError::new(
+        SceneErrorKind::Missing,
+        format!("the scene draws `{what}` and has no [peridynamics] to fill it with"),
+    )
+    .label(span, "would be finite elements")
+    .help(
+        "add [peridynamics] with horizon = ..., or take the zone out, or type coupling = \"local\"",
+    ))
 }
 
 /// What keeps truncated bonds from being exact, if anything does.
@@ -93,38 +140,40 @@ fn obstacle<const D: usize>(
     mesh: &Mesh<D>,
     truncated: &Joined,
     placed: Option<&Placed>,
-) -> Result<Option<String>, SceneError> {
+) -> Result<Option<Obstacle>, SceneError> {
+    let certain = |reason: &str| Ok(Some(Obstacle::Certain(reason.to_owned())));
+    let mut negative = None;
     for m in found {
         let (lambda, mu) = m.lame;
         match m.law {
             Law::Correspondence(..) => {
-                return Ok(Some(format!("the correspondence material `{}`", m.name)));
+                return certain(&format!("the correspondence material `{}`", m.name));
             }
-            Law::Lps(_) if lambda < mu * (1.0 - 1e-9) => {
-                return Ok(Some(format!(
-                    "an lps material below the Poisson ratio of a bond-based one, `{}`: its dilatation has a negative stiffness",
-                    m.name
-                )));
-            }
+            Law::Lps(_) if lambda < mu * (1.0 - 1e-9) => negative = Some(&m.name),
             _ => {}
         }
     }
-    if matches!(p.points, PointsSpec::Cells) {
-        return Ok(Some("points that are no lattice".to_owned()));
+    if matches!(p.points, Some(PointsSpec::Cells)) {
+        return certain("points that are no lattice");
     }
     if p.weights == WeightsSpec::Fitted {
-        return Ok(Some("weights that are fitted family by family".to_owned()));
+        return certain("weights that are fitted family by family");
     }
     if p.horizon.as_constant().is_none() {
-        return Ok(Some("a horizon that varies".to_owned()));
+        return certain("a horizon that varies");
     }
-    let lattice = peridynamics::peridynamics(p, truncated.joining.lattice, mesh)?;
-    let Points::Lattice { spacing, origin } = lattice.points else {
-        return Ok(Some("points that are no lattice".to_owned()));
-    };
     let zones = zones::zones(spec, truncated, mesh, placed)?;
+    let lattice = peridynamics::peridynamics(p, truncated.joining.lattice, mesh, &zones)?;
+    let Points::Lattice { spacing, origin } = lattice.points else {
+        return certain("points that are no lattice");
+    };
+    if let Some(name) = negative {
+        return Ok(Some(Obstacle::Possible(format!(
+            "the lps material `{name}` has a Poisson's ratio below that of a bond-based one"
+        ))));
+    }
     Ok((!follows(mesh, &zones, spacing, &origin))
-        .then(|| "a nonlocal zone whose faces do not follow the lattice".to_owned()))
+        .then(|| Obstacle::Possible("the faces of the zone do not follow the lattice".to_owned())))
 }
 
 /// Whether the faces of the zone are planes of the lattice, or halfway between them, and their nodes too.
@@ -198,19 +247,29 @@ y = 0
         let (name, why) = coupling(&[]);
         assert_eq!(name, "truncated");
         assert!(why.is_some());
-        for (change, reason) in [
+        for (change, first, reason) in [
+            // the seam has to tell: tried first
             (
                 "materials.plate.lps.poisson-ratio=0.1",
-                "below the Poisson ratio",
+                "truncated",
+                "below that of a bond-based",
             ),
-            ("peridynamics.horizon=0.3 + 0.01*x", "a horizon that varies"),
-            ("peridynamics.weights=fitted", "fitted"),
-            ("peridynamics.points=cells", "no lattice"),
             // a zone of cells of 0.1 beside a lattice of 0.08
-            ("peridynamics.points.lattice.spacing=0.08", "do not follow"),
+            (
+                "peridynamics.points.lattice.spacing=0.08",
+                "truncated",
+                "do not follow",
+            ),
+            (
+                "peridynamics.horizon=0.3 + 0.01*x",
+                "splice",
+                "a horizon that varies",
+            ),
+            ("peridynamics.weights=fitted", "splice", "fitted"),
+            ("peridynamics.points=cells", "splice", "no lattice"),
         ] {
             let (name, why) = coupling(&[change]);
-            assert_eq!(name, "splice", "{change}");
+            assert_eq!(name, first, "{change}");
             assert!(why.is_some_and(|w| w.contains(reason)), "{change}");
         }
     }

@@ -8,11 +8,13 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `validate.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `follow.rs`, `output.rs` | its parts |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `default_points.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `follow.rs`, `output.rs` | its parts |
 //! | `automatic/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `definite.rs` | whether a seam that may be unstable is |
 //! | `doubts.rs` | what of a model makes its results doubtful |
-//! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `joined.rs`, `chosen.rs` | the coupling that is typed, or the one that suits the scene; the next one where that does not hold |
+//! | `agreement.rs` | whether parts that are right alone agree |
+//! | `unused.rs` | parts of a scene that touch nothing |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
 //! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
@@ -25,15 +27,18 @@
 //! | `error.rs` | place, value and remedy |
 
 pub mod accuracy;
+mod agreement;
 mod automatic;
 mod bodies;
 mod breaking;
 mod budget;
 mod check;
 mod choice;
+mod chosen;
 mod conditions;
 mod converge;
 mod cost;
+pub(crate) mod default_points;
 mod definite;
 pub(crate) mod doubts;
 mod error;
@@ -58,6 +63,7 @@ mod solve;
 mod source;
 pub mod spec;
 mod template;
+mod unused;
 mod validate;
 mod value;
 mod write;

@@ -1,6 +1,7 @@
 //! The peridynamic choices of a validated scene: horizon, points, weights, influence function, partial volumes.
 
 use super::check;
+use super::default_points::default_points;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::position;
@@ -10,10 +11,10 @@ use super::spec::{
     WeightsSpec,
 };
 use super::value::Number;
-use crate::coupling::Lattice;
+use crate::coupling::{Lattice, Zone};
 use crate::mesh::Mesh;
 use crate::peridynamics::{Influence, PartialVolume};
-use crate::tensor::Vector;
+use crate::tensor::{Vector, padded};
 
 /// Where the peridynamic points are.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +44,8 @@ pub struct Peridynamics<const D: usize> {
     pub horizon: Expression,
     /// Where the points are.
     pub points: Points<D>,
+    /// Why they are there, if the scene does not say where.
+    pub points_why: Option<String>,
     /// Bond weights.
     pub weights: WeightsSpec,
     /// Shares of the cells that the horizon cuts.
@@ -77,11 +80,12 @@ pub(crate) fn influence(place: &str, spec: &InfluenceSpec) -> Result<Influence, 
     })
 }
 
-/// What `[peridynamics]` says; a lattice starts at a corner of the mesh, or half a spacing inside.
+/// What `[peridynamics]` says; a lattice starts at a corner of the mesh, or half a spacing inside. `zones` are what a lattice that is not typed is laid out for.
 pub(crate) fn peridynamics<const D: usize>(
     spec: &PeridynamicsSpec,
     start: LatticeStart,
     mesh: &Mesh<D>,
+    zones: &[Zone],
 ) -> Result<Peridynamics<D>, SceneError> {
     check::no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
     solve::still("peridynamics.horizon", &spec.horizon)?;
@@ -92,9 +96,16 @@ pub(crate) fn peridynamics<const D: usize>(
         };
         check::positive("peridynamics.horizon", &number)?;
     }
+    let mut points_why = None;
     let points = match &spec.points {
-        PointsSpec::Cells => Points::Cells,
-        PointsSpec::Lattice(lattice) => {
+        None => {
+            let horizon = |c: usize| spec.horizon.eval(&padded(&mesh.centroid(c)));
+            let (points, why) = default_points(mesh, zones, start, horizon);
+            points_why = Some(why);
+            points
+        }
+        Some(PointsSpec::Cells) => Points::Cells,
+        Some(PointsSpec::Lattice(lattice)) => {
             let spacing = check::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
             let (lo, hi) = mesh.bounds();
             let count: f64 = (hi - lo).iter().map(|l| l / spacing).product();
@@ -122,6 +133,7 @@ pub(crate) fn peridynamics<const D: usize>(
     Ok(Peridynamics {
         horizon: spec.horizon.clone(),
         points,
+        points_why,
         weights: spec.weights,
         volumes: volumes(spec)?,
         surfaces: spec.surfaces,
@@ -144,7 +156,7 @@ fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
             .label(typed.span(), "needs a lattice of points")
             .help(help))
     };
-    if matches!(spec.points, PointsSpec::Cells) {
+    if matches!(spec.points, Some(PointsSpec::Cells)) {
         return conflict(
             "`peridynamics.volumes` is partial, and the points are those of the mesh's cells",
             "give peridynamics.points.lattice a spacing, or use volumes = \"full\"",

@@ -57,6 +57,9 @@ pub struct Share {
 pub struct Prediction {
     /// The scene's name or title.
     pub scene: String,
+    /// Why the model was not laid out: sizes and memory are then counted from volumes, and nothing is proven; `run` proves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counted: Option<String>,
     /// Space dimension.
     pub dimension: usize,
     /// Coupling method, as the scene names it.
@@ -337,6 +340,7 @@ pub(crate) fn predict<const D: usize>(
     timings.add("output", output_seconds(&rest.output, &made_up)?);
     let mut prediction = Prediction {
         scene: title,
+        counted: None,
         dimension: D,
         coupling: joining.name.to_owned(),
         sizes,
@@ -472,9 +476,15 @@ fn transition_width<const D: usize>(mesh: &Mesh<D>, zones: &[Zone]) -> Option<f6
 
 impl fmt::Display for Prediction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = match &self.counted {
+            None => "the scene is right".to_owned(),
+            Some(why) => {
+                format!("counted from volumes, not proven: {why}; `run` proves it before it solves")
+            }
+        };
         writeln!(
             f,
-            "{} ({}D, coupling: {}): the scene is right\n",
+            "{} ({}D, coupling: {}): {found}\n",
             self.scene, self.dimension, self.coupling
         )?;
         let s = &self.sizes;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::breaking::Breaking;
 use super::budget;
+use super::chosen::with_choice;
 use super::conditions::Condition;
 use super::definite::{self, Ratio};
 use super::doubts::warnings;
@@ -106,6 +107,20 @@ pub enum RunError {
         /// The ratio of a pairwise law.
         pairwise: f64,
     },
+    /// No coupling that the program would choose holds.
+    #[error(
+        "no coupling holds of those that suit a scene that names none. `{first}`: {reason}. `{second}`: {error}"
+    )]
+    NoCoupling {
+        /// The coupling tried first.
+        first: &'static str,
+        /// Why it does not hold.
+        reason: Box<RunError>,
+        /// The coupling tried next.
+        second: &'static str,
+        /// Why that does not hold either.
+        error: Box<RunError>,
+    },
     /// The state cannot be carried over to other zones.
     #[error(transparent)]
     Carry(#[from] CarryError),
@@ -174,7 +189,7 @@ pub fn run<const D: usize>(
     let moves = scene.solve != Solve::Static;
     let _claim = scene.output.claim(&scene.title, moves)?;
     if moves {
-        return motion::run(scene, options, progress);
+        return with_choice(scene, |scene| motion::run(scene, options, progress));
     }
     solve_with(scene, progress, |output, solved| {
         super::write::write(output, solved)
@@ -186,6 +201,21 @@ pub fn run<const D: usize>(
 /// # Errors
 /// [`RunError`], each with place and remedy.
 pub fn solve_with<const D: usize>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+    visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
+) -> Result<RunSummary, RunError> {
+    let mut visit = Some(visit);
+    with_choice(scene, |scene| {
+        solve_chosen(scene, progress, |output, solved| match visit.take() {
+            Some(visit) => visit(output, solved),
+            // a solved scene is not solved again
+            None => Ok(Vec::new()),
+        })
+    })
+}
+
+fn solve_chosen<const D: usize>(
     mut scene: Scene<D>,
     progress: &dyn Progress,
     visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,

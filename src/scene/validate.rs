@@ -18,15 +18,18 @@ use super::predict::{self, Prediction};
 use super::region::Region;
 use super::run::{self, RunError};
 use super::solve::Solve;
-use super::source::{Source, Span};
+use super::source::Source;
 use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
+use super::unused::Parts;
 use super::{
-    automatic, bodies, breaking, budget, follow, initial, joined, obstacles, output, solve, zones,
+    agreement, automatic, bodies, breaking, budget, chosen, follow, initial, joined, obstacles,
+    output, solve, zones,
 };
 use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
+use crate::observe::report::number;
 use crate::observe::summary::{Choice, RunSummary};
 use crate::peridynamics::Influence;
 use crate::progress::Progress;
@@ -58,7 +61,7 @@ pub struct Scene<const D: usize> {
     pub coupling_why: Option<String>,
     /// How the nonlocal zone came about; none if the scene draws it.
     pub(crate) placement: Option<Placement<D>>,
-    /// What was chosen for the accuracy that the scene wants.
+    /// What was chosen for the accuracy that the scene wants, and for points that it does not place.
     pub choices: Vec<Choice>,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
@@ -78,6 +81,10 @@ pub struct Scene<const D: usize> {
     pub solver: Solver,
     /// What is written.
     pub output: Output<D>,
+    /// The scene with the coupling to go on with, if this one was chosen and turns out not to hold.
+    pub(crate) otherwise: Option<Box<Self>>,
+    /// Warnings of parts that touch nothing.
+    pub unused: Vec<String>,
     /// A number for the scene's text, by which a checkpoint knows that it belongs to it.
     pub fingerprint: Fingerprint,
 }
@@ -162,11 +169,12 @@ impl AnyScene {
 
     /// Keeps what was chosen for an accuracy, to be told with the results.
     pub(super) fn chose(&mut self, choices: Vec<Choice>) {
-        match self {
-            Self::Bar(s) => s.choices = choices,
-            Self::Plane(s) => s.choices = choices,
-            Self::Solid(s) => s.choices = choices,
-        }
+        let known = match self {
+            Self::Bar(s) => &mut s.choices,
+            Self::Plane(s) => &mut s.choices,
+            Self::Solid(s) => &mut s.choices,
+        };
+        known.splice(0..0, choices);
     }
 
     /// Validates a scene that leaves nothing open.
@@ -231,23 +239,62 @@ impl AnyScene {
         progress: &dyn Progress,
     ) -> Result<RunSummary, RunError> {
         self.fits()?;
-        match self {
+        let unused = self.unused().to_vec();
+        let mut summary = match self {
             Self::Bar(s) => run::run(*s, options, progress),
             Self::Plane(s) => run::run(*s, options, progress),
             Self::Solid(s) => run::run(*s, options, progress),
-        }
+        }?;
+        summary.warnings.extend(unused);
+        Ok(summary)
     }
 
-    /// What a run will need, without solving.
+    /// What a run will need, without solving; counted from volumes where laying the model out would take too long, see [`Prediction::counted`].
     ///
     /// # Errors
     /// [`RunError`], each with place and remedy.
     pub fn predict(self, progress: &dyn Progress) -> Result<Prediction, RunError> {
         self.fits()?;
+        let unused = self.unused().to_vec();
+        let counted = match &self {
+            Self::Bar(s) => budget::counted(s),
+            Self::Plane(s) => budget::counted(s),
+            Self::Solid(s) => budget::counted(s),
+        };
+        if let Some(mut prediction) = counted {
+            prediction.warnings.extend(unused);
+            return Ok(prediction);
+        }
+        let mut prediction = match self {
+            Self::Bar(s) => chosen::with_choice(*s, |s| predict::predict(s, progress)),
+            Self::Plane(s) => chosen::with_choice(*s, |s| predict::predict(s, progress)),
+            Self::Solid(s) => chosen::with_choice(*s, |s| predict::predict(s, progress)),
+        }?;
+        prediction.warnings.extend(unused);
+        Ok(prediction)
+    }
+
+    /// The spacing of the scene's lattice of points, if it has one.
+    pub(super) fn lattice_spacing(&self) -> Option<f64> {
+        fn of<const D: usize>(scene: &Scene<D>) -> Option<f64> {
+            match &scene.peridynamics.as_ref()?.points {
+                Points::Lattice { spacing, .. } => Some(*spacing),
+                Points::Cells | Points::Lattices { .. } => None,
+            }
+        }
         match self {
-            Self::Bar(s) => predict::predict(*s, progress),
-            Self::Plane(s) => predict::predict(*s, progress),
-            Self::Solid(s) => predict::predict(*s, progress),
+            Self::Bar(s) => of(s),
+            Self::Plane(s) => of(s),
+            Self::Solid(s) => of(s),
+        }
+    }
+
+    /// Warnings of parts of the scene that touch nothing.
+    pub fn unused(&self) -> &[String] {
+        match self {
+            Self::Bar(s) => &s.unused,
+            Self::Plane(s) => &s.unused,
+            Self::Solid(s) => &s.unused,
         }
     }
 
@@ -323,28 +370,32 @@ fn scene<const D: usize>(
     let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
     let initial = initial::initial(&spec.initial, &mesh, clock)?;
     add_mesh(&mesh, &mut fingerprint);
-    let lay_out = |placed: Option<&Placed>| -> Result<Scene<D>, SceneError> {
-        let mut joined = joined::joined(spec, &found, &mesh, placed)?;
+    let lay_out_as = |placed: Option<&Placed>,
+                      instead: Option<&CouplingSpec>|
+     -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
+        let mut joined = joined::joined(spec, &found, &mesh, placed, instead)?;
         let joining = joined.joining;
-        let peridynamics = match (&spec.peridynamics, joining.zones) {
-            (Some(p), _) => Some(peridynamics::peridynamics(p, joining.lattice, &mesh)?),
-            (None, ZonesNeeded::Everywhere(Zone::Local)) => None,
-            (None, _) => {
-                return Err(SceneError::new(
-                    SceneErrorKind::Missing,
-                    format!("coupling `{}` needs [peridynamics]", joining.name),
-                )
-                .label(joined.span.clone(), "has a peridynamic side")
-                .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
-            }
-        };
+        if spec.peridynamics.is_none()
+            && !matches!(joining.zones, ZonesNeeded::Everywhere(Zone::Local))
+        {
+            return Err(SceneError::new(
+                SceneErrorKind::Missing,
+                format!("coupling `{}` needs [peridynamics]", joining.name),
+            )
+            .label(joined.span.clone(), "has a peridynamic side")
+            .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
+        }
         let mut zones = zones::zones(spec, &joined, &mesh, placed)?;
+        let peridynamics = (spec.peridynamics.as_ref())
+            .map(|p| peridynamics::peridynamics(p, joining.lattice, &mesh, &zones))
+            .transpose()?;
+        let choices = peridynamics.as_ref().and_then(points_choice);
         let peridynamics = peridynamics
             .map(|p| bodies::bodies(spec, joining, p, &mesh, &mut zones))
             .transpose()?;
-        one_peridynamic_material(spec, &found, &cell_material, &zones)?;
+        agreement::one_peridynamic_material(spec, &found, &cell_material, &zones)?;
         if let Some(p) = &peridynamics {
-            horizon(spec, p, &mesh, &zones)?;
+            agreement::horizon(spec, p, &mesh, &zones)?;
         }
         let (voids, barriers) = obstacles::obstacles(spec, &mesh, &zones)?;
         if matches!(solve, Solve::Explicit(_)) {
@@ -366,7 +417,7 @@ fn scene<const D: usize>(
             |c| cell_material[c] == peridynamic,
         )?;
         let output = output::output(spec, &mesh, &voids, name)?;
-        Ok(Scene {
+        let scene = Scene {
             title: spec.title.clone().unwrap_or_else(|| name.to_owned()),
             kinematics,
             mesh: mesh.clone(),
@@ -377,7 +428,7 @@ fn scene<const D: usize>(
             coupling: joined.coupling,
             coupling_why: joined.why,
             placement: None,
-            choices: Vec::new(),
+            choices: choices.into_iter().collect(),
             conditions: conditions.clone(),
             voids,
             barriers,
@@ -387,9 +438,13 @@ fn scene<const D: usize>(
             follow,
             solver,
             output,
+            otherwise: None,
+            unused: Vec::new(),
             fingerprint,
-        })
+        };
+        Ok((scene, joined.otherwise))
     };
+    let lay_out = |placed: Option<&Placed>| Ok(lay_out_as(placed, None)?.0);
     let unplaced = Unplaced {
         spec,
         mesh: &mesh,
@@ -400,12 +455,37 @@ fn scene<const D: usize>(
         initial: &initial,
         solver: &solver,
     };
-    let Some((placed, placement)) = automatic::placed(&unplaced, &lay_out)? else {
-        return lay_out(None);
+    let mut scene = match automatic::placed(&unplaced, &lay_out)? {
+        Some((placed, placement)) => Scene {
+            placement: Some(placement),
+            ..lay_out(Some(&placed))?
+        },
+        None => {
+            let (mut scene, otherwise) = lay_out_as(None, None)?;
+            if let Some(coupling) = otherwise {
+                // an alternative that is wrong itself is none
+                let laid_out = lay_out_as(None, Some(&coupling)).ok();
+                scene.otherwise = laid_out.map(|(other, _)| Box::new(other));
+            }
+            scene
+        }
     };
-    Ok(Scene {
-        placement: Some(placement),
-        ..lay_out(Some(&placed))?
+    scene.unused = Parts {
+        spec,
+        scene: &scene,
+    }
+    .unused();
+    Ok(scene)
+}
+
+/// Says where points lie that the scene does not place.
+fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Choice> {
+    let Points::Lattice { spacing, .. } = &p.points else {
+        return None;
+    };
+    Some(Choice {
+        choice: format!("points on a lattice of spacing {}", number(*spacing)),
+        why: p.points_why.clone()?,
     })
 }
 
@@ -497,80 +577,6 @@ fn solver(spec: &SceneSpec) -> Result<Solver, SceneError> {
         tolerance,
         max_iterations,
     })
-}
-
-/// The core gives all points one law.
-fn one_peridynamic_material<const D: usize>(
-    spec: &SceneSpec,
-    found: &[Material<D>],
-    cell_material: &[u16],
-    zones: &[Zone],
-) -> Result<(), SceneError> {
-    let mut used = cell_material
-        .iter()
-        .zip(zones)
-        .filter(|(_, zone)| **zone != Zone::Local)
-        .map(|(m, _)| *m);
-    let Some(first) = used.next() else {
-        return Ok(());
-    };
-    let Some(other) = used.find(|m| *m != first) else {
-        return Ok(());
-    };
-    let (a, b) = (&found[first as usize].name, &found[other as usize].name);
-    let span = |name: &str| -> Span {
-        spec.materials
-            .get_key_value(name)
-            .map_or(0..0, |(k, _)| k.span.clone())
-    };
-    Err(SceneError::new(
-        SceneErrorKind::Later,
-        format!("the materials `{a}` and `{b}` both reach into the peridynamic zones"),
-    )
-    .label(span(a), "one")
-    .label(span(b), "another")
-    .help("keep the nonlocal and transition zones within one material; bonds between materials come later"))
-}
-
-fn horizon<const D: usize>(
-    spec: &SceneSpec,
-    p: &Peridynamics<D>,
-    mesh: &Mesh<D>,
-    zones: &[Zone],
-) -> Result<(), SceneError> {
-    for c in (0..mesh.cell_count()).filter(|&c| zones[c] != Zone::Local) {
-        let x = mesh.centroid(c);
-        let delta = p.horizon_at(&x);
-        let spacing = match &p.points {
-            Points::Lattice { spacing, .. } => *spacing,
-            // checked body by body
-            Points::Lattices { .. } => continue,
-            Points::Cells if zones[c] == Zone::Nonlocal => {
-                mesh.cell_volume(c).abs().powf(1.0 / D as f64)
-            }
-            Points::Cells => 0.0,
-        };
-        if delta.is_finite() && delta > 0.0 && delta >= spacing * (1.0 - 1e-9) {
-            continue;
-        }
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            if delta.is_finite() && delta > 0.0 {
-                format!(
-                    "`peridynamics.horizon` is {delta} at {:?}, below the spacing {spacing} of the points there",
-                    x.as_slice()
-                )
-            } else {
-                format!("`peridynamics.horizon` is {delta} at {:?}", x.as_slice())
-            },
-        )
-        .label(
-            spec.peridynamics.as_ref().map_or(0..0, |p| p.horizon.span.clone()),
-            "no point would have a neighbour",
-        )
-        .help("make it three to six times the spacing, or refine the points"));
-    }
-    Ok(())
 }
 
 impl<const D: usize> Scene<D> {

@@ -161,6 +161,11 @@ fn transition_cells<const D: usize>(
         }
         TransitionSpec::Box(s) => ShapeSpec::Box(s),
         TransitionSpec::Ball(s) => ShapeSpec::Ball(s),
+        TransitionSpec::Point(s) => ShapeSpec::Point(s),
+        TransitionSpec::Segment(s) => ShapeSpec::Segment(s),
+        TransitionSpec::Polyline(s) => ShapeSpec::Polyline(s),
+        TransitionSpec::Polygon(s) => ShapeSpec::Polygon(s),
+        TransitionSpec::Everywhere(s) => ShapeSpec::Everywhere(s),
         TransitionSpec::Near(s) => ShapeSpec::Near(s),
         TransitionSpec::Set(s) => ShapeSpec::Set(s),
         TransitionSpec::Any(s) => ShapeSpec::Any(s),

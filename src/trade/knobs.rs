@@ -1,9 +1,11 @@
 //! What of a scene trades speed for accuracy: the settings of each knob, and the overrides that several of them make together.
 
+use super::generated::{Axis, Generated, generated};
 use crate::scene::SceneSpec;
+use crate::scene::default_points::{RATIO, fraction_of_cells};
 use crate::scene::spec::{
-    AxisSpec, CouplingSpec, Joining, LatticeStart, MaterialSpec, MeshSpec, PointsSpec, ShapeSpec,
-    SolveSpec, TransitionSpec, TruncatedSpec, ZonesNeeded,
+    CouplingSpec, Joining, LatticeStart, MaterialSpec, MeshSpec, PointsSpec, ShapeSpec, SolveSpec,
+    TransitionSpec, TruncatedSpec, ZonesNeeded,
 };
 
 /// One setting of a knob: how it is called in tables, and what it does.
@@ -77,22 +79,6 @@ pub(crate) struct Base {
     explicit: bool,
 }
 
-/// A generated mesh: the table's name, its corners, its axes.
-#[derive(Clone, Debug, PartialEq)]
-struct Generated {
-    shape: &'static str,
-    min: Vec<f64>,
-    max: Vec<f64>,
-    axes: Vec<(&'static str, Axis)>,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-enum Axis {
-    Cells(usize),
-    Spacing(f64),
-    Graded { spacing: f64, largest: Option<f64> },
-}
-
 /// A zone whose edge can be moved outwards.
 #[derive(Clone, Debug, PartialEq)]
 enum Grown {
@@ -104,10 +90,17 @@ impl Base {
     pub(crate) fn of(spec: &SceneSpec) -> Self {
         let pd = spec.peridynamics.as_ref();
         let lattice = pd.and_then(|p| match &p.points {
-            PointsSpec::Lattice(l) => {
+            Some(PointsSpec::Lattice(l)) => {
                 Some((l.spacing.value, l.origin.as_ref().map(|o| o.values.clone())))
             }
-            PointsSpec::Cells => None,
+            Some(PointsSpec::Cells) => None,
+            // where the lattice is that of the cells, the two are one
+            None => {
+                let horizon = p.horizon.as_constant()?;
+                let cell = generated(&spec.mesh).as_ref().and_then(Generated::cell);
+                let spacing = cell.map_or(horizon / RATIO, |a| fraction_of_cells(a, horizon));
+                (Some(spacing) != cell).then_some((spacing, None))
+            }
         });
         let breaks = |m: &MaterialSpec| match m {
             MaterialSpec::BondBased(m) => {
@@ -161,12 +154,7 @@ impl Base {
 
     /// Edge of the first cells along the first axis.
     pub(crate) fn cell(&self) -> Option<f64> {
-        let mesh = self.mesh.as_ref()?;
-        let length = mesh.max.first()? - mesh.min.first()?;
-        Some(match mesh.axes.first()?.1 {
-            Axis::Cells(n) => length / n.max(1) as f64,
-            Axis::Spacing(s) | Axis::Graded { spacing: s, .. } => s,
-        })
+        self.mesh.as_ref().and_then(Generated::cell)
     }
 
     /// Spacing of the points.
@@ -503,42 +491,6 @@ pub(crate) fn coordinates(x: &[f64]) -> String {
             format!("[{}]", list.join(", "))
         }
     }
-}
-
-fn generated(mesh: &MeshSpec) -> Option<Generated> {
-    let axis = |a: &AxisSpec| match a {
-        AxisSpec::Cells(n) => Axis::Cells(n.value),
-        AxisSpec::Spacing(s) => Axis::Spacing(s.value),
-        AxisSpec::Graded(g) => Axis::Graded {
-            spacing: g.spacing.value,
-            largest: g.largest.as_ref().map(|l| l.value),
-        },
-    };
-    Some(match mesh {
-        MeshSpec::Line(m) => Generated {
-            shape: "line",
-            min: m.min.values.clone(),
-            max: m.max.values.clone(),
-            axes: vec![("x", axis(m.x.get_ref()))],
-        },
-        MeshSpec::Rectangle(m) => Generated {
-            shape: "rectangle",
-            min: m.min.values.clone(),
-            max: m.max.values.clone(),
-            axes: vec![("x", axis(m.x.get_ref())), ("y", axis(m.y.get_ref()))],
-        },
-        MeshSpec::Box(m) => Generated {
-            shape: "box",
-            min: m.min.values.clone(),
-            max: m.max.values.clone(),
-            axes: vec![
-                ("x", axis(m.x.get_ref())),
-                ("y", axis(m.y.get_ref())),
-                ("z", axis(m.z.get_ref())),
-            ],
-        },
-        MeshSpec::File(_) => return None,
-    })
 }
 
 /// Corners of the cut-outs of a generated mesh.

@@ -16,6 +16,7 @@
 
 mod case;
 mod effects;
+mod generated;
 mod knobs;
 mod measure;
 mod record;

@@ -1,13 +1,16 @@
 //! Scenes that once gave a wrong answer without a word, by the binary: each gives the right one, is warned of with a number, or is refused.
 
 mod a;
+mod any_faces;
 mod b;
 mod e;
 mod f;
 mod g_growth;
 mod h;
 mod i;
+mod j;
 mod k;
+mod m;
 mod n;
 mod o;
 mod q;
@@ -18,8 +21,6 @@ mod u;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-
-mod any_faces;
 
 /// A folder of its own for one test, with the files that its scene names; removed when dropped.
 pub struct Case {

@@ -24,6 +24,7 @@ mod pilot;
 mod versions;
 
 use std::path::Path;
+use std::time::Instant;
 
 use serde::Serialize;
 
@@ -61,6 +62,15 @@ impl From<SceneError> for CheckError {
 /// Pilots for the error may take this share of the predicted time of a run, or [`LEAST`].
 const PILOTS: f64 = 0.15;
 
+/// Seconds that `check` may take, or a [`TENTH`] of the run if that is more.
+pub(crate) const ANSWERS: f64 = 5.0;
+
+/// See [`ANSWERS`].
+pub(crate) const TENTH: f64 = 0.1;
+
+/// Pilots take no longer than this \[s\], however long the run is: an answer after a minute is none.
+const PATIENCE: f64 = 30.0;
+
 /// Seconds that pilots may take whatever the run does.
 pub(crate) const LEAST: f64 = 1.0;
 
@@ -82,12 +92,22 @@ pub fn check(
     if let Some((_, chosen)) = &chosen {
         scene.chose(chosen.choices.clone());
     }
+    let begun = Instant::now();
     let mut prediction = scene.predict(progress)?;
+    if let (Some(_), None) = (&prediction.counted, pilots) {
+        prediction.no_error = Some("the model was counted, not laid out".to_owned());
+        return Ok(prediction);
+    }
     progress.stage("coarser and finer runs", None);
     let known = chosen.as_ref().and_then(|(_, c)| c.prediction());
     let found = match (known, pilots) {
         (Some(known), _) => Ok(known),
-        (None, None) => error_of(complete, directory, &prediction, LEAST)?,
+        (None, None) => {
+            let run = solving(&prediction);
+            let left = (TENTH * run).max(ANSWERS) - begun.elapsed().as_secs_f64();
+            let most = (PILOTS * run).min(left).min(PATIENCE).max(LEAST);
+            predicted_error(complete, directory, run, most)?
+        }
         (None, Some(most)) => predicted_error(complete, directory, solving(&prediction), most)?,
     };
     match found {

@@ -116,7 +116,11 @@ pub(super) fn placed<const D: usize>(
     };
     let options = options(auto.get_ref())?;
     let start = Instant::now();
-    let choices = peridynamics::peridynamics(p, LatticeStart::OnCorner, mesh)?;
+    let choices = {
+        // no zone is placed yet: a lattice that is not typed suits all cells
+        let all = vec![Zone::Nonlocal; mesh.cell_count()];
+        peridynamics::peridynamics(p, LatticeStart::OnCorner, mesh, &all)?
+    };
     let horizon: Vec<f64> = (0..mesh.cell_count())
         .map(|c| choices.horizon_at(&mesh.centroid(c)))
         .collect();

@@ -79,6 +79,7 @@ fn prediction<const D: usize>(
     choices.extend(laid_out.choices.iter().filter(|c| **c != told).cloned());
     Prediction {
         scene: laid_out.title.clone(),
+        counted: None,
         dimension: D,
         coupling: laid_out.joining.name.to_owned(),
         sizes,

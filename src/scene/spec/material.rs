@@ -179,9 +179,9 @@ pub struct PeridynamicsSpec {
     /// Influence function of state-based laws; `{ degree = 3, alpha = 0 }` if left out.
     #[serde(default)]
     pub influence: Option<InfluenceSpec>,
-    /// Where the points are.
+    /// Where the points are; a lattice if left out, as fine as the cells of the zone where they are alike, else a third of the horizon.
     #[serde(default)]
-    pub points: PointsSpec,
+    pub points: Option<PointsSpec>,
     /// How the force of a bond depends on the displacement; "linear" without damage and "exact" with it if left out.
     #[serde(default)]
     #[schemars(with = "Option<super::motion::BondsSpec>")]
@@ -228,11 +228,10 @@ pub enum VolumesSpec {
 }
 
 /// Where the peridynamic points are.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointsSpec {
     /// One at the centroid of each cell of the zone.
-    #[default]
     Cells,
     /// A regular lattice that fills the zone.
     Lattice(LatticeSpec),

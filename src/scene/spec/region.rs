@@ -128,10 +128,20 @@ pub enum TransitionSpec {
     Box(BoxSpec),
     /// All points within a radius of a centre.
     Ball(BallSpec),
+    /// A point; of use within `near`.
+    Point(Coordinates),
+    /// A straight line.
+    Segment(SegmentSpec),
+    /// Straight lines from each point to the next.
+    Polyline(Vec<Coordinates>),
+    /// A closed polygon.
+    Polygon(Vec<Coordinates>),
     /// All points within a distance of a shape.
     Near(NearSpec),
     /// A named set of cells of the mesh.
     Set(Text),
+    /// The whole body.
+    Everywhere(bool),
     /// All points of any of several shapes.
     Any(Vec<ShapeSpec>),
     /// A shape without another.

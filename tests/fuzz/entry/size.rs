@@ -80,7 +80,7 @@ fn points(spec: &SceneSpec, lengths: &[f64]) -> bool {
             .product();
         count <= MOST_POINTS
     };
-    let lattice = match spec.peridynamics.as_ref().map(|p| &p.points) {
+    let lattice = match spec.peridynamics.as_ref().and_then(|p| p.points.as_ref()) {
         Some(PointsSpec::Lattice(l)) => few(&l.spacing),
         _ => true,
     };

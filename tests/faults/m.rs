@@ -1,0 +1,203 @@
+//! Small things that were wrong or silent: overrides of tables, wrong hints, parts of a scene that touch nothing.
+
+use super::Case;
+
+const PLATE: &str = r#"
+kinematics = "plane-stress"
+[mesh.rectangle]
+min = [0, 0]
+max = [1, 1]
+x = { cells = 20 }
+y = { cells = 20 }
+[materials.m.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = 0.15
+points.lattice = { spacing = 0.05 }
+[zones.nonlocal]
+box = { min = [0.2, 0.2], max = [0.8, 0.8] }
+[conditions.b.displacement]
+on = "bottom"
+x = 0
+y = 0
+[conditions.t.traction]
+on = "top"
+x = 1
+"#;
+
+/// Standard output and error of `check`, in one line.
+fn told(text: &str, sets: &[&str]) -> String {
+    let mut arguments = Vec::new();
+    sets.iter().for_each(|s| arguments.extend(["--set", *s]));
+    let output = Case::new(text).command("check", &arguments);
+    let both = [output.stdout, output.stderr].map(|t| String::from_utf8_lossy(&t).into_owned());
+    let words: Vec<&str> = both.iter().flat_map(|t| t.split_whitespace()).collect();
+    words.join(" ").replace("│ ", "")
+}
+
+#[test]
+fn a_table_that_is_set_replaces_the_one_of_the_file() {
+    // with x free, the plate slides and nothing holds it: kept x = 0 solved another problem
+    let case = Case::new(PLATE);
+    let set = r#"conditions.b.displacement={on="bottom",y=0}"#;
+    let error = case
+        .run(&["--set", set])
+        .expect_err("nothing holds it along x");
+    assert!(error.contains("free to move"), "{error}");
+}
+
+#[test]
+fn a_study_of_convergence_refuses_points_that_stay() {
+    let text = PLATE.replace(
+        "[mesh.rectangle]\nmin = [0, 0]\nmax = [1, 1]\nx = { cells = 20 }\ny = { cells = 20 }",
+        "[mesh.file]\npath = \"grad.msh\"",
+    );
+    let text = text.replace("on = \"top\"", "on = \"right\"");
+    let case = Case::new(&text).with_file("grad.msh");
+    let output = case.command(
+        "converge",
+        &[
+            "--set",
+            "peridynamics={horizon=3,points=\"cells\"}",
+            "--set",
+            "coupling=splice",
+            "--set",
+            "zones.nonlocal={box={min=[6,6],max=[14,14]}}",
+        ],
+    );
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(error.contains("get no finer"), "{error}");
+}
+
+#[test]
+fn hints_name_the_mistake() {
+    let coarse = told(PLATE, &["peridynamics.points.lattice.spacing=0.5"]);
+    assert!(
+        coarse.contains("use a spacing of 0.05000, a third of the horizon"),
+        "{coarse}"
+    );
+    let below = PLATE.replace("horizon = 0.15", "horizon = 0.15\nzones = \"auto\"");
+    let below = told(&below, &[]);
+    assert!(
+        below.contains("`zones` belongs at the top of the scene"),
+        "{below}"
+    );
+    assert!(!below.contains("did you mean"), "{below}");
+}
+
+#[test]
+fn a_zone_without_peridynamics_is_refused() {
+    let start = PLATE.find("[peridynamics]").expect("it is there");
+    let end = PLATE.find("[zones.nonlocal]").expect("it is there");
+    let without = [&PLATE[..start], &PLATE[end..]].concat();
+    let error = told(&without, &[]);
+    assert!(
+        error.contains("has no [peridynamics] to fill it with"),
+        "{error}"
+    );
+    // and a fracture energy that nothing uses is told of
+    let zone = without.find("[zones.nonlocal]").expect("it is there");
+    let conditions = without.find("[conditions.b").expect("it is there");
+    let alone = [&without[..zone], &without[conditions..]].concat();
+    let warned = told(&alone, &["materials.m.bond-based.fracture-energy=1"]);
+    assert!(
+        warned.contains("`fracture-energy` of the material `m` is not used"),
+        "{warned}"
+    );
+}
+
+#[test]
+fn parts_that_touch_nothing_are_warned_of_by_name() {
+    let sets = [
+        "voids.beside.inside.box={min=[5,5],max=[6,6]}",
+        "voids.between.inside.box={min=[0.501,0.501],max=[0.502,0.502]}",
+        "voids.hole.inside.box={min=[0.41,0.41],max=[0.49,0.49]}",
+        "cracks.short.segment={from=[0.5050,0.5013],to=[0.5055,0.5013]}",
+        "cracks.long.segment={from=[0.3,0.6],to=[0.5,0.6]}",
+        "zones.transition.around=0.1",
+        "materials.m.bond-based.fracture-energy=1",
+        "materials.m.bond-based.density=1",
+        "solve.explicit.duration=0.1",
+        "no-fail.beside.box={min=[5,5],max=[6,6]}",
+        "no-fail.inside.box={min=[0.3,0.3],max=[0.6,0.6]}",
+        "output.tips.t={direction=[1,0],inside={box={min=[5,5],max=[6,6]}}}",
+    ];
+    let warned = told(PLATE, &sets);
+    for part in [
+        "the void `beside` holds no point and cuts no bond",
+        "the void `between` holds no point",
+        "the crack `short` cuts no bond",
+        "the region `no-fail.beside` holds no point",
+        "`output.tips.t` looks where no point lies",
+        "`zones.transition` is not used: coupling `truncated`",
+    ] {
+        assert!(warned.contains(part), "{part}: {warned}");
+    }
+    for part in ["`hole`", "`long`", "`no-fail.inside`"] {
+        assert!(!warned.contains(part), "{part}: {warned}");
+    }
+}
+
+#[test]
+fn a_horizon_wider_than_the_zone_is_warned_of() {
+    let small = "zones.nonlocal={box={min=[0.4,0.4],max=[0.5,0.5]}}";
+    let warned = told(PLATE, &[small]);
+    assert!(warned.contains("narrower than a horizon"), "{warned}");
+    let outside = "zones.nonlocal={box={min=[0.4,0.4],max=[5,0.6]}}";
+    let warned = told(PLATE, &[outside]);
+    assert!(warned.contains("reaches beyond the mesh"), "{warned}");
+    let fine = told(PLATE, &[]);
+    assert!(
+        !fine.contains("horizon wide") && !fine.contains("beyond the mesh"),
+        "{fine}"
+    );
+}
+
+#[test]
+fn a_transition_may_be_a_polygon() {
+    let sets = [
+        "coupling=blending",
+        "zones.transition.polygon=[[0.05,0.05],[0.95,0.05],[0.95,0.95],[0.05,0.95]]",
+    ];
+    let answer = told(PLATE, &sets);
+    assert!(answer.contains("the scene is right"), "{answer}");
+}
+
+#[test]
+fn points_that_are_left_out_are_a_lattice_on_every_mesh() {
+    // pulled by 100 on triangles of 0.5 to 1.9; at their centroids the points gave up to 817, and -3697 for -2000
+    let text = r#"
+kinematics = "plane-stress"
+[mesh.file]
+path = "grad.msh"
+[materials.m.lps]
+youngs-modulus = 210e3
+poisson-ratio = 0.3
+[peridynamics]
+horizon = 3
+[zones.nonlocal]
+box = { min = [6, 6], max = [14, 14] }
+[conditions.l.displacement]
+on = "left"
+x = 0
+[conditions.b.displacement]
+on = "bottom"
+y = 0
+[conditions.r.traction]
+on = "right"
+x = 100
+"#;
+    let summary = Case::new(text)
+        .with_file("grad.msh")
+        .run(&[])
+        .expect("it runs");
+    let reactions = summary["reactions"].as_array().expect("a list");
+    let left = reactions
+        .iter()
+        .find(|r| r["condition"] == "l")
+        .expect("held");
+    let force = left["force"][0].as_f64().expect("a number");
+    assert!((force + 2000.0).abs() < 1e-6, "{force}");
+    let told = summary["choices"].to_string();
+    assert!(told.contains("points on a lattice of spacing 1"), "{told}");
+}
