@@ -192,6 +192,16 @@ impl<const D: usize> Row<D> {
         std::mem::take(&mut self.columns)
     }
 
+    /// Empties the row into `visit`, block by block.
+    pub fn take_blocks(&mut self, mut visit: impl FnMut(u32, &Tensor<D>)) {
+        for (&column, block) in self.columns.iter().zip(&self.blocks) {
+            visit(column, block);
+            self.slot[column as usize] = EMPTY;
+        }
+        self.columns.clear();
+        self.blocks.clear();
+    }
+
     /// Empties the row into sorted columns and row-major blocks.
     fn drain_into(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f64>) {
         let mut order: Vec<u32> = (0..self.columns.len() as u32).collect();

@@ -257,15 +257,6 @@ impl<const D: usize> LatticeFactors<D> {
             tensor,
         })
     }
-
-    /// The elastic tensor of the plain full lattice; none without a lattice.
-    pub fn tensor(
-        &self,
-        p: &Peridynamics<D>,
-        horizon: f64,
-    ) -> Result<Option<Tensor4<D>>, ModelError> {
-        Ok(self.whole_family(p, horizon)?.map(|whole| whole.tensor))
-    }
 }
 
 /// Integer offset of a lattice's bond.
@@ -298,6 +289,18 @@ impl<const D: usize> WholeFamily<D> {
     /// All bonds by their integer offsets, in their order, with `p` and `ω`.
     pub fn bonds(&self) -> impl Iterator<Item = ([i32; D], (f64, f64))> + '_ {
         self.bonds.iter().copied()
+    }
+
+    /// The bond vectors, each with the volume of a whole cell.
+    pub fn vectors(&self) -> Vec<(Vector<D>, f64)> {
+        let volume = self.spacing.powi(D as i32);
+        self.bonds
+            .iter()
+            .map(|(k, _)| {
+                let xi = Vector::from_fn(|i, _| f64::from(k[i]) * self.spacing);
+                (xi, volume)
+            })
+            .collect()
     }
 
     /// The coefficients `p` and `ω` of a bond; zero for one that the lattice does not have.

@@ -105,6 +105,43 @@ fn monomial_row<const D: usize>(x: &Vector<D>) -> Vec<f64> {
     row
 }
 
+/// The Taylor monomials of degree two: `x_b x_d`, halved on the diagonal, for `b ≤ d`.
+pub(super) fn second_monomials<const D: usize>(x: &Vector<D>) -> Vec<f64> {
+    monomial_row(x).split_off(D)
+}
+
+/// Least independence of the monomials on a patch, as the smallest over the largest diagonal entry of R: the nearest sites of regular elements have 0.1 and more.
+const DETERMINED: f64 = 0.02;
+
+/// Weights of the second derivatives `∂_b ∂_d u` (`b ≤ d`) at the origin, one list per datum, by least squares over data at `data`; exact for quadratic fields.
+///
+/// The weight of a datum at the distance `r` is `1/(r² + ¼)`, lengths being in units of an element. Returns `None` if the data determine no quadratic well.
+pub(super) fn second_derivatives<const D: usize>(data: &[Vector<D>]) -> Option<Vec<Vec<f64>>> {
+    let columns = 1 + monomials(D);
+    if data.len() < columns {
+        return None;
+    }
+    let mut a = DMatrix::zeros(data.len(), columns);
+    let weights: Vec<f64> = data
+        .iter()
+        .map(|x| 1.0 / (x.norm_squared() + 0.25))
+        .collect();
+    for (r, (x, w)) in data.iter().zip(&weights).enumerate() {
+        a[(r, 0)] = *w;
+        for (c, value) in monomial_row(x).into_iter().enumerate() {
+            a[(r, c + 1)] = w * value;
+        }
+    }
+    let inverse = left_inverse(a, DETERMINED)?;
+    Some(
+        weights
+            .iter()
+            .enumerate()
+            .map(|(r, w)| (1 + D..columns).map(|c| inverse[(c, r)] * w).collect())
+            .collect(),
+    )
+}
+
 /// Weights of a moving least-squares fit of degree 1 (`affine`) or 2 at `x`, over data at `data`; they reproduce polynomials of that degree.
 ///
 /// Source: the constraint of [SAND2015-7998] section 7.3 (there quadratic). The weight of a datum at distance `r` is `(1 − (r/R)²)²`, `R` just beyond the farthest datum.

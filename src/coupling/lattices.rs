@@ -8,7 +8,7 @@ use crate::{
         points::PointCloud,
     },
     peridynamics::{Families, PartialVolume, TIE_TOLERANCE},
-    tensor::Tensor4,
+    tensor::{Tensor4, Vector},
 };
 
 /// What bonds that end on the faces of elements need: the lattices as they go on behind the faces.
@@ -132,6 +132,56 @@ impl<const D: usize> Model<D> {
             wide,
             is_constant,
         })
+    }
+
+    /// Whether a position may be in the family of a Gauss point of an element that carries the partial stress.
+    fn near_stress_elements(&self, cloud: &PointCloud<D>) -> impl Fn(&Vector<D>, f64) -> bool {
+        let boxes: Vec<(Vector<D>, Vector<D>)> = (0..self.mesh.cell_count())
+            .filter(|&c| self.roles[c] == CellRole::StressElement)
+            .map(|c| self.mesh.bounds_of(self.mesh.cell(c)))
+            .collect();
+        let slack = 1e-9 * cloud.spacing;
+        move |x, horizon| {
+            boxes.iter().any(|(low, high)| {
+                let outside =
+                    Vector::<D>::from_fn(|a, _| (low[a] - x[a]).max(x[a] - high[a]).max(0.0));
+                outside.norm() < horizon - slack
+            })
+        }
+    }
+
+    /// Refuses families that reach into another material: their bonds would take its strain for that of the peridynamic one, and as the elements there
+    /// know nothing of them, forces would not balance by far.
+    fn check_materials(
+        &self,
+        cloud: &PointCloud<D>,
+        counts: impl Fn(usize) -> bool,
+    ) -> Result<(), ModelError> {
+        let (offsets, cells) = self.node_cells();
+        let own = |node: u32| {
+            cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize]
+                .iter()
+                .any(|&c| self.material_of_cell(c as usize) == self.peridynamic_material())
+        };
+        for (i, (x, element)) in cloud.position.iter().zip(&cloud.element).enumerate() {
+            let Some((cell, weights)) = element else {
+                continue;
+            };
+            // a place on the border of the two materials has its weights on nodes of both
+            let beyond = self.material_of_cell(*cell as usize) != self.peridynamic_material()
+                && self
+                    .mesh
+                    .cell(*cell as usize)
+                    .iter()
+                    .zip(weights)
+                    .any(|(&n, w)| w.abs() > 1e-9 && !own(n));
+            if beyond && counts(i) {
+                return Err(ModelError::OtherMaterial {
+                    position: x.iter().copied().collect(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Refuses several lattices where bonds do not end on faces, where two meet, and where bonds of two could not be told apart.

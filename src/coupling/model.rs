@@ -3,15 +3,18 @@
 use std::any::Any;
 use std::sync::OnceLock;
 
+use rustc_hash::FxHashMap;
+
 use crate::{
     assembly::{self, Row, Transfer},
     coupling::{
-        CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Surfaces, Zone,
-        bonds::{self, LatticeFactors},
+        CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Reach, Surfaces, Zone,
+        bonds::{self, LatticeFactors, WholeFamily},
         fit::{self, Sites},
         lattices::{self, Grown, Passing},
         place::{self, Beyond},
         points::{PointCloud, Volumes},
+        recovery::{self, Patch},
         tributary::Tributary,
     },
     fem,
@@ -69,6 +72,10 @@ pub struct Model<const D: usize> {
     node_cells: (Vec<u32>, Vec<u32>),
     pub(super) interface: Interface,
     passing: Option<Passing<D>>,
+    /// What interpolation lacks in elements, where elements carry the partial stress of points between their nodes.
+    patches: FxHashMap<u32, Patch<D>>,
+    /// The whole family of a lattice with plain weights, whose tensor the elements have.
+    plain_lattice: Option<WholeFamily<D>>,
     spacing: f64,
     is_lattice: bool,
     volumes: Volumes,
@@ -123,6 +130,8 @@ impl<const D: usize> Model<D> {
             node_cells,
             interface: coupling.interface(),
             passing: None,
+            patches: FxHashMap::default(),
+            plain_lattice: None,
             spacing: 0.0,
             is_lattice: false,
             volumes: Volumes::default(),
@@ -147,7 +156,7 @@ impl<const D: usize> Model<D> {
                     _ => Beyond::Empty,
                 };
                 model.check_lattices(p)?;
-                let reach = coupling.reach(p.law.as_ref());
+                let reach = reach(coupling.as_ref(), p);
                 place::place(&model.mesh, &model.zones, &model.roles, p, reach, beyond)?
             }
             _ => Vec::new(),
@@ -221,59 +230,6 @@ impl<const D: usize> Model<D> {
         node_site
     }
 
-    /// Whether a position may be in the family of a Gauss point of an element that carries the partial stress.
-    pub(super) fn near_stress_elements(
-        &self,
-        cloud: &PointCloud<D>,
-    ) -> impl Fn(&Vector<D>, f64) -> bool {
-        let boxes: Vec<(Vector<D>, Vector<D>)> = (0..self.mesh.cell_count())
-            .filter(|&c| self.roles[c] == CellRole::StressElement)
-            .map(|c| self.mesh.bounds_of(self.mesh.cell(c)))
-            .collect();
-        let slack = 1e-9 * cloud.spacing;
-        move |x, horizon| {
-            boxes.iter().any(|(low, high)| {
-                let outside =
-                    Vector::<D>::from_fn(|a, _| (low[a] - x[a]).max(x[a] - high[a]).max(0.0));
-                outside.norm() < horizon - slack
-            })
-        }
-    }
-
-    /// Refuses families that reach into another material: their bonds would take its strain for that of the peridynamic one, and as the elements there
-    /// know nothing of them, forces would not balance by far.
-    pub(super) fn check_materials(
-        &self,
-        cloud: &PointCloud<D>,
-        counts: impl Fn(usize) -> bool,
-    ) -> Result<(), ModelError> {
-        let (offsets, cells) = &self.node_cells;
-        let own = |node: u32| {
-            cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize]
-                .iter()
-                .any(|&c| self.cell_material[c as usize] == self.peridynamic_material)
-        };
-        for (i, (x, element)) in cloud.position.iter().zip(&cloud.element).enumerate() {
-            let Some((cell, weights)) = element else {
-                continue;
-            };
-            // a place on the border of the two materials has its weights on nodes of both
-            let beyond = self.cell_material[*cell as usize] != self.peridynamic_material
-                && self
-                    .mesh
-                    .cell(*cell as usize)
-                    .iter()
-                    .zip(weights)
-                    .any(|(&n, w)| w.abs() > 1e-9 && !own(n));
-            if beyond && counts(i) {
-                return Err(ModelError::OtherMaterial {
-                    position: x.iter().copied().collect(),
-                });
-            }
-        }
-        Ok(())
-    }
-
     /// Makes sites of points, completes families, and expresses every other place through sites.
     fn place_points(
         &mut self,
@@ -308,7 +264,7 @@ impl<const D: usize> Model<D> {
         progress: &dyn Progress,
     ) -> Result<(), ModelError> {
         progress.stage("families", None);
-        let reach = coupling.reach(p.law.as_ref());
+        let reach = reach(coupling, p);
         let mut grown = clouds
             .into_iter()
             .enumerate()
@@ -355,20 +311,20 @@ impl<const D: usize> Model<D> {
             }
         }
         progress.stage("seam", None);
-        self.node_transfer = fit::fit_nodes(
-            &Sites {
-                mesh: &self.mesh,
-                roles: &self.roles,
-                sites: &self.sites,
-                node_site,
-                barriers: &Barriers::new(p.barriers.clone()),
-            },
-            coupling.interface(),
-            &cloud,
-        )?;
-        let transfer = self.transfer_of(&cloud, |i| point_site[i]);
+        let barriers = Barriers::new(p.barriers.clone());
+        let sites = Sites {
+            mesh: &self.mesh,
+            roles: &self.roles,
+            sites: &self.sites,
+            node_site,
+            barriers: &barriers,
+        };
+        self.node_transfer = fit::fit_nodes(&sites, coupling.interface(), &cloud)?;
+        let (transfer, _) = self.transfer_of(&sites, &cloud, |i| point_site[i]);
         if let Some((wide, renumbered)) = wide {
-            let transfer = self.transfer_of(&wide, |i| point_site[renumbered[i] as usize]);
+            let site = |i: usize| point_site[renumbered[i] as usize];
+            let (transfer, patches) = self.transfer_of(&sites, &wide, site);
+            self.patches = patches;
             self.surroundings = Some(Cloud {
                 position: wide.position,
                 volume: wide.volume,
@@ -395,10 +351,11 @@ impl<const D: usize> Model<D> {
             Ends::Differ
         };
         if p.weights == BondWeights::Plain
-            && let Some(tensor) = factors[0].tensor(p, horizons[0])?
+            && let Some(whole) = factors[0].whole_family(p, horizons[0])?
         {
             // the local side carries the stiffness of the peridynamic quadrature, or the seam would be a jump of material
-            self.tensors[peridynamic_material as usize] = tensor;
+            self.tensors[peridynamic_material as usize] = whole.tensor;
+            self.plain_lattice = Some(whole);
         }
         if let Some(families) = passing {
             let is_regular = constant && p.weights != BondWeights::Fitted;
@@ -423,30 +380,54 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
-    /// Expresses the points of a cloud through sites; `site` names that of a point that is one.
-    fn transfer_of(&self, cloud: &PointCloud<D>, site: impl Fn(usize) -> u32) -> Transfer {
-        Transfer::from_rows(cloud.element.iter().enumerate().map(|(i, element)| {
-            match element {
-                None => vec![(site(i), 1.0)],
-                Some((cell, shape)) => self
-                    .mesh
-                    .cell(*cell as usize)
-                    .iter()
-                    .zip(shape)
-                    .filter(|&(_, &s)| s != 0.0)
-                    .flat_map(|(&n, &s)| {
-                        self.node_transfer
-                            .row(n as usize)
-                            .map(move |(site, w)| (site, w * s))
-                    })
-                    .collect(),
-            }
-        }))
+    /// Expresses the points of a cloud through sites, with what interpolation lacks in elements where some lie between the nodes; `site` names that of a point that is one.
+    ///
+    /// Where bonds end on faces, what lies behind them is a place only, and interpolation will do; elsewhere forces of points depend on it.
+    fn transfer_of(
+        &self,
+        sites: &Sites<'_, D>,
+        cloud: &PointCloud<D>,
+        site: impl Fn(usize) -> u32 + Sync,
+    ) -> (Transfer, FxHashMap<u32, Patch<D>>) {
+        let patches = match self.interface {
+            Interface::Faces => FxHashMap::default(),
+            _ => recovery::patches(
+                sites,
+                cloud,
+                &self.node_transfer,
+                self.node_cells(),
+                &self.cell_material,
+            ),
+        };
+        let rows = recovery::rows(&self.mesh, cloud, &self.node_transfer, &patches, site);
+        (rows, patches)
+    }
+
+    /// Whether points in elements that carry the partial stress, or around such, lie between the nodes.
+    pub fn has_places_between_nodes(&self) -> bool {
+        !self.patches.is_empty()
+    }
+
+    /// The place `x` in an element with these shape values, through sites.
+    pub(super) fn place_row(&self, cell: u32, shape: &[f64], x: &Vector<D>) -> Vec<(u32, f64)> {
+        recovery::row(
+            &self.mesh,
+            &self.node_transfer,
+            &self.patches,
+            cell,
+            shape,
+            x,
+        )
     }
 
     /// All quadrature points in and around elements whose stress is a partial stress, if there are such elements.
     pub fn surroundings(&self) -> Option<&Cloud<D>> {
         self.surroundings.as_ref()
+    }
+
+    /// The whole family of a lattice with plain weights.
+    pub(super) fn plain_lattice(&self) -> Option<&WholeFamily<D>> {
+        self.plain_lattice.as_ref()
     }
 
     /// Removes the bonds that voids, cracks or the boundary of the mesh cut.
@@ -560,6 +541,11 @@ impl<const D: usize> Model<D> {
         self.interface != Interface::Faces || self.is_element(cell)
     }
 
+    /// Whether bonds end on the faces of elements, so that no place beyond acts on a point.
+    pub fn faces_cut_bonds(&self) -> bool {
+        self.interface == Interface::Faces
+    }
+
     /// The lattice behind the faces at which bonds end, if they do.
     pub(super) fn passing(&self) -> Option<&Passing<D>> {
         self.passing.as_ref()
@@ -638,5 +624,13 @@ impl<const D: usize> Model<D> {
         );
         progress.finish();
         pattern
+    }
+}
+
+/// How far families have to be complete: weights that are fitted family by family differ at both ends of a bond, so that those of the neighbours count too.
+fn reach<const D: usize>(coupling: &dyn Coupling<D>, p: &Peridynamics<D>) -> Reach {
+    match p.weights {
+        BondWeights::Fitted => Reach::Neighbours,
+        BondWeights::Plain | BondWeights::Isotropic => coupling.reach(p.law.as_ref()),
     }
 }

@@ -64,6 +64,10 @@ struct Scratch<const D: usize> {
     factors: Vec<f64>,
 }
 
+/// Factors of the bonds `(ξ, V)` of one family of a horizon.
+pub type FamilyFactors<'a, const D: usize> =
+    dyn Fn(&[(Vector<D>, f64)], f64) -> Result<Vec<f64>, PdError> + Sync + 'a;
+
 /// The kernel factors of a body's bonds.
 pub enum Factors<'a, const D: usize> {
     /// All 1.
@@ -72,6 +76,8 @@ pub enum Factors<'a, const D: usize> {
     Shells(&'a (dyn Fn(f64, &Vector<D>) -> f64 + Sync)),
     /// Fitted to the fourth moments, family by family.
     Fitted,
+    /// As a function of the bonds `(ξ, V)` of a family and its horizon says.
+    OfFamily(&'a FamilyFactors<'a, D>),
 }
 
 impl<const D: usize> PdBody<D> {
@@ -133,6 +139,11 @@ impl<const D: usize> PdBody<D> {
                         let bonds = of.bonds.iter().copied().zip(of.volumes.iter().copied());
                         let bonds: Vec<(Vector<D>, f64)> = bonds.collect();
                         of.factors.extend(fitted(law, &bonds, horizon).map_err(at)?);
+                    }
+                    Factors::OfFamily(f) => {
+                        let bonds = of.bonds.iter().copied().zip(of.volumes.iter().copied());
+                        let bonds: Vec<(Vector<D>, f64)> = bonds.collect();
+                        of.factors.extend(f(&bonds, horizon).map_err(at)?);
                     }
                 }
                 law.coefficients(

@@ -71,16 +71,43 @@ impl<const D: usize> Conditions<D> {
         conditions
     }
 
-    /// Adds `Σ g ξ⊗ξ⊗ξ V = 0` (for [`Conditions::lps`]: `Σ ω ξ⊗ξ⊗ξ/|ξ|² V = 0`): 1, 4 or 10 conditions that a family lacks
-    /// when it is not symmetric about its point.
-    pub fn with_vanishing_third_moments(mut self) -> Self {
+    /// Adds `Σ g ξ⊗…⊗ξ V = 0` (for [`Conditions::lps`]: `Σ ω ξ⊗…⊗ξ/|ξ|² V = 0`) of an odd degree, which a family lacks when it is not symmetric about its point: 1, 4 or 10 conditions of degree
+    /// three, 1, 6 or 21 of degree five. With the latter its partial stress is exact for quadratic fields (the trace of those of an LPS holds the third moments of ω).
+    pub fn with_vanishing_moments(mut self, degree: u8) -> Self {
         let radial = self.share - 4;
+        let zero = |exponents| Condition {
+            exponents,
+            radial,
+            value: 0.0,
+        };
         self.rows
-            .extend(exponents::<D>(3).into_iter().map(|e| Condition {
-                exponents: e,
-                radial,
-                value: 0.0,
-            }));
+            .extend(exponents::<D>(degree).into_iter().map(zero));
+        self
+    }
+
+    /// The same conditions with the values that another family has, of coefficients `g` on the bonds `(ξ, V)`; those of [`Conditions::lps`] at the weighted volume that they ask for.
+    pub fn with_values_of(mut self, bonds: &[(Vector<D>, f64)], g: &[f64]) -> Self {
+        let values: Vec<f64> = self
+            .rows
+            .iter()
+            .map(|row| {
+                let terms = bonds.iter().zip(g);
+                terms.map(|((xi, v), g)| g * v * monomial(row, xi)).sum()
+            })
+            .collect();
+        // Σ ω |ξ|² V is the double trace
+        let (mut asked, mut there) = (0.0, 0.0);
+        for (row, value) in self.rows.iter().zip(&values) {
+            if row.exponents.iter().all(|e| e % 2 == 0) {
+                let times = if row.exponents.contains(&4) { 1.0 } else { 2.0 };
+                asked += times * row.value;
+                there += times * value;
+            }
+        }
+        let scale = if self.share == 2 { asked / there } else { 1.0 };
+        for (row, value) in self.rows.iter_mut().zip(values) {
+            row.value = scale * value;
+        }
         self
     }
 
@@ -402,7 +429,7 @@ mod tests {
             assert!(miss < 1e-13, "{D}D: {miss:e}, plain {plain:e}");
             assert!(D == 1 || plain > 1e-3);
 
-            let conditions = conditions.with_vanishing_third_moments();
+            let conditions = conditions.with_vanishing_moments(3);
             let both = fit(&bonds, &base, &conditions, Bound::Free).unwrap();
             let got = fourth_moments(&bonds, &both.values).scaled(0.5);
             assert!(largest_miss(&got, &c) < 1e-13);
@@ -456,7 +483,7 @@ mod tests {
         let third = fit(
             &bonds,
             &omega,
-            &Conditions::lps(m).with_vanishing_third_moments(),
+            &Conditions::lps(m).with_vanishing_moments(3),
             Bound::Free,
         )
         .unwrap();
@@ -517,7 +544,7 @@ mod tests {
         let base = vec![1.0; bonds.len()];
         let trace: f64 = bonds.iter().map(|(x, v)| v * x.norm().powi(4)).sum();
         let c = Tensor4::isotropic(trace / 16.0, trace / 16.0);
-        let conditions = Conditions::bond_based(&c).with_vanishing_third_moments();
+        let conditions = Conditions::bond_based(&c).with_vanishing_moments(3);
         let free = fit(&bonds, &base, &conditions, Bound::Free).unwrap();
         assert!(free.smallest_factor < 0.05, "{}", free.smallest_factor);
         let bounded = fit(&bonds, &base, &conditions, Bound::AtLeast(0.05)).unwrap();

@@ -3,8 +3,10 @@
 mod a;
 mod any_faces;
 mod b;
+mod cantilever;
 mod e;
 mod f;
+mod fitted_weights;
 mod g_growth;
 mod h;
 mod i;

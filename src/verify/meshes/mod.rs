@@ -6,6 +6,7 @@
 //! | `motion.rs` | growth that the proof tells of beside that of the run; discrete energy |
 //! | `affine.rs` | affine fields on eight families of meshes |
 //! | `fracture.rs` | planes pulled apart, balance of energy of bodies that break |
+//! | `order.rs` | orders of convergence to exact solutions beside every coupling |
 //! | `scene.rs` | a scene as text, run in a folder of its own, and what it summed up |
 //!
 //! A row passes, or the scene is refused with its reason, and both are counted. Nothing here builds a model by another way than a scene does.
@@ -14,6 +15,7 @@ pub mod affine;
 pub mod fracture;
 pub mod loads;
 mod motion;
+mod order;
 pub mod scene;
 
 use super::Effort;
@@ -30,6 +32,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         affine::tables,
         fracture::planes,
         fracture::balances,
+        order::order,
     ];
     tables
         .iter()
