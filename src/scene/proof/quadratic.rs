@@ -56,7 +56,12 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         .map_init(
             || Row::<D>::new(model.sites.len()),
             |row, &(point, site)| {
-                let volume = body.cloud.volume[point];
+                // assembled rows are scaled to the part of the body that a site stands for
+                let scale = match subject.stiffness {
+                    Some(_) => model.row_scale().map_or(1.0, |scale| scale[site]),
+                    None => 1.0,
+                };
+                let volume = body.cloud.volume[point] * scale;
                 let mut sums = second_moments(subject, site, row);
                 for (sum, (b, d)) in sums.iter_mut().zip(pairs::<D>()) {
                     *sum += density(&tensor, b, d) * volume;
@@ -69,7 +74,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     let mut largest = 0.0f64;
     let mut mean = vec![Tensor::<D>::zeros(); pairs::<D>().count()];
     let mut worst = (0.0, first);
-    for ((v, sums), &(point, _)) in moments.iter().zip(&seam) {
+    for ((v, sums), &(point, _)) in moments.iter().zip(&seam).filter(|(m, _)| m.0 > 0.0) {
         for (m, s) in mean.iter_mut().zip(sums) {
             *m += s / (volume * stiffness);
             let here = s.amax() / (v * stiffness);
