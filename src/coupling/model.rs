@@ -14,7 +14,7 @@ use crate::{
         lattices::{self, Grown, Passing},
         place::{self, Beyond},
         points::{PointCloud, Volumes},
-        recovery::{self, Patch},
+        recovery::Patch,
         tributary::Tributary,
     },
     fem,
@@ -63,7 +63,7 @@ pub struct Model<const D: usize> {
     /// The peridynamic part of the problem.
     pub peridynamics: Option<Peridynamics<D>>,
     tensors: Vec<Tensor4<D>>,
-    cell_material: Vec<u16>,
+    pub(super) cell_material: Vec<u16>,
     peridynamic_material: u16,
     body: Option<PdBody<D>>,
     /// All quadrature points in and around elements whose stress is a partial stress.
@@ -73,7 +73,7 @@ pub struct Model<const D: usize> {
     pub(super) interface: Interface,
     passing: Option<Passing<D>>,
     /// What interpolation lacks in elements, where elements carry the partial stress of points between their nodes.
-    patches: FxHashMap<u32, Patch<D>>,
+    pub(super) patches: FxHashMap<u32, Patch<D>>,
     /// The whole family of a lattice with plain weights, whose tensor the elements have.
     plain_lattice: Option<WholeFamily<D>>,
     spacing: f64,
@@ -378,46 +378,6 @@ impl<const D: usize> Model<D> {
         self.body = Some(body);
         self.factors = factors.into_iter().zip(horizons).collect();
         Ok(())
-    }
-
-    /// Expresses the points of a cloud through sites, with what interpolation lacks in elements where some lie between the nodes; `site` names that of a point that is one.
-    ///
-    /// Where bonds end on faces, what lies behind them is a place only, and interpolation will do; elsewhere forces of points depend on it.
-    fn transfer_of(
-        &self,
-        sites: &Sites<'_, D>,
-        cloud: &PointCloud<D>,
-        site: impl Fn(usize) -> u32 + Sync,
-    ) -> (Transfer, FxHashMap<u32, Patch<D>>) {
-        let patches = match self.interface {
-            Interface::Faces => FxHashMap::default(),
-            _ => recovery::patches(
-                sites,
-                cloud,
-                &self.node_transfer,
-                self.node_cells(),
-                &self.cell_material,
-            ),
-        };
-        let rows = recovery::rows(&self.mesh, cloud, &self.node_transfer, &patches, site);
-        (rows, patches)
-    }
-
-    /// Whether points in elements that carry the partial stress, or around such, lie between the nodes.
-    pub fn has_places_between_nodes(&self) -> bool {
-        !self.patches.is_empty()
-    }
-
-    /// The place `x` in an element with these shape values, through sites.
-    pub(super) fn place_row(&self, cell: u32, shape: &[f64], x: &Vector<D>) -> Vec<(u32, f64)> {
-        recovery::row(
-            &self.mesh,
-            &self.node_transfer,
-            &self.patches,
-            cell,
-            shape,
-            x,
-        )
     }
 
     /// All quadrature points in and around elements whose stress is a partial stress, if there are such elements.

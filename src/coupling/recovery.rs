@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::{
     assembly::Transfer,
     coupling::{
-        CellRole, SiteKind, derivative,
+        CellRole, Interface, Model, SiteKind, derivative,
         fit::{Bins, Sites},
         points::PointCloud,
     },
@@ -31,10 +31,52 @@ pub(super) struct Patch<const D: usize> {
     weights: Vec<(u32, Vec<f64>)>,
 }
 
+impl<const D: usize> Model<D> {
+    /// Expresses the points of a cloud through sites, with what interpolation lacks in elements where some lie between the nodes; `site` names that of a point that is one.
+    ///
+    /// Where bonds end on faces, what lies behind them is a place only, and interpolation will do; elsewhere forces of points depend on it.
+    pub(super) fn transfer_of(
+        &self,
+        sites: &Sites<'_, D>,
+        cloud: &PointCloud<D>,
+        site: impl Fn(usize) -> u32 + Sync,
+    ) -> (Transfer, FxHashMap<u32, Patch<D>>) {
+        let patches = match self.interface {
+            Interface::Faces => FxHashMap::default(),
+            _ => patches(
+                sites,
+                cloud,
+                &self.node_transfer,
+                self.node_cells(),
+                &self.cell_material,
+            ),
+        };
+        let rows = rows(&self.mesh, cloud, &self.node_transfer, &patches, site);
+        (rows, patches)
+    }
+
+    /// Whether points in elements that carry the partial stress, or around such, lie between the nodes.
+    pub fn has_places_between_nodes(&self) -> bool {
+        !self.patches.is_empty()
+    }
+
+    /// The place `x` in an element with these shape values, through sites.
+    pub(super) fn place_row(&self, cell: u32, shape: &[f64], x: &Vector<D>) -> Vec<(u32, f64)> {
+        row(
+            &self.mesh,
+            &self.node_transfer,
+            &self.patches,
+            cell,
+            shape,
+            x,
+        )
+    }
+}
+
 /// Rows of all places of a cloud, exact for quadratic fields where their element has a patch.
 ///
 /// `site` names the site of a point that is one; `of_node` expresses nodes through sites.
-pub(super) fn rows<const D: usize>(
+fn rows<const D: usize>(
     mesh: &Mesh<D>,
     cloud: &PointCloud<D>,
     of_node: &Transfer,
@@ -52,7 +94,7 @@ pub(super) fn rows<const D: usize>(
 }
 
 /// The row of the place `x` in a cell with these shape values.
-pub(super) fn row<const D: usize>(
+fn row<const D: usize>(
     mesh: &Mesh<D>,
     of_node: &Transfer,
     patches: &FxHashMap<u32, Patch<D>>,
@@ -101,7 +143,7 @@ fn lacking<const D: usize>(
 /// The patches of all elements that hold places which coincide with none of their nodes.
 ///
 /// `node_cells` are the cells around each node, as [`crate::mesh::Mesh::node_cells`] has them; patches end where another material begins, since gradients jump there.
-pub(super) fn patches<const D: usize>(
+fn patches<const D: usize>(
     at: &Sites<'_, D>,
     cloud: &PointCloud<D>,
     of_node: &Transfer,
