@@ -43,6 +43,8 @@ impl<const D: usize> Model<D> {
     ) -> (Transfer, FxHashMap<u32, Patch<D>>) {
         let patches = match self.interface {
             Interface::Faces => FxHashMap::default(),
+            // families of other clouds carry no affine field, and no better ghost would mend that
+            _ if !self.is_lattice() => FxHashMap::default(),
             _ => patches(
                 sites,
                 cloud,

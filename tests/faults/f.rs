@@ -62,7 +62,9 @@ fn the_energy_is_bounded_or_the_run_is_refused_or_stops() {
                 assert!(said.contains(part), "{said}");
             }
             // let begin all the same, it stops once a tenth of the energy comes from nowhere
-            let output = case.command("run", &["--set", "solve.explicit.growing-modes=warn"]);
+            let longer = "solve.explicit.duration=24";
+            let warn = "solve.explicit.growing-modes=warn";
+            let output = case.command("run", &["--set", warn, "--set", longer]);
             assert_eq!(output.status.code(), Some(3));
             let said = String::from_utf8_lossy(&output.stdout);
             assert!(said.contains("without work"), "{said}");
