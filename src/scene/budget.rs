@@ -451,7 +451,7 @@ fn remedy<const D: usize>(scene: &Scene<D>, counts: &Counts, there: u64) -> Stri
 /// Seconds of one thread per bond that the search for families finds, measured on 6.5 million bonds in 2D with the other threads busy.
 const SEARCH: f64 = 4e-7;
 /// The same per bond of a body that moves: its passes, and the stable step from its rows.
-const SET_UP: f64 = 1.5e-6;
+const SET_UP: f64 = 2.5e-6;
 /// The same per scalar of the stiffness: computed, dropped, ordered.
 const PATTERN: f64 = 1.8e-7;
 /// The same per scalar of an iterative solve.
