@@ -104,7 +104,13 @@ fn costs_are_warned_of() {
         warnings(&["coupling=splice", "peridynamics.horizon=\"1.5/120\""])
             .contains("1.50 spacings")
     );
-    assert_eq!(warnings(&["coupling=splice"]), "[]");
+    // the scene's transition zone is for blending
+    let unused = warnings(&["coupling=splice"]);
+    assert_eq!(unused.matches('"').count(), 2, "{unused}");
+    assert!(
+        unused.contains("`zones.transition` is not used"),
+        "{unused}"
+    );
 }
 
 /// An `accuracy` fills in the mesh, and `zones.auto` then finds that nothing needs peridynamics: both are told, by `check` and by `run`.

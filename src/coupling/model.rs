@@ -550,22 +550,37 @@ impl<const D: usize> Model<D> {
         self.roles[cell] != CellRole::Points && self.mesh.shapes[cell] != CellShape::Vertex
     }
 
+    /// Adds the row that a site has in the stiffness: that of the operator times its [`Model::row_scale`].
+    pub fn add_scaled_row(&self, operator: &dyn super::Operator<D>, site: usize, row: &mut Row<D>) {
+        operator.add_row(site, row);
+        if let Some(scale) = self.row_scale() {
+            row.scale(scale[site]);
+        }
+    }
+
     /// Assembles the stiffness: the rows of the operator, each times its [`Model::row_scale`].
     pub fn assemble(&self, operator: &dyn super::Operator<D>, progress: &dyn Progress) -> BlockCsr {
         progress.stage("assembly", Some(self.sites.len() as u64));
-        let scale = self.row_scale();
         let matrix = assembly::assemble(
             self.sites.len(),
             |by| progress.advance(by),
-            |site, row| {
-                operator.add_row(site, row);
-                if let Some(scale) = scale {
-                    row.scale(scale[site]);
-                }
-            },
+            |site, row| self.add_scaled_row(operator, site, row),
         );
         progress.finish();
         matrix
+    }
+
+    /// Assembles the rows as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
+    pub fn assemble_unscaled(
+        &self,
+        operator: &dyn super::Operator<D>,
+        progress: &dyn Progress,
+    ) -> BlockCsr {
+        assembly::assemble(
+            self.sites.len(),
+            |by| progress.advance(by),
+            |site, row| operator.add_row(site, row),
+        )
     }
 
     /// The pattern of the stiffness, without its values, and its products with `fields`.
@@ -580,7 +595,7 @@ impl<const D: usize> Model<D> {
             self.sites.len(),
             fields,
             |by| progress.advance(by),
-            |site, row| operator.add_row(site, row),
+            |site, row| self.add_scaled_row(operator, site, row),
         );
         progress.finish();
         pattern

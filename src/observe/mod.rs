@@ -162,3 +162,14 @@ fn remedy(error: &std::io::Error) -> &'static str {
         _ => "check the path or choose another output folder",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_has_a_remedy() {
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        assert!(remedy(&full).contains("free some space"));
+    }
+}

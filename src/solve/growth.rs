@@ -217,7 +217,7 @@ fn rate_from(operator: &mut Scaled<'_>, start: Vec<f64>, step: f64, steps: u64) 
         std::mem::swap(&mut last, &mut x);
         let size = norm(&x);
         if !size.is_finite() || size > 1e12 * begun {
-            return (size.min(f64::MAX) / begun).ln() / (taken as f64 * step);
+            return (2.0 * size.min(f64::MAX) / begun).ln() / (taken as f64 * step);
         }
         match 4 * taken / steps {
             1 => early = early.max(size),
@@ -226,7 +226,10 @@ fn rate_from(operator: &mut Scaled<'_>, start: Vec<f64>, step: f64, steps: u64) 
         }
     }
     if early > 0.0 && late > early {
-        (late / early).ln() / (0.5 * steps as f64 * step)
+        // a mode that starts at rest grows as cosh(σt): late / early = cosh(2a) / cosh(a) with a = σT/2
+        let ratio = late / early;
+        let cosh = 0.25 * (ratio + (ratio * ratio + 8.0).sqrt());
+        cosh.max(1.0).acosh() / (0.5 * steps as f64 * step)
     } else {
         0.0
     }

@@ -26,7 +26,7 @@
 //! | `extremes` | units, places, laws, shapes and steps at their limits |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
 //!
-//! `page.rs` writes what they found as `docs/verification.md`. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
+//! `page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 
 pub mod balance;
 pub mod bar;

@@ -261,7 +261,7 @@ fn horizon_below_h() {
         &[
             "`peridynamics.horizon` is 0.02",
             "below the spacing 0.05",
-            "three to six times the spacing",
+            "three to six spacings",
         ],
     );
 }

@@ -60,7 +60,7 @@ fn a_study_of_convergence_refuses_points_that_stay() {
             "--set",
             "peridynamics={horizon=3,points=\"cells\"}",
             "--set",
-            "coupling=splice",
+            "coupling=nonlocal",
             "--set",
             "zones.nonlocal={box={min=[6,6],max=[14,14]}}",
         ],
@@ -157,7 +157,8 @@ fn a_horizon_wider_than_the_zone_is_warned_of() {
 fn a_transition_may_be_a_polygon() {
     let sets = [
         "coupling=blending",
-        "zones.transition.polygon=[[0.05,0.05],[0.95,0.05],[0.95,0.95],[0.05,0.95]]",
+        "zones.nonlocal={box={min=[0.45,0.45],max=[0.55,0.55]}}",
+        "zones.transition.polygon=[[0.35,0.35],[0.65,0.35],[0.65,0.65],[0.35,0.65]]",
     ];
     let answer = told(PLATE, &sets);
     assert!(answer.contains("the scene is right"), "{answer}");

@@ -173,7 +173,7 @@ fn system<const D: usize>(
         true => points
             .iter()
             .copied()
-            .zip((first..).step_by(even))
+            .zip((first..).step_by(even.max(1)))
             .collect(),
         false => FxHashMap::default(),
     };

@@ -95,7 +95,7 @@ pub(super) fn part<const D: usize>(
         (None, None, Some(system)) => system.tangent_into(u, force),
         (None, None, None) => {
             let rows = |s: usize, row: &mut Row<D>| {
-                subject.operator.add_row(s, row);
+                model.add_scaled_row(subject.operator, s, row);
                 row.take_products([u])[0]
             };
             let each = (0..sites).into_par_iter();

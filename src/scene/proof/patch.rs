@@ -73,7 +73,7 @@ pub(super) fn stress_errors<const D: usize>(
         count,
         model.sites.len(),
         |_| (),
-        |r, row| around.operator.add_row(list[r] as usize, row),
+        |r, row| model.add_scaled_row(around.operator, list[r] as usize, row),
     );
     let (matrix, free, keeps) = local(around, &rows, &list, main);
     let positions: Vec<[f64; 3]> = list
