@@ -571,14 +571,10 @@ impl<const D: usize> Model<D> {
     }
 
     /// Assembles the rows as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
-    pub fn assemble_unscaled(
-        &self,
-        operator: &dyn super::Operator<D>,
-        progress: &dyn Progress,
-    ) -> BlockCsr {
+    pub fn assemble_unscaled(&self, operator: &dyn super::Operator<D>) -> BlockCsr {
         assembly::assemble(
             self.sites.len(),
-            |by| progress.advance(by),
+            |_| (),
             |site, row| operator.add_row(site, row),
         )
     }

@@ -344,7 +344,7 @@ impl<const D: usize> Enclosed<D> {
         let (model, coupling) = Model::new(problem, &Silent)?;
         let stiffness = {
             let operator = coupling.operator(&model)?;
-            model.assemble(operator.as_ref(), &Silent)
+            model.assemble_unscaled(operator.as_ref())
         };
         Ok(Self {
             model,
