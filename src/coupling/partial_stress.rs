@@ -256,11 +256,14 @@ impl<'a, const D: usize> Elements<'a, D> {
     }
 }
 
+/// Bonds of a whole family with their volumes, and the moments that they have.
+type LatticeMoments<const D: usize> = (Vec<(Vector<D>, f64)>, Vec<f64>);
+
 /// How the weights of a Gauss point's family are fitted, so that its partial stress is that of the elements around under affine fields.
 struct FamilyFit<'a, const D: usize> {
     law: &'a dyn BondLaw<D>,
     /// Bonds and coefficients of the lattice whose tensor the elements have, where that is not the typed one.
-    lattice: Option<(Vec<(Vector<D>, f64)>, Vec<f64>)>,
+    lattice: Option<LatticeMoments<D>>,
     /// Whether places in elements lie between the nodes, so that fifth moments should vanish too. Where every one is a node, what the points of one element err under quadratic fields cancels around each node.
     between_nodes: bool,
 }

@@ -105,7 +105,7 @@ pub fn check(
         (None, None) => {
             let run = solving(&prediction);
             let left = (TENTH * run).max(ANSWERS) - begun.elapsed().as_secs_f64();
-            let most = (PILOTS * run).min(left).min(PATIENCE).max(LEAST);
+            let most = (PILOTS * run).min(left).clamp(LEAST, PATIENCE);
             predicted_error(complete, directory, run, most)?
         }
         (None, Some(most)) => predicted_error(complete, directory, solving(&prediction), most)?,

@@ -149,7 +149,7 @@ fn load_steps<const D: usize>(
         loaded.u.clone_from(&state.u);
     }
     let first = state.step;
-    let times = |k: u64| (k <= pace.steps).then(|| k as f64 * step);
+    let times = |k: u64| (k <= pace.steps).then_some(k as f64 * step);
     watch.lap(&mut timings, "start");
     let written = recorder.seconds;
     progress.stage("load steps", Some(pace.steps));

@@ -231,6 +231,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     ///
     /// # Errors
     /// [`ObserveError`] for files that cannot be made or cut.
+    #[expect(clippy::too_many_arguments, reason = "each is another part of the run")]
     pub fn new(
         output: &'a Output<D>,
         conditions: &[Condition<D>],
