@@ -90,8 +90,8 @@ fn the_additions_of_the_page_build_and_run() {
     let page = fs::read_to_string(root.join("docs/extending.md")).unwrap();
     let copied = Path::new(env!("CARGO_TARGET_TMPDIR")).join("worked_additions");
     let _ = fs::remove_dir_all(&copied);
-    // the suites read scenes of the examples
-    for folder in ["src", "examples"] {
+    // the suites read scenes of the examples, and meshes
+    for folder in ["src", "examples", "meshes"] {
         copy(&root.join(folder), &copied.join(folder));
     }
     // under another name, so that nothing of the crate itself is overwritten

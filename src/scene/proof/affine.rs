@@ -19,6 +19,9 @@ use crate::tensor::{Tensor, Tensor4, Vector};
 /// Most rows whose kind is found out one by one; of more, a sample of the worst.
 const CLASSIFIED: usize = 20_000;
 
+/// Relative difference up to which the forces of two rows count as alike.
+const ALIKE: f64 = 1e-6;
+
 /// What is proved, with what several steps of it ask for.
 struct Subject<'a, const D: usize> {
     model: &'a Model<D>,
@@ -167,7 +170,7 @@ fn prove<const D: usize>(
     } else {
         unbalanced(subject, &off, &worst, &tensor, &nodal)
     };
-    told(list.len(), residual, total, &unbalanced)
+    told(list.len(), residual, total, &unbalanced, model.is_lattice())
 }
 
 /// How far from the boundary rows may lack bonds \[m\].
@@ -179,8 +182,8 @@ fn reach<const D: usize>(model: &Model<D>) -> f64 {
         .as_ref()
         .is_some_and(|p| p.law.is_pairwise())
         && !model.zones.contains(&Zone::Transition);
-    // a point on the boundary lacks nothing if the next one beyond it would be farther than the horizon
-    (if alone { 1.0 } else { 2.0 }) * largest * (1.0 - 1e-6)
+    // points on the boundary itself have half a cell, so that a family lacks as much that only touches it
+    (if alone { 1.0 } else { 2.0 }) * largest * (1.0 + 1e-6)
 }
 
 /// Sorts the rows that are out of balance, and predicts the error of the stress at the worst of each class.
@@ -225,15 +228,21 @@ fn unbalanced<const D: usize>(
             .iter()
             .zip(&classified)
             .filter(move |(_, c)| c.0 == class);
-        let size = |s: u32| worst[s as usize];
-        let largest = own
-            .clone()
-            .map(|(&s, _)| s)
-            .max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+        // what is not a number is largest
+        let size = |s: u32| match worst[s as usize] {
+            r if r.is_nan() => f64::INFINITY,
+            r => r,
+        };
+        // of rows that are alike but for rounding, the first
+        let first_of = |counts: &dyn Fn(bool) -> bool| {
+            let mut counted = own.clone().filter(|(_, c)| counts(c.2));
+            let most = counted.clone().map(|(&s, _)| size(s)).fold(0.0, f64::max);
+            counted.find(|(s, _)| size(**s) >= most * (1.0 - ALIKE))
+        };
+        let (&largest, _) = first_of(&|_| true)?;
         // where one surface alone lies near, if anywhere: at a corner no uniform stress leaves both sides free
-        let (&place, &(_, facet, _)) = own
-            .clone()
-            .max_by(|(a, c), (b, d)| c.2.cmp(&d.2).then(size(**a).total_cmp(&size(**b))))?;
+        let (&place, &(_, facet, _)) =
+            first_of(&|is_alone| is_alone).or_else(|| first_of(&|_| true))?;
         let mut found = Unbalanced {
             class,
             rows: own.count(),

@@ -18,6 +18,8 @@ pub(super) mod limits {
     /// As [`REFUSE`], where the seam meets a surface: an incomplete family alone leaves less than 1. Surfaces alone are warned of, never refused: of rows that
     /// are nearly alike the one that is judged hangs on round-off, and so does the number.
     pub const REFUSE_SURFACE: f64 = 2.0;
+    /// As [`REFUSE`], where points of a transition zone lie at a surface: what is local of their rows knows nothing of a boundary, and a patch shows a third of what the whole zone does.
+    pub const REFUSE_TRANSITION: f64 = 0.5;
 }
 
 /// Where rows that an affine field leaves out of balance lie.
@@ -59,7 +61,13 @@ pub(super) struct Unbalanced {
 }
 
 /// What the proof has shown, as data.
-pub(super) fn told(fields: usize, residual: f64, rows: usize, unbalanced: &[Unbalanced]) -> Part {
+pub(super) fn told(
+    fields: usize,
+    residual: f64,
+    rows: usize,
+    unbalanced: &[Unbalanced],
+    is_lattice: bool,
+) -> Part {
     let figure = |name: String, value: f64| Figure { name, value };
     let mut figures = vec![
         figure("fields".to_owned(), fields as f64),
@@ -86,7 +94,10 @@ pub(super) fn told(fields: usize, residual: f64, rows: usize, unbalanced: &[Unba
         name: "affine",
         line,
         figures,
-        findings: unbalanced.iter().filter_map(verdict).collect(),
+        findings: unbalanced
+            .iter()
+            .filter_map(|rows| verdict(rows, is_lattice))
+            .collect(),
     }
 }
 
@@ -107,12 +118,22 @@ impl RowClass {
 }
 
 /// What is told of a class of rows.
-fn verdict(rows: &Unbalanced) -> Option<Finding> {
+fn verdict(rows: &Unbalanced, is_lattice: bool) -> Option<Finding> {
     let place = |x: &[f64]| {
         let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
         format!("({})", x.join(", "))
     };
     let (what, remedy, [warn, refuse]) = match rows.class {
+        RowClass::Seam if is_lattice => (
+            "at the seam",
+            "use coupling.truncated",
+            [limits::WARN, limits::REFUSE],
+        ),
+        RowClass::Points if is_lattice => (
+            "among the points",
+            "leave peridynamics.weights out: isotropic ones carry the constants typed",
+            [limits::WARN, limits::REFUSE],
+        ),
         RowClass::Seam => (
             "at the seam",
             "give peridynamics.points a lattice, or use coupling.truncated",
@@ -131,7 +152,7 @@ fn verdict(rows: &Unbalanced) -> Option<Finding> {
         RowClass::Transition => (
             "where the transition zone meets the surface of the body, which its rows know nothing of,",
             "end the transition zone two horizons from the surface, or use coupling.truncated",
-            [limits::WARN_SURFACE, f64::INFINITY],
+            [limits::WARN_SURFACE, limits::REFUSE_TRANSITION],
         ),
         RowClass::FreeSurface | RowClass::LoadedSurface => (
             "at a surface that crosses the peridynamic zone, where families lack points",
