@@ -160,11 +160,8 @@ fn law_and_cells<'a>(
 }
 
 fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneError> {
-    let (kind, energy, stretch) = match spec {
-        MaterialSpec::BondBased(m) => ("bond-based", &m.fracture_energy, &m.critical_stretch),
-        MaterialSpec::Lps(m) => ("lps", &m.fracture_energy, &m.critical_stretch),
-        // the bonds of all others are known to first order only
-        _ => return Ok(None),
+    let Some((kind, energy, stretch)) = spec.fracture() else {
+        return Ok(None);
     };
     let place = |key: &str| format!("materials.{name}.{kind}.{key}");
     match (energy, stretch) {

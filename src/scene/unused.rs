@@ -29,15 +29,9 @@ impl<const D: usize> Parts<'_, D> {
     pub fn unused(&self) -> Vec<String> {
         let (mut list, joining) = (Vec::new(), self.scene.coupling.joining());
         for (name, material) in &self.spec.materials {
-            use super::spec::MaterialSpec::{BondBased, Correspondence, Lps};
-            let (energy, stretch) = match material {
-                BondBased(m) => (&m.fracture_energy, &m.critical_stretch),
-                Lps(m) => (&m.fracture_energy, &m.critical_stretch),
-                Correspondence(_) => continue,
-            };
-            let key = match (energy, stretch) {
-                (Some(_), _) => "fracture-energy",
-                (_, Some(_)) => "critical-stretch",
+            let key = match material.fracture() {
+                Some((_, Some(_), _)) => "fracture-energy",
+                Some((.., Some(_))) => "critical-stretch",
                 _ => continue,
             };
             if !(0..self.scene.mesh.cell_count()).any(|c| self.holds(c)) {

@@ -102,12 +102,9 @@ impl Base {
                 (Some(spacing) != cell).then_some((spacing, None))
             }
         });
-        let breaks = |m: &MaterialSpec| match m {
-            MaterialSpec::BondBased(m) => {
-                m.fracture_energy.is_some() || m.critical_stretch.is_some()
-            }
-            MaterialSpec::Lps(m) => m.fracture_energy.is_some() || m.critical_stretch.is_some(),
-            _ => false,
+        let breaks = |m: &MaterialSpec| {
+            let fracture = m.fracture();
+            fracture.is_some_and(|(_, energy, stretch)| energy.is_some() || stretch.is_some())
         };
         let solve = spec.solve.as_ref().map(|s| s.get_ref());
         let moves = !matches!(solve, None | Some(SolveSpec::Static(_)));

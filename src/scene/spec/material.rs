@@ -22,6 +22,17 @@ pub enum MaterialSpec {
     Correspondence(CorrespondenceSpec),
 }
 
+impl MaterialSpec {
+    /// The key of a material whose bonds can break, with its fracture energy and critical stretch; the bonds of all others are known to first order only.
+    pub fn fracture(&self) -> Option<(&'static str, &Option<Number>, &Option<Number>)> {
+        match self {
+            Self::BondBased(m) => Some(("bond-based", &m.fracture_energy, &m.critical_stretch)),
+            Self::Lps(m) => Some(("lps", &m.fracture_energy, &m.critical_stretch)),
+            _ => None,
+        }
+    }
+}
+
 /// The constants of a bond-based material.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
