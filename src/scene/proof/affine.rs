@@ -20,7 +20,7 @@ use crate::tensor::{Tensor, Tensor4, Vector};
 const CLASSIFIED: usize = 20_000;
 
 /// Relative difference up to which the forces of two rows count as alike.
-const ALIKE: f64 = 1e-6;
+const ALIKE: f64 = 1.0e-6;
 
 /// What is proved, with what several steps of it ask for.
 struct Subject<'a, const D: usize> {
