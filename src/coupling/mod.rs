@@ -12,7 +12,7 @@
 //! | `model.rs` | shared: sites, families, what completes them | |
 //! | `lattices.rs`, `lattice_axes.rs` | shared: one lattice of points, or several that elements keep apart; its axes | |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
-//! | `recovery.rs` | shared: second derivatives at places in elements | [ZienkiewiczZhu1992] |
+//! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
 //! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `need.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `motion.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |

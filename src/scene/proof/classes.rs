@@ -18,8 +18,9 @@ pub(super) mod limits {
     /// As [`REFUSE`], where the seam meets a surface: an incomplete family alone leaves less than 1. Surfaces alone are warned of, never refused: of rows that
     /// are nearly alike the one that is judged hangs on round-off, and so does the number.
     pub const REFUSE_SURFACE: f64 = 2.0;
-    /// As [`REFUSE`], where points of a transition zone lie at a surface: what is local of their rows knows nothing of a boundary, and a patch shows a third of what the whole zone does.
-    pub const REFUSE_TRANSITION: f64 = 0.5;
+    /// As [`REFUSE`], where points of a transition zone lie at a surface: what is local of their rows knows nothing of a boundary, and a patch shows a third of what the whole zone does. Small zones
+    /// beside one surface lie near 0.5.
+    pub const REFUSE_TRANSITION: f64 = 1.0;
 }
 
 /// Where rows that an affine field leaves out of balance lie.
