@@ -9,7 +9,7 @@
 //! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
-//! | `model.rs` | shared: sites, families, what completes them | |
+//! | `model.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
 //! | `lattices.rs`, `lattice_axes.rs` | shared: one lattice of points, or several that elements keep apart; its axes | |
 //! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
@@ -41,6 +41,7 @@ mod place;
 pub mod points;
 pub mod problem;
 mod recovery;
+mod rows;
 pub mod sample;
 pub mod single;
 pub mod splice;

@@ -10,7 +10,7 @@
 //! | `claim.rs` | who writes into a folder, so that no two runs write the same files |
 //! | `csv.rs` | values along a line or at probes, row by row |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
-//! | `summary.rs` | what one run did: sizes, choices, timings, balance |
+//! | `summary.rs`, `motion_summary.rs` | what one run did: sizes, choices, timings, balance; energies over time |
 //! | `proof.rs` | what was shown about a model before it was solved |
 //! | `switch.rs` | changes of the nonlocal zone during a run |
 //! | `progress.rs` | a bar on standard error, if that is a terminal |
@@ -26,6 +26,7 @@ pub mod figure;
 pub mod file;
 pub mod history;
 pub mod map;
+mod motion_summary;
 pub mod progress;
 pub mod proof;
 pub mod report;

@@ -9,7 +9,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::accuracy::{ANSWERS, TENTH};
 use super::peridynamics::Points;
 use super::predict::{Prediction, Share};
-use super::run::{self, RunError};
+use super::run_error::RunError;
+use super::setup;
 use super::solve::Solve;
 use super::spec::WeightsSpec;
 use super::validate::Scene;
@@ -116,7 +117,7 @@ impl Counts {
         let material = (scene.zones.iter().zip(&scene.cell_material))
             .find(|(zone, _)| **zone != Zone::Local)
             .map_or(0, |(_, m)| usize::from(*m));
-        let law = run::law(&scene.materials[material]);
+        let law = setup::law(&scene.materials[material]);
         let coupling = scene.coupling.build::<D>(Influence::Gaussian);
         let horizon: Vec<f64> = (0..mesh.cell_count())
             .map(|c| p.horizon_at(&mesh.centroid(c)))

@@ -1,6 +1,6 @@
 //! What a run does when the coupling that was chosen for it does not hold: it goes on with the next one, and says so.
 
-use super::run::RunError;
+use super::run_error::RunError;
 use super::validate::Scene;
 use crate::coupling::ModelError;
 

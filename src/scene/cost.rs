@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use super::run::Solved;
+use super::solution::Solved;
 use super::validate::Output;
 use super::write::{OverSites, Shown, snapshot, write};
 use crate::observe::ObserveError;

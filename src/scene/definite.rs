@@ -6,7 +6,7 @@ use crate::coupling::{Model, Operator};
 use crate::material::Kinematics;
 use crate::observe::summary::Choice;
 use crate::progress::Progress;
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::solve::FreeDofs;
 use crate::solve::direct::{Analysis, DirectError, DirectParams, Factor};
 use crate::solve::ordering::Ordering;

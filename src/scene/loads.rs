@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::conditions::{Condition, Prescribed, Support};
 use super::region::Region;
-use super::run::RunError;
+use super::run_error::RunError;
 use crate::coupling::tributary::{Detail, Parts};
 use crate::coupling::{CellRole, Model, SiteKind};
 use crate::fem;

@@ -13,6 +13,7 @@ use super::spec::{AxisSpec, CutoutSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
 use super::value::{Coordinates, Text};
 use crate::mesh::generate::{Axis, CutOut, Grid};
 use crate::mesh::{Mesh, MeshError, quality, read};
+use crate::observe::checkpoint::Fingerprint;
 
 /// The most cells that a generated mesh may have: beyond it a typing error is likelier than a wish.
 const MOST_CELLS: f64 = 1e8;
@@ -248,6 +249,34 @@ fn axis(
                 },
                 (fine[1] - fine[0]).abs() / spacing + growing,
             ))
+        }
+    }
+}
+
+/// Adds a mesh to the fingerprint of a scene: one from a file may change while its name stays.
+pub(super) fn add_mesh<const D: usize>(mesh: &Mesh<D>, print: &mut Fingerprint) {
+    for x in mesh.nodes.iter().flatten() {
+        print.add(&x.to_le_bytes());
+    }
+    for n in &mesh.connectivity {
+        print.add(&n.to_le_bytes());
+    }
+    for shape in &mesh.shapes {
+        print.add(&[*shape as u8]);
+    }
+    // conditions, materials and zones are given by them
+    let numbers = |list: &[u32]| -> Vec<u8> { list.iter().flat_map(|n| n.to_le_bytes()).collect() };
+    for sets in [&mesh.cell_sets, &mesh.node_sets] {
+        for (name, set) in sets {
+            print.add(name.as_bytes());
+            print.add(&numbers(set));
+        }
+        print.add(b"end of sets");
+    }
+    for (name, facets) in &mesh.facet_sets {
+        print.add(name.as_bytes());
+        for facet in facets {
+            print.add(&numbers(facet));
         }
     }
 }

@@ -17,14 +17,16 @@
 //! | `unused.rs` | parts of a scene that touch nothing |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `motion/` | scenes in time: what drives them, what they write, checkpoints |
-//! | `run.rs`, `write.rs` | `Scene` to model, solution, files |
+//! | `setup.rs` | `Scene` to the problem that is coupled, and the settings that a run keeps |
+//! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
+//! | `run.rs`, `write.rs` | the sequence of a run; its files |
 //! | `budget.rs` | the memory that a run may take, and the refusal of what needs more before anything is laid out |
 //! | `proof/` | what is shown about a model before it is solved |
 //! | `predict.rs`, `cost.rs` | what a run will need, without solving; what its outputs will cost |
 //! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
 //! | `converge.rs` | one scene at several refinements |
 //! | `template.rs` | commented scenes to start from |
-//! | `error.rs` | place, value and remedy |
+//! | `error.rs`, `run_error.rs` | place, value and remedy: of what is typed, and of what cannot be run |
 
 pub mod accuracy;
 mod agreement;
@@ -41,6 +43,7 @@ mod cost;
 pub(crate) mod default_points;
 mod definite;
 pub(crate) mod doubts;
+mod equilibrium;
 mod error;
 mod expression;
 mod follow;
@@ -59,6 +62,9 @@ mod proof;
 mod region;
 mod rotation;
 mod run;
+mod run_error;
+mod setup;
+mod solution;
 mod solve;
 mod source;
 pub mod spec;
@@ -83,7 +89,9 @@ pub use motion::{RunOptions, StartFrom};
 pub use peridynamics::{Peridynamics, Points};
 pub use predict::{MotionPrediction, Prediction, Share};
 pub use region::Region;
-pub use run::{RunError, Solved, solve_with};
+pub use run::solve_with;
+pub use run_error::RunError;
+pub use solution::Solved;
 pub use solve::{Explicit, QuasiStatic, Solve};
 pub use source::{Source, Span};
 pub use spec::SceneSpec;

@@ -13,10 +13,15 @@ use super::accuracy::ErrorPrediction;
 use super::budget;
 use super::cost::{made_up, output_seconds};
 use super::doubts::doubts;
+use super::equilibrium;
 use super::loads;
 use super::motion;
 use super::proof::{self, Subject};
-use super::run::{self, Rest, RunError, Solved};
+use super::run_error::RunError;
+use super::setup;
+use super::setup::Rest;
+use super::solution;
+use super::solution::Solved;
 use super::solve::Solve;
 use super::spec::{Joining, ZonesNeeded};
 use super::validate::Scene;
@@ -168,7 +173,7 @@ impl Planned {
     ) -> Result<Self, RunError> {
         let nonzeros = pattern.stored * D * D;
         let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-        let mut params = run::params(&rest.solver);
+        let mut params = equilibrium::params(&rest.solver);
         let stored = pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8;
         // a run holds the stiffness by then
         params.memory_limit = params
@@ -213,7 +218,7 @@ pub(crate) fn predict<const D: usize>(
     let title = scene.title.clone();
     let joining = scene.coupling.joining();
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
-    let (problem, rest) = run::problem(scene);
+    let (problem, rest) = setup::problem(scene);
     let (model, coupling) = Model::new(problem, progress)?;
     let operator = coupling.operator(&model)?;
     watch.lap(&mut timings, "sites and bonds");
@@ -244,7 +249,7 @@ pub(crate) fn predict<const D: usize>(
     let mut choices = rest.choices.clone();
     choices.extend(rest.placed.iter().cloned());
     choices.push(rest.coupling(joining));
-    let symmetry = run::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
+    let symmetry = equilibrium::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
     let Planned {
         analysis,
@@ -289,7 +294,7 @@ pub(crate) fn predict<const D: usize>(
                 BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
             },
         });
-        choices.extend(run::volumes_choice(&model));
+        choices.extend(setup::volumes_choice(&model));
     }
 
     let output_bytes = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
@@ -327,7 +332,7 @@ pub(crate) fn predict<const D: usize>(
         let pass = nonzeros as f64 * seconds_per_scalar() / threads;
         timings.add("iteration", PASSES * pass);
     }
-    let zones = run::zone_of_site(&model);
+    let zones = solution::zone_of_site(&model);
     let displacement = made_up(model.sites.len() * D);
     let made_up = Solved {
         model: &model,

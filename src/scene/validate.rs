@@ -16,7 +16,8 @@ use super::motion::RunOptions;
 use super::peridynamics::{self, Peridynamics, Points};
 use super::predict::{self, Prediction};
 use super::region::Region;
-use super::run::{self, RunError};
+use super::run;
+use super::run_error::RunError;
 use super::solve::Solve;
 use super::source::Source;
 use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
@@ -369,7 +370,7 @@ fn scene<const D: usize>(
     let clock = solve.clock();
     let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
     let initial = initial::initial(&spec.initial, &mesh, clock)?;
-    add_mesh(&mesh, &mut fingerprint);
+    meshing::add_mesh(&mesh, &mut fingerprint);
     let lay_out_as = |placed: Option<&Placed>,
                       instead: Option<&CouplingSpec>|
      -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
@@ -487,34 +488,6 @@ fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Choice> {
         choice: format!("points on a lattice of spacing {}", number(*spacing)),
         why: p.points_why.clone()?,
     })
-}
-
-/// A mesh from a file may change while its name stays.
-fn add_mesh<const D: usize>(mesh: &Mesh<D>, print: &mut Fingerprint) {
-    for x in mesh.nodes.iter().flatten() {
-        print.add(&x.to_le_bytes());
-    }
-    for n in &mesh.connectivity {
-        print.add(&n.to_le_bytes());
-    }
-    for shape in &mesh.shapes {
-        print.add(&[*shape as u8]);
-    }
-    // conditions, materials and zones are given by them
-    let numbers = |list: &[u32]| -> Vec<u8> { list.iter().flat_map(|n| n.to_le_bytes()).collect() };
-    for sets in [&mesh.cell_sets, &mesh.node_sets] {
-        for (name, set) in sets {
-            print.add(name.as_bytes());
-            print.add(&numbers(set));
-        }
-        print.add(b"end of sets");
-    }
-    for (name, facets) in &mesh.facet_sets {
-        print.add(name.as_bytes());
-        for facet in facets {
-            print.add(&numbers(facet));
-        }
-    }
 }
 
 /// Refuses a motion without inertia.

@@ -37,7 +37,7 @@ use versions::predicted_error;
 
 use super::error::SceneError;
 use super::predict::Prediction;
-use super::run::RunError;
+use super::run_error::RunError;
 use super::source::Source;
 use super::validate::{AnyScene, read};
 use crate::progress::Progress;

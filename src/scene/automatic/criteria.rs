@@ -6,7 +6,7 @@ use crate::coupling::need::{Criteria, Need, gradient_ratio};
 use crate::scene::conditions::Support;
 use crate::scene::error::SceneError;
 use crate::scene::materials::{Fracture, Law, Material};
-use crate::scene::{region, run};
+use crate::scene::{region, setup};
 use crate::tensor::{Tensor4, Vector};
 
 /// What is asked of the cells.
@@ -88,7 +88,7 @@ fn critical_stretch<const D: usize>(material: &Material<D>, horizon: f64) -> Opt
     match material.fracture? {
         Fracture::Stretch(s) => Some(s),
         Fracture::Energy(energy) => {
-            let bonds = run::law(material).bond_energy(horizon)?;
+            let bonds = setup::law(material).bond_energy(horizon)?;
             bonds.critical_stretch::<D>(energy, horizon).ok()
         }
     }

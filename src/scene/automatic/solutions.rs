@@ -7,10 +7,13 @@ use crate::coupling::{Coupling, Local, Model, Problem, Sampler, SiteKind, Zone};
 use crate::observe::summary::{Stopwatch, Timings};
 use crate::progress::Silent;
 use crate::scene::conditions::Condition;
+use crate::scene::equilibrium;
+use crate::scene::equilibrium::Equilibrium;
 use crate::scene::error::{SceneError, SceneErrorKind};
 use crate::scene::initial::InitialKind;
 use crate::scene::materials::Material;
-use crate::scene::run::{self, Equilibrium, RunError};
+use crate::scene::run_error::RunError;
+use crate::scene::setup;
 use crate::scene::solve::Solve;
 use crate::scene::source::Span;
 use crate::scene::validate::{Scene, Solver};
@@ -88,7 +91,7 @@ pub(super) fn state<const D: usize>(
 /// # Errors
 /// What the solution complains of.
 pub(super) fn coupled<const D: usize>(scene: Scene<D>, span: &Span) -> Result<Kept<D>, SceneError> {
-    let (problem, rest) = run::problem(scene);
+    let (problem, rest) = setup::problem(scene);
     solved(problem, &rest.conditions, &rest.solver, 0.0).map_err(|error| {
         unsolved(&error, "with a zone around cracks and voids", span)
             .help("draw the zone, [zones.nonlocal], to see what the scene lacks")
@@ -160,8 +163,8 @@ fn solved<const D: usize>(
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(&model)?;
     watch.lap(&mut timings, "assembly");
-    let equilibrium = run::equilibrium(
-        &run::At {
+    let equilibrium = equilibrium::equilibrium(
+        &equilibrium::At {
             model: &model,
             coupling: coupling.as_ref(),
             operator: operator.as_ref(),

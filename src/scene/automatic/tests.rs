@@ -7,7 +7,7 @@ use crate::coupling::{Model, Motion, Zone};
 use crate::peridynamics::kernel::Kinematics;
 use crate::progress::Silent;
 use crate::scene::validate::{AnyScene, Scene};
-use crate::scene::{SceneError, SceneErrorKind, Source, run, solve_with};
+use crate::scene::{SceneError, SceneErrorKind, Source, setup, solve_with};
 
 /// A plate 2 by 1 that is pulled, with cells and points of 0.05 and a horizon of 0.15.
 const PLATE: &str = r#"
@@ -251,7 +251,7 @@ fn wrong_zones_are_refused_with_the_key_and_the_remedy() {
 #[test]
 fn a_scene_allocates_what_it_needs() {
     // no bond and no point where all is local
-    let (problem, _) = run::problem(bar(&[]));
+    let (problem, _) = setup::problem(bar(&[]));
     let (model, coupling) = Model::new(problem, &Silent).expect("a model");
     assert!(model.body().is_none());
     assert_eq!(model.spacing(), 0.0);
@@ -264,7 +264,7 @@ fn a_scene_allocates_what_it_needs() {
     assert_eq!((stiffness.block, stiffness.dofs()), (1, 201));
     // of a lattice that moves, bits of damage where bonds can break and none where they cannot
     let crack = "cracks.slit.segment={from=[0.8,0.5],to=[1.2,0.5]}";
-    let (problem, _) = run::problem(plate(&[crack, LENIENT]));
+    let (problem, _) = setup::problem(plate(&[crack, LENIENT]));
     let (model, coupling) = Model::new(problem, &Silent).expect("a model");
     let operator = coupling.operator(&model).expect("rows");
     let bits = |critical_stretch: Option<f64>| {

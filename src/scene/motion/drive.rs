@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::coupling::Model;
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::loads::{Loads, displacement, holders};
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::solve::explicit::Drive;
 use crate::tensor::Vector;
 

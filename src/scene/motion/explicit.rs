@@ -23,7 +23,10 @@ use crate::observe::summary::{
 use crate::progress::Progress;
 use crate::scene::doubts::warnings;
 use crate::scene::loads;
-use crate::scene::run::{self, Rest, RunError, Solved};
+use crate::scene::run_error::RunError;
+use crate::scene::setup::Rest;
+use crate::scene::solution;
+use crate::scene::solution::Solved;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::scene::validate::Scene;
@@ -191,7 +194,7 @@ fn leg<'r, const D: usize>(
         From::Switch(between) => before.after_switch(*between)?,
     };
     let breaks = breaks(moving.system.as_ref(), rest);
-    let zones = run::zone_of_site(model);
+    let zones = solution::zone_of_site(model);
     let is_linear = moving.is_linear;
     let balance = proved.map_or(Balance::Watched, |_| Balance::Proved);
     let mut guard = Guard::new(model, balance, spec, is_linear, pace.steps, seen);

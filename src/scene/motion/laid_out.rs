@@ -9,7 +9,9 @@ use crate::observe::proof::Proof;
 use crate::observe::summary::{Choice, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
 use crate::scene::proof::{self, Subject, growth};
-use crate::scene::run::{self, Rest, RunError};
+use crate::scene::run_error::RunError;
+use crate::scene::setup;
+use crate::scene::setup::Rest;
 use crate::scene::spec::Joining;
 use crate::scene::validate::Scene;
 use crate::system::Dynamic;
@@ -54,7 +56,7 @@ pub(super) fn begun<const D: usize>(scene: Scene<D>) -> (Begun, Problem<D>, Rest
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
     }
-    let (problem, rest) = run::problem(scene);
+    let (problem, rest) = setup::problem(scene);
     let begun = Begun {
         title,
         joining,
@@ -84,7 +86,7 @@ pub(super) fn lay_out<const D: usize, T>(
         mut watch,
     } = begun;
     let (model, coupling) = Model::new(problem, progress)?;
-    choices.extend(run::volumes_choice(&model));
+    choices.extend(setup::volumes_choice(&model));
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;

@@ -32,7 +32,7 @@ mod watch;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::predict::Prediction;
-use super::run::RunError;
+use super::run_error::RunError;
 use super::solve::Solve;
 use super::validate::Scene;
 use crate::observe::checkpoint::Pace;

@@ -7,7 +7,7 @@ use crate::observe::{proof::Part, report::number, summary::Choice};
 use crate::scene::conditions::Condition;
 use crate::scene::loads::holders;
 use crate::scene::proof::growth::{self, Asked};
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::BeyondLimitSpec;
 use crate::solve::explicit::State;

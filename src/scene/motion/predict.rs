@@ -18,7 +18,9 @@ use crate::scene::budget;
 use crate::scene::cost::{TrialFolder, file_seconds, made_up};
 use crate::scene::predict::{MotionPrediction, OUTPUT_BYTES, Planned, Prediction, Share, warnings};
 use crate::scene::proof::growth::Asked;
-use crate::scene::run::{self, RunError, Solved};
+use crate::scene::run_error::RunError;
+use crate::scene::solution;
+use crate::scene::solution::Solved;
 use crate::scene::solve::{Explicit as Spec, QuasiStatic};
 use crate::scene::spec::LoadStepSpec;
 use crate::scene::validate::{Output, Scene};
@@ -199,7 +201,7 @@ fn steps<const D: usize>(
             operator: laid_out.operator,
             displacement: &u,
             residual: &[],
-            zone_of_site: &run::zone_of_site(model),
+            zone_of_site: &solution::zone_of_site(model),
             broken: &[],
         };
         let mut series = Series::new(folder.path(), "trial");

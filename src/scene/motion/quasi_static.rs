@@ -20,9 +20,13 @@ use crate::observe::summary::{
 };
 use crate::progress::Progress;
 use crate::scene::doubts::warnings;
+use crate::scene::equilibrium;
 use crate::scene::loads;
 use crate::scene::rotation::Rotations;
-use crate::scene::run::{self, Rest, RunError, Solved};
+use crate::scene::run_error::RunError;
+use crate::scene::setup::Rest;
+use crate::scene::solution;
+use crate::scene::solution::Solved;
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
 use crate::scene::validate::Scene;
@@ -121,7 +125,7 @@ fn load_steps<const D: usize>(
         saved.as_ref().map(|s| &s.written),
     )?;
     recorder.hold(drive.holders());
-    let zones = run::zone_of_site(model);
+    let zones = solution::zone_of_site(model);
     let solved =
         |moment: &Moment<'_>, visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
             visit(&Solved {
@@ -320,7 +324,7 @@ fn factors<const D: usize>(
     choices: &mut Vec<Choice>,
     progress: &dyn Progress,
 ) -> Result<Option<Factor>, RunError> {
-    let params = run::params(&rest.solver);
+    let params = equilibrium::params(&rest.solver);
     if !may_factorise(model, params.method, symmetry) {
         return Ok(None);
     }

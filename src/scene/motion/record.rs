@@ -15,7 +15,7 @@ use crate::observe::history::History;
 use crate::observe::series::Series;
 use crate::observe::switch::Switch;
 use crate::scene::conditions::Condition;
-use crate::scene::run::Solved;
+use crate::scene::solution::Solved;
 use crate::scene::validate::{Output, Tip};
 use crate::scene::write::{OverSites, Shown, snapshot};
 use crate::solve::explicit::State;

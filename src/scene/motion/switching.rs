@@ -3,7 +3,7 @@
 use crate::coupling::{Carried, Model};
 use crate::fem;
 use crate::observe::switch::Switch;
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::solve::explicit::{Drive, State};
 use crate::system::Dynamic;
 use crate::tensor::Vector;

@@ -9,9 +9,11 @@ use crate::peridynamics::fracture;
 use crate::peridynamics::kernel::{Kinematics, Storage};
 use crate::progress::Progress;
 use crate::scene::definite;
+use crate::scene::equilibrium;
 use crate::scene::initial::{Initial, InitialKind};
 use crate::scene::materials::Fracture;
-use crate::scene::run::{self, Rest, RunError};
+use crate::scene::run_error::RunError;
+use crate::scene::setup::Rest;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
 use crate::system::{Dynamic, LinearMotion};
@@ -141,7 +143,7 @@ pub(super) fn dynamic<'a, const D: usize>(
         }
         Err(error) if is_linear => {
             let stiffness = model.assemble(operator, progress);
-            let symmetry = run::symmetry(coupling, || stiffness.asymmetry(), choices);
+            let symmetry = equilibrium::symmetry(coupling, || stiffness.asymmetry(), choices);
             choices.push(Choice {
                 choice: "assembled stiffness instead of bonds".to_owned(),
                 why: reason(&error),

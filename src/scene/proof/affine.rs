@@ -12,7 +12,7 @@ use crate::observe::proof::Part;
 use crate::progress::Progress;
 use crate::scene::conditions::{Condition, Support};
 use crate::scene::loads::holders;
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::scene::spec::PrecisionSpec;
 use crate::tensor::{Tensor, Tensor4, Vector};
 

@@ -3,7 +3,7 @@
 use crate::coupling::{Model, Operator};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::scene::spec::{CouplingSpec, GrowingModesSpec};
 use crate::solve::growth::{Evidence, Growth, LARGEST_GAIN, growth};
 use crate::system::{Dynamic, Symmetry};

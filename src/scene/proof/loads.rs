@@ -11,7 +11,7 @@ use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
 use crate::scene::conditions::{Components, Condition, Prescribed, Support};
 use crate::scene::loads::{Loads, cells_of, may_bound_zone, nearest_points, site_of_node};
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::system::Symmetry;
 use crate::tensor::Vector;
 

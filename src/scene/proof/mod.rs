@@ -22,7 +22,8 @@ mod quadratic;
 mod surface;
 mod symmetry;
 
-use super::run::{Rest, RunError};
+use super::run_error::RunError;
+use super::setup::Rest;
 use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::proof::{Part, Proof, Severity};
 use crate::progress::Progress;

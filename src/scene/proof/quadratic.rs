@@ -11,7 +11,7 @@ use crate::assembly::Row;
 use crate::coupling::{CellRole, SiteKind};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::peridynamics::PdBody;
-use crate::scene::run::RunError;
+use crate::scene::run_error::RunError;
 use crate::tensor::{Tensor, Tensor4, Vector};
 
 /// Error of the strain over its change across the zone, as this check predicts it, from which on it is warned of: elements of two spacings beside a right seam err as much.
