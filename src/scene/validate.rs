@@ -20,7 +20,9 @@ use super::run;
 use super::run_error::RunError;
 use super::solve::Solve;
 use super::source::Source;
-use super::spec::{CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, ZonesNeeded};
+use super::spec::{
+    CouplingSpec, InfluenceSpec, KinematicsSpec, SceneSpec, UnprovenSpec, ZonesNeeded,
+};
 use super::unused::Parts;
 use super::{
     agreement, automatic, bodies, breaking, budget, chosen, follow, initial, joined, obstacles,
@@ -99,6 +101,8 @@ pub struct Solver {
     pub ordering: Ordering,
     /// Relative residual.
     pub tolerance: f64,
+    /// What becomes of a model whose proof refuses it.
+    pub unproven: UnprovenSpec,
     /// Most iterations.
     pub max_iterations: usize,
 }
@@ -547,6 +551,7 @@ fn solver(spec: &SceneSpec) -> Result<Solver, SceneError> {
     Ok(Solver {
         method: s.method,
         ordering: s.ordering,
+        unproven: s.unproven,
         tolerance,
         max_iterations,
     })

@@ -72,4 +72,12 @@ fn transition_zones_at_the_surface_are_refused() {
         let check = case.command("check", &[]);
         assert!(!check.status.success());
     }
+    // whoever wants to see it all the same says so
+    let case = Case::new(STRESS);
+    let summary = case.run(&["--set", "solver.unproven=warn"]).unwrap();
+    let warnings = summary["warnings"].to_string();
+    assert!(
+        warnings.contains("transition zone meets the surface"),
+        "{warnings}"
+    );
 }

@@ -24,6 +24,7 @@ mod symmetry;
 
 use super::run_error::RunError;
 use super::setup::Rest;
+use super::spec::UnprovenSpec;
 use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::proof::{Part, Proof, Severity};
 use crate::progress::Progress;
@@ -59,9 +60,14 @@ pub(super) fn prove<const D: usize>(
         symmetry::part(subject),
         quadratic::part(subject)?,
     ];
-    Ok(Proof {
+    let mut proof = Proof {
         parts: parts.into_iter().flatten().collect(),
-    })
+    };
+    if subject.rest.solver.unproven == UnprovenSpec::Warn {
+        let findings = proof.parts.iter_mut().flat_map(|p| &mut p.findings);
+        findings.for_each(|f| f.severity = Severity::Warning);
+    }
+    Ok(proof)
 }
 
 /// Refuses what a proof does not hold for.

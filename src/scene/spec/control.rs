@@ -26,6 +26,20 @@ pub struct SolverSpec {
     /// Elimination order of the direct solver.
     #[serde(default)]
     pub ordering: Ordering,
+    /// What becomes of a model whose proof refuses it: affine or quadratic fields come out wrong, or loads do not add up.
+    #[serde(default)]
+    pub unproven: UnprovenSpec,
+}
+
+/// What becomes of a model whose proof refuses it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum UnprovenSpec {
+    /// It is not solved.
+    #[default]
+    Refuse,
+    /// It is solved, with a warning.
+    Warn,
 }
 
 /// What is written, and where.

@@ -13,7 +13,7 @@ mod region;
 pub use condition::{
     BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VelocitySpec, VoidSpec,
 };
-pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec};
+pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec, UnprovenSpec};
 pub use coupling::{
     BetaSpec, BlendingSpec, CouplingSpec, CutBondsSpec, FormSpec, InterfaceSpec, Joining,
     LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
