@@ -510,52 +510,26 @@ impl<'a> Reader<'a> {
         if self.source.encoding == Encoding::Binary {
             return self.at;
         }
-        let rest = &self.source.bytes[self.at..];
-        self.at
-            + rest
-                .iter()
-                .position(|b| !b.is_ascii_whitespace())
-                .unwrap_or(rest.len())
+        self.source.next(self.at)
     }
 
     fn skip_space(&mut self) {
-        let rest = &self.source.bytes[self.at..];
-        self.at += rest
-            .iter()
-            .position(|b| !b.is_ascii_whitespace())
-            .unwrap_or(rest.len());
+        self.at = self.source.next(self.at);
     }
 
     /// The rest of the line, trimmed; what is not UTF-8 reads as nothing.
     fn line(&mut self) -> &'a str {
-        let rest = &self.source.bytes[self.at..];
-        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
-        self.at += (length + 1).min(rest.len());
-        std::str::from_utf8(&rest[..length]).unwrap_or("").trim()
+        let (text, next) = self.source.line(self.at);
+        self.at = next;
+        text
     }
 
     fn truncated(&self, wanted: &str) -> MeshError {
-        MeshError::Truncated {
-            path: self.source.path.clone(),
-            place: self.source.place(self.at),
-            section: self.section.clone(),
-            wanted: wanted.into(),
-        }
+        self.source.truncated(self.at, &self.section, wanted)
     }
 
     fn syntax_at(&self, at: usize, found: &str, wanted: &str) -> MeshError {
-        let found: String = found.chars().take(60).collect();
-        MeshError::Syntax {
-            path: self.source.path.clone(),
-            place: self.source.place(at),
-            found: if found.is_empty() {
-                "nothing legible".into()
-            } else {
-                format!("\"{found}\"")
-            },
-            wanted: wanted.into(),
-            remedy: REWRITE,
-        }
+        self.source.syntax(at, found, wanted, REWRITE)
     }
 
     fn unsupported(&self, at: usize, what: &str, remedy: &'static str) -> MeshError {

@@ -70,7 +70,48 @@ pub(super) enum Encoding {
     Binary,
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    /// Where the next word begins: after blanks and line ends from byte `at` on.
+    pub fn next(&self, at: usize) -> usize {
+        let rest = &self.bytes[at..];
+        let blanks = rest.iter().position(|b| !b.is_ascii_whitespace());
+        at + blanks.unwrap_or(rest.len())
+    }
+
+    /// The rest of the line from byte `at` on, trimmed, and where the next one begins; what is not UTF-8 reads as nothing.
+    pub fn line(&self, at: usize) -> (&'a str, usize) {
+        let rest = &self.bytes[at..];
+        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+        let text = std::str::from_utf8(&rest[..length]).unwrap_or("").trim();
+        (text, at + (length + 1).min(rest.len()))
+    }
+
+    /// The file ends at byte `at`, where `wanted` should stand.
+    pub fn truncated(&self, at: usize, section: &str, wanted: &str) -> MeshError {
+        MeshError::Truncated {
+            path: self.path.clone(),
+            place: self.place(at),
+            section: section.to_owned(),
+            wanted: wanted.into(),
+        }
+    }
+
+    /// `found` stands at byte `at` instead of `wanted`.
+    pub fn syntax(&self, at: usize, found: &str, wanted: &str, remedy: &'static str) -> MeshError {
+        let found: String = found.chars().take(60).collect();
+        MeshError::Syntax {
+            path: self.path.clone(),
+            place: self.place(at),
+            found: if found.is_empty() {
+                "nothing legible".into()
+            } else {
+                format!("\"{found}\"")
+            },
+            wanted: wanted.into(),
+            remedy,
+        }
+    }
+
     /// The place of byte `at`.
     pub fn place(&self, at: usize) -> Place {
         match self.encoding {

@@ -461,41 +461,22 @@ impl<'a> Reader<'a> {
 
     /// Where the next word begins.
     fn next(&self) -> usize {
-        let rest = &self.source.bytes[self.at..];
-        let blanks = rest.iter().position(|b| !b.is_ascii_whitespace());
-        self.at + blanks.unwrap_or(rest.len())
+        self.source.next(self.at)
     }
 
     /// The rest of the line, trimmed; what is not UTF-8 reads as nothing.
     fn line(&mut self) -> &'a str {
-        let rest = &self.source.bytes[self.at..];
-        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
-        self.at += (length + 1).min(rest.len());
-        std::str::from_utf8(&rest[..length]).unwrap_or("").trim()
+        let (text, next) = self.source.line(self.at);
+        self.at = next;
+        text
     }
 
     fn truncated(&self, wanted: &str) -> MeshError {
-        MeshError::Truncated {
-            path: self.source.path.clone(),
-            place: self.source.place(self.at),
-            section: self.section.clone(),
-            wanted: wanted.into(),
-        }
+        self.source.truncated(self.at, &self.section, wanted)
     }
 
     fn syntax(&self, at: usize, found: &str, wanted: &str) -> MeshError {
-        let found: String = found.chars().take(60).collect();
-        MeshError::Syntax {
-            path: self.source.path.clone(),
-            place: self.source.place(at),
-            found: if found.is_empty() {
-                "nothing legible".into()
-            } else {
-                format!("\"{found}\"")
-            },
-            wanted: wanted.into(),
-            remedy: REWRITE,
-        }
+        self.source.syntax(at, found, wanted, REWRITE)
     }
 }
 

@@ -19,39 +19,16 @@ pub(super) struct Storage {
 
 /// The type of numbers that VTK calls `name`.
 pub(super) fn kind(name: &str) -> Option<Kind> {
+    let integer = |bytes, signed| Kind::Integer { bytes, signed };
     Some(match name {
-        "Int8" => Kind::Integer {
-            bytes: 1,
-            signed: true,
-        },
-        "UInt8" => Kind::Integer {
-            bytes: 1,
-            signed: false,
-        },
-        "Int16" => Kind::Integer {
-            bytes: 2,
-            signed: true,
-        },
-        "UInt16" => Kind::Integer {
-            bytes: 2,
-            signed: false,
-        },
-        "Int32" => Kind::Integer {
-            bytes: 4,
-            signed: true,
-        },
-        "UInt32" => Kind::Integer {
-            bytes: 4,
-            signed: false,
-        },
-        "Int64" => Kind::Integer {
-            bytes: 8,
-            signed: true,
-        },
-        "UInt64" => Kind::Integer {
-            bytes: 8,
-            signed: false,
-        },
+        "Int8" => integer(1, true),
+        "UInt8" => integer(1, false),
+        "Int16" => integer(2, true),
+        "UInt16" => integer(2, false),
+        "Int32" => integer(4, true),
+        "UInt32" => integer(4, false),
+        "Int64" => integer(8, true),
+        "UInt64" => integer(8, false),
         "Float32" => Kind::Real { bytes: 4 },
         "Float64" => Kind::Real { bytes: 8 },
         _ => return None,
