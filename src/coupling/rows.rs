@@ -1,0 +1,92 @@
+//! Rows of a model: those of its elements, and all of them assembled.
+
+use crate::{
+    assembly::{self, Row},
+    coupling::{CellRole, Model, Operator},
+    fem,
+    progress::Progress,
+    system::BlockCsr,
+};
+
+impl<const D: usize> Model<D> {
+    /// Adds the finite-element row of a node: all cells around it but those whose stress is a partial stress.
+    pub fn add_element_rows(&self, site: usize, row: &mut Row<D>) {
+        for (c, local) in self.cells_of_site(site) {
+            if self.roles[c] == CellRole::StressElement || !self.node_takes(c) {
+                continue;
+            }
+            let stiffness = || fem::stiffness(&self.mesh, c, self.tensor_of_cell(c));
+            let blocks = row.element_row(c, local, stiffness);
+            for (b, &n) in self.mesh.cell(c).iter().enumerate() {
+                row.add(&self.node_transfer, n as usize, &blocks[b]);
+            }
+        }
+    }
+
+    /// Adds the force that the finite elements around a node of the mesh exert on it, all by their classical law and none that overlaps: the gradient of their own energy.
+    pub fn add_own_element_rows(&self, node: u32, row: &mut Row<D>) {
+        let (offsets, cells) = self.node_cells();
+        for &c in &cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize] {
+            let c = c as usize;
+            let cell = self.mesh.cell(c);
+            let Some(local) = cell.iter().position(|&n| n == node) else {
+                continue;
+            };
+            if !self.is_element(c) {
+                continue;
+            }
+            let stiffness = || fem::stiffness(&self.mesh, c, self.tensor_of_cell(c));
+            let blocks = row.element_row(c, local, stiffness);
+            for (b, &n) in cell.iter().enumerate() {
+                row.add(&self.node_transfer, n as usize, &blocks[b]);
+            }
+        }
+    }
+
+    /// Adds the row that a site has in the stiffness: that of the operator times its [`Model::row_scale`].
+    pub fn add_scaled_row(&self, operator: &dyn Operator<D>, site: usize, row: &mut Row<D>) {
+        operator.add_row(site, row);
+        if let Some(scale) = self.row_scale() {
+            row.scale(scale[site]);
+        }
+    }
+
+    /// Assembles the stiffness: the rows of the operator, each times its [`Model::row_scale`].
+    pub fn assemble(&self, operator: &dyn Operator<D>, progress: &dyn Progress) -> BlockCsr {
+        progress.stage("assembly", Some(self.sites.len() as u64));
+        let matrix = assembly::assemble(
+            self.sites.len(),
+            |by| progress.advance(by),
+            |site, row| self.add_scaled_row(operator, site, row),
+        );
+        progress.finish();
+        matrix
+    }
+
+    /// Assembles the rows as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
+    pub fn assemble_unscaled(&self, operator: &dyn Operator<D>) -> BlockCsr {
+        assembly::assemble(
+            self.sites.len(),
+            |_| (),
+            |site, row| operator.add_row(site, row),
+        )
+    }
+
+    /// The pattern of the stiffness, without its values, and its products with `fields`.
+    pub fn pattern(
+        &self,
+        operator: &dyn Operator<D>,
+        fields: &[Vec<f64>],
+        progress: &dyn Progress,
+    ) -> assembly::Pattern {
+        progress.stage("pattern", Some(self.sites.len() as u64));
+        let pattern = assembly::pattern(
+            self.sites.len(),
+            fields,
+            |by| progress.advance(by),
+            |site, row| self.add_scaled_row(operator, site, row),
+        );
+        progress.finish();
+        pattern
+    }
+}

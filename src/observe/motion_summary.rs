@@ -1,0 +1,210 @@
+//! What one run in time did: why it ended, its energies, growth without work, rotation.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::cracks::CrackSummary;
+use super::report::number;
+use super::summary::{components, grouped};
+use super::switch::{self, Switch};
+
+/// Why a run in time ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ended {
+    /// It reached the end of the scene.
+    Finished,
+    /// It was interrupted; its checkpoint takes it up again.
+    Interrupted,
+    /// Damage reached the edge of the nonlocal zone.
+    DamageAtEdge,
+    /// The motion gained more energy without work than the scene allows.
+    EnergyGained,
+    /// An element rotated more than the scene allows.
+    ElementsRotated,
+}
+
+/// Energy that a motion gained without work: what a coupling of unsymmetric stiffness feeds to it.
+///
+/// Parts are those of the largest energy so far, or of the work where that is larger.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EnergyGain {
+    /// The largest part; negative where energy was only lost.
+    pub largest: f64,
+    /// The step at which it was found.
+    pub step: u64,
+    /// The time of that step.
+    pub time: f64,
+    /// The part at which the run stops.
+    pub limit: f64,
+    /// Step and time at which it first went beyond 1 %.
+    pub first_told: Option<(u64, f64)>,
+}
+
+impl EnergyGain {
+    /// What a summary warns of, from 1 % on.
+    pub fn warning(&self) -> Option<String> {
+        let (step, time) = self.first_told?;
+        Some(format!(
+            "the motion gained {:.1} % of its largest energy without work by step {}, t = {} (1 % at step {step}, t = {}): the stiffness is not symmetric, and the seam feeds its modes; results from there on are not to be trusted: make the run shorter, or use coupling.truncated",
+            100.0 * self.largest,
+            self.step,
+            number(self.time),
+            number(time)
+        ))
+    }
+}
+
+/// The largest rotation of a finite element, where it matters: elements are linear.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rotation {
+    /// The angle in degrees.
+    pub degrees: f64,
+    /// The centre of the element.
+    pub place: Vec<f64>,
+    /// Step and time, of a run in time or under a load that grows.
+    pub when: Option<(u64, f64)>,
+    /// What linear elements add to lengths at this angle, `1/cos θ − 1`.
+    pub length_error: f64,
+    /// Energy of the misfit between elements and a zone of exact bonds, as a part of the largest energy of the run; none where bonds are linear as well, or nothing moves.
+    pub energy_error: Option<f64>,
+}
+
+impl Rotation {
+    /// What a summary warns of.
+    pub fn warning(&self) -> String {
+        let when = self.when.map_or_else(String::new, |(step, time)| {
+            format!(" at step {step}, t = {}", number(time))
+        });
+        let energy = match self.energy_error {
+            Some(part) if part < 1.0 => format!(
+                "; against the exact bonds of the nonlocal zone that takes an estimated {} % of the energy of the run",
+                number(100.0 * part)
+            ),
+            Some(_) => "; against the exact bonds of the nonlocal zone that takes all of the energy of the run"
+                .to_owned(),
+            None => String::new(),
+        };
+        format!(
+            "a finite element at ({}) has rotated by {:.1} degrees{when}: elements are linear, and rotated by so much they are {} % too large{energy}; where that matters let coupling = \"nonlocal\" carry what rotates",
+            components(&self.place),
+            self.degrees,
+            number(100.0 * self.length_error)
+        )
+    }
+}
+
+/// What became of a scene in time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionSummary {
+    /// Why it ended.
+    pub ended: Ended,
+    /// Steps since the beginning, those before a checkpoint included.
+    pub steps: u64,
+    /// Steps to the end of the scene.
+    pub of_steps: u64,
+    /// Time reached.
+    pub time: f64,
+    /// The time step.
+    pub step: f64,
+    /// The largest step that is taken to be stable; none where load steps are solved.
+    pub stable_step: Option<f64>,
+    /// Kinetic energy at the end.
+    pub kinetic_energy: f64,
+    /// Energy stored in the bodies at the end.
+    pub stored_energy: f64,
+    /// Work of loads and supports.
+    pub external_work: f64,
+    /// Energy at the start and work, less kinetic and stored energy: what broken bonds took, and what the seam did.
+    pub missing_energy: f64,
+    /// Energy gained without work; none of a motion whose balance closes by construction.
+    pub energy_gain: Option<EnergyGain>,
+    /// What breaking bonds cost; none where none can break.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cracks: Option<CrackSummary>,
+    /// Bonds broken, each once for each direction.
+    pub broken_bonds: u64,
+    /// When damage reached the edge of the nonlocal zone, and where.
+    pub edge_reached: Option<(f64, Vec<f64>)>,
+    /// Steps per second of this run, writing included.
+    pub steps_per_second: f64,
+    /// When the nonlocal zone changed, and what that cost, of a zone that follows the crack.
+    pub switches: Vec<Switch>,
+    /// What the nonlocal zone has of the body's volume at the start, the most that it had, and at the end.
+    pub nonlocal_share: [f64; 3],
+}
+
+impl MotionSummary {
+    pub(super) fn write(&self, dimension: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let share = self.stable_step.map_or_else(String::new, |stable| {
+            format!(" ({:.1} % of the stable step)", 100.0 * self.step / stable)
+        });
+        writeln!(
+            f,
+            "time                   {} after {} of {} steps of {}{share}",
+            number(self.time),
+            self.steps,
+            self.of_steps,
+            number(self.step)
+        )?;
+        writeln!(
+            f,
+            "speed                  {} steps/s",
+            number(self.steps_per_second)
+        )?;
+        for (name, value) in [
+            ("kinetic energy", self.kinetic_energy),
+            ("stored energy", self.stored_energy),
+            ("external work", self.external_work),
+        ] {
+            writeln!(f, "{name:<22} {}", number(value))?;
+        }
+        if let Some(cracks) = &self.cracks {
+            cracks.write(dimension, f)?;
+        }
+        // load steps leave out the motion of what breaks
+        let rest = match self.stable_step {
+            None if self.cracks.is_some() => "set free by breaking",
+            _ => "energy not accounted",
+        };
+        let dissipated = self.cracks.map_or(0.0, |c| c.dissipated_energy);
+        writeln!(f, "{rest:<22} {}", number(self.missing_energy - dissipated))?;
+        if self.broken_bonds > 0 {
+            writeln!(
+                f,
+                "broken bonds           {}",
+                grouped(self.broken_bonds as usize)
+            )?;
+        }
+        switch::write(&self.switches, self.nonlocal_share, f)?;
+        if let Some((time, place)) = &self.edge_reached {
+            writeln!(
+                f,
+                "warning: damage reached the edge of the nonlocal zone at t = {}, ({}): enlarge [zones.nonlocal] there",
+                number(*time),
+                components(place)
+            )?;
+        }
+        match self.ended {
+            Ended::Finished => Ok(()),
+            Ended::Interrupted => writeln!(f, "interrupted            go on with --resume"),
+            Ended::DamageAtEdge => writeln!(
+                f,
+                "stopped                where damage reached that edge; zones.damage-at-edge = \"warn\" goes on"
+            ),
+            Ended::EnergyGained => {
+                let limit = self.energy_gain.map_or(0.0, |g| g.limit);
+                writeln!(
+                    f,
+                    "stopped                where energy gained without work passed {} % of the largest; solve.explicit.largest-energy-gain sets the part",
+                    number(100.0 * limit)
+                )
+            }
+            Ended::ElementsRotated => writeln!(
+                f,
+                "stopped                where an element rotated beyond largest-rotation"
+            ),
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Why a scene that is right could not be run.
+
+use crate::coupling::motion::MotionError;
+use crate::coupling::{CarryError, ModelError};
+use crate::observe::ObserveError;
+use crate::observe::checkpoint::CheckpointError;
+use crate::peridynamics::FractureError;
+use crate::solve::explicit::ExplicitError;
+use crate::solve::quasi_static::QuasiStaticError;
+use crate::solve::stable_step::StepError;
+use crate::solve::statics::StaticError;
+use crate::solve::sub_cycling::SubCyclingError;
+
+/// Why a scene that is right could not be run.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The model cannot be built.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The system cannot be solved.
+    #[error(transparent)]
+    Solve(#[from] StaticError),
+    /// A result cannot be written.
+    #[error(transparent)]
+    Observe(#[from] ObserveError),
+    /// The motion cannot start or go on.
+    #[error(transparent)]
+    Explicit(#[from] ExplicitError),
+    /// The run cannot go on from a checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A load step has no solution.
+    #[error(transparent)]
+    QuasiStatic(#[from] QuasiStaticError),
+    /// The time step, or the model at any step, is not stable.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// A mode of the coupled model doubles the energy within the run, whatever the step.
+    #[error(
+        "this model is unstable in time at any step: a mode largest at ({}) grows as exp({rate:e} t), by exp({gain:.1}) over the run (eigenvalue {real:e} + {imaginary:e} i of M⁻¹K, which should be real and positive); {remedy}; or let it begin with solve.explicit.growing-modes = \"warn\"", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+    )]
+    Grows {
+        /// Where the mode is largest.
+        place: Vec<f64>,
+        /// σ \[1/s\].
+        rate: f64,
+        /// σ times the duration of the run.
+        gain: f64,
+        /// Real part of its eigenvalue \[1/s²\].
+        real: f64,
+        /// Imaginary part.
+        imaginary: f64,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The stiffest sites cannot take sub-steps.
+    #[error(transparent)]
+    SubCycling(#[from] SubCyclingError),
+    /// The bonds cannot move.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// The fracture energy gives no critical stretch.
+    #[error("the material of the points cannot break: {0}")]
+    Fracture(#[from] FractureError),
+    /// The seam may have a negative stiffness, and nothing shows that it has none.
+    #[error(
+        "Poisson's ratio {typed:.4} is below {pairwise:.4}, that of bonds that act alone, and the seam of coupling `truncated` then has dilatations of a negative stiffness: {what}; couple by splice or blending, or take a larger poisson-ratio"
+    )]
+    Indefinite {
+        /// What was found.
+        what: String,
+        /// Poisson's ratio of the material.
+        typed: f64,
+        /// The ratio of a pairwise law.
+        pairwise: f64,
+    },
+    /// No coupling that the program would choose holds.
+    #[error(
+        "no coupling holds of those that suit a scene that names none. `{first}`: {reason}. `{second}`: {error}"
+    )]
+    NoCoupling {
+        /// The coupling tried first.
+        first: &'static str,
+        /// Why it does not hold.
+        reason: Box<RunError>,
+        /// The coupling tried next.
+        second: &'static str,
+        /// Why that does not hold either.
+        error: Box<RunError>,
+    },
+    /// The state cannot be carried over to other zones.
+    #[error(transparent)]
+    Carry(#[from] CarryError),
+    /// A check of the model failed, so that no result of it can be trusted.
+    #[error("{0}; or let it run with solver.unproven = \"warn\"")]
+    Unproven(String),
+    /// Something that is planned and not there yet.
+    #[error("{what}: {remedy}")]
+    Later {
+        /// What was asked for.
+        what: &'static str,
+        /// What to do instead.
+        remedy: &'static str,
+    },
+    /// The scene needs more memory than there is.
+    #[error(
+        "the scene needs about {needed} of memory, {there} are there: {largest} ({sizes}); {remedy}"
+    )]
+    Memory {
+        /// What it needs.
+        needed: String,
+        /// The budget, [`memory_budget`](super::memory_budget).
+        there: String,
+        /// The three largest items.
+        largest: String,
+        /// What was counted.
+        sizes: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// A condition meets no site.
+    #[error("the condition `{condition}` meets no site of the model; {remedy}")]
+    Idle {
+        /// Its name.
+        condition: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
