@@ -90,6 +90,24 @@ fn partial_stress_in_elements() {
 }
 
 #[test]
+fn sites_without_mass_are_refused_in_motion_only() {
+    // nodes on the core's faces follow points by weights of either sign, by which some of these stand for less than nothing
+    let coupling = "\"partial-stress\"";
+    let ratio = tip(coupling, TRANSITION, 8, 2, 0.0);
+    assert!((ratio - 1.0).abs() < LIMIT, "{ratio}");
+    let case = Case::new(&scene(coupling, TRANSITION, 8, 2, 0.0));
+    let said = case
+        .run(&[
+            "--set",
+            "materials.m={bond-based={youngs-modulus=1,density=1}}",
+            "--set",
+            "solve.explicit.duration=1",
+        ])
+        .expect_err("it has rows without mass");
+    assert!(said.contains("stands for the mass"), "{said}");
+}
+
+#[test]
 fn small_elements_with_partial_stress_are_warned_of() {
     let warned = |finer, offset| {
         let case = Case::new(&scene(

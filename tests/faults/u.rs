@@ -1,6 +1,6 @@
 //! Energy typed against energy spent.
 
-use bondline::verify::meshes::fracture::{balance, plane};
+use bondline::verify::meshes::fracture::{balance, plane, plate};
 
 use crate::Case;
 
@@ -23,7 +23,7 @@ fn the_energy_of_a_plate_that_breaks_is_accounted_for() {
     // of both laws, at three steps: `bondline verify meshes`
     let law = "lps]\npoisson-ratio = 0.35";
     for coupling in ["nonlocal", "truncated"] {
-        let (gap, broken) = balance(coupling, law, 0.1).expect("it runs");
+        let (gap, broken) = balance(&plate(coupling, law, 0.1), &[], &[]).expect("it runs");
         assert!(broken > 0 && gap.abs() < 1e-3, "{coupling} {law}: {gap}");
     }
 }

@@ -36,7 +36,10 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         figures: Vec::new(),
         findings: Vec::new(),
     };
-    let mut worst = mass(model, &subject.rest.density, &mut part);
+    let (mut worst, masses) = mass(model, &subject.rest.density, &mut part);
+    // in equilibrium masses play no part: a load on a row does, whose scale is that of its part of the body
+    let moves = subject.system.is_some();
+    let mut is_needed = vec![moves; masses.len()];
     let loads = Loads::new(model, conditions)?;
     let mut count = 0;
     for condition in loads.conditions() {
@@ -50,11 +53,15 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
             let f = Vector::<D>::from_column_slice(f);
             own.add(&f, &(site.position - centre));
         }
+        for (needed, f) in is_needed.iter_mut().zip(load.chunks_exact(D)) {
+            *needed |= f.iter().any(|&f| f != 0.0);
+        }
         let exact = exact(model, c, &field);
         let figure = compare(model, &c.name, "load", &own, &exact, &mut part);
         worst = worst.max(figure);
         count += 1;
     }
+    without_mass(model, &masses, &is_needed, &mut part);
     if subject.coupling.symmetry() != Symmetry::Symmetric {
         let found = conditions.iter().filter_map(|c| unbalanced(model, c));
         part.findings.extend(found);
@@ -230,8 +237,8 @@ fn sizes<const D: usize>(force: &Vector<D>) -> String {
     format!("({})", each.join(", "))
 }
 
-/// Compares the mass of the sites with that of the mesh, less voids.
-fn mass<const D: usize>(model: &Model<D>, density: &[f64], part: &mut Part) -> f64 {
+/// Compares the mass of the sites with that of the mesh, less voids; the masses of the sites beside the largest difference.
+fn mass<const D: usize>(model: &Model<D>, density: &[f64], part: &mut Part) -> (f64, Vec<f64>) {
     let has_mass = density.iter().all(|&d| d > 0.0) && !density.is_empty();
     let of = |material: u16| match has_mass {
         true => density[material as usize],
@@ -271,22 +278,6 @@ fn mass<const D: usize>(model: &Model<D>, density: &[f64], part: &mut Part) -> f
             value,
         });
     }
-    let least = masses.iter().copied().fold(f64::INFINITY, f64::min);
-    if least <= 0.0 {
-        let at = masses.iter().position(|&m| m == least).unwrap_or(0);
-        let x = &model.sites[at].position;
-        part.findings.push(Finding {
-            severity: Severity::Refusal,
-            place: x.iter().copied().collect(),
-            value: least,
-            limit: 0.0,
-            message: format!(
-                "the site at {} stands for the mass {}: the lattice of points and the surface of the nonlocal zone leave it none; move peridynamics.points.lattice.origin or refine the lattice",
-                sizes(x),
-                number(least)
-            ),
-        });
-    }
     let worst = total.max(first);
     if worst > EXACT {
         part.findings.push(Finding {
@@ -302,7 +293,36 @@ fn mass<const D: usize>(model: &Model<D>, density: &[f64], part: &mut Part) -> f
             ),
         });
     }
-    worst
+    (worst, masses)
+}
+
+/// Refuses a site that stands for no mass, where one is needed.
+fn without_mass<const D: usize>(
+    model: &Model<D>,
+    masses: &[f64],
+    is_needed: &[bool],
+    part: &mut Part,
+) {
+    let needed = (0..masses.len()).filter(|&s| is_needed[s]);
+    let Some(at) = needed.min_by(|&a, &b| masses[a].total_cmp(&masses[b]).then(a.cmp(&b))) else {
+        return;
+    };
+    let least = masses[at];
+    if least > 0.0 {
+        return;
+    }
+    let x = &model.sites[at].position;
+    part.findings.push(Finding {
+        severity: Severity::Refusal,
+        place: x.iter().copied().collect(),
+        value: least,
+        limit: 0.0,
+        message: format!(
+            "the site at {} stands for the mass {}: the lattice of points and the surface of the nonlocal zone leave it none; move peridynamics.points.lattice.origin or refine the lattice",
+            sizes(x),
+            number(least)
+        ),
+    });
 }
 
 /// A support or a traction on a surface where a coupling by forces mixes two models: rows there are equations at a place, which know of no surface, so that neither the support nor the load is felt as a whole.

@@ -172,25 +172,118 @@ fn rows(case: &Case, table: &mut Table) {
     }
 }
 
-/// The largest change of the discrete energy over a run of linear bonds without loads, relative to the energy.
-fn discrete_energy(name: &str, overrides: &[&str], steps: u64, table: &mut Table) {
-    let base = [
-        &[
+/// A motion whose discrete energy is looked at: linear bonds, no loads.
+struct Swing {
+    name: &'static str,
+    text: &'static str,
+    mesh: &'static [(&'static str, &'static str)],
+    overrides: &'static [&'static str],
+    /// The time step, beside its limit.
+    step: f64,
+}
+
+/// Triangles from Gmsh, sides of 0.5 to 1.9, and a box across them.
+const TRIANGLES: &str = r#"
+kinematics = "plane-stress"
+mesh.file.path = "m.msh"
+materials.plate.bond-based = { youngs-modulus = 1, density = 1 }
+peridynamics = { horizon = 0.9, points.lattice = { spacing = 0.3 }, bonds = "linear" }
+zones.nonlocal.box = { min = [6.13, 5.88], max = [14.21, 13.77] }
+coupling = "truncated"
+initial.v.velocity = { x = "1e-3*sin(x/2)", y = "1e-3*cos(y/2)*sin(x/3)" }
+solve.explicit = { duration = 100, outputs = 0 }
+output.vtu = false
+"#;
+
+/// A bar of tetrahedra from Gmsh, sides of 1/3, and a box across them.
+const TETRAHEDRA: &str = r#"
+kinematics = "solid"
+mesh.file.path = "m.msh"
+materials.bar.bond-based = { youngs-modulus = 1, density = 1 }
+peridynamics = { horizon = 0.375, points.lattice = { spacing = 0.125 }, bonds = "linear" }
+zones.nonlocal.box = { min = [2.05, 0, 0], max = [3.93, 1, 1] }
+coupling = "truncated"
+initial.v.velocity = { x = "1e-3*sin(x)", y = "1e-3*cos(y)*sin(x/2)", z = "1e-3*cos(z)*sin(x)" }
+solve.explicit = { duration = 10, outputs = 0 }
+output.vtu = false
+"#;
+
+const OF_TRIANGLES: &[(&str, &str)] = &[(
+    "m.msh",
+    include_str!("../../../meshes/graded_triangles.msh"),
+)];
+const OF_TETRAHEDRA: &[(&str, &str)] = &[("m.msh", include_str!("../../../meshes/bar_tets.msh"))];
+
+const ON_PLATE: &str = "initial.v={velocity={x=\"1e-3*sin(x)\",y=\"1e-3*cos(y)*sin(x/2)\"}}";
+
+const SWINGS: &[Swing] = &[
+    Swing {
+        name: "plate, quadrilaterals",
+        text: PLATE,
+        mesh: &[],
+        overrides: &["coupling=truncated", ON_PLATE],
+        step: 0.3,
+    },
+    Swing {
+        name: "plate, triangles",
+        text: PLATE,
+        mesh: &[],
+        overrides: &["coupling=truncated", ON_PLATE, "mesh.rectangle.cell=tri3"],
+        step: 0.3,
+    },
+    Swing {
+        name: "plate, LPS",
+        text: PLATE,
+        mesh: &[],
+        overrides: &[
             "coupling=truncated",
-            "solve.explicit.step=0.3",
-            "initial.v={velocity={x=\"1e-3*sin(x)\",y=\"1e-3*cos(y)*sin(x/2)\"}}",
-        ][..],
-        overrides,
-    ]
-    .concat();
-    let duration = format!("solve.explicit.duration={}", 0.3 * steps as f64);
-    let rows = format!(
-        "solve.explicit.history-interval={}",
-        0.3 * steps as f64 / 500.0
-    );
-    let all = [&base[..], &[duration.as_str(), rows.as_str()]].concat();
+            ON_PLATE,
+            "materials.plate={lps={youngs-modulus=1,density=1,poisson-ratio=0.4}}",
+        ],
+        step: 0.3,
+    },
+    Swing {
+        name: "plate, zone across the cells",
+        text: PLATE,
+        mesh: &[],
+        overrides: &[
+            "coupling=truncated",
+            ON_PLATE,
+            "peridynamics.points={lattice={spacing=0.4,origin=[0.07,0.11]}}",
+            "peridynamics.horizon=1.2",
+        ],
+        step: 0.3,
+    },
+    Swing {
+        name: "Gmsh triangles, a box across them",
+        text: TRIANGLES,
+        mesh: OF_TRIANGLES,
+        overrides: &[],
+        step: 0.06,
+    },
+    Swing {
+        name: "Gmsh tetrahedra, a box across them",
+        text: TETRAHEDRA,
+        mesh: OF_TETRAHEDRA,
+        overrides: &[],
+        step: 0.0123,
+    },
+];
+
+/// The largest change of the discrete energy over a run, relative to the energy.
+fn discrete_energy(swing: &Swing, steps: u64, table: &mut Table) {
+    let name = swing.name;
+    let duration = swing.step * steps as f64;
+    let typed = [
+        format!("solve.explicit.step={}", swing.step),
+        format!("solve.explicit.duration={duration}"),
+        format!("solve.explicit.history-interval={}", duration / 500.0),
+    ];
+    let all: Vec<&str> = (swing.overrides.iter().copied())
+        .chain(typed.iter().map(String::as_str))
+        .collect();
     let quantity = "change of the discrete energy, relative";
-    match history(PLATE, &all, &[], "discrete_energy") {
+    match history(swing.text, &all, swing.mesh, "discrete_energy") {
         Err(reason) => table.push(Row::refused(name, quantity, reason)),
         Ok(values) => {
             let first = values.first().copied().unwrap_or(f64::NAN);
@@ -201,11 +294,12 @@ fn discrete_energy(name: &str, overrides: &[&str], steps: u64, table: &mut Table
 }
 
 /// The tables of motion.
-pub(super) fn tables(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
+pub(super) fn tables(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     let mut growth = Table::new(
         "motion: growth that the proof tells of beside that of the run",
         Columns::Full,
     );
+    progress.stage("motion", None);
     CASES.iter().for_each(|case| rows(case, &mut growth));
     let steps = match effort {
         Effort::Quick => 5_000,
@@ -215,22 +309,10 @@ pub(super) fn tables(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
         format!("motion: discrete energy over {steps} steps, truncated, linear bonds"),
         Columns::Full,
     );
-    for (name, overrides) in [
-        ("plate, quadrilaterals", &[][..]),
-        ("plate, triangles", &["mesh.rectangle.cell=tri3"]),
-        (
-            "plate, LPS",
-            &["materials.plate={lps={youngs-modulus=1,density=1,poisson-ratio=0.4}}"],
-        ),
-        (
-            "plate, zone across the cells",
-            &[
-                "peridynamics.points={lattice={spacing=0.4,origin=[0.07,0.11]}}",
-                "peridynamics.horizon=1.2",
-            ],
-        ),
-    ] {
-        discrete_energy(name, overrides, steps, &mut energy);
+    for swing in SWINGS {
+        // solids cost six times as much per step
+        let fewer = effort == Effort::Quick && swing.text == TETRAHEDRA;
+        discrete_energy(swing, if fewer { steps / 5 } else { steps }, &mut energy);
     }
     vec![growth, energy]
 }
