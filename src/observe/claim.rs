@@ -12,6 +12,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::ObserveError;
+use crate::regular_file;
 
 /// The files of one run in its folder.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -36,6 +37,33 @@ impl Files {
             .and_then(|rest| rest.strip_prefix('_'))
             .and_then(|rest| rest.strip_suffix(".vtu"));
         number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
+    }
+
+    /// A file in `folder` that these would write over and that a scene of another name has left, and whose it is.
+    ///
+    /// A file at rest may be called as one of a series is: it is part of it where the collection lists it. A series begins with a file that stands alone
+    /// only where another scene wrote that: its own runs, ended or killed, leave a claim, a collection or a table with it.
+    fn of_another(&self, folder: &Path, was_claimed: bool) -> Option<(PathBuf, String)> {
+        let listed = self.files.iter().find_map(|file| {
+            let (name, _) = file.strip_suffix(".vtu")?.rsplit_once('_')?;
+            let series = Self {
+                name: name.to_owned(),
+                series: true,
+                ..Self::default()
+            };
+            let collection = folder.join(format!("{name}.pvd"));
+            let lists = series.is_of_series(file)
+                && regular_file::read_to_string(&collection)
+                    .is_ok_and(|text| text.contains(&format!("\"{file}\"")));
+            lists.then(|| (folder.join(file), collection.display().to_string()))
+        });
+        let alone = || {
+            let first = folder.join(format!("{}_0000.vtu", self.name));
+            let is_own = self.files.iter().any(|file| folder.join(file).exists());
+            let foreign = self.series && !was_claimed && first.exists() && !is_own;
+            foreign.then(|| (first, "a scene of another name".to_owned()))
+        };
+        listed.or_else(alone)
     }
 
     /// A file that both would write.
@@ -75,7 +103,8 @@ impl Claim {
     /// Claims `files` in `folder` for a scene, and removes what killed runs left of them half written.
     ///
     /// # Errors
-    /// [`ObserveError::Claimed`] if another run writes any of them, [`ObserveError::Folder`], [`ObserveError::Write`].
+    /// [`ObserveError::Claimed`] if another run writes any of them, [`ObserveError::OfAnother`] if a scene of another name has left one that would be
+    /// written over, [`ObserveError::Folder`], [`ObserveError::Write`].
     pub fn take(folder: &Path, scene: &str, files: &Files) -> Result<Self, ObserveError> {
         let folder = match folder.as_os_str().is_empty() {
             true => Path::new("."),
@@ -121,6 +150,8 @@ impl Claim {
                 Err(TryLockError::Error(_)) => return Ok(claim),
             }
         };
+        // what a killed run leaves says whose its files are
+        let was_claimed = file.metadata().is_ok_and(|found| found.len() > 0);
         let holder = Holder {
             process: std::process::id(),
             scene: scene.to_owned(),
@@ -140,6 +171,9 @@ impl Claim {
             {
                 return Err(claimed(folder, &other, Some(shared)));
             }
+        }
+        if let Some((path, owner)) = files.of_another(folder, was_claimed) {
+            return Err(ObserveError::OfAnother { path, owner });
         }
         remove_parts(folder, files);
         Ok(claim)

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::ObserveError;
-use super::file::create_parent;
+use super::file::{create_parent, write_whole};
 use crate::regular_file;
 
 /// One entry of a row.
@@ -53,12 +53,7 @@ impl CsvTable {
     /// # Errors
     /// [`ObserveError::Empty`] without columns, [`ObserveError::Folder`], [`ObserveError::Write`].
     pub fn create(path: &Path, header: &[&str]) -> Result<Self, ObserveError> {
-        if header.is_empty() {
-            return Err(ObserveError::Empty {
-                path: path.to_path_buf(),
-                what: "the table has no columns",
-            });
-        }
+        has_columns(path, header)?;
         create_parent(path)?;
         let file = regular_file::may_be_written(path)
             .and_then(|()| File::create(path))
@@ -72,8 +67,7 @@ impl CsvTable {
             header: header.iter().map(|&h| h.to_owned()).collect(),
             rows: 0,
         };
-        let names: Vec<String> = header.iter().map(|h| quoted(h)).collect();
-        table.line(&names.join(","))?;
+        table.line(&first_line(header))?;
         Ok(table)
     }
 
@@ -135,30 +129,8 @@ impl CsvTable {
     /// [`ObserveError::RowLength`], [`ObserveError::NotFinite`] (the column is named) or [`ObserveError::Write`]; nothing
     /// of the row is then written, except on a full disk.
     pub fn entries(&mut self, entries: &[Entry]) -> Result<(), ObserveError> {
-        if entries.len() != self.header.len() {
-            return Err(ObserveError::RowLength {
-                path: self.path.clone(),
-                expected: self.header.len(),
-                found: entries.len(),
-            });
-        }
-        let mut words = Vec::with_capacity(entries.len());
-        for (entry, column) in entries.iter().zip(&self.header) {
-            words.push(match entry {
-                Entry::Real(v) if !v.is_finite() => {
-                    return Err(ObserveError::NotFinite {
-                        path: self.path.clone(),
-                        field: column.clone(),
-                        entry: self.rows,
-                        value: *v,
-                    });
-                }
-                Entry::Real(v) => format!("{v:e}"),
-                Entry::Integer(v) => v.to_string(),
-                Entry::Text(v) => quoted(v),
-            });
-        }
-        self.line(&words.join(","))?;
+        let line = line_of(&self.path, &self.header, self.rows, entries)?;
+        self.line(&line)?;
         self.rows += 1;
         Ok(())
     }
@@ -181,6 +153,79 @@ impl CsvTable {
                 source,
             })
     }
+}
+
+/// Writes a table whose rows are all known, whole or not at all: a reader, or a run that is killed, never finds half of it.
+///
+/// # Errors
+/// As [`CsvTable::create`] and [`CsvTable::entries`]; the file that lay at `path` before is then still there.
+pub fn write_table(
+    path: &Path,
+    header: &[&str],
+    rows: impl Iterator<Item = Vec<f64>>,
+) -> Result<(), ObserveError> {
+    has_columns(path, header)?;
+    let columns: Vec<String> = header.iter().map(|&h| h.to_owned()).collect();
+    let mut text = first_line(header);
+    text.push('\n');
+    for (number, row) in rows.enumerate() {
+        let entries: Vec<Entry> = row.into_iter().map(Entry::Real).collect();
+        text.push_str(&line_of(path, &columns, number, &entries)?);
+        text.push('\n');
+    }
+    regular_file::may_be_written(path).map_err(|source| ObserveError::Write {
+        path: path.to_path_buf(),
+        source,
+    })?;
+    write_whole(path, |file| file.write_all(text.as_bytes()))
+}
+
+fn has_columns(path: &Path, header: &[&str]) -> Result<(), ObserveError> {
+    if header.is_empty() {
+        return Err(ObserveError::Empty {
+            path: path.to_path_buf(),
+            what: "the table has no columns",
+        });
+    }
+    Ok(())
+}
+
+fn first_line(header: &[&str]) -> String {
+    let names: Vec<String> = header.iter().map(|h| quoted(h)).collect();
+    names.join(",")
+}
+
+/// Row `number` of a table, without the end of the line.
+fn line_of(
+    path: &Path,
+    header: &[String],
+    number: usize,
+    entries: &[Entry],
+) -> Result<String, ObserveError> {
+    if entries.len() != header.len() {
+        return Err(ObserveError::RowLength {
+            path: path.to_path_buf(),
+            expected: header.len(),
+            found: entries.len(),
+        });
+    }
+    let mut words = Vec::with_capacity(entries.len());
+    for (entry, column) in entries.iter().zip(header) {
+        words.push(match entry {
+            Entry::Real(v) if !v.is_finite() => {
+                return Err(ObserveError::NotFinite {
+                    path: path.to_path_buf(),
+                    field: column.clone(),
+                    entry: number,
+                    value: *v,
+                });
+            }
+            Entry::Real(v) => format!("{v:e}"),
+            Entry::Integer(v) => v.to_string(),
+            Entry::Text(v) => quoted(v),
+        });
+    }
+    Ok(words.join(","))
 }
 
 /// RFC 4180: quotes around an entry with a comma, a quote or a line break; quotes inside doubled.

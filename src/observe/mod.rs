@@ -64,6 +64,14 @@ pub enum ObserveError {
         /// The process and its scene.
         by: String,
     },
+    /// A scene of another name has left this file.
+    #[error("{} belongs to {owner}; give another folder by --output or another output.name, or remove it", path.display())]
+    OfAnother {
+        /// The file.
+        path: PathBuf,
+        /// Whose it is.
+        owner: String,
+    },
     /// The encoder refused the data.
     #[error("cannot encode {} as {format}: {message}; please report this with the scene", path.display())]
     Encode {

@@ -15,6 +15,11 @@ pub(super) fn with_choice<const D: usize, T>(
     let Some(mut other) = scene.otherwise.take() else {
         return then(scene);
     };
+    // what whoever holds the scene has set since it was read; its layout is its own
+    other.output = scene.output.clone();
+    other.solve = scene.solve.clone();
+    other.solver = scene.solver;
+    other.title = scene.title.clone();
     let (first, second) = (scene.coupling.joining().name, other.coupling.joining().name);
     match then(scene) {
         Err(reason) if reason.is_of_coupling() => {

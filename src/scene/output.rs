@@ -13,6 +13,9 @@ use crate::observe::ObserveError;
 use crate::observe::claim::{Claim, Files};
 use crate::shape::Shape;
 
+/// The table of all probes; lines have tables by their own names beside it.
+pub(super) const PROBES: &str = "probes";
+
 /// The outputs of a scene whose files are named `name` by default.
 pub(super) fn output<const D: usize>(
     spec: &SceneSpec,
@@ -42,6 +45,14 @@ pub(super) fn output<const D: usize>(
         let positions = (0..n)
             .map(|i| from.lerp(&to, i as f64 / (n - 1) as f64))
             .collect();
+        if key.value == PROBES && !o.probes.is_empty() {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("the line `{place}` has the name of the table of all probes"),
+            )
+            .label(key.span.clone(), "both would be one file")
+            .help("give the line another name"));
+        }
         lines.push((key.value.clone(), positions));
     }
     let locator = Locator::new(mesh, 0..mesh.cell_count());
@@ -119,7 +130,7 @@ impl<const D: usize> Output<D> {
             }
             ends.extend(self.lines.iter().map(|(line, _)| format!("_{line}.csv")));
             if !self.probes.is_empty() {
-                ends.push("_probes.csv".to_owned());
+                ends.push(format!("_{PROBES}.csv"));
             }
         }
         Files {

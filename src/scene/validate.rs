@@ -475,11 +475,11 @@ fn scene<const D: usize>(
             scene
         }
     };
-    scene.unused = Parts {
-        spec,
-        scene: &scene,
+    let unused = |scene: &Scene<D>| Parts { spec, scene }.unused();
+    scene.unused = unused(&scene);
+    if let Some(other) = &mut scene.otherwise {
+        other.unused = unused(other);
     }
-    .unused();
     Ok(scene)
 }
 

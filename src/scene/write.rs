@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
+use super::output::PROBES;
 use super::solution::Solved;
 use super::validate::Output;
 use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
 use crate::fem::{self, Locator};
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
-use crate::observe::csv::CsvTable;
+use crate::observe::csv::write_table;
 use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
 use crate::shape::Shape;
 use crate::tensor::{Tensor, Vector, padded, strain};
@@ -37,7 +38,9 @@ pub fn write<const D: usize>(
         files.push(path);
     }
     if !output.probes.is_empty() {
-        let path = output.directory.join(format!("{}_probes.csv", output.name));
+        let path = output
+            .directory
+            .join(format!("{}_{PROBES}.csv", output.name));
         let positions: Vec<Vector<D>> = output.probes.iter().map(|(_, x)| *x).collect();
         table(&path, &positions, &solution)?;
         files.push(path);
@@ -59,11 +62,10 @@ fn table<const D: usize>(
     }
     header.push("model".to_owned());
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let mut table = CsvTable::create(path, &header)?;
     let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| solution.at(x)).collect();
-    for (x, sample) in positions.iter().zip(samples) {
+    let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
         // a line may cross a slit: there is nothing to tell in it
-        let Some(sample) = sample else { continue };
+        let sample = sample?;
         let e = strain(&sample.gradient);
         let mut row: Vec<f64> = x
             .iter()
@@ -74,9 +76,9 @@ fn table<const D: usize>(
             row.extend((i..D).map(|j| e[(i, j)]));
         }
         row.push(f64::from(label(sample.zone)));
-        table.row(&row)?;
-    }
-    Ok(())
+        Some(row)
+    });
+    write_table(path, &header, told)
 }
 
 /// 0 local, 1 transition, 2 nonlocal.

@@ -143,3 +143,86 @@ fn long_expressions_are_read_and_longer_ones_refused() {
     assert_eq!(status, Some(1), "{said}");
     assert!(said.contains("bytes are longer than the"), "{said}");
 }
+
+#[test]
+fn a_line_with_the_name_of_the_table_of_probes() {
+    let lines = "output.lines.probes={from=[0,0.5],to=[1,0.5],samples=3}";
+    crate::wrong_scene(
+        &[],
+        &["output.probes.middle.at=[0.5,0.5]", lines],
+        &[
+            "the line `output.lines.probes` has the name of the table of all probes",
+            "give the line another name",
+        ],
+    );
+    let (status, said) = crate::run(SCENE, &mesh(), &[lines]);
+    assert_eq!(status, Some(0), "{said}");
+}
+
+/// A table is there whole or not at all: what a reader holds open, or a run that is killed leaves, is the old one.
+#[test]
+#[cfg(unix)]
+fn tables_of_a_scene_at_rest_are_replaced_whole() {
+    use std::os::unix::fs::MetadataExt as _;
+    let folder = folder_with(SCENE);
+    let overrides = [
+        "output.lines.across={from=[0,0.5],to=[1,0.5],samples=3}",
+        "output.probes.middle.at=[0.5,0.5]",
+        "output.vtu=false",
+    ];
+    let tables = ["across", "probes"].map(|t| folder.path().join(format!("out/scene_{t}.csv")));
+    let run = || {
+        let (status, said) = crate::run_in(folder.path(), &["run", "scene.toml"], &overrides);
+        assert_eq!(status, Some(0), "{said}");
+        tables.each_ref().map(|t| {
+            let text = std::fs::read_to_string(t).unwrap();
+            (std::fs::metadata(t).unwrap().ino(), text)
+        })
+    };
+    // both are held open, so that no number of a file is used again
+    let first = run();
+    let _open = tables.each_ref().map(|t| std::fs::File::open(t).unwrap());
+    for (one, other) in first.iter().zip(run()) {
+        assert_eq!(one.1, other.1);
+        assert_ne!(one.0, other.0, "written into the file that lay there");
+    }
+}
+
+/// Where the first coupling does not hold, `--output` and the warnings of parts that touch nothing are those of the scene all the same.
+#[test]
+fn the_coupling_that_is_taken_in_the_end_writes_where_it_is_told() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let scene = format!(
+        "kinematics = 'plane-strain'
+mesh.file.path = '{}'
+materials.stuff.lps = {{ youngs-modulus = 1, poisson-ratio = 0.1 }}
+peridynamics.horizon = 0.2
+zones.nonlocal.box = {{ min = [0.8, 0.3], max = [1.33, 0.61] }}
+voids.hole.inside.ball = {{ center = [9, 9], radius = 0.1 }}
+conditions.held.displacement = {{ on = 'fixed', x = 0, y = 0 }}
+conditions.weight.body-force.x = 1e-3
+output.probes.middle.at = [1, 0.5]",
+        fixtures.join("plate_41_ascii.msh").display()
+    );
+    let folder = folder_with(&scene);
+    let output = Command::new(env!("CARGO_BIN_EXE_bondline"))
+        .args(["run", "scene.toml", "--output", "elsewhere"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let said = [output.stdout, output.stderr].map(|s| String::from_utf8(s).unwrap());
+    let said = said.concat();
+    for part in [
+        "was tried and does not hold",
+        "the void `hole` holds no point",
+    ] {
+        assert!(said.contains(part), "{said}");
+    }
+    for file in ["scene.vtu", "scene_probes.csv"] {
+        assert!(
+            folder.path().join("elsewhere").join(file).exists(),
+            "{said}"
+        );
+    }
+    assert!(!folder.path().join("out").exists(), "{said}");
+}

@@ -107,6 +107,51 @@ fn the_same_scene_twice_is_refused_by_name_and_others_go_on() {
     }
 }
 
+/// `bar_0000` at rest writes the file that `bar` in motion begins with: whoever comes second is refused, also when the first has long ended.
+#[test]
+fn a_name_that_is_that_of_a_file_of_another_scene_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let moving = ["bar.toml", "--set", "solve.explicit.duration=2"];
+    let text = BREAKING.replace("coupling.splice", "coupling.truncated");
+    write(folder.path(), "bar.toml", &text);
+    let still = text.replace(" * min(1, t / 8)", "");
+    let (still, _) = still.split_once("[solve.explicit]").unwrap();
+    let name = "output.name = \"bar_0000\"\n";
+    let load = "[conditions.load.traction]\non = \"right\"\nx = 1e-6\n[conditions.left.displacement]\non = \"left\"\nx = 0\ny = 0\n";
+    write(folder.path(), "still.toml", &format!("{name}{still}{load}"));
+    let at_rest = ["still.toml"];
+    let refused = |arguments: &[&str], parts: &[&str]| {
+        let output = bondline(folder.path()).arg("run").args(arguments).output();
+        let said = String::from_utf8(output.unwrap().stderr).unwrap();
+        let said = said.split_whitespace().filter(|w| *w != "│");
+        let said = said.collect::<Vec<_>>().join(" ");
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    };
+    run(folder.path(), &moving);
+    let before = files(&folder.path().join("out"));
+    refused(
+        &at_rest,
+        &["out/bar_0000.vtu belongs to out/bar.pvd", "--output"],
+    );
+    assert!(before == files(&folder.path().join("out")));
+    // what was killed, whatever it left, begins again
+    for left in ["bar.pvd", "bar_history.csv"] {
+        std::fs::remove_file(folder.path().join("out").join(left)).unwrap();
+        run(folder.path(), &moving);
+    }
+    std::fs::remove_dir_all(folder.path().join("out")).unwrap();
+    run(folder.path(), &at_rest);
+    refused(
+        &moving,
+        &[
+            "out/bar_0000.vtu belongs to a scene of another name",
+            "output.name",
+        ],
+    );
+}
+
 /// Pairs of runs into one folder, begun in random order and killed at random: every run ends right or with a refusal by name, and no file of one is
 /// touched by another. `BONDLINE_PAIRS` says how many.
 #[test]
