@@ -3,6 +3,7 @@
 use super::spec::Joining;
 use crate::coupling::{CellRole, Model, Zone};
 use crate::observe::proof::{Proof, Severity};
+use crate::observe::report::number;
 use crate::shape::Barrier;
 
 /// All doubts about a model.
@@ -19,6 +20,26 @@ pub(super) fn warnings<const D: usize>(
 ) -> Vec<String> {
     let proved = proof.messages(Severity::Warning).map(str::to_owned);
     proved.chain(doubts(model, joining)).collect()
+}
+
+/// The out-of-balance force, relative to the sum of all nodal loads and reactions, from which on it is told.
+///
+/// A fixed body carries what is applied, so that a reaction that differs from the load is an error of every stress on the way. Rows of couplings by force
+/// are exact under affine fields and out of balance under others. Measured on plates of an LPS with a splice, horizon 3 spacings: 0.033 with a zone a third
+/// of a horizon beside a loaded face, whose reaction is 7 % too large and the displacements 8 %; with `truncated` 4e-15, and 4e-5 of the displacement.
+const OUT_OF_BALANCE: f64 = 0.01;
+
+/// A solution whose loads and reactions do not balance.
+pub(super) fn out_of_balance(force: &[f64], relative: f64, joining: Joining) -> Option<String> {
+    (relative > OUT_OF_BALANCE).then(|| {
+        let force: Vec<String> = force.iter().map(|f| number(*f)).collect();
+        format!(
+            "loads and reactions are out of balance by {:.1} % of the sum of them all, by the force ({}): the seam of coupling `{}` balances affine fields only, and displacements may be wrong by as much or more; couple by truncated, or enclose the zone in more elements, further from surfaces and supports",
+            100.0 * relative,
+            force.join(", "),
+            joining.name
+        )
+    })
 }
 
 /// What partial stress does where its elements meet the surface of the body: measured in `docs/bars.md`.

@@ -2,7 +2,7 @@
 
 use super::chosen::with_choice;
 use super::definite;
-use super::doubts::warnings;
+use super::doubts::{out_of_balance, warnings};
 use super::equilibrium::{At, Equilibrium, equilibrium};
 use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
@@ -195,6 +195,16 @@ fn solve_chosen<const D: usize>(
         .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
     let mut told = warnings(model, joining, &proof);
     told.extend(rotation.as_ref().map(Rotation::warning));
+    let out_of_balance_relative = if scale > 0.0 {
+        balance.norm() / scale
+    } else {
+        0.0
+    };
+    told.extend(out_of_balance(
+        balance.as_slice(),
+        out_of_balance_relative,
+        joining,
+    ));
     let summary = RunSummary {
         scene: name,
         dimension: D,
@@ -223,11 +233,7 @@ fn solve_chosen<const D: usize>(
         factor_nonzeros: info.factor_nnz,
         residual: info.relative_residual,
         out_of_balance_force: balance.iter().copied().collect(),
-        out_of_balance_relative: if scale > 0.0 {
-            balance.norm() / scale
-        } else {
-            0.0
-        },
+        out_of_balance_relative,
         applied: applied.clone(),
         reactions: rest
             .conditions

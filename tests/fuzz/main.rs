@@ -102,13 +102,13 @@ fn from_environment(key: &str, plain: u64) -> u64 {
 /// `BONDLINE_RANDOM_SCENES` and `BONDLINE_RANDOM_FROM` say how many and from which number on; scene `n` is the same wherever it is made.
 #[test]
 fn random_scenes_solve_or_are_refused_by_name() {
-    let count = from_environment("BONDLINE_RANDOM_SCENES", 150);
+    let count = from_environment("BONDLINE_RANDOM_SCENES", 110);
     let from = from_environment("BONDLINE_RANDOM_FROM", 0);
     let mut ends: BTreeMap<String, usize> = BTreeMap::new();
     let mut broken = Vec::new();
     let (mut slowest, mut total) = ((Duration::ZERO, 0), Duration::ZERO);
     let at = Arc::new(AtomicU64::new(from));
-    watch(&at);
+    watch(&at, entry::random_text);
     for number in from..from + count {
         at.store(number, Ordering::Relaxed);
         let data = bytes(number);
@@ -149,6 +149,81 @@ fn random_scenes_solve_or_are_refused_by_name() {
     assert!(2 * solved >= count, "{solved} of {count} solve");
 }
 
+/// Scenes as users type them, with defaults left out, zones drawn across the mesh and meshes from Gmsh: each is proved, warned of or refused by name, and
+/// where bondline warns of nothing a scene at rest agrees with its elements alone within what was predicted.
+///
+/// `BONDLINE_TYPED_SCENES` and `BONDLINE_RANDOM_FROM` say how many and from which number on; scene `n` is the same wherever it is made. With
+/// `BONDLINE_SHOW` set the text of each that disagrees is shown.
+#[test]
+fn typed_scenes_are_proved_warned_of_or_refused() {
+    let count = from_environment("BONDLINE_TYPED_SCENES", 40);
+    let from = from_environment("BONDLINE_RANDOM_FROM", 0);
+    let show = std::env::var_os("BONDLINE_SHOW").is_some();
+    let mut ends: BTreeMap<String, usize> = BTreeMap::new();
+    let (mut broken, mut apart) = (Vec::new(), Vec::new());
+    let (mut slowest, mut total) = ((Duration::ZERO, 0), Duration::ZERO);
+    let at = Arc::new(AtomicU64::new(from));
+    watch(&at, entry::typed_text);
+    for number in from..from + count {
+        at.store(number, Ordering::Relaxed);
+        let data = bytes(number);
+        let begun = processor_time();
+        let ended = catch_unwind(AssertUnwindSafe(|| entry::typed_scene(&data)));
+        let took = processor_time().saturating_sub(begun);
+        total += took;
+        slowest = slowest.max((took, number));
+        assert!(
+            peak_memory_bytes().is_none_or(|b| b < MOST_MEMORY),
+            "scene {number}"
+        );
+        let Ok(told) = ended else {
+            println!("scene {number}:\n{}", entry::typed_text(&data));
+            broken.push(number);
+            continue;
+        };
+        let end = match (told.outcome, told.warned, told.agreement) {
+            (Outcome::Refused(kind), ..) => format!("refused: {kind}"),
+            (Outcome::Skipped(why), ..) => format!("not run: {why}"),
+            (_, true, _) => "solved, warned of".to_owned(),
+            (_, _, None) => "solved without a warning, not compared".to_owned(),
+            (_, _, Some(a)) if a.from_elements < 0.01 => {
+                "solved without a warning, agrees within 1 %".to_owned()
+            }
+            (_, _, Some(a)) if a.from_elements < 0.05 && a.holds() => {
+                "solved without a warning, agrees within 5 %".to_owned()
+            }
+            (_, _, Some(a)) if a.holds() => {
+                println!("scene {number} agrees as predicted: {a:?}");
+                "solved without a warning, agrees as far as predicted".to_owned()
+            }
+            (_, _, Some(a)) => {
+                println!("scene {number} is apart: {a:?}");
+                if show {
+                    println!("{}", entry::typed_text(&data));
+                }
+                apart.push(number);
+                "solved without a warning, is apart".to_owned()
+            }
+        };
+        *ends.entry(end).or_default() += 1;
+    }
+    for (end, times) in &ends {
+        println!("{times:7}  {end}");
+    }
+    println!(
+        "{count} scenes in {:.1} s of the processor, the slowest (number {}) {:.2} s, peak memory of all {}",
+        total.as_secs_f64(),
+        slowest.1,
+        slowest.0.as_secs_f64(),
+        peak_memory_bytes().map_or("unknown".to_owned(), bytes_text)
+    );
+    if show {
+        println!("the slowest:\n{}", entry::typed_text(&bytes(slowest.1)));
+    }
+    assert!(broken.is_empty(), "scenes {broken:?}");
+    assert!(apart.is_empty(), "scenes {apart:?}");
+}
+
 /// Time that the threads of this process have computed for; the time of day where the system does not tell.
 fn processor_time() -> Duration {
     let of_all = || -> Option<f64> {
@@ -164,7 +239,7 @@ fn processor_time() -> Duration {
 }
 
 /// Ends the process, with the scene at hand, where one takes longer than the budget: a scene that hangs cannot be unwound.
-fn watch(at: &Arc<AtomicU64>) {
+fn watch(at: &Arc<AtomicU64>, text: fn(&[u8]) -> String) {
     let at = Arc::downgrade(at);
     std::thread::spawn(move || {
         let mut since = (u64::MAX, Instant::now(), processor_time());
@@ -175,7 +250,7 @@ fn watch(at: &Arc<AtomicU64>) {
             } else if processor_time().saturating_sub(since.2) > BUDGET
                 || since.1.elapsed() > 10 * BUDGET
             {
-                let text = entry::random_text(&bytes(number));
+                let text = text(&bytes(number));
                 eprintln!("scene {number} takes longer than {BUDGET:?}:\n{text}");
                 std::process::abort();
             }

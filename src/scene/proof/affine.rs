@@ -249,14 +249,19 @@ fn unbalanced<const D: usize>(
             residual: size(largest),
             at: position(largest).iter().copied().collect(),
             stress_error: None,
+            is_unpredictable: false,
             stress_at: Vec::new(),
         };
         if is_told || found.residual < limits::NEGLIGIBLE {
             return Some(found);
         }
-        if let Some(e) = predicted(subject, &around, tensor, (class, place, facet), nodal) {
-            found.stress_error = Some(e.relative);
-            found.stress_at = e.at.iter().copied().collect();
+        match predicted(subject, &around, tensor, (class, place, facet), nodal) {
+            Predicted::NotAsked => {}
+            Predicted::Unknown => found.is_unpredictable = true,
+            Predicted::Error(e) => {
+                found.stress_error = Some(e.relative);
+                found.stress_at = e.at.iter().copied().collect();
+            }
         }
         Some(found)
     };
@@ -336,6 +341,15 @@ fn class<const D: usize>(
     (class, facet, is_alone)
 }
 
+/// What is known of the stress around a row.
+enum Predicted<const D: usize> {
+    /// There is no field to ask by.
+    NotAsked,
+    /// The patch does not tell.
+    Unknown,
+    Error(StressError<D>),
+}
+
 /// The error of the stress around one row.
 fn predicted<const D: usize>(
     subject: &Subject<'_, D>,
@@ -343,12 +357,12 @@ fn predicted<const D: usize>(
     tensor: &Tensor4<D>,
     (class, site, facet): (RowClass, u32, Option<usize>),
     nodal: &dyn Fn(&Tensor<D>, &mut [f64]),
-) -> Option<StressError<D>> {
+) -> Predicted<D> {
     let model = around.model;
     let place = model.sites[site as usize].position;
     let (main, list) = match (class, facet) {
         // what a crack does to the stress is what it is there for
-        (RowClass::Crack, _) | (RowClass::SeamAtSurface, None) => return None,
+        (RowClass::Crack, _) | (RowClass::SeamAtSurface, None) => return Predicted::NotAsked,
         (RowClass::Seam | RowClass::Points, _) | (_, None) => (None, gradients(tensor)),
         (_, Some(f)) => {
             let n = around.boundary.normals[f];
@@ -383,11 +397,17 @@ fn predicted<const D: usize>(
             mismatch,
         })
         .collect();
-    let errors = stress_errors(around, &place, main, &fields)?;
+    if fields.is_empty() {
+        return Predicted::NotAsked;
+    }
+    let Some(errors) = stress_errors(around, &place, main, &fields) else {
+        return Predicted::Unknown;
+    };
     let size = |e: &StressError<D>| e.relative.abs();
     errors
         .into_iter()
         .max_by(|a, b| size(a).total_cmp(&size(b)))
+        .map_or(Predicted::NotAsked, Predicted::Error)
 }
 
 /// By how much the displacement that a support prescribes at a point off its facets differs from that of a field which the facets keep: points of the first layer lie up

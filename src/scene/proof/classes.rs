@@ -57,7 +57,9 @@ pub(super) struct Unbalanced {
     pub at: Vec<f64>,
     /// Predicted error of the stress, over that of the field; signed where it is that of the component which the field has. None where it is not predicted.
     pub stress_error: Option<f64>,
-    /// Where.
+    /// Whether it was asked for in vain: other surfaces cut all families around, or the patch has no unique solution.
+    pub is_unpredictable: bool,
+    /// Where the stress is wrong.
     pub stress_at: Vec<f64>,
 }
 
@@ -85,6 +87,9 @@ pub(super) fn told(
         if let Some(error) = class.stress_error {
             figures.push(figure(format!("stress error {name}"), error));
             kind += &format!(", stress {:+.1} %", 100.0 * error);
+        }
+        if class.is_unpredictable {
+            kind += ", stress not known";
         }
         kinds.push(kind);
     }
@@ -167,12 +172,26 @@ fn verdict(rows: &Unbalanced, is_lattice: bool) -> Option<Finding> {
         ),
         RowClass::Crack => return None,
     };
+    let is_surface = !matches!(rows.class, RowClass::Seam | RowClass::Points);
     if rows.residual < limits::NEGLIGIBLE {
         return None;
     }
+    if rows.is_unpredictable && is_surface && rows.residual >= warn {
+        return Some(Finding {
+            severity: Severity::Warning,
+            place: rows.at.clone(),
+            value: rows.residual,
+            limit: warn,
+            message: format!(
+                "a uniform stress is out of balance {what} by {} of it per spacing near {}, and what becomes of it cannot be predicted, as where a body is thinner than its families are wide; {remedy}, or take a smaller horizon",
+                number(rows.residual),
+                place(&rows.at)
+            ),
+        });
+    }
     let Some(error) = rows.stress_error else {
         // where another class speaks for it
-        if !matches!(rows.class, RowClass::Seam | RowClass::Points) {
+        if is_surface {
             return None;
         }
         return Some(Finding {

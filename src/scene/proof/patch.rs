@@ -76,6 +76,12 @@ pub(super) fn stress_errors<const D: usize>(
         |r, row| model.add_scaled_row(around.operator, list[r] as usize, row),
     );
     let (matrix, free, keeps) = local(around, &rows, &list, main);
+    let is_point = |s: u32| matches!(model.sites[s as usize].kind, SiteKind::Point(_));
+    let mut points = list.iter().zip(&keeps).filter(|(s, _)| is_point(**s));
+    // a patch that keeps the field everywhere would show no error whatever its rows are
+    if main.is_some() && points.clone().next().is_some() && points.all(|(_, keeps)| *keeps) {
+        return None;
+    }
     let positions: Vec<[f64; 3]> = list
         .iter()
         .map(|&s| padded(&model.sites[s as usize].position))

@@ -64,6 +64,17 @@ fn failed(error: &RunError) -> Outcome {
 
 /// Runs a scene that is small enough, whose files go into `folder`.
 pub fn examine(scene: AnyScene, folder: &Path) -> Outcome {
+    match ended(scene, folder) {
+        Ok(_) => Outcome::Solved,
+        Err(outcome) => outcome,
+    }
+}
+
+/// As [`examine`], with the summary of a scene that is solved.
+///
+/// # Errors
+/// How it ended else.
+pub fn ended(scene: AnyScene, folder: &Path) -> Result<RunSummary, Outcome> {
     match scene {
         AnyScene::Bar(s) => run(*s, AnyScene::Bar, folder),
         AnyScene::Plane(s) => run(*s, AnyScene::Plane, folder),
@@ -75,9 +86,9 @@ fn run<const D: usize>(
     mut scene: Scene<D>,
     wrap: fn(Box<Scene<D>>) -> AnyScene,
     folder: &Path,
-) -> Outcome {
+) -> Result<RunSummary, Outcome> {
     if scene.mesh.cell_count() > 2 * super::size::MOST_CELLS {
-        return Outcome::Skipped("large");
+        return Err(Outcome::Skipped("large"));
     }
     scene.output.directory = folder.into();
     scene.output.name = "fuzz".into();
@@ -96,7 +107,7 @@ fn run<const D: usize>(
             if !steps && let Ok(summary) = solve(scene, wrap) {
                 panic!("check refuses ({error}) what a run solves: {summary}");
             }
-            return outcome;
+            return Err(outcome);
         }
     };
     if prediction
@@ -104,19 +115,16 @@ fn run<const D: usize>(
         .as_ref()
         .is_some_and(|m| m.steps > MOST_STEPS)
     {
-        return Outcome::Skipped("many steps");
+        return Err(Outcome::Skipped("many steps"));
     }
-    let summary = match solve(scene, wrap) {
-        Ok(summary) => summary,
-        Err(error) => return failed(&error),
-    };
+    let summary = solve(scene, wrap).map_err(|error| failed(&error))?;
     finite(&summary);
     if moves {
         numbers_in_tables_are_finite(folder);
     } else {
         assert!(summary.residual <= RESIDUAL, "{summary}");
     }
-    Outcome::Solved
+    Ok(summary)
 }
 
 fn solve<const D: usize>(

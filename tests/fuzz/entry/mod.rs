@@ -8,11 +8,15 @@
 //! | `examine.rs` | a scene to its end: what has to hold of it |
 //! | `random.rs` | bytes to a scene within the schema |
 //! | `size.rs` | which scenes are small enough to be run |
+//! | `typed.rs` | bytes to a scene as users type it |
+//! | `agree.rs` | such a scene beside its elements alone |
 
+mod agree;
 mod binary;
 mod examine;
 mod random;
 mod size;
+mod typed;
 
 use std::path::{Path, PathBuf};
 
@@ -21,6 +25,8 @@ use bondline::mesh::{MeshError, quality, read};
 use bondline::scene::{AnyScene, SceneSpec, Source};
 
 #[allow(unused_imports)] // each target calls its own
+pub use agree::{Agreement, typed_scene, typed_text};
+#[allow(unused_imports)] // as above
 pub use binary::{binary_file, genuine_checkpoint};
 pub use examine::Outcome;
 use examine::{examine, refused};
