@@ -68,3 +68,66 @@ fn triangles_move_and_keep_their_energy_below_the_pairwise_ratio_and_when_bonds_
         }
     }
 }
+
+/// Twelve by twelve cells of a polar grid, as a file of Gmsh 2.2 with its boundary as the set `outer`.
+fn polar() -> String {
+    let nodes = (0..13 * 13).map(|k| {
+        let (r, a) = (6.0 + f64::from(k % 13), 0.09 * (f64::from(k / 13) - 6.0));
+        format!("{} {} {} 0\n", k + 1, r * a.cos() - 6.0, r * a.sin() + 6.0)
+    });
+    let at = |i: usize, j: usize| 1 + i + 13 * j;
+    let mut lists = Vec::new();
+    for k in 0..12 {
+        for (i, j, di, dj) in [(k, 0, 1, 0), (k, 12, 1, 0), (0, k, 0, 1), (12, k, 0, 1)] {
+            lists.push(format!("1 2 2 2 {} {}", at(i, j), at(i + di, j + dj)));
+        }
+        for j in 0..12 {
+            let of = [at(k, j), at(k + 1, j), at(k + 1, j + 1), at(k, j + 1)];
+            lists.push(format!("3 2 1 1 {} {} {} {}", of[0], of[1], of[2], of[3]));
+        }
+    }
+    let elements = lists.iter().enumerate();
+    let elements = elements.map(|(n, list)| format!("{} {list}\n", n + 1));
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n1 2 \"outer\"\n2 1 \"body\"\n$EndPhysicalNames\n$Nodes\n169\n{}$EndNodes\n$Elements\n{}\n{}$EndElements\n",
+        nodes.collect::<String>(),
+        lists.len(),
+        elements.collect::<String>()
+    )
+}
+
+#[test]
+fn a_zone_of_nine_large_elements_passes_affine_fields() {
+    // ten nodes at the seam, none but those of the face itself within a horizon of most ends: factors alone leave 1.6e-2 of the largest traction
+    for (law, nu) in [
+        ("bond-based = { youngs-modulus = 2 }", 1.0 / 3.0),
+        ("lps = { youngs-modulus = 2, poisson-ratio = 0.34 }", 0.34),
+    ] {
+        let case = Case::new(&format!(
+            r#"
+kinematics = "plane-stress"
+mesh.file.path = "polar.msh"
+materials.plate.{law}
+peridynamics = {{ horizon = 0.75, points.lattice = {{ spacing = 0.25, origin = [0.1575, 0.005] }} }}
+zones.nonlocal.box = {{ min = [4.5, 4.5], max = [7.5, 7.5] }}
+coupling = "truncated"
+[conditions.sides.displacement]
+on = "outer"
+x = "1e-3*x + 2e-4*y"
+y = "-3e-4*y + 1e-4*x"
+"#
+        ));
+        std::fs::write(case.path("polar.msh"), polar()).expect("the mesh is written");
+        let summary = case.run(&[]).expect("it runs");
+        let energy = summary["energy"].as_f64().expect("a number");
+        let (xx, yy, xy) = (1e-3f64, -3e-4, 3e-4);
+        let square = xx * xx + yy * yy + 2.0 * nu * xx * yy + 0.5 * (1.0 - nu) * xy * xy;
+        // chords of 0.09 around: area of twelve by twelve cells between the radii 6 and 18
+        let area = 12.0 * 0.5 * 0.09f64.sin() * (18.0 * 18.0 - 6.0 * 6.0);
+        let wanted = area * square / (1.0 - nu * nu);
+        assert!(
+            (energy / wanted - 1.0).abs() < 1e-12,
+            "{law}: {energy} for {wanted}"
+        );
+    }
+}

@@ -82,7 +82,7 @@ fn blending() {
 
 #[test]
 fn partial_stress_in_elements() {
-    // elements of one spacing are another matter: warned of, see below
+    // elements of one spacing are another matter: refused, see below
     for offset in [0.3, 0.5] {
         let ratio = tip("\"partial-stress\"", TRANSITION, 8, 2, offset);
         assert!((ratio - 1.0).abs() < LIMIT, "{offset}: {ratio}");
@@ -108,22 +108,22 @@ fn sites_without_mass_are_refused_in_motion_only() {
 }
 
 #[test]
-fn small_elements_with_partial_stress_are_warned_of() {
-    let warned = |finer, offset| {
-        let case = Case::new(&scene(
-            "\"partial-stress\"",
-            TRANSITION,
-            16 / finer,
-            finer,
-            offset,
-        ));
-        let summary = case.run(&[]).expect("it runs");
-        let proof = summary["proof"].to_string();
-        proof.contains("partial stress are 1.00 spacings")
+fn small_elements_with_partial_stress_are_refused() {
+    let said = |finer, offset| {
+        let coupling = "\"partial-stress\"";
+        let case = Case::new(&scene(coupling, TRANSITION, 16 / finer, finer, offset));
+        case.run(&[]).map(|summary| summary["proof"].to_string())
     };
-    assert!(warned(1, 0.3));
-    assert!(!warned(1, 0.0));
-    assert!(!warned(2, 0.3));
+    // the tip would be at 0.39 of the exact deflection
+    let refusal = said(1, 0.3).expect_err("it is refused");
+    assert!(
+        crate::flat(&refusal).contains("partial stress are 1.00 spacings"),
+        "{refusal}"
+    );
+    for (finer, offset) in [(1, 0.0), (2, 0.3)] {
+        let proof = said(finer, offset).expect("it runs");
+        assert!(!proof.contains("partial stress are"), "{proof}");
+    }
 }
 
 #[test]

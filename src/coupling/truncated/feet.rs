@@ -1,15 +1,25 @@
 //! Changes of the traces at which pieces end.
 //!
-//! A piece that ends at `x` on a face follows `Σ w_a u(x_a)` over nodes `a`: any weights with `Σ w_a = 1` and `Σ w_a x_a = x` keep forces and moments in balance and every energy positive. So beside the shape functions of the
-//! face there is a space of weights over the nodes around, and a node that few pieces reach, of an element smaller than the spacing or at a sharp corner of the zone, gets its load by them.
+//! A piece that ends at `x` on a face follows `Σ w_a u(x_a)` over sites `a`: any weights with `Σ w_a = 1` and `Σ w_a x_a = x` keep forces and moments in balance and every energy positive. So beside the shape functions of the
+//! face there is a space of weights over the nodes around, and a node that few pieces reach, of an element smaller than the spacing or at a sharp corner of the zone, gets its load by them. Points at the seam count as well as nodes: where elements are large
+//! few nodes are near, and what positive factors cannot balance is at the points.
 
 use rustc_hash::FxHashMap;
 
-use super::segments::{End, Segments};
+use super::{
+    fit::points_at_seam,
+    segments::{End, Segment, Segments},
+};
 use crate::tensor::Vector;
 
 /// Nodes around an end, those of its trace included, beyond the D + 1 that an affine field determines.
 const MOST_BESIDE: usize = 6;
+
+/// Points around an end, for each dimension.
+const MOST_POINTS: usize = 2;
+
+/// Most changes in all: what is factorised grows with them.
+const MOST_SHIFTS: usize = 40_000;
 
 /// Part of a direction that has to be new for it to count.
 const NEW: f64 = 0.1;
@@ -21,7 +31,7 @@ pub(super) struct Shift {
     pub weights: Vec<(u32, f64)>,
 }
 
-/// A basis of the changes at the ends on faces of all pieces of at least the length `shortest`, by nodes of `nodes` within a horizon.
+/// A basis of the changes at the ends on faces of all pieces of at least the length `shortest`, by nodes of `nodes` and points at the seam within a horizon.
 pub(super) fn shifts<const D: usize>(
     segments: &Segments<'_, D>,
     nodes: &FxHashMap<u32, Vector<D>>,
@@ -30,15 +40,18 @@ pub(super) fn shifts<const D: usize>(
     let cloud = &segments.body.cloud;
     let sites = &segments.model.sites;
     let reach = cloud.horizon.iter().copied().fold(0.0, f64::max);
-    let key =
-        |x: &Vector<D>| -> [i64; D] { std::array::from_fn(|i| (x[i] / reach).floor() as i64) };
-    let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
     let mut order: Vec<u32> = nodes.keys().copied().collect();
     order.sort_unstable();
-    for &site in &order {
-        let of = bins.entry(key(&sites[site as usize].position)).or_default();
-        of.push(site);
-    }
+    let place = |site: u32| sites[site as usize].position;
+    let node_bins = Bins::new(&order, place, reach);
+    let seam: Vec<u32> = points_at_seam(segments)
+        .map(|p| segments.site[p as usize])
+        .collect();
+    let point_bins = Bins::new(&seam, place, reach);
+    let mut near: Vec<(f64, u32)> = Vec::new();
+    let of_end = |s: &Segment| s.ends.iter().filter(|e| matches!(e, End::Face(_))).count();
+    let ends: usize = segments.cut.iter().map(of_end).sum();
+    let most = (MOST_SHIFTS / ends.max(1)).max(1);
     let mut shifts = Vec::new();
     for (piece, s) in segments.cut.iter().enumerate() {
         let xi = segments.body.bond(s.i as usize, s.j as usize);
@@ -50,26 +63,13 @@ pub(super) fn shifts<const D: usize>(
             let at = [s.piece.from, s.piece.to][side];
             let x = cloud.position[s.i as usize] + xi * at;
             let trace: Vec<u32> = foot.trace.iter().map(|t| t.0).collect();
-            let mut near: Vec<(f64, u32)> = Vec::new();
-            let middle = key(&x);
-            for number in 0..3usize.pow(D as u32) {
-                let mut rest = number;
-                let bin = middle.map(|k| {
-                    let step = (rest % 3) as i64 - 1;
-                    rest /= 3;
-                    k + step
-                });
-                for &site in bins.get(&bin).into_iter().flatten() {
-                    let away = (sites[site as usize].position - x).norm();
-                    if away <= reach && !trace.contains(&site) {
-                        near.push((away, site));
-                    }
-                }
-            }
-            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            node_bins.near(&x, |site| trace.contains(&site), &mut near);
             let mut around = trace;
             let room = (MOST_BESIDE + D + 1).saturating_sub(around.len());
             around.extend(near.iter().take(room).map(|n| n.1));
+            let own = [s.i, s.j].map(|p| segments.site[p as usize]);
+            point_bins.near(&x, |site| own.contains(&site), &mut near);
+            around.extend(near.iter().take(MOST_POINTS * D).map(|n| n.1));
             let affine = |r: usize| -> Vec<f64> {
                 let of = |&site: &u32| match r {
                     0 => 1.0,
@@ -95,14 +95,66 @@ pub(super) fn shifts<const D: usize>(
                     basis.push(new);
                 }
             }
-            shifts.extend(basis.split_off(affine_rows).into_iter().map(|v| Shift {
-                piece,
-                side,
-                weights: around.iter().copied().zip(v).collect(),
-            }));
+            shifts.extend(
+                basis
+                    .split_off(affine_rows)
+                    .into_iter()
+                    .take(most)
+                    .map(|v| Shift {
+                        piece,
+                        side,
+                        weights: around.iter().copied().zip(v).collect(),
+                    }),
+            );
         }
     }
     shifts
+}
+
+/// Sites in bins.
+struct Bins<const D: usize> {
+    reach: f64,
+    sites: FxHashMap<[i64; D], Vec<(u32, Vector<D>)>>,
+}
+
+impl<const D: usize> Bins<D> {
+    fn new(list: &[u32], place: impl Fn(u32) -> Vector<D>, reach: f64) -> Self {
+        let mut bins = Self {
+            reach,
+            sites: FxHashMap::default(),
+        };
+        for &site in list {
+            let x = place(site);
+            let of = bins.sites.entry(bins.key(&x)).or_default();
+            of.push((site, x));
+        }
+        bins
+    }
+
+    fn key(&self, x: &Vector<D>) -> [i64; D] {
+        std::array::from_fn(|i| (x[i] / self.reach).floor() as i64)
+    }
+
+    /// Collects the sites within reach but those that are `left_out`, with their distances, nearest first.
+    fn near(&self, x: &Vector<D>, left_out: impl Fn(u32) -> bool, near: &mut Vec<(f64, u32)>) {
+        near.clear();
+        let middle = self.key(x);
+        for number in 0..3usize.pow(D as u32) {
+            let mut rest = number;
+            let bin = middle.map(|k| {
+                let step = (rest % 3) as i64 - 1;
+                rest /= 3;
+                k + step
+            });
+            for (site, y) in self.sites.get(&bin).into_iter().flatten() {
+                let away = (y - x).norm();
+                if away <= self.reach && !left_out(*site) {
+                    near.push((away, *site));
+                }
+            }
+        }
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    }
 }
 
 fn norm(v: &[f64]) -> f64 {

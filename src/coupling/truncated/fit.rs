@@ -239,33 +239,20 @@ pub(super) fn fit<const D: usize>(
             residual: left,
         });
     };
-    // a lattice with few bonds may need a second layer of points
-    for _ in 0..2 {
-        let parts = parts(segments);
-        let (conditions, target) = pair_conditions(segments, &parts, &missing);
-        // without the floor first: where even that fails, nothing else has to be tried
-        let (mut change, mut rest) = finish(&conditions, &target, f64::NEG_INFINITY);
-        if rest <= 1e-3 * scale && change.iter().any(|&c| c < FLOOR - 1.0) {
-            (change, rest) = finish(&conditions, &target, FLOOR - 1.0);
+    // the pairwise part by itself, and shares of dilatations for it
+    let mut trial = segments.clone();
+    left = fit_factors(&mut trial, false);
+    if left <= MET + rounding {
+        let parts = parts(&trial);
+        let rest = state_change(&mut trial, &parts, &nodes, state);
+        if rest > MET + rounding {
+            return Err(ModelError::Seam {
+                what: "shares of the dilatation",
+                residual: rest,
+            });
         }
-        left = rest / scale;
-        if left <= MET + rounding {
-            for (part, c) in parts.iter().zip(&change) {
-                match *part {
-                    Part::Piece(k) => segments.cut[k].scale += c,
-                    Part::Bond(i, j) => segments.changed.entry((i, j)).or_default().scale += c,
-                }
-            }
-            let rest = state_change(segments, &parts, &nodes, state);
-            if rest > MET + rounding {
-                return Err(ModelError::Seam {
-                    what: "shares of the dilatation",
-                    residual: rest,
-                });
-            }
-            return Ok(true);
-        }
-        segments.widen();
+        *segments = trial;
+        return Ok(true);
     }
     Err(ModelError::Seam {
         what: "positive factors",

@@ -27,6 +27,7 @@ mod edges;
 mod feet;
 mod fit;
 mod moving;
+mod normal;
 mod parts;
 mod seam;
 mod segments;

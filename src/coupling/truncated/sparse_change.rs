@@ -5,6 +5,8 @@ use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
 use rayon::prelude::*;
 
+use super::normal::Dense;
+
 /// Steps of the dual Newton method.
 const MOST_STEPS: usize = 20;
 
@@ -26,8 +28,35 @@ const REGULAR: f64 = 1e-8;
 /// Corrections by the factors after the last step, each of which has to leave less than [`STALLED`] of the gap.
 const MOST_CORRECTIONS: usize = 10;
 
-/// Iterations of conjugate gradients within a step.
+/// Conditions up to which factors of a step are dense.
+const DENSE: usize = 2500;
+
+/// Root mean square of changes, relative to what changes, beyond which they are of no use: none is looked for.
+const MOST_CHANGE: f64 = 5.0;
+
+/// Iterations of conjugate gradients within a step, without factors that lead them.
 const MOST_ITERATIONS: usize = 4000;
+
+/// The same in all steps together, with factors: seams that are met take 30 a step.
+const MOST_LED: usize = 3000;
+
+/// Newton steps with factors of their own.
+const MOST_DIRECT_STEPS: usize = 60;
+
+/// Most conditions for such steps: each takes seconds beyond.
+const MOST_DIRECT: usize = 6000;
+
+/// What may be left of the target, relative, where no second search is needed.
+const MET: f64 = 1e-12;
+
+/// How the steps of Newton's method are found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Steps {
+    /// By conjugate gradients, led by the factors of the equations of all changes.
+    Gradients,
+    /// By the factors of the equations of the changes off the floor.
+    Direct,
+}
 
 /// Conditions on changes, one column per change.
 #[derive(Clone)]
@@ -232,48 +261,77 @@ impl Conditions {
     /// Minimises `½ Σ x²` subject to `A x = missing` and `x ≥ floor`.
     ///
     /// As for the weights of a family the dual is smooth, `x = max(floor, Aᵀ λ)`; Newton's method, its steps by conjugate gradients with the normal equations of the changes off
-    /// the floor, led by the factors of those of all changes. What these leave is made up for by the factors alone, in `Aᵀ λ` itself. Where the conditions contradict each other or the floor, the change that came nearest is returned: the caller looks at what is still missing.
+    /// the floor, led by the factors of those of all changes. What these leave is made up for by the factors alone, in `Aᵀ λ` itself. With many changes at the floor the conditions on the others nearly depend on each other, and such steps end before they are of use: where something is left, the search
+    /// begins again with steps that factorise the equations of the changes off the floor, a little added to their diagonal. No change that meets the conditions has less than twice the dual as its square, so a search ends when only changes far too large are left. Where the conditions contradict each other or the floor, the change
+    /// that came nearest is returned: the caller looks at what is still missing.
     pub fn least_change(&self, missing: &[f64], floor: f64) -> Vec<f64> {
         // all rows to the same size, or conjugate gradients take ages
         let (scaled, target) = self.scaled(missing);
-        let goal = 1e-15 * norm(&target);
+        let (left, change) = scaled.newton(&target, floor, Steps::Gradients);
+        if left <= MET * norm(&target) || floor == f64::NEG_INFINITY || self.count > MOST_DIRECT {
+            return change;
+        }
+        let (less, other) = scaled.newton(&target, floor, Steps::Direct);
+        if less < left { other } else { change }
+    }
+
+    /// The dual of a change, to be made large; `z` is `Aᵀ λ`.
+    fn dual(&self, target: &[f64], multiplier: &[f64], z: &[f64], floor: f64) -> f64 {
+        let penalty = z.iter().enumerate().map(|(k, &z)| {
+            let floor = self.floor_of(k, floor);
+            if z >= floor {
+                0.5 * z * z
+            } else {
+                floor * (z - 0.5 * floor)
+            }
+        });
+        dot(multiplier, target) - penalty.sum::<f64>()
+    }
+
+    /// Newton's method for the dual, of rows of the norm 1; what is left, and the change.
+    fn newton(&self, target: &[f64], floor: f64, steps: Steps) -> (f64, Vec<f64>) {
+        let goal = 1e-15 * norm(target);
         let lifted = |z: &[f64]| -> Vec<f64> {
             let all = z.iter().enumerate();
             all.map(|(k, z)| z.max(self.floor_of(k, floor))).collect()
         };
-        let left = |x: &[f64]| scaled.left(&target, x);
-        // the dual, to be made large
-        let dual = |multiplier: &[f64], z: &[f64]| -> f64 {
-            let penalty: f64 = z
-                .iter()
-                .enumerate()
-                .map(|(k, &z)| {
-                    let floor = self.floor_of(k, floor);
-                    if z >= floor {
-                        0.5 * z * z
-                    } else {
-                        floor * (z - 0.5 * floor)
-                    }
-                })
-                .sum();
-            dot(multiplier, &target) - penalty
-        };
+        let left = |x: &[f64]| self.left(target, x);
+        // the dual is below half of the square of any change that meets the conditions
+        let most_change = MOST_CHANGE * floor.abs().max(1.0);
+        let bound = 0.5 * self.changes() as f64 * most_change * most_change;
         let mut multiplier = vec![0.0; self.count];
         let mut z = vec![0.0; self.changes()];
         let mut gap = left(&lifted(&z));
         let mut best = (norm(&gap), z.clone());
-        let factors = scaled.factors();
-        for _ in 0..MOST_STEPS {
+        let (most, factors) = match steps {
+            Steps::Gradients => (MOST_STEPS, self.factors(|_| true)),
+            Steps::Direct => (MOST_DIRECT_STEPS, None),
+        };
+        let mut led = 0;
+        for _ in 0..most {
             if best.0 <= goal {
                 break;
             }
-            let direction = scaled.newton_step(&gap, &z, floor, factors.as_ref());
+            let is_free = |k: usize| z[k] >= self.floor_of(k, floor);
+            let direction = match steps {
+                Steps::Gradients => {
+                    let (direction, iterations) = self.newton_step(&gap, is_free, factors.as_ref());
+                    if factors.is_some() {
+                        led += iterations;
+                    }
+                    direction
+                }
+                Steps::Direct => match self.direct_step(&gap, norm(target), is_free) {
+                    Some(direction) => direction,
+                    None => break,
+                },
+            };
             let rise = dot(&gap, &direction);
             if rise <= 0.0 {
                 // conjugate gradients found nothing that leaves less
                 break;
             }
-            let (here, was) = (dual(&multiplier, &z), norm(&gap));
+            let (here, was) = (self.dual(target, &multiplier, &z, floor), norm(&gap));
             let mut step = 1.0;
             let mut moved = false;
             while step > 1e-4 {
@@ -282,11 +340,13 @@ impl Conditions {
                     .zip(&direction)
                     .map(|(m, d)| m + step * d)
                     .collect();
-                let next = scaled.transposed(&trial);
+                let next = self.transposed(&trial);
                 let changed = lifted(&next);
                 let remaining = left(&changed);
                 // near the end the dual is flat to round-off, the gap is not
-                if norm(&remaining) < 0.9 * was || dual(&trial, &next) > here + 1e-4 * step * rise {
+                if norm(&remaining) < 0.9 * was
+                    || self.dual(target, &trial, &next, floor) > here + 1e-4 * step * rise
+                {
                     (multiplier, z, gap) = (trial, next, remaining);
                     moved = true;
                     break;
@@ -300,14 +360,16 @@ impl Conditions {
             if reached < best.0 {
                 best = (reached, z.clone());
             }
-            if floor == f64::NEG_INFINITY && reached > STALLED * was {
+            let is_stalled = floor == f64::NEG_INFINITY && reached > STALLED * was;
+            let is_far = self.dual(target, &multiplier, &z, floor) > bound;
+            if is_stalled || is_far || led > MOST_LED {
                 break;
             }
         }
         let (mut reached, mut z) = best;
         if let Some(factors) = &factors {
             for _ in 0..MOST_CORRECTIONS {
-                let correction = scaled.transposed(&solved(factors, &left(&lifted(&z))));
+                let correction = self.transposed(&solved(factors, &left(&lifted(&z))));
                 let next: Vec<f64> = z.iter().zip(correction).map(|(z, c)| z + c).collect();
                 let remaining = norm(&left(&lifted(&next)));
                 if remaining < STALLED * reached {
@@ -317,44 +379,90 @@ impl Conditions {
                 }
             }
         }
-        lifted(&z)
+        (reached, lifted(&z))
     }
 
-    /// The factors of the normal equations of all changes, if there are many; rows are those of norm 1.
-    fn factors(&self) -> Option<Llt<usize, f64>> {
+    /// The factors of the normal equations of the changes that count, if there are many; rows are those of norm 1.
+    fn factors(&self, counts: impl Fn(usize) -> bool + Sync) -> Option<Llt<usize, f64>> {
         if self.count < FACTORISED {
             return None;
         }
-        let mut entries: Vec<Triplet<usize, usize, f64>> = (0..self.count)
-            .map(|r| Triplet::new(r, r, REGULAR))
-            .collect();
-        for k in 0..self.changes() {
+        let mut of_row: Vec<Vec<(usize, f64)>> = vec![Vec::new(); self.count];
+        for k in (0..self.changes()).filter(|&k| counts(k)) {
             for (r, v) in self.column(k) {
-                let lower = self.column(k).filter(|&(s, _)| s <= r);
-                entries.extend(lower.map(|(s, w)| Triplet::new(r, s, v * w)));
+                of_row[r].push((k, v));
             }
         }
+        // a row at a time: a change of a trace has a hundred entries, and its square ten thousand
+        let rows = of_row.par_iter().enumerate().map_init(
+            || vec![0.0; self.count],
+            |sums, (r, of)| {
+                let mut touched = vec![r];
+                sums[r] = REGULAR;
+                for &(k, v) in of {
+                    for (s, w) in self.column(k).filter(|&(s, _)| s <= r) {
+                        if sums[s] == 0.0 {
+                            touched.push(s);
+                        }
+                        sums[s] += v * w;
+                    }
+                }
+                touched.sort_unstable();
+                touched.dedup();
+                let row = touched
+                    .iter()
+                    .map(|&s| Triplet::new(r, s, std::mem::take(&mut sums[s])));
+                row.collect::<Vec<_>>()
+            },
+        );
+        let entries: Vec<Vec<Triplet<usize, usize, f64>>> = rows.collect();
+        let entries = entries.concat();
         // without factors all goes as before, and takes longer
         let normal = SparseColMat::try_new_from_triplets(self.count, self.count, &entries).ok()?;
         normal.sp_cholesky(faer::Side::Lower).ok()
     }
 
-    /// Solves the normal equations of the changes off the floor as far as their residual falls; `factors` of those of all changes, where there are some, make that a matter of few iterations.
+    /// Solves the normal equations of the changes off the floor, with as much added to their diagonal as still tells conditions apart.
+    fn direct_step(
+        &self,
+        gap: &[f64],
+        whole: f64,
+        is_free: impl Fn(usize) -> bool + Sync,
+    ) -> Option<Vec<f64>> {
+        let n = self.count;
+        if n > DENSE {
+            return Some(solved(&self.factors(is_free)?, gap));
+        }
+        let mut normal = vec![0.0; n * n];
+        for k in (0..self.changes()).filter(|&k| is_free(k)) {
+            for (r, v) in self.column(k) {
+                for (s, w) in self.column(k).filter(|&(s, _)| s >= r) {
+                    normal[r * n + s] += v * w;
+                }
+            }
+        }
+        let regular = (REGULAR * norm(gap) / whole).clamp(1e-12, REGULAR);
+        for r in 0..n {
+            normal[r * n + r] += regular;
+        }
+        Some(Dense::new(n, normal)?.solved(gap))
+    }
+
+    /// Solves the normal equations of the changes off the floor as far as their residual falls; `factors`, of those of all changes or of as many as are off it, make that a matter of few iterations. Returns how many it took.
     fn newton_step(
         &self,
         gap: &[f64],
-        z: &[f64],
-        floor: f64,
+        is_free: impl Fn(usize) -> bool,
         factors: Option<&Llt<usize, f64>>,
-    ) -> Vec<f64> {
+    ) -> (Vec<f64>, usize) {
         let lead = |residual: &[f64]| match factors {
             Some(factors) => solved(factors, residual),
             None => residual.to_vec(),
         };
         let apply = |v: &[f64]| {
             let mut t = self.transposed(v);
-            for (k, (t, &z)) in t.iter_mut().zip(z).enumerate() {
-                if z < self.floor_of(k, floor) {
+            for (k, t) in t.iter_mut().enumerate() {
+                if !is_free(k) {
                     *t = 0.0;
                 }
             }
@@ -367,7 +475,9 @@ impl Conditions {
         // conditions that follow from each other have directions of round-off alone, and the residual grows there once the rest is met
         let mut best = (dot(gap, gap), solution.clone());
         let goal = best.0 * 1e-20;
+        let mut iterations = 0;
         for _ in 0..MOST_ITERATIONS {
+            iterations += 1;
             let along = apply(&direction);
             let curvature = dot(&direction, &along);
             // conditions that contradict each other have directions without any
@@ -392,7 +502,7 @@ impl Conditions {
                 *d = r + ratio * *d;
             }
         }
-        best.1
+        (best.1, iterations)
     }
 }
 

@@ -247,10 +247,10 @@ fn zone_size<const D: usize>(subject: &Subject<'_, D>) -> f64 {
 /// Size of elements that carry the partial stress over the spacing of points from which on their strains stay smooth wherever the lattice lies.
 ///
 /// Tip of a cantilever over the exact one (1/32 = h, m = 3), lattice off the nodes by 0, 0.1, 0.25, 0.3, 0.4 and 0.5 h: 1.000, 1.000, −0.06, 0.39, 1.28, 1.000 with elements of h; 1.000 with those of 2 h and 0.999 with those of 3 h.
-/// The short-wave stiffness of such elements is near zero, and the unlike families of the Gauss points take it below.
+/// The short-wave stiffness of such elements is near zero, and the unlike families of the Gauss points take it below; where it does so no affine or quadratic field tells.
 const SMOOTH: f64 = 1.5;
 
-/// What is told of elements that carry the partial stress of points between their nodes and are as small as the spacing.
+/// What refuses elements that carry the partial stress of points between their nodes and are as small as the spacing.
 fn small_stress_elements<const D: usize>(subject: &Subject<'_, D>) -> Option<Finding> {
     let model = subject.model;
     if !model.has_places_between_nodes() {
@@ -264,7 +264,7 @@ fn small_stress_elements<const D: usize>(subject: &Subject<'_, D>) -> Option<Fin
     let value = size / model.spacing();
     let place: Vec<f64> = model.mesh.centroid(cell).iter().copied().collect();
     (value < SMOOTH).then(|| Finding {
-        severity: Severity::Warning,
+        severity: Severity::Refusal,
         value,
         limit: SMOOTH,
         message: format!(
