@@ -120,6 +120,12 @@ fn small_elements_with_partial_stress_are_refused() {
         crate::flat(&refusal).contains("partial stress are 1.00 spacings"),
         "{refusal}"
     );
+    // with a point in the middle of every element it is exact, and warned of
+    let halfway = said(1, 0.5).expect("it runs");
+    assert!(
+        halfway.contains("partial stress are 1.00 spacings"),
+        "{halfway}"
+    );
     for (finer, offset) in [(1, 0.0), (2, 0.3)] {
         let proof = said(finer, offset).expect("it runs");
         assert!(!proof.contains("partial stress are"), "{proof}");

@@ -399,9 +399,7 @@ const METHODS: &[Method] = &[
         typed: "coupling = { partial-stress = { form = \"meshfree\" } }",
         has_transition: true,
         finer: 1,
-        dear: Some(
-            "left out: its second mesh took two minutes where no other coupling took one",
-        ),
+        dear: Some("left out: its second mesh took two minutes where no other coupling took one"),
     },
     Method {
         name: "truncated",
