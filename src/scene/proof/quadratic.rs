@@ -271,6 +271,7 @@ fn small_stress_elements<const D: usize>(subject: &Subject<'_, D>) -> Option<Fin
             let place = (centroid[k] - origin[k]) / spacing;
             (place - place.round()).abs() < 1e-6
         }),
+        Some(PointSource::Cells) => true,
         _ => false,
     };
     (value < SMOOTH).then(|| Finding {
