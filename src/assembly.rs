@@ -72,6 +72,14 @@ impl Transfer {
             .zip(self.weights[range].iter().copied())
     }
 
+    /// The site that a place is.
+    #[inline]
+    pub fn site(&self, place: usize) -> Option<u32> {
+        let start = self.offsets[place];
+        let is_site = self.offsets[place + 1] == start + 1 && self.weights[start] == 1.0;
+        is_site.then(|| self.sites[start])
+    }
+
     /// Number of stored weights.
     pub fn weight_count(&self) -> usize {
         self.sites.len()
@@ -94,6 +102,10 @@ pub struct Row<const D: usize> {
     slot: Vec<u32>,
     columns: Vec<u32>,
     blocks: Vec<Tensor<D>>,
+    /// What [`Row::gather`] holds: blocks of places that are no sites.
+    slot_of_place: Vec<u32>,
+    places: Vec<u32>,
+    place_blocks: Vec<Tensor<D>>,
     /// Stiffnesses of elements, each at its number's remainder: nodes that follow each other have elements in common.
     elements: Vec<(u32, ElementRows<D>)>,
 }
@@ -113,6 +125,9 @@ impl<const D: usize> Row<D> {
             slot: vec![EMPTY; sites],
             columns: Vec::new(),
             blocks: Vec::new(),
+            slot_of_place: Vec::new(),
+            places: Vec::new(),
+            place_blocks: Vec::new(),
             elements: Vec::new(),
         }
     }
@@ -159,6 +174,39 @@ impl<const D: usize> Row<D> {
                 self.add_site(site, &(block * weight));
             }
         }
+    }
+
+    /// As [`Row::add`], but a place that is no site waits for [`Row::spread`]: a row names such a place many times, and each has many sites.
+    #[inline]
+    pub fn gather(&mut self, transfer: &Transfer, place: usize, block: &Tensor<D>) {
+        if let Some(site) = transfer.site(place) {
+            self.add_site(site, block);
+            return;
+        }
+        if self.slot_of_place.len() <= place {
+            self.slot_of_place.resize(transfer.len(), EMPTY);
+        }
+        let slot = &mut self.slot_of_place[place];
+        if *slot == EMPTY {
+            *slot = self.places.len() as u32;
+            self.places.push(place as u32);
+            self.place_blocks.push(*block);
+        } else {
+            self.place_blocks[*slot as usize] += block;
+        }
+    }
+
+    /// Adds what waits for the places of this transfer.
+    pub fn spread(&mut self, transfer: &Transfer) {
+        let places = std::mem::take(&mut self.places);
+        let blocks = std::mem::take(&mut self.place_blocks);
+        for (&place, block) in places.iter().zip(&blocks) {
+            self.slot_of_place[place as usize] = EMPTY;
+            self.add(transfer, place as usize, block);
+        }
+        (self.places, self.place_blocks) = (places, blocks);
+        self.places.clear();
+        self.place_blocks.clear();
     }
 
     /// Multiplies the row by a factor.

@@ -11,7 +11,9 @@ use crate::{
     mesh::Mesh,
     peridynamics::{
         BondLaw, Bound, Cloud, Conditions, Ends, Factors, Families, Influence, PdBody, PdError,
-        TIE_TOLERANCE, weights,
+        TIE_TOLERANCE,
+        alike::{self, Shape},
+        weights,
     },
     tensor::{Tensor, Vector},
 };
@@ -103,17 +105,19 @@ impl<const D: usize> Meshfree<'_, D> {
             return;
         };
         let mut own = Vector::zeros();
+        let mut on: Vec<(usize, Vector<D>)> = Vec::new();
         for &j in body.families.of(i) {
             let j = j as usize;
             let xi = body.bond(i, j);
             // K u = f is minus the internal force
             let a = inverse * xi * (-weigh(j, &xi) * body.cloud.volume[i]);
             own -= a;
-            body.add_partial_stress(j, &a, row);
+            on.push((j, a));
         }
         if own.amax() > 1e-15 * body.cloud.volume[i] / horizon {
-            body.add_partial_stress(i, &own, row);
+            on.push((i, own));
         }
+        body.add_partial_stresses(on, row);
     }
 }
 
@@ -196,11 +200,23 @@ impl<'a, const D: usize> Elements<'a, D> {
         }
         let fit = FamilyFit::new(model, peridynamics.law.as_ref());
         let families = Self::families(model, &mut cloud, points, &fit)?;
+        let centres: Vec<usize> = (points..cloud.position.len()).collect();
+        let shapes = shapes(&cloud, &families, &centres);
+        let first_alike = alike::first_alike(&shapes);
+        let fitted: Vec<Result<Vec<f64>, PdError>> = shapes
+            .par_iter()
+            .enumerate()
+            .map(|(k, shape)| match first_alike[k] == k {
+                true => fit.factors(&shape.bonds, shape.horizon),
+                false => Ok(Vec::new()),
+            })
+            .collect();
+        let factors = |i: usize| fitted[first_alike[i - points]].clone();
         let body = PdBody::new(
             cloud,
             families,
             peridynamics.law.as_ref(),
-            &Factors::OfFamily(&|bonds, horizon| fit.factors(bonds, horizon)),
+            &Factors::OfFamily(&factors),
             Ends::Alike,
         )
         .map_err(ModelError::gauss_point)?;
@@ -231,20 +247,17 @@ impl<'a, const D: usize> Elements<'a, D> {
             )?;
             let mut families = rows.spread(&centres, cloud.position.len());
             model.cut_bonds(&cloud.position, &mut families);
-            candidates = candidates
+            let shapes = shapes(cloud, &families, &candidates);
+            let first_alike = alike::first_alike(&shapes);
+            let lacks: Vec<bool> = (0..shapes.len())
                 .into_par_iter()
-                .filter(|&i| {
-                    let bonds: Vec<(Vector<D>, f64)> = families
-                        .of(i)
-                        .iter()
-                        .map(|&j| {
-                            let j = j as usize;
-                            (cloud.position[j] - cloud.position[i], cloud.volume[j])
-                        })
-                        .collect();
-                    !fit.is_met_by_positive(&bonds, cloud.horizon[i])
+                .map(|k| {
+                    first_alike[k] == k
+                        && !fit.is_met_by_positive(&shapes[k].bonds, shapes[k].horizon)
                 })
                 .collect();
+            let mut of_candidates = first_alike.iter().map(|&k| lacks[k]);
+            candidates.retain(|_| of_candidates.next() == Some(true));
             if candidates.is_empty() || widened > WIDEST {
                 return Ok(families);
             }
@@ -254,6 +267,28 @@ impl<'a, const D: usize> Elements<'a, D> {
             }
         }
     }
+}
+
+/// The families of some points.
+fn shapes<const D: usize>(
+    cloud: &Cloud<D>,
+    families: &Families,
+    points: &[usize],
+) -> Vec<Shape<D>> {
+    points
+        .par_iter()
+        .map(|&i| Shape {
+            bonds: families
+                .of(i)
+                .iter()
+                .map(|&j| {
+                    let j = j as usize;
+                    (cloud.position[j] - cloud.position[i], cloud.volume[j])
+                })
+                .collect(),
+            horizon: cloud.horizon[i],
+        })
+        .collect()
 }
 
 /// Bonds of a whole family with their volumes, and the moments that they have.
@@ -351,17 +386,17 @@ impl<const D: usize> Operator<D> for Elements<'_, D> {
         }
         self.model.add_element_rows(site, row);
         let mut quadrature = Vec::new();
+        let mut on: Vec<(usize, Vector<D>)> = Vec::new();
         for (c, local) in self.model.cells_of_site(site) {
             if self.first[c] == u32::MAX {
                 continue;
             }
             fem::quadrature(&self.model.mesh, c, &mut quadrature);
             for (q, g) in quadrature.iter().enumerate() {
-                let a = g.gradient[local] * g.weight;
-                self.body
-                    .add_partial_stress(self.first[c] as usize + q, &a, row);
+                on.push((self.first[c] as usize + q, g.gradient[local] * g.weight));
             }
         }
+        self.body.add_partial_stresses(on, row);
     }
 
     fn is_body_row(&self, site: usize) -> bool {

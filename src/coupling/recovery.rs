@@ -17,6 +17,7 @@ use crate::{
         points::PointCloud,
     },
     mesh::Mesh,
+    peridynamics::alike::{Shape, first_alike},
     tensor::Vector,
 };
 
@@ -186,12 +187,12 @@ fn patches<const D: usize>(
         bins: Bins::new(&positions, 2.0 * cloud.spacing),
         points,
     };
-    wanted
-        .par_iter()
-        .filter_map(|&cell| around.patch(cell).map(|patch| (cell, patch)))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .collect()
+    let mut patches = FxHashMap::default();
+    let mut sought: Vec<(u32, Vec<u32>)> = wanted.into_iter().map(|c| (c, vec![c])).collect();
+    for sharing in [D, 1, 1] {
+        around.find(&mut sought, sharing, &mut patches);
+    }
+    patches
 }
 
 /// The centroid of a cell, and the edge of a cube as large as its box is on average.
@@ -212,26 +213,63 @@ struct Around<'a, const D: usize> {
 }
 
 impl<const D: usize> Around<'_, D> {
-    /// Second derivatives in a cell from the nearest sites that determine them; none if none do.
-    fn patch(&self, cell: u32) -> Option<Patch<D>> {
-        let (centre, size) = centre_and_size(self.at, cell);
-        let mut cells = vec![cell];
-        for sharing in [D, 1, 1] {
-            self.grow(&mut cells, sharing);
-            let sites = self.sites_of(&cells, &centre, size);
-            let data: Vec<Vector<D>> = sites
-                .iter()
-                .map(|&s| (self.at.sites[s as usize].position - centre) / size)
-                .collect();
-            if let Some(second) = derivative::second_derivatives(&data) {
-                return Some(Patch {
-                    centre,
-                    size,
-                    weights: sites.into_iter().zip(second).collect(),
+    /// Second derivatives in those of the cells sought where the sites in the cells around, of which each brings those found before, determine them.
+    fn find(
+        &self,
+        sought: &mut Vec<(u32, Vec<u32>)>,
+        sharing: usize,
+        patches: &mut FxHashMap<u32, Patch<D>>,
+    ) {
+        let places: Vec<(Vec<u32>, Shape<D>)> = sought
+            .par_iter_mut()
+            .map(|(cell, cells)| {
+                let (centre, size) = centre_and_size(self.at, *cell);
+                self.grow(cells, sharing);
+                let sites = self.sites_of(cells, &centre, size);
+                let data = sites.iter().map(|&s| {
+                    let x = self.at.sites[s as usize].position;
+                    ((x - centre) / size, 1.0)
                 });
-            }
-        }
-        None
+                let bonds = data.collect();
+                (
+                    sites,
+                    Shape {
+                        bonds,
+                        horizon: 1.0,
+                    },
+                )
+            })
+            .collect();
+        let (sites, shapes): (Vec<_>, Vec<_>) = places.into_iter().unzip();
+        let first_alike = first_alike(&shapes);
+        let found: Vec<Option<Vec<Vec<f64>>>> = shapes
+            .par_iter()
+            .enumerate()
+            .map(|(k, shape)| {
+                let data: Vec<Vector<D>> = shape.bonds.iter().map(|b| b.0).collect();
+                (first_alike[k] == k)
+                    .then(|| derivative::second_derivatives(&data))
+                    .flatten()
+            })
+            .collect();
+        let mut k = 0;
+        let mut sites = sites.into_iter();
+        sought.retain(|(cell, _)| {
+            let second = &found[first_alike[k]];
+            k += 1;
+            let (Some(second), Some(sites)) = (second, sites.next()) else {
+                return true;
+            };
+            let (centre, size) = centre_and_size(self.at, *cell);
+            let weights = sites.into_iter().zip(second.iter().cloned()).collect();
+            let patch = Patch {
+                centre,
+                size,
+                weights,
+            };
+            patches.insert(*cell, patch);
+            false
+        });
     }
 
     /// Adds the cells of the same material that share at least so many nodes with one of those given.

@@ -64,9 +64,8 @@ struct Scratch<const D: usize> {
     factors: Vec<f64>,
 }
 
-/// Factors of the bonds `(ξ, V)` of one family of a horizon.
-pub type FamilyFactors<'a, const D: usize> =
-    dyn Fn(&[(Vector<D>, f64)], f64) -> Result<Vec<f64>, PdError> + Sync + 'a;
+/// Factors of the bonds of a point's family.
+pub type FamilyFactors<'a> = dyn Fn(usize) -> Result<Vec<f64>, PdError> + Sync + 'a;
 
 /// The kernel factors of a body's bonds.
 pub enum Factors<'a, const D: usize> {
@@ -76,8 +75,8 @@ pub enum Factors<'a, const D: usize> {
     Shells(&'a (dyn Fn(f64, &Vector<D>) -> f64 + Sync)),
     /// Fitted to the fourth moments, family by family.
     Fitted,
-    /// As a function of the bonds `(ξ, V)` of a family and its horizon says.
-    OfFamily(&'a FamilyFactors<'a, D>),
+    /// As a function of the point says.
+    OfFamily(&'a FamilyFactors<'a>),
 }
 
 impl<const D: usize> PdBody<D> {
@@ -140,11 +139,7 @@ impl<const D: usize> PdBody<D> {
                         let bonds: Vec<(Vector<D>, f64)> = bonds.collect();
                         of.factors.extend(fitted(law, &bonds, horizon).map_err(at)?);
                     }
-                    Factors::OfFamily(f) => {
-                        let bonds = of.bonds.iter().copied().zip(of.volumes.iter().copied());
-                        let bonds: Vec<(Vector<D>, f64)> = bonds.collect();
-                        of.factors.extend(f(&bonds, horizon).map_err(at)?);
-                    }
+                    Factors::OfFamily(f) => of.factors.extend(f(i).map_err(at)?),
                 }
                 law.coefficients(
                     &Family {
@@ -267,7 +262,7 @@ impl<const D: usize> PdBody<D> {
                 first += xi * (omega[k] * of_state);
             }
             own += block;
-            row.add(transfer, j, &(-block));
+            row.gather(transfer, j, &(-block));
         }
         if let Some(state) = self.state(i) {
             // a full family has Σ ω ξ V = 0; what is left of it is a surface or a weight that changes in space
@@ -291,13 +286,14 @@ impl<const D: usize> PdBody<D> {
                     self.add_weighted_gradient(j, &c, row);
                 }
                 own += block;
-                row.add(transfer, j, &(-block));
+                row.gather(transfer, j, &(-block));
             }
         }
-        row.add(transfer, i, &own);
+        row.gather(transfer, i, &own);
+        row.spread(transfer);
     }
 
-    /// Adds the row of `A : Ḡ_j`, where `a[b]` is the block that multiplies column `b` of `Ḡ_j = Σ ω η ⊗ ξ V`.
+    /// Gathers the row of `A : Ḡ_j`, where `a[b]` is the block that multiplies column `b` of `Ḡ_j = Σ ω η ⊗ ξ V`.
     fn add_weighted_gradient(&self, j: usize, a: &[Tensor<D>; D], row: &mut Row<D>) {
         let (_, omega) = self.kernel(j);
         let mut own = Tensor::zeros();
@@ -309,15 +305,26 @@ impl<const D: usize> PdBody<D> {
                 block += a[b] * xi[b];
             }
             own -= block;
-            row.add(&self.cloud.transfer, l, &block);
+            row.gather(&self.cloud.transfer, l, &block);
         }
-        row.add(&self.cloud.transfer, j, &own);
+        row.gather(&self.cloud.transfer, j, &own);
     }
 
-    /// Adds the row of `ν^ps(x_j) · a`, the partial stress of point `j` on a direction (or a shape-function gradient) `a`.
+    /// Adds the row of `Σ ν^ps(x_j) · a`, the partial stresses of points `j` on directions (or shape-function gradients) `a`.
     ///
     /// Source: [SAND2015-7998] eq. (2.19), `ν^ps = Σ T⟨ξ⟩ ⊗ ξ V`.
-    pub fn add_partial_stress(&self, j: usize, a: &Vector<D>, row: &mut Row<D>) {
+    pub fn add_partial_stresses(
+        &self,
+        on: impl IntoIterator<Item = (usize, Vector<D>)>,
+        row: &mut Row<D>,
+    ) {
+        for (j, a) in on {
+            self.add_partial_stress(j, &a, row);
+        }
+        row.spread(&self.cloud.transfer);
+    }
+
+    fn add_partial_stress(&self, j: usize, a: &Vector<D>, row: &mut Row<D>) {
         let (pair, omega) = self.kernel(j);
         let state = self.state(j);
         let mut own = Tensor::zeros();
@@ -330,9 +337,9 @@ impl<const D: usize> PdBody<D> {
                 block += Tensor::identity() * (state.stabilisation * omega[k] * s);
             }
             own -= block;
-            row.add(&self.cloud.transfer, l, &block);
+            row.gather(&self.cloud.transfer, l, &block);
         }
-        row.add(&self.cloud.transfer, j, &own);
+        row.gather(&self.cloud.transfer, j, &own);
         if let Some(state) = state {
             self.add_weighted_gradient(j, &along(&state.modulus, &(state.shape * a), 1.0), row);
         }

@@ -17,6 +17,7 @@
 //! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |
 //! | `kernel/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
 
+pub(crate) mod alike;
 pub mod body;
 pub mod bond_based;
 pub mod contact;
