@@ -342,7 +342,14 @@ fn same_lattice(progress: &dyn Progress, figures: Option<&Path>) -> Result<Vec<T
 }
 
 /// Finite elements that coarsen away from the slit: how much faster at what error.
-fn graded(n: usize, least_ratio: f64, progress: &dyn Progress) -> Result<Table, Failure> {
+///
+/// Both are solved `rounds` times in turn.
+fn graded(
+    n: usize,
+    least_ratio: f64,
+    rounds: usize,
+    progress: &dyn Progress,
+) -> Result<Table, Failure> {
     let mut table = Table::new(
         format!("Finite elements graded away from the slit, h = 1/{n}, horizon 6 h"),
         Columns::ByQuantity,
@@ -389,13 +396,27 @@ fn graded(n: usize, least_ratio: f64, progress: &dyn Progress) -> Result<Table, 
             .chain([format!("solver.method={method}")])
             .collect()
     };
-    let a = solve(
-        *load("slit_plate.toml", &best(&coupled, "direct"))?,
-        n,
-        progress,
-        None,
-    )?;
-    let pd = full(n, &best(&spacing, "direct"), &a.lattice, progress)?;
+    let both = || -> Result<_, Failure> {
+        let a = solve(
+            *load("slit_plate.toml", &best(&coupled, "direct"))?,
+            n,
+            progress,
+            None,
+        )?;
+        let pd = full(n, &best(&spacing, "direct"), &a.lattice, progress)?;
+        Ok((a, pd))
+    };
+    // in turn, and the least time of each: whatever else the machine does only adds to it
+    let (mut a, mut pd) = both()?;
+    for _ in 1..rounds {
+        let (other_a, other_pd) = both()?;
+        if other_a.seconds() < a.seconds() {
+            a = other_a;
+        }
+        if other_pd.seconds() < pd.seconds() {
+            pd = other_pd;
+        }
+    }
     compare(
         &mut table,
         "splice, direct",
@@ -500,9 +521,9 @@ fn main() -> ExitCode {
         .map(PathBuf::from);
     let progress = TerminalProgress::on_stderr();
     let tables = same_lattice(&progress, figures.as_deref()).and_then(|mut tables| {
-        tables.push(graded(120, 11.0, &progress)?);
+        tables.push(graded(120, 11.0, 3, &progress)?);
         if has("--fine") {
-            tables.push(graded(480, 60.0, &progress)?);
+            tables.push(graded(480, 60.0, 1, &progress)?);
         }
         Ok(tables)
     });
