@@ -37,7 +37,7 @@ pub enum RunError {
     Step(#[from] StepError),
     /// A mode of the coupled model doubles the energy within the run, whatever the step.
     #[error(
-        "this model is unstable in time at any step: a mode largest at ({}) grows as exp({rate:e} t), by exp({gain:.1}) over the run (eigenvalue {real:e} + {imaginary:e} i of M⁻¹K, which should be real and positive); {remedy}; or let it begin with solve.explicit.growing-modes = \"warn\"", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+        "this model is unstable in time at any step: a mode largest at ({}) grows as exp({rate:.3e} t), by exp({gain:.1}) over the run (eigenvalue {real:.3e} + {imaginary:.3e} i of M⁻¹K, which should be real and positive); {remedy}; or let it begin with solve.explicit.growing-modes = \"warn\"", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
     )]
     Grows {
         /// Where the mode is largest.

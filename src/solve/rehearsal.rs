@@ -172,8 +172,8 @@ mod tests {
     use crate::solve::ordering::Ordering;
     use crate::solve::stencils::Lattice;
 
-    /// Against a factorisation that runs, in alternation, the median of three ratios: within a factor of three even where
-    /// other programs have the machine.
+    /// Against a factorisation that runs, in alternation, the median of three ratios: within a factor of three. Other tests run at the same time, so that
+    /// three times in a row it has to miss before it counts.
     #[test]
     fn a_rehearsal_takes_as_long_as_the_factorisation() {
         let lattice = Lattice::rectangle(120, 120);
@@ -184,22 +184,25 @@ mod tests {
             .collect();
         let free = FreeDofs::from_prescribed(&prescribed, 2);
         for symmetry in [Symmetry::Symmetric, Symmetry::Unsymmetric] {
-            let mut ratios: Vec<f64> = (0..3)
-                .map(|_| {
-                    let analysis =
-                        Analysis::new(&matrix, &free, &positions, Ordering::default()).unwrap();
-                    let told = rehearse(&analysis, symmetry, Duration::from_millis(30));
-                    let params = DirectParams {
-                        symmetry,
-                        ..DirectParams::default()
-                    };
-                    let (_, info) =
-                        Factor::new(&matrix, &free, analysis, &params, &Silent).unwrap();
-                    told.factorisation / info.factor_seconds
-                })
-                .collect();
-            ratios.sort_by(f64::total_cmp);
-            assert!((0.33..3.0).contains(&ratios[1]), "{ratios:?}");
+            let ratio = || {
+                let analysis =
+                    Analysis::new(&matrix, &free, &positions, Ordering::default()).unwrap();
+                let told = rehearse(&analysis, symmetry, Duration::from_millis(30));
+                let params = DirectParams {
+                    symmetry,
+                    ..DirectParams::default()
+                };
+                let (_, info) = Factor::new(&matrix, &free, analysis, &params, &Silent).unwrap();
+                told.factorisation / info.factor_seconds
+            };
+            let holds = |r: &[f64; 3]| (0.33..3.0).contains(&r[1]);
+            let mut rounds: Vec<[f64; 3]> = Vec::new();
+            while rounds.len() < 3 && !rounds.last().is_some_and(holds) {
+                let mut ratios = [ratio(), ratio(), ratio()];
+                ratios.sort_by(f64::total_cmp);
+                rounds.push(ratios);
+            }
+            assert!(rounds.last().is_some_and(holds), "{rounds:?}");
         }
     }
 }

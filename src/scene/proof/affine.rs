@@ -170,7 +170,13 @@ fn prove<const D: usize>(
     } else {
         unbalanced(subject, &off, &worst, &tensor, &nodal)
     };
-    told(list.len(), residual, total, &unbalanced, model.is_lattice())
+    told(
+        list.len(),
+        residual,
+        total,
+        &unbalanced,
+        (model.is_lattice(), model.faces_cut_bonds()),
+    )
 }
 
 /// How far from the boundary rows may lack bonds \[m\].
@@ -184,6 +190,21 @@ fn reach<const D: usize>(model: &Model<D>) -> f64 {
         && !model.zones.contains(&Zone::Transition);
     // points on the boundary itself have half a cell, so that a family lacks as much that only touches it
     (if alone { 1.0 } else { 2.0 }) * largest * (1.0 + 1e-6)
+}
+
+/// How much farther than a family the bonds reach whose ends on faces a node carries a part of \[m\].
+fn cut_bonds_reach<const D: usize>(model: &Model<D>, site: u32) -> f64 {
+    if !model.faces_cut_bonds() || model.point_of(site as usize).is_some() {
+        return 0.0;
+    }
+    let extent = |(c, _): (usize, usize)| {
+        let (low, high) = model.mesh.bounds_of(model.mesh.cell(c));
+        (high - low).norm()
+    };
+    model
+        .cells_of_site(site as usize)
+        .map(extent)
+        .fold(0.0, f64::max)
 }
 
 /// Sorts the rows that are out of balance, and predicts the error of the stress at the worst of each class.
@@ -202,7 +223,11 @@ fn unbalanced<const D: usize>(
         low = low.inf(position(s));
         high = high.sup(position(s));
     }
-    let boundary = Boundary::new(model, subject.conditions, reach, (low, high));
+    let widest = off
+        .iter()
+        .map(|&s| cut_bonds_reach(model, s))
+        .fold(0.0, f64::max);
+    let boundary = Boundary::new(model, subject.conditions, reach + widest, (low, high));
     let classified: Vec<(RowClass, Option<usize>, bool)> = off
         .par_iter()
         .map_init(
@@ -270,20 +295,28 @@ fn unbalanced<const D: usize>(
     let is_told = |class: RowClass| match class {
         RowClass::LoadedSurface => has(RowClass::FreeSurface) || has(RowClass::Transition),
         RowClass::FreeSurface => has(RowClass::Transition),
-        RowClass::SeamAtSurface => classes.iter().any(|c| {
-            matches!(
-                c,
-                RowClass::FreeSurface
-                    | RowClass::Support
-                    | RowClass::LoadedSurface
-                    | RowClass::Transition
-            )
-        }),
         _ => false,
     };
-    let all = classes.iter().copied();
-    all.filter_map(|class| of_class(class, is_told(class)))
-        .collect()
+    let mut found: Vec<Unbalanced> = Vec::new();
+    let (seam, others): (Vec<RowClass>, Vec<RowClass>) =
+        classes.iter().partition(|c| **c == RowClass::SeamAtSurface);
+    found.extend(others.iter().filter_map(|&c| of_class(c, is_told(c))));
+    // unless the surface shows nothing
+    let is_told = found.iter().any(|other| {
+        let is_surface = matches!(
+            other.class,
+            RowClass::FreeSurface
+                | RowClass::Support
+                | RowClass::LoadedSurface
+                | RowClass::Transition
+        );
+        let is_warned = other
+            .stress_error
+            .is_some_and(|e| e.abs() >= limits::WARN_SURFACE);
+        is_surface && is_warned
+    });
+    found.extend(seam.iter().filter_map(|&c| of_class(c, is_told)));
+    found
 }
 
 /// The class of a row, the nearest facet where families lack points, and whether no other surface is near.
@@ -296,6 +329,7 @@ fn class<const D: usize>(
 ) -> (RowClass, Option<usize>, bool) {
     let model = subject.model;
     let x = &model.sites[site as usize].position;
+    let reach = reach + cut_bonds_reach(model, site);
     let mut nearest: Option<(usize, f64)> = None;
     for (f, distance) in boundary.near(x, reach) {
         if nearest.is_none_or(|(_, d)| distance < d) {

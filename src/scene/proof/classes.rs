@@ -69,7 +69,7 @@ pub(super) fn told(
     residual: f64,
     rows: usize,
     unbalanced: &[Unbalanced],
-    is_lattice: bool,
+    (is_lattice, is_truncated): (bool, bool),
 ) -> Part {
     let figure = |name: String, value: f64| Figure { name, value };
     let mut figures = vec![
@@ -102,7 +102,7 @@ pub(super) fn told(
         figures,
         findings: unbalanced
             .iter()
-            .filter_map(|rows| verdict(rows, is_lattice))
+            .filter_map(|rows| verdict(rows, is_lattice, is_truncated))
             .collect(),
     }
 }
@@ -124,12 +124,22 @@ impl RowClass {
 }
 
 /// What is told of a class of rows.
-fn verdict(rows: &Unbalanced, is_lattice: bool) -> Option<Finding> {
+fn verdict(rows: &Unbalanced, is_lattice: bool, is_truncated: bool) -> Option<Finding> {
     let place = |x: &[f64]| {
         let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
         format!("({})", x.join(", "))
     };
     let (what, remedy, [warn, refuse]) = match rows.class {
+        RowClass::Seam if is_lattice && is_truncated => (
+            "at the seam",
+            "leave peridynamics.points out, whose lattice follows the mesh, or make the elements beside the zone no larger than two spacings",
+            [limits::WARN, limits::REFUSE],
+        ),
+        RowClass::Seam if is_truncated => (
+            "at the seam",
+            "give peridynamics.points a lattice",
+            [limits::WARN, limits::REFUSE],
+        ),
         RowClass::Seam if is_lattice => (
             "at the seam",
             "use coupling.truncated",

@@ -194,7 +194,7 @@ pub enum ExplicitError {
     },
     /// The energy grew beyond everything that was put in.
     #[error(
-        "the motion ran away at step {step}, t = {time:e} s: its kinetic energy {energy:e} J is more than {factor} times the {supplied:e} J put in, fastest at site {site}; the time step is too large or the coupling unstable: take the stable step, or coupling.splice"
+        "the motion ran away at step {step}, t = {time:.4e} s: its kinetic energy {energy:.3e} J is more than {factor} times the {supplied:.3e} J put in, fastest at site {site}; the time step is too large or the coupling unstable: take the stable step, or use coupling.truncated"
     )]
     Runaway {
         /// Step at which it was found.
