@@ -15,6 +15,8 @@ pub enum Verdict {
     Pass,
     /// The value misses its limit, or is not a number.
     Short,
+    /// The value misses its limit, and the run that it is from says so with place and number.
+    Warned,
     /// The case is refused, for the reason given.
     Refused,
     /// A published figure cannot be reproduced as written, for the reason given.
@@ -27,6 +29,7 @@ impl Verdict {
         match self {
             Self::Pass => "pass",
             Self::Short => "SHORT",
+            Self::Warned => "warned",
             Self::Refused => "refused",
             Self::Differs => "differs",
         }
@@ -141,6 +144,20 @@ impl Row {
             .judged(Bound::Within, limit)
     }
 
+    /// A value that the run itself warns of, and in which words.
+    pub fn warned(
+        case: impl Into<String>,
+        quantity: impl Into<String>,
+        value: f64,
+        reason: impl Into<String>,
+    ) -> Self {
+        Self {
+            verdict: Verdict::Warned,
+            reason: Some(reason.into()),
+            ..Self::new(case, quantity, value)
+        }
+    }
+
     /// A case that is not run, and why; its value is NaN.
     pub fn refused(
         case: impl Into<String>,
@@ -247,7 +264,11 @@ impl Table {
             self.count(Verdict::Pass),
             self.count(Verdict::Short)
         );
-        for (verdict, word) in [(Verdict::Refused, "refused"), (Verdict::Differs, "differ")] {
+        for (verdict, word) in [
+            (Verdict::Warned, "warned of"),
+            (Verdict::Refused, "refused"),
+            (Verdict::Differs, "differ"),
+        ] {
             if self.count(verdict) > 0 {
                 let _ = write!(counts, ", {} {word}", self.count(verdict));
             }
@@ -349,6 +370,10 @@ impl Table {
                         number(row.value),
                         row.limit_text()
                     )
+                }
+                Verdict::Warned => {
+                    cell.push_str(" W");
+                    format!("W  {}, {}", row.case, row.quantity)
                 }
                 Verdict::Refused => {
                     cell.push_str(" R");

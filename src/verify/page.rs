@@ -29,23 +29,24 @@ pub fn page(outcomes: &[Outcome], effort: Effort) -> String {
         "# Verification\n\nWritten by `bondline verify{option} --markdown FILE`; change the suites, not this page.\n\n\
          Where a paper prints a value it stands beside ours with their ratio. *differs* marks what cannot be reproduced as written, *refused* what is not run, each with its\n\
          reason; *SHORT* is a row that misses its limit. Tables without a printed value show ours alone, long ones only their counts: the command prints them all.\n\n\
-         | suite | what it measures | pass | short | differ | refused |\n|---|---|---|---|---|---|\n"
+         | suite | what it measures | pass | short | differ | warned | refused |\n|---|---|---|---|---|---|---|\n"
     );
     for o in outcomes {
         let count = |v: Verdict| o.tables.iter().map(|t| t.count(v)).sum::<usize>();
         let _ = writeln!(
             text,
-            "| [`{0}`](#{0}) | {1} | {2} | {3} | {4} | {5} |",
+            "| [`{0}`](#{0}) | {1} | {2} | {3} | {4} | {5} | {6} |",
             o.suite.name,
             o.suite.about,
             count(Verdict::Pass),
             count(Verdict::Short),
             count(Verdict::Differs),
+            count(Verdict::Warned),
             count(Verdict::Refused)
         );
     }
     for s in LONG_SUITES {
-        let _ = writeln!(text, "| `{}` | {} | | | | |", s.name, s.about);
+        let _ = writeln!(text, "| `{}` | {} | | | | | |", s.name, s.about);
     }
     for o in outcomes {
         let _ = write!(

@@ -307,9 +307,7 @@ fn row(family: &Family, law: (&str, &str), coupling: (&str, &str, bool), per_ele
                 .iter()
                 .find(|w| w.contains("uniform stress"));
             match warned {
-                Some(why) if error > LIMIT => {
-                    Row::info(&name, "error", error).because(format!("warned: {why}"))
-                }
+                Some(why) if error > LIMIT => Row::warned(&name, "error", error, why),
                 _ => Row::at_most(&name, "error", error, LIMIT),
             }
         }
