@@ -12,7 +12,7 @@ use crate::{
 /// Half of a splice's rows and half of a blending's, with a step in β at the edge of the nonlocal zone.
 ///
 /// Source: none; derived in `docs/methods.md`, section 8. Under a field with a third derivative the internal forces of a splice add up to `(M₆ − g) u‴/24` at a seam, those of a blending to
-/// `−(M₆′ − g) u‴/24`, whatever the width of β (`crate::verify::balance`). The shares `s` of the splice with `s (M₆ − g) = (1 − s)(M₆′ − g)` leave nothing: ½ for what bonds do by
+/// `−(M₆′ − g) u‴/24`, whatever the width of β (suite `balance`). The shares `s` of the splice with `s (M₆ − g) = (1 − s)(M₆′ − g)` leave nothing: ½ for what bonds do by
 /// themselves. For the state part of a law the dilatation reaches over two horizons and its expansion over one, `M₆ = 8 L K′`, `M₆′ = 2 L K′`, `g = 2 h² K′` with
 /// `L = 3 Σω|ξ|⁴V / ((D + 2) Σω|ξ|²V)`, hence `s = (L − h²)/(5 L − 2 h²)`.
 ///

@@ -10,20 +10,11 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::ObserveError;
+pub use super::data_array::Compression;
 use super::data_array::{Number, encoded};
 use super::file::write_whole;
 use crate::mesh::{CellShape, Mesh};
 use crate::tensor::{Tensor, Vector, padded};
-
-/// How arrays are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Compression {
-    /// As they are: about four times larger, about five times as fast to write.
-    Plain,
-    /// zlib at a low level; higher levels cost several times the time for a few per cent.
-    #[default]
-    Zlib,
-}
 
 /// Values of a field.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,9 +4,6 @@
 
 use rayon::prelude::*;
 
-use super::grid::{Coincidence, Grid};
-use crate::tensor::Vector;
-
 /// Relative tolerance by which a bond may be longer than the horizon and still belong to the family.
 ///
 /// Bonds that touch the horizon exactly (δ = m h) must not depend on rounding. Typed and written coordinates carry six digits and
@@ -92,84 +89,6 @@ impl Reversed {
 }
 
 impl Families {
-    /// The families of all points of a cloud, `{j ≠ i : |x_j − x_i| ≤ δ_i (1 + tie_tolerance)}`.
-    ///
-    /// Units: positions and horizons \[m\]. [`TIE_TOLERANCE`] is the tolerance to use unless there is a reason.
-    ///
-    /// # Errors
-    /// [`FamilyError`] on non-finite positions, non-positive horizons and coincident points.
-    pub fn search<const D: usize>(
-        points: &[Vector<D>],
-        horizons: &[f64],
-        tie_tolerance: f64,
-    ) -> Result<Self, FamilyError> {
-        let grid = Grid::new(points, points, horizons)?;
-        grid.families(
-            points.len(),
-            |i| (points[i], horizons[i], Some(i as u32)),
-            Coincidence::Refused,
-            tie_tolerance,
-        )
-    }
-
-    /// The families of some points of a cloud: row `r` is that of point `centres[r]`, whose horizon is `horizons[r]`.
-    ///
-    /// # Errors
-    /// As [`Families::search`]; also if a centre is no point of the cloud.
-    pub fn search_centres<const D: usize>(
-        points: &[Vector<D>],
-        centres: &[u32],
-        horizons: &[f64],
-        tie_tolerance: f64,
-    ) -> Result<Self, FamilyError> {
-        let queries = centres
-            .iter()
-            .map(|&c| points.get(c as usize).copied())
-            .collect::<Option<Vec<_>>>()
-            .ok_or(FamilyError::Length {
-                what: "the cloud",
-                length: points.len(),
-                wanted: "fewer than a centre's number needs",
-            })?;
-        let grid = Grid::new(points, &queries, horizons)?;
-        grid.families(
-            queries.len(),
-            |r| (queries[r], horizons[r], Some(centres[r])),
-            Coincidence::Refused,
-            tie_tolerance,
-        )
-    }
-
-    /// The families of query points that need not be in the cloud, Gauss points of a cell say.
-    ///
-    /// `selves[r]` is the cloud point that query `r` is, if it is one. Any cloud point on which a query lies is left out, since a bond
-    /// without length has no direction.
-    ///
-    /// # Errors
-    /// [`FamilyError`] on non-finite positions, non-positive horizons and lists of unequal length.
-    pub fn search_from<const D: usize>(
-        queries: &[Vector<D>],
-        selves: &[Option<u32>],
-        horizons: &[f64],
-        cloud: &[Vector<D>],
-        tie_tolerance: f64,
-    ) -> Result<Self, FamilyError> {
-        if selves.len() != queries.len() {
-            return Err(FamilyError::Length {
-                what: "the list of self indices",
-                length: selves.len(),
-                wanted: "not one per query",
-            });
-        }
-        let grid = Grid::new(cloud, queries, horizons)?;
-        grid.families(
-            queries.len(),
-            |r| (queries[r], horizons[r], selves[r]),
-            Coincidence::LeftOut,
-            tie_tolerance,
-        )
-    }
-
     /// Rows of the given lengths, each written by `fill(row, its neighbours)`, in parallel and in any order.
     pub(super) fn filled(
         lengths: impl ExactSizeIterator<Item = usize>,

@@ -72,6 +72,7 @@ mod template;
 mod unused;
 mod validate;
 mod value;
+pub mod variants;
 mod write;
 mod zones;
 
@@ -88,6 +89,7 @@ pub use materials::{Fracture, Law, Material};
 pub use motion::{RunOptions, StartFrom};
 pub use peridynamics::{Peridynamics, Points};
 pub use predict::{MotionPrediction, Prediction, Share};
+pub(crate) use proof::growth::{REMEDY, REMEDY_SEAM};
 pub use region::Region;
 pub use run::solve_with;
 pub use run_error::RunError;

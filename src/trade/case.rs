@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::TradeError;
-use super::measure::Measured;
 use crate::observe::claim;
+use crate::scene::variants::Measured;
 
 /// What a case cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

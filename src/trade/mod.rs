@@ -2,13 +2,13 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `knobs.rs` | what can be turned in a scene, and the overrides that it means |
 //! | `case.rs` | one case in a process of its own: its cost, its outcome |
-//! | `measure.rs` | how far its outputs are from those of the reference |
 //! | `effects.rs` | guesses of cost and error for cases that were not run; the Pareto front |
 //! | `study.rs` | which case runs next |
 //! | `record.rs` | what is kept of a study, so that it can go on |
 //! | `report.rs` | table, CSV, JSON, plot, and the scene for a wanted error |
+//!
+//! What can be turned in a scene, and how far outputs are apart, is in `scene/variants`.
 //!
 //! First the reference runs, then the scene as it is, then every setting alone. From these, cost and error of every combination are guessed, and the
 //! one that promises the largest gain over the front so far is run, again and again, until none promises any or the time is used up. Every outcome is
@@ -16,9 +16,6 @@
 
 mod case;
 mod effects;
-mod generated;
-mod knobs;
-mod measure;
 mod record;
 mod report;
 mod study;
@@ -29,19 +26,15 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::scene::variants::{KNOBS, Knob, Quantity, Setting, distance_from_path, typed};
 pub use case::{Cost, Outcome};
 pub use effects::front;
-pub use knobs::{KNOBS, Knob, Setting, typed};
-pub use measure::{Quantity, distance_from_path};
-
-pub(crate) use knobs::{Base, coordinates, corners, cutouts};
-pub(crate) use measure::Measured;
 
 use crate::observe::ObserveError;
 use crate::observe::claim::{Claim, Files};
 use crate::progress::Progress;
 use crate::regular_file;
-use crate::scene::spec::SolveSpec;
+use crate::scene::variants::{Base, measured_keys};
 use crate::scene::{SceneError, SceneSpec, Source, accuracy};
 use case::{Attempt, Runner};
 use record::{Head, kept, new_record, read_record};
@@ -458,57 +451,4 @@ fn chosen_knobs(base: &Base, params: &TradeParams) -> Result<Vec<Knob>, TradeErr
     };
     chosen.extend(params.vary.iter().cloned());
     Ok(chosen)
-}
-
-/// Keys that make a run comparable: samples where a scene asks for none, and as few pictures as may be, which cost more than a motion.
-fn measured_keys(spec: &SceneSpec) -> Vec<String> {
-    let mut keys = Vec::new();
-    match spec.solve.as_ref().map(|s| s.get_ref()) {
-        None | Some(SolveSpec::Static(_)) => {
-            if spec.output.lines.is_empty() && spec.output.probes.is_empty() {
-                keys.extend(lines(spec));
-            }
-        }
-        Some(SolveSpec::Explicit(e)) => {
-            if e.output_interval.is_none() {
-                keys.push("solve.explicit.outputs=1".to_owned());
-            }
-        }
-        Some(SolveSpec::QuasiStatic(_)) => keys.push("solve.quasi-static.outputs=1".to_owned()),
-    }
-    keys
-}
-
-/// Keys of a run that is compared and leaves no pictures.
-pub(crate) fn quiet(spec: &SceneSpec) -> Vec<String> {
-    let mut keys = measured_keys(spec);
-    keys.push("output.vtu=false".to_owned());
-    keys
-}
-
-/// Lines of samples through a generated mesh, for a scene that asks for none: at a third and two thirds of each width.
-fn lines(spec: &SceneSpec) -> Vec<String> {
-    let Some((min, max)) = knobs::corners(spec) else {
-        return Vec::new();
-    };
-    let d = min.len();
-    let mut list = Vec::new();
-    for axis in 0..d {
-        for (k, share) in [0.31, 0.64].iter().enumerate() {
-            let (mut from, mut to) = (min.clone(), max.clone());
-            for a in (0..d).filter(|a| *a != axis) {
-                from[a] = min[a] + share * (max[a] - min[a]);
-                to[a] = from[a];
-            }
-            list.push(format!(
-                "output.lines.trade-{axis}-{k}={{from={},to={},samples=101}}",
-                coordinates(&from),
-                coordinates(&to)
-            ));
-            if d == 1 {
-                break;
-            }
-        }
-    }
-    list
 }

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::measure::{Measured, Quantity};
 use super::{Case, Cost, TradeError};
 use crate::observe::checkpoint::Fingerprint;
 use crate::regular_file;
 use crate::scene::spec::MeshSpec;
+use crate::scene::variants::{Measured, Quantity};
 use crate::scene::{SceneSpec, Source};
 
 /// The first line of a record: what its errors belong to.

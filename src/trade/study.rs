@@ -6,12 +6,12 @@ use std::time::{Duration, Instant};
 
 use super::case::{Attempt, Outcome, Runner};
 use super::effects::{Effects, most_promising};
-use super::knobs::{Base, Setting};
-use super::measure::{Measured, Quantity};
 use super::record::{self, write_line};
 use super::{Case, TradeEnd, TradeError, TradeParams};
 use crate::progress::Progress;
 use crate::scene::Source;
+use crate::scene::variants::{Base, Setting};
+use crate::scene::variants::{Measured, Quantity};
 
 /// A combination is worth running if it promises this factor in cost or error over the front.
 const WORTH: f64 = 1.1;

@@ -13,6 +13,7 @@ use crate::{
         influence::{Alpha, Degree},
     },
     progress::Progress,
+    scene::{REMEDY, REMEDY_SEAM},
     solve::{
         growth::{self, LARGEST_GAIN},
         stable_step,
@@ -29,13 +30,6 @@ pub const ROUND_OFF: f64 = 1e-4;
 
 /// A run of this many crossings is what a configuration is admitted or refused for.
 pub const CROSSINGS: f64 = 100.0;
-
-/// What to do about an unstable partial stress.
-pub const REMEDY: &str = "give the material and the divergence an influence function P_n/|xi| with n >= 1 (bond-based: micromodulus triangular), keep the horizon constant in the transition zone, or use coupling.truncated";
-
-/// What to do about a splice or a blending whose motion grows.
-pub const REMEDY_SEAM: &str =
-    "make the run shorter, or use coupling.truncated, whose stiffness is symmetric";
 
 /// How the horizon runs through the transition zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,6 +12,7 @@ use crate::{
     observe::report::{Columns, Row, Table},
     peridynamics::Micromodulus,
     progress::Progress,
+    scene::{REMEDY, REMEDY_SEAM},
     solve::{
         explicit::{Explicit, ExplicitParams, State, Undriven},
         growth,
@@ -22,7 +23,6 @@ use crate::{
     verify::{
         Effort,
         enclosed::{INFLUENCE, Method},
-        spectrum::{REMEDY, REMEDY_SEAM},
         strip::{Kind, Strip, StripCase, StripLaw},
     },
 };

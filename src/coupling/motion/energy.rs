@@ -2,7 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, rows::SiteRows};
+use super::{
+    CHUNK,
+    rows::{SiteRows, row_product},
+};
 use crate::{
     assembly::{self, Transfer},
     coupling::{CellRole, Model, SiteKind},
@@ -82,18 +85,4 @@ impl ElementEnergy {
             .sum();
         0.5 * (inner + seam)
     }
-}
-
-/// One block row times a vector.
-pub(super) fn row_product<const D: usize>(matrix: &BlockCsr, row: usize, u: &[f64]) -> Vector<D> {
-    let (columns, blocks) = matrix.row(row);
-    let mut sum = Vector::zeros();
-    for (&c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
-        for a in 0..D {
-            for b in 0..D {
-                sum[a] += block[a * D + b] * u[c as usize * D + b];
-            }
-        }
-    }
-    sum
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, NONE, energy::row_product};
+use super::{CHUNK, NONE};
 use crate::{
     assembly::{self, Row},
     system::BlockCsr,
@@ -116,4 +116,18 @@ impl SiteRows {
             row => row_product(&self.matrix, row as usize, u),
         }
     }
+}
+
+/// One block row times a vector.
+pub(super) fn row_product<const D: usize>(matrix: &BlockCsr, row: usize, u: &[f64]) -> Vector<D> {
+    let (columns, blocks) = matrix.row(row);
+    let mut sum = Vector::zeros();
+    for (&c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+        for a in 0..D {
+            for b in 0..D {
+                sum[a] += block[a * D + b] * u[c as usize * D + b];
+            }
+        }
+    }
+    sum
 }

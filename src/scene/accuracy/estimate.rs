@@ -1,7 +1,7 @@
 //! Error and order from runs at several spacings (Richardson).
 
 use super::pilot::Pilot;
-use crate::trade::Quantity;
+use crate::scene::variants::Quantity;
 
 /// Orders below are those of a singularity, orders above do not last: linear elements and the nonlocal operator have two
 /// (\[SAND2015-7998\] (2.23) to (2.28): the difference from the local operator is δ² times fourth derivatives).

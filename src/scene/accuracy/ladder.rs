@@ -5,7 +5,7 @@ use super::coarsest::coarsest;
 use super::estimate::{self, Fit, SAFETY, USUAL};
 use super::open::{Asked, Family};
 use super::pilot::{Bench, Pilot};
-use crate::trade::Base;
+use crate::scene::variants::Base;
 
 /// Rungs before the first fit.
 const FIRST: usize = 3;

@@ -3,7 +3,7 @@
 use super::super::error::{SceneError, SceneErrorKind};
 use super::super::source::Source;
 use super::super::spec::SceneSpec;
-use crate::trade::{self, Base, coordinates};
+use crate::scene::variants::{self, Base, coordinates};
 
 /// A scene with an `accuracy`, as far as the choice looks at it.
 #[derive(Clone, Debug)]
@@ -117,7 +117,7 @@ impl Asked {
             None => return Ok(None),
         };
         let base = Base::of(&spec);
-        let (min, max) = trade::corners(&spec).unwrap_or_default();
+        let (min, max) = variants::corners(&spec).unwrap_or_default();
         let drawn = zoned(&spec);
         let cracks = at(&table, &["cracks"]).and_then(toml::Value::as_table);
         let only_cracks = base.breaks && spec.voids.is_empty() && !base.can_break;
@@ -185,7 +185,7 @@ impl Asked {
         }
         let fits = |n: usize| {
             let cell = self.shortest() / n as f64;
-            trade::cutouts(&self.spec).iter().all(|(low, high)| {
+            variants::cutouts(&self.spec).iter().all(|(low, high)| {
                 (0..self.min.len()).all(|a| {
                     let length = self.max[a] - self.min[a];
                     let size = length / (length / cell).round().max(1.0);

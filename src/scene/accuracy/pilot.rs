@@ -8,7 +8,7 @@ use super::super::spec::SceneSpec;
 use super::super::validate::AnyScene;
 use crate::observe::summary::RunSummary;
 use crate::progress::Silent;
-use crate::trade::{self, Measured, Quantity};
+use crate::scene::variants::{self, Measured, Quantity};
 
 /// A run, as far as it is compared.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ impl Bench {
             source: source.clone(),
             directory: directory.to_path_buf(),
             folder: TrialFolder::new(directory),
-            common: trade::quiet(spec),
+            common: variants::quiet(spec),
             quantities: Vec::new(),
             seconds: 0.0,
             refusal: None,

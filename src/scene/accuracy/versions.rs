@@ -9,7 +9,7 @@ use super::estimate::{self, Fit, USUAL};
 use super::ladder::growth;
 use super::pilot::{Bench, Pilot};
 use super::{Against, ErrorPrediction};
-use crate::trade::Base;
+use crate::scene::variants::Base;
 
 /// Runs that are made at most, the scene itself among them if it is paid for.
 const MOST: usize = 4;

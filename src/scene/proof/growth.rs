@@ -7,7 +7,13 @@ use crate::scene::run_error::RunError;
 use crate::scene::spec::{CouplingSpec, GrowingModesSpec};
 use crate::solve::growth::{Evidence, Growth, LARGEST_GAIN, growth};
 use crate::system::{Dynamic, Symmetry};
-use crate::verify::spectrum::{REMEDY, REMEDY_SEAM};
+
+/// What to do about an unstable partial stress.
+pub(crate) const REMEDY: &str = "give the material and the divergence an influence function P_n/|xi| with n >= 1 (bond-based: micromodulus triangular), keep the horizon constant in the transition zone, or use coupling.truncated";
+
+/// What to do about a splice or a blending whose motion grows.
+pub(crate) const REMEDY_SEAM: &str =
+    "make the run shorter, or use coupling.truncated, whose stiffness is symmetric";
 
 /// The largest factor by which a mode that is not seen may grow over the run, if the answer is to be that none grows.
 const UNSEEN: f64 = 1.1;

@@ -28,13 +28,13 @@ pub use mesh::{
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
-    BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, ExplicitSpec,
-    GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec,
-    SolveSpec, TipSpec,
+    BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ExplicitSpec, GrowingModesSpec,
+    InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec, SolveSpec,
+    TipSpec,
 };
 pub use region::{
-    AutoSpec, BallSpec, BodySpec, BoxSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec, SkinSpec,
-    TransitionSpec, WithoutSpec, ZonesSpec,
+    AutoSpec, BallSpec, BodySpec, BoxSpec, EdgeSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec,
+    SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
 
 use std::collections::BTreeMap;

@@ -183,16 +183,6 @@ pub enum CalibrationSpec {
     Continuum,
 }
 
-/// What is done when damage reaches the edge of the nonlocal zone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum EdgeSpec {
-    /// The run ends there, its outputs written.
-    Stop,
-    /// The run goes on; the summary says when it happened.
-    Warn,
-}
-
 /// Short-range repulsion of points that share no bond: of two bodies, or of the faces of a crack.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]

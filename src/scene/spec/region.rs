@@ -26,8 +26,8 @@ pub struct ZonesSpec {
     pub transition: Option<Spanned<TransitionSpec>>,
     /// What is done when damage reaches the edge of the nonlocal zone; "stop" if left out.
     #[serde(default)]
-    #[schemars(with = "Option<super::motion::EdgeSpec>")]
-    pub damage_at_edge: Option<Spanned<super::motion::EdgeSpec>>,
+    #[schemars(with = "Option<EdgeSpec>")]
+    pub damage_at_edge: Option<Spanned<EdgeSpec>>,
     /// The nonlocal zone follows the crack; `{}` for the defaults. Scenes in time only.
     #[serde(default)]
     #[schemars(with = "Option<FollowSpec>")]
@@ -209,4 +209,14 @@ pub struct WithoutSpec {
     pub from: ShapeSpec,
     /// What is taken away.
     pub removed: ShapeSpec,
+}
+
+/// What is done when damage reaches the edge of the nonlocal zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeSpec {
+    /// The run ends there, its outputs written.
+    Stop,
+    /// The run goes on; the summary says when it happened.
+    Warn,
 }

@@ -13,7 +13,7 @@ use crate::scene::spec::{
 pub struct Setting {
     /// In tables, for example `m = 4`.
     pub label: String,
-    pub(super) change: Change,
+    pub(crate) change: Change,
 }
 
 /// What a setting does to a scene.
@@ -165,7 +165,7 @@ impl Base {
     }
 
     /// Everything that can be turned in this scene without being asked for.
-    pub(super) fn knobs(&self) -> Vec<Knob> {
+    pub(crate) fn knobs(&self) -> Vec<Knob> {
         KNOBS
             .iter()
             .filter_map(|name| {
@@ -223,7 +223,7 @@ impl Base {
     }
 
     /// What a reference is made of: twice as fine in horizon (unless it is a length of the material), points and elements.
-    pub(super) fn finer(&self) -> Vec<Change> {
+    pub(crate) fn finer(&self) -> Vec<Change> {
         self.scaled(0.5)
     }
 
