@@ -234,6 +234,7 @@ impl Families {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tensor::Vector;
 
     /// Reproducible numbers in [0, 1).
     fn random(state: &mut u64) -> f64 {
