@@ -64,7 +64,15 @@ pub enum RunError {
     Fracture(#[from] FractureError),
     /// The seam may have a negative stiffness, and nothing shows that it has none.
     #[error(
-        "Poisson's ratio {typed:.4} is below {pairwise:.4}, that of bonds that act alone, and the seam of coupling `truncated` then has dilatations of a negative stiffness: {what}; couple by splice or blending, or take a larger poisson-ratio"
+        "{}: {what}; {}",
+        match typed < pairwise {
+            true => format!("Poisson's ratio {typed:.4} is below {pairwise:.4}, that of bonds that act alone, and the seam of coupling `truncated` then has dilatations of a negative stiffness"),
+            false => "the faces of the nonlocal zone leave pieces of bonds that the seam of coupling `truncated` can only balance with a negative stiffness".to_owned(),
+        },
+        match typed < pairwise {
+            true => "couple by splice or blending, or take a larger poisson-ratio",
+            false => "leave peridynamics.points out, whose lattice follows the mesh, enlarge the zone, end it off the surface of the body, or couple by splice or blending",
+        }
     )]
     Indefinite {
         /// What was found.

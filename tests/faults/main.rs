@@ -10,6 +10,7 @@ mod fitted_weights;
 mod g_growth;
 mod h;
 mod i;
+mod indefinite;
 mod j;
 mod k;
 mod m;

@@ -210,6 +210,12 @@ impl<const D: usize> Dilatations<D> {
         found
     }
 
+    /// Whether no energy is negative but those that an element has already: a volume that pieces hand to an element may be less than none.
+    pub fn is_positive(&self) -> bool {
+        let all = self.stiffness.iter().zip(&self.taken_back);
+        all.filter(|(_, back)| !**back).all(|(k, _)| *k >= 0.0)
+    }
+
     fn push(&mut self, stiffness: f64, functional: &Functional<D>, taken_back: bool) {
         self.stiffness.push(stiffness);
         self.taken_back.push(taken_back);

@@ -129,7 +129,11 @@ impl<const D: usize> Coupling<D> for Truncated {
             Some(common) => Dilatations::new(&segments, common, &listed),
             None => Dilatations::none(model.sites.len()),
         };
-        let squares = segments.is_squares || common.as_ref().is_none_or(|c| c.bulk >= 0.0);
+        // below the pairwise ratio dilatations take from the bonds what a fit has left them
+        let squares = match &common {
+            Some(common) if common.bulk < 0.0 => segments.is_squares,
+            _ => springs.is_positive() && dilatations.is_positive(),
+        };
         let (whole, states) = match common {
             None => (Some(WholeBonds::of(segments)), None),
             Some(common) => (None, Some((segments, common))),

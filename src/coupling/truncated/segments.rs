@@ -374,6 +374,11 @@ pub(super) struct OwnSpring<const D: usize> {
 }
 
 impl<const D: usize> Springs<D> {
+    /// Whether no spring has a negative stiffness.
+    pub fn is_positive(&self) -> bool {
+        self.stiffness.iter().all(|k| *k >= 0.0)
+    }
+
     /// All pieces, the whole bonds that a fit has changed, and the other whole bonds of the points that `listed` names.
     ///
     /// A piece of the length s, as a fraction of its bond, has the energy `s w(D/s)`, so the stiffness `k/s`.

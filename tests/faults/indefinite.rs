@@ -1,0 +1,57 @@
+//! A zone narrower than its families, at the surface of the body and on a lattice that its faces cut: pieces of bonds hand an element less than no volume.
+
+use crate::{Case, flat};
+
+const BLOCK: &str = r#"
+kinematics = "solid"
+coupling = "truncated"
+[mesh.box]
+cell = "tet4"
+min = [0, 0, 0]
+max = [6, 6, 6]
+x = { cells = 6 }
+y = { cells = 6 }
+z = { cells = 6 }
+[materials.m.lps]
+youngs-modulus = 1
+poisson-ratio = 0.3
+density = 1
+[peridynamics]
+horizon = 3
+points.lattice.spacing = 0.93
+influence = { degree = 1, alpha = 1 }
+[zones]
+nonlocal.box = { min = [0, 2, 2], max = [4.5, 3.6, 4] }
+[conditions.held.displacement]
+on = "left"
+x = 0
+y = 0
+z = 0
+[conditions.pulled.traction]
+on = "right"
+x = 1e-3
+[output]
+vtu = false
+"#;
+
+const MOTION: &str = "\n[solve.explicit]\nduration = 12\noutputs = 1\n";
+
+#[test]
+fn a_seam_whose_energy_may_be_negative_is_refused_at_rest_and_in_motion() {
+    // the motion ran away within nine steps of what was called a sum of squares, and statics took an LU factorisation without a word
+    for text in [BLOCK.to_owned(), BLOCK.to_owned() + MOTION] {
+        let said = Case::new(&text).run(&[]).expect_err("it has no minimum");
+        let said = flat(&said);
+        assert!(said.contains("negative eigenvalue"), "{said}");
+        assert!(said.contains("peridynamics.points out"), "{said}");
+    }
+}
+
+#[test]
+fn the_same_zone_inside_is_definite() {
+    let inside = "zones.nonlocal.box={min=[1,2,2],max=[4.5,3.6,4]}";
+    let case = Case::new(&(BLOCK.to_owned() + MOTION));
+    let summary = case.run(&["--set", inside]).expect("it runs");
+    let proof = summary["proof"].to_string();
+    assert!(proof.contains("no mode grows, proved"), "{proof}");
+}
