@@ -217,7 +217,7 @@ impl<const D: usize> Grid<D> {
 impl Families {
     /// The families of all points of a cloud, `{j ≠ i : |x_j − x_i| ≤ δ_i (1 + tie_tolerance)}`.
     ///
-    /// Units: positions and horizons \[m\]. [`TIE_TOLERANCE`] is the tolerance to use unless there is a reason.
+    /// Units: positions and horizons \[m\]. [`super::TIE_TOLERANCE`] is the tolerance to use unless there is a reason.
     ///
     /// # Errors
     /// [`FamilyError`] on non-finite positions, non-positive horizons and coincident points.
