@@ -52,6 +52,11 @@ fn kept_random_scenes() {
     replay("random_scene", entry::random_scene);
 }
 
+#[test]
+fn kept_binary_files() {
+    replay("binary_file", entry::binary_file);
+}
+
 /// A genuine checkpoint goes on; with a byte altered, cut or repeated, and its checksum right, it goes on or is refused by name. So are arrays of VTU
 /// files that announce anything. `BONDLINE_ALTERED` says how many of each.
 #[test]

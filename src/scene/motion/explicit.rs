@@ -8,13 +8,13 @@ use super::RunOptions;
 use super::guard::{Balance, Guard};
 use super::laid_out::{Begun, LaidOut, begun, breaks, lay_out, opened};
 use super::ready::{Before, Between, Ready};
-use super::record::{Breaks, EdgeReached, Moment, Saved};
+use super::record::{Breaks, EdgeReached, Moment, Saved, Zone as FollowedZone};
 use super::switching::{Leaving, share};
 use super::system::{PlaneEnergy, critical_stretch, plane_energy};
 use super::watch::{Watch, fastest_crack};
 use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::ObserveError;
-use crate::observe::checkpoint::CheckpointFile;
+use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
 use crate::observe::cracks::CrackSummary;
 use crate::observe::summary::{
     Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Sizes, Stopwatch, Timings,
@@ -95,8 +95,20 @@ pub(super) fn run<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     let (mut begun, mut problem, rest) = begun(scene);
     let (file, saved) = opened(&rest, options, &mut begun.choices)?;
-    if let Some(zone) = saved.as_ref().and_then(|s| s.zone.as_ref()) {
-        problem.zones = zones_of(&zone.nonlocal);
+    if let Some(saved) = &saved {
+        let cells = problem.mesh.cell_count();
+        let fits = |zone: &FollowedZone| zone.nonlocal.len() == cells && zone.wanted.len() == cells;
+        if saved.zone.is_some() != rest.follow.is_some()
+            || saved.zone.as_ref().is_some_and(|z| !fits(z))
+        {
+            return Err(RunError::Checkpoint(CheckpointError::Content {
+                path: file.path().to_path_buf(),
+                message: "its nonlocal zone is not one of this mesh".to_owned(),
+            }));
+        }
+        if let Some(zone) = &saved.zone {
+            problem.zones = zones_of(&zone.nonlocal);
+        }
     }
     let mut from = From::Start(file, saved.map(Box::new));
     loop {
