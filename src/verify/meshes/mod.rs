@@ -26,16 +26,28 @@ type Tables = fn(Effort, &dyn Progress) -> Vec<Table>;
 
 /// Every table of the suite.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let tables: &[Tables] = &[
+    let parts: &[Tables] = &[
         loads::run,
         motion::tables,
         affine::tables,
         fracture::planes,
         fracture::balances,
-        order::order,
     ];
+    let mut tables = Vec::new();
+    for part in parts {
+        for table in part(effort, progress) {
+            tell(&table, effort, progress);
+            tables.push(table);
+        }
+    }
+    // these take an hour, and tell of each problem by themselves
+    tables.extend(order::order(effort, progress));
     tables
-        .iter()
-        .flat_map(|table| table(effort, progress))
-        .collect()
+}
+
+/// Shows a table of the full suite as soon as it is there: the suite takes more than an hour.
+fn tell(table: &Table, effort: Effort, progress: &dyn Progress) {
+    if effort == Effort::Full {
+        progress.note(&table.text());
+    }
 }

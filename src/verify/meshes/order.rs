@@ -11,6 +11,8 @@
 
 use std::fmt::Write as _;
 
+use rayon::prelude::*;
+
 use super::scene;
 use crate::{
     observe::report::{Columns, Row, Table},
@@ -469,31 +471,41 @@ fn error(text: &str, mesh: Option<&str>, exact: Exact) -> Result<f64, String> {
     Ok((error / size).sqrt())
 }
 
-/// Errors of all couplings on a sequence of meshes, with their orders.
+/// Errors of all couplings on a sequence of meshes, with their orders: a table per problem.
 pub fn order(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let mut table = Table::new(
-        "Order beside meshes that fit nothing: m = 3, δ and elements halved together, the zone fixed and enclosed; L2 error of the displacement against classical elasticity",
-        Columns::Full,
-    );
-    for problem in PROBLEMS {
+    let of = |problem: &Problem| {
         progress.stage(problem.name, None);
-        if let Err(why) = measured(problem, effort, &mut table) {
-            table.push(Row::info(problem.name, "error", f64::NAN).because(why));
+        let title = format!(
+            "Order beside meshes that fit nothing, {}: m = 3, δ and elements halved together, the zone fixed and enclosed; L2 error of the displacement against classical elasticity",
+            problem.name
+        );
+        let mut table = Table::new(title, Columns::Full);
+        match measured(problem, effort) {
+            Ok(rows) => table.rows.extend(rows),
+            Err(why) => table.push(Row::info(problem.name, "error", f64::NAN).because(why)),
         }
-    }
-    vec![table]
+        super::tell(&table, effort, progress);
+        table
+    };
+    PROBLEMS
+        .iter()
+        // the others take minutes
+        .filter(|problem| effort == Effort::Full || problem.name == "cantilever")
+        .map(of)
+        .collect()
 }
 
-fn measured(problem: &Problem, effort: Effort, table: &mut Table) -> Result<(), String> {
+/// A mesh of some elements per length: its table in the scene, and the text of the file that it names.
+type Typed = (usize, String, Option<String>);
+
+fn measured(problem: &Problem, effort: Effort) -> Result<Vec<Row>, String> {
     let is_solid = problem.kinematics == "solid";
     let meshes = match (effort, is_solid) {
-        // the others take minutes
-        (Effort::Quick, _) if problem.name != "cantilever" => return Ok(()),
         (Effort::Quick, _) => 2,
         (Effort::Full, true) => 3,
         (Effort::Full, false) => 4,
     };
-    let typed: Vec<(usize, String, Option<String>)> = (0..meshes)
+    let typed: Vec<Typed> = (0..meshes)
         .map(|k| {
             let n = problem.coarsest << k;
             let (table, file) = (problem.mesh)(n);
@@ -501,42 +513,65 @@ fn measured(problem: &Problem, effort: Effort, table: &mut Table) -> Result<(), 
         })
         .collect();
     let error_of = |method: Option<&Method>| -> Vec<Result<f64, String>> {
-        let run = |(n, table, file): &(usize, String, Option<String>)| {
+        let run = |(n, table, file): &Typed| {
             let text = text(problem, method, *n, table);
             error(&text, file.as_deref(), problem.exact)
         };
         typed.iter().map(run).collect()
     };
     let of_elements: Vec<f64> = error_of(None).into_iter().collect::<Result<_, _>>()?;
-    for method in METHODS {
-        let case = format!("{}, {}", problem.name, method.name);
-        if let (true, Some(why)) = (is_solid, method.dear) {
-            table.push(Row::info(case, "order", f64::NAN).because(why));
-            continue;
-        }
-        let errors = error_of(Some(method));
-        for (k, (error, alone)) in errors.iter().zip(&of_elements).enumerate() {
-            let quantity = format!("error, mesh {}", k + 1);
-            table.push(match error {
-                Err(why) => Row::refused(case.as_str(), quantity, why.as_str()),
-                Ok(e) if k == 1 => Row::at_most(case.as_str(), quantity, *e, alone + BEYOND_LIMIT)
-                    .with_reference(*alone),
-                Ok(e) => Row::info(case.as_str(), quantity, *e).with_reference(*alone),
-            });
-        }
-        // a coarser mesh may be refused: the order is that of the last two
-        let [.., Ok(before), Ok(last)] = errors[..] else {
-            continue;
-        };
-        let observed = (before / last).log2();
-        let alone = of_elements[meshes - 1];
-        table.push(match (effort, is_solid) {
-            (Effort::Quick, _) => Row::info(case.as_str(), "order", observed),
-            (Effort::Full, true) if last <= alone => Row::info(case.as_str(), "order", observed)
-                .because("the error is at most that of elements alone"),
-            (Effort::Full, true) => Row::at_least(case.as_str(), "order", observed, ORDER_LIMIT_3D),
-            (Effort::Full, false) => Row::at_least(case.as_str(), "order", observed, ORDER_LIMIT),
+    let rows: Vec<Vec<Row>> = METHODS
+        .par_iter()
+        .map(|method| {
+            let case = format!("{}, {}", problem.name, method.name);
+            match method.dear {
+                Some(why) if is_solid => {
+                    vec![Row::info(case, "order", f64::NAN).because(why)]
+                }
+                _ => judged(
+                    &case,
+                    &error_of(Some(method)),
+                    &of_elements,
+                    effort,
+                    is_solid,
+                ),
+            }
+        })
+        .collect();
+    Ok(rows.into_iter().flatten().collect())
+}
+
+/// The rows of one coupling: its errors beside those of elements alone, and their order.
+fn judged(
+    case: &str,
+    errors: &[Result<f64, String>],
+    of_elements: &[f64],
+    effort: Effort,
+    is_solid: bool,
+) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (k, (error, alone)) in errors.iter().zip(of_elements).enumerate() {
+        let quantity = format!("error, mesh {}", k + 1);
+        rows.push(match error {
+            Err(why) => Row::refused(case, quantity, why.as_str()),
+            Ok(e) if k == 1 => {
+                Row::at_most(case, quantity, *e, alone + BEYOND_LIMIT).with_reference(*alone)
+            }
+            Ok(e) => Row::info(case, quantity, *e).with_reference(*alone),
         });
     }
-    Ok(())
+    // a coarser mesh may be refused: the order is that of the last two
+    let [.., Ok(before), Ok(last)] = errors else {
+        return rows;
+    };
+    let observed = (before / last).log2();
+    let alone = of_elements[errors.len() - 1];
+    rows.push(match (effort, is_solid) {
+        (Effort::Quick, _) => Row::info(case, "order", observed),
+        (Effort::Full, true) if *last <= alone => Row::info(case, "order", observed)
+            .because("the error is at most that of elements alone"),
+        (Effort::Full, true) => Row::at_least(case, "order", observed, ORDER_LIMIT_3D),
+        (Effort::Full, false) => Row::at_least(case, "order", observed, ORDER_LIMIT),
+    });
+    rows
 }
