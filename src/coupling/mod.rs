@@ -142,6 +142,17 @@ pub trait Coupling<const D: usize>: Send + Sync {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
 }
 
+/// What shows that the energy behind symmetric rows is never negative.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Definiteness {
+    /// It is a sum of squares, whatever the model is.
+    SumOfSquares,
+    /// It is one but for small terms of either sign along the edges of a nonlocal zone in 3D. They cancel under affine fields; the matrix at hand decides about others.
+    EdgeTerms,
+    /// Terms of the seam are negative: a run factorises the matrix before it trusts it.
+    NegativeTerms,
+}
+
 /// The rows of a coupled model.
 pub trait Operator<const D: usize>: Sync {
     /// Adds the internal force of a site, times −1 (`K u = f`).
@@ -176,9 +187,9 @@ pub trait Operator<const D: usize>: Sync {
     /// Adds what is left of the row of a site without its bonds, for an operator that has [`Operator::seam_bonds`].
     fn add_row_without_bonds(&self, _site: usize, _row: &mut Row<D>) {}
 
-    /// Whether the energy behind the rows is bounded below whatever the model; where it is not, a run factorises the matrix before it trusts it.
-    fn is_sum_of_squares(&self) -> bool {
-        true
+    /// What shows that the energy behind symmetric rows is never negative.
+    fn definiteness(&self) -> Definiteness {
+        Definiteness::SumOfSquares
     }
 
     /// Number of directed bonds that the method adds to those of the peridynamic body (Gauss points).

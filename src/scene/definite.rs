@@ -2,7 +2,7 @@
 //!
 //! Truncated bonds of an LPS below the Poisson ratio of a pairwise law have dilatations of negative stiffness. Whole bonds outweigh them down to a bulk modulus of zero, pieces need not: the matrix at hand decides.
 
-use crate::coupling::{Model, Operator};
+use crate::coupling::{Definiteness, Model, Operator};
 use crate::material::Kinematics;
 use crate::observe::summary::Choice;
 use crate::progress::Progress;
@@ -50,7 +50,7 @@ pub(super) fn check<const D: usize>(
     choices: &mut Vec<Choice>,
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
-    if operator.is_sum_of_squares() {
+    if operator.definiteness() != Definiteness::NegativeTerms {
         return Ok(());
     }
     let refused = |what: String| RunError::Indefinite {
@@ -58,21 +58,8 @@ pub(super) fn check<const D: usize>(
         typed: ratio.typed,
         pairwise: ratio.pairwise,
     };
-    let mut matrix = model.assemble(operator, progress);
-    matrix.raise_diagonal(SHIFT);
-    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let free = FreeDofs::from_prescribed(&vec![None; matrix.dofs()], D);
-    let params = DirectParams {
-        symmetry: Symmetry::Symmetric,
-        smallest_pivot: 0.0,
-        ..DirectParams::default()
-    };
-    let factor = match Analysis::new(&matrix, &free, &positions, Ordering::default()) {
-        Ok(analysis) => Factor::new(&matrix, &free, analysis, &params, progress),
-        Err(error) => return Err(refused(format!("nothing shows that it has none: {error}"))),
-    };
-    match factor {
-        Ok(_) => {
+    match factorised(model, operator, f64::INFINITY, progress) {
+        Ok(()) => {
             choices.push(Choice {
                 choice: "the seam is stable".to_owned(),
                 why: format!(
@@ -82,7 +69,7 @@ pub(super) fn check<const D: usize>(
             });
             Ok(())
         }
-        Err(DirectError::NotPositive { site } | DirectError::Singular { site, .. }) => {
+        Err(Open::Negative { site }) => {
             let x = model.sites[site].position;
             let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
             Err(refused(format!(
@@ -90,8 +77,49 @@ pub(super) fn check<const D: usize>(
                 x.join(", ")
             )))
         }
-        Err(error @ DirectError::TooLarge { .. }) => {
+        Err(Open::NotFactorised(error)) => {
             Err(refused(format!("nothing shows that it has none: {error}")))
         }
+    }
+}
+
+/// Why a matrix is not shown to have no negative eigenvalue.
+pub(super) enum Open {
+    /// A pivot of a site is negative.
+    Negative { site: usize },
+    /// It could not be factorised, or not at the price.
+    NotFactorised(String),
+}
+
+/// Factorises the matrix at rest of all sites, none of them held, if that takes at most so many operations.
+pub(super) fn factorised<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    most_flops: f64,
+    progress: &dyn Progress,
+) -> Result<(), Open> {
+    let mut matrix = model.assemble(operator, progress);
+    matrix.raise_diagonal(SHIFT);
+    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+    let free = FreeDofs::from_prescribed(&vec![None; matrix.dofs()], D);
+    let params = DirectParams {
+        symmetry: Symmetry::Symmetric,
+        smallest_pivot: 0.0,
+        ..DirectParams::default()
+    };
+    let analysis = Analysis::new(&matrix, &free, &positions, Ordering::default())
+        .map_err(|error| Open::NotFactorised(error.to_string()))?;
+    let flops = analysis.cost(params.symmetry).flops;
+    if flops > most_flops {
+        return Err(Open::NotFactorised(format!(
+            "it would take {flops:.1e} operations"
+        )));
+    }
+    match Factor::new(&matrix, &free, analysis, &params, progress) {
+        Ok(_) => Ok(()),
+        Err(DirectError::NotPositive { site } | DirectError::Singular { site, .. }) => {
+            Err(Open::Negative { site })
+        }
+        Err(error @ DirectError::TooLarge { .. }) => Err(Open::NotFactorised(error.to_string())),
     }
 }

@@ -55,3 +55,26 @@ fn the_same_zone_inside_is_definite() {
     let proof = summary["proof"].to_string();
     assert!(proof.contains("no mode grows, proved"), "{proof}");
 }
+
+/// A zone that follows the lattice has strings along its edges, whose energies have either sign.
+const ALIGNED: [&str; 8] = [
+    "--set",
+    "materials.m={bond-based={youngs-modulus=1,density=1}}",
+    "--set",
+    "mesh.box={min=[0,0,0],max=[6,6,6],x={cells=6},y={cells=6},z={cells=6}}",
+    "--set",
+    "peridynamics={horizon=2,points={lattice={spacing=1,origin=[0.5,0.5,0.5]}}}",
+    "--set",
+    "zones.nonlocal.box={min=[1,2,2],max=[4,4,4]}",
+];
+
+#[test]
+fn strings_along_the_edges_of_a_zone_are_shown_definite_by_factors() {
+    let case = Case::new(&(BLOCK.to_owned() + MOTION));
+    let summary = case.run(&ALIGNED).expect("it runs");
+    let proof = summary["proof"].to_string();
+    assert!(
+        proof.contains("proved: a Cholesky factorisation"),
+        "{proof}"
+    );
+}

@@ -15,7 +15,8 @@
 //! ```
 //!
 //! along every edge of the zone (n₁, n₂ the outward normals of its faces; with the other sign along a re-entrant edge) does: under an affine field its line is in equilibrium but for the ends, and three edges that meet at a
-//! corner leave exactly `−R` there. It is symmetric, sparse, and moves no force but along edges.
+//! corner leave exactly `−R` there. It is symmetric, sparse, and moves no force but along edges. Its sign depends on the field, so that
+//! a model with strings is definite only if its matrix is ([`super::super::Definiteness::EdgeTerms`]).
 
 use std::collections::HashMap;
 
@@ -146,6 +147,11 @@ impl<const D: usize> Strings<D> {
             list: Vec::new(),
             of_site: HashMap::new(),
         }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
     }
 
     /// Whether a string ends at a site.

@@ -46,7 +46,9 @@ use self::{
 };
 use crate::{
     assembly::Row,
-    coupling::{CellRole, Coupling, Interface, Model, ModelError, Operator, Reach, Zone},
+    coupling::{
+        CellRole, Coupling, Definiteness, Interface, Model, ModelError, Operator, Reach, Zone,
+    },
     mesh::Mesh,
     peridynamics::BondLaw,
     system::Symmetry,
@@ -233,8 +235,12 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         }
     }
 
-    fn is_sum_of_squares(&self) -> bool {
-        self.pieces.squares
+    fn definiteness(&self) -> Definiteness {
+        match (self.pieces.squares, self.pieces.strings.is_empty()) {
+            (true, true) => Definiteness::SumOfSquares,
+            (true, false) => Definiteness::EdgeTerms,
+            (false, _) => Definiteness::NegativeTerms,
+        }
     }
 
     fn seam_bonds(&self) -> Option<SeamBonds<D>> {

@@ -99,7 +99,7 @@ pub(super) fn lay_out<const D: usize, T>(
         &mut choices,
         progress,
     )?;
-    let proved = growth::proved(&model, operator.as_ref(), moving.system.as_ref());
+    let proved = growth::proved(&model, operator.as_ref(), moving.system.as_ref(), progress);
     watch.lap(&mut timings, "rows and bonds");
     let proof = proof::prove(
         &Subject {

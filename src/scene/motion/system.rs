@@ -3,7 +3,7 @@
 use crate::coupling::motion::{
     BondBehaviour, ContactBehaviour, Critical, Motion, MotionError, masses,
 };
-use crate::coupling::{BrokenBonds, Coupling, Interface, Model, Operator};
+use crate::coupling::{BrokenBonds, Coupling, Definiteness, Interface, Model, Operator};
 use crate::observe::summary::Choice;
 use crate::peridynamics::fracture;
 use crate::peridynamics::kernel::{Kinematics, Storage};
@@ -97,7 +97,7 @@ pub(super) fn dynamic<'a, const D: usize>(
         Ok(motion) => {
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
-                && !operator.is_sum_of_squares()
+                && operator.definiteness() == Definiteness::NegativeTerms
             {
                 return Err(RunError::Indefinite {
                     what: "bonds that break at the seam may bring that forth at any time; cut-bonds = \"linear\" in [coupling.truncated] keeps them whole".to_owned(),
