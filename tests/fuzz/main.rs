@@ -109,81 +109,105 @@ fn from_environment(key: &str, plain: u64) -> u64 {
 fn random_scenes_solve_or_are_refused_by_name() {
     let count = from_environment("BONDLINE_RANDOM_SCENES", 110);
     let from = from_environment("BONDLINE_RANDOM_FROM", 0);
-    let mut ends: BTreeMap<String, usize> = BTreeMap::new();
-    let mut broken = Vec::new();
-    let (mut slowest, mut total) = ((Duration::ZERO, 0), Duration::ZERO);
-    let at = Arc::new(AtomicU64::new(from));
-    watch(&at, entry::random_text);
+    let mut tally = Tally::new(from, entry::random_text);
     for number in from..from + count {
-        at.store(number, Ordering::Relaxed);
+        let Some(outcome) = tally.run(number, entry::random_scene) else {
+            continue;
+        };
+        tally.ended(match outcome {
+            Outcome::Solved => SOLVED.to_owned(),
+            Outcome::Refused(kind) => format!("refused: {kind}"),
+            Outcome::Skipped(why) => format!("not run: {why}"),
+        });
+    }
+    tally.print();
+    assert!(tally.broken.is_empty(), "scenes {:?}", tally.broken);
+    let solved = tally.ends.get(SOLVED).copied().unwrap_or(0) as u64;
+    assert!(2 * solved >= count, "{solved} of {count} solve");
+}
+
+const SOLVED: &str = "solved";
+
+/// How random scenes end, and what they take.
+struct Tally {
+    text: fn(&[u8]) -> String,
+    /// The scene that runs, for [`watch`].
+    at: Arc<AtomicU64>,
+    ends: BTreeMap<String, usize>,
+    /// Scenes that panicked.
+    broken: Vec<u64>,
+    slowest: (Duration, u64),
+    total: Duration,
+}
+
+impl Tally {
+    fn new(from: u64, text: fn(&[u8]) -> String) -> Self {
+        let at = Arc::new(AtomicU64::new(from));
+        watch(&at, text);
+        Self {
+            text,
+            at,
+            ends: BTreeMap::new(),
+            broken: Vec::new(),
+            slowest: (Duration::ZERO, from),
+            total: Duration::ZERO,
+        }
+    }
+
+    /// Runs a scene; none if it panics.
+    fn run<T>(&mut self, number: u64, scene: fn(&[u8]) -> T) -> Option<T> {
+        self.at.store(number, Ordering::Relaxed);
         let data = bytes(number);
         let begun = processor_time();
-        let ended = catch_unwind(AssertUnwindSafe(|| entry::random_scene(&data)));
+        let ended = catch_unwind(AssertUnwindSafe(|| scene(&data)));
         let took = processor_time().saturating_sub(begun);
-        total += took;
-        slowest = slowest.max((took, number));
+        self.total += took;
+        self.slowest = self.slowest.max((took, number));
         // what the next ones run into says which one it was
         assert!(
             peak_memory_bytes().is_none_or(|b| b < MOST_MEMORY),
             "scene {number}"
         );
-        let end = match ended {
-            Ok(Outcome::Solved) => "solved".to_owned(),
-            Ok(Outcome::Refused(kind)) => format!("refused: {kind}"),
-            Ok(Outcome::Skipped(why)) => format!("not run: {why}"),
-            Err(_) => {
-                println!("scene {number}:\n{}", entry::random_text(&data));
-                broken.push(number);
-                "broken".to_owned()
-            }
-        };
-        *ends.entry(end).or_default() += 1;
+        if ended.is_err() {
+            println!("scene {number}:\n{}", (self.text)(&data));
+            self.broken.push(number);
+        }
+        ended.ok()
     }
-    for (end, times) in &ends {
-        println!("{times:7}  {end}");
+
+    fn ended(&mut self, how: String) {
+        *self.ends.entry(how).or_default() += 1;
     }
-    println!(
-        "{count} scenes in {:.1} s of the processor, the slowest (number {}) {:.2} s, peak memory of all {}",
-        total.as_secs_f64(),
-        slowest.1,
-        slowest.0.as_secs_f64(),
-        peak_memory_bytes().map_or("unknown".to_owned(), bytes_text)
-    );
-    assert!(broken.is_empty(), "scenes {broken:?}");
-    let solved = ends.get("solved").copied().unwrap_or(0) as u64;
-    assert!(2 * solved >= count, "{solved} of {count} solve");
+
+    fn print(&self) {
+        for (end, times) in &self.ends {
+            println!("{times:7}  {end}");
+        }
+        println!(
+            "{} scenes in {:.1} s of the processor, the slowest (number {}) {:.2} s, peak memory of all {}",
+            self.broken.len() + self.ends.values().sum::<usize>(),
+            self.total.as_secs_f64(),
+            self.slowest.1,
+            self.slowest.0.as_secs_f64(),
+            peak_memory_bytes().map_or("unknown".to_owned(), bytes_text)
+        );
+    }
 }
 
 /// Scenes as users type them, with defaults left out, zones drawn across the mesh and meshes from Gmsh: each is proved, warned of or refused by name, and
 /// where bondline warns of nothing a scene at rest agrees with its elements alone within what was predicted.
 ///
 /// `BONDLINE_TYPED_SCENES` and `BONDLINE_RANDOM_FROM` say how many and from which number on; scene `n` is the same wherever it is made. With
-/// `BONDLINE_SHOW` set the text of each that disagrees is shown.
+/// `BONDLINE_SHOW` set the text of each that disagrees is shown; in the folder `BONDLINE_KEEP` the last one stays, with its meshes.
 #[test]
 fn typed_scenes_are_proved_warned_of_or_refused() {
     let count = from_environment("BONDLINE_TYPED_SCENES", 40);
     let from = from_environment("BONDLINE_RANDOM_FROM", 0);
     let show = std::env::var_os("BONDLINE_SHOW").is_some();
-    let mut ends: BTreeMap<String, usize> = BTreeMap::new();
-    let (mut broken, mut apart) = (Vec::new(), Vec::new());
-    let (mut slowest, mut total) = ((Duration::ZERO, 0), Duration::ZERO);
-    let at = Arc::new(AtomicU64::new(from));
-    watch(&at, entry::typed_text);
+    let mut apart = Vec::new();
+    let mut tally = Tally::new(from, entry::typed_text);
     for number in from..from + count {
-        at.store(number, Ordering::Relaxed);
-        let data = bytes(number);
-        let begun = processor_time();
-        let ended = catch_unwind(AssertUnwindSafe(|| entry::typed_scene(&data)));
-        let took = processor_time().saturating_sub(begun);
-        total += took;
-        slowest = slowest.max((took, number));
-        assert!(
-            peak_memory_bytes().is_none_or(|b| b < MOST_MEMORY),
-            "scene {number}"
-        );
-        let Ok(told) = ended else {
-            println!("scene {number}:\n{}", entry::typed_text(&data));
-            broken.push(number);
+        let Some(told) = tally.run(number, entry::typed_scene) else {
             continue;
         };
         let end = match (told.outcome, told.warned, told.agreement) {
@@ -204,28 +228,22 @@ fn typed_scenes_are_proved_warned_of_or_refused() {
             (_, _, Some(a)) => {
                 println!("scene {number} is apart: {a:?}");
                 if show {
-                    println!("{}", entry::typed_text(&data));
+                    println!("{}", entry::typed_text(&bytes(number)));
                 }
                 apart.push(number);
                 "solved without a warning, is apart".to_owned()
             }
         };
-        *ends.entry(end).or_default() += 1;
+        tally.ended(end);
     }
-    for (end, times) in &ends {
-        println!("{times:7}  {end}");
-    }
-    println!(
-        "{count} scenes in {:.1} s of the processor, the slowest (number {}) {:.2} s, peak memory of all {}",
-        total.as_secs_f64(),
-        slowest.1,
-        slowest.0.as_secs_f64(),
-        peak_memory_bytes().map_or("unknown".to_owned(), bytes_text)
-    );
+    tally.print();
     if show {
-        println!("the slowest:\n{}", entry::typed_text(&bytes(slowest.1)));
+        println!(
+            "the slowest:\n{}",
+            entry::typed_text(&bytes(tally.slowest.1))
+        );
     }
-    assert!(broken.is_empty(), "scenes {broken:?}");
+    assert!(tally.broken.is_empty(), "scenes {:?}", tally.broken);
     assert!(apart.is_empty(), "scenes {apart:?}");
 }
 

@@ -15,6 +15,8 @@ pub(super) mod limits {
     pub const REFUSE: f64 = 0.5;
     /// As [`WARN`], at free surfaces and supports that cross the peridynamic zone.
     pub const WARN_SURFACE: f64 = 0.02;
+    /// As [`WARN`], where the seam meets a surface: an error beside one edge bends the body, and a strip of 1.7 % there bent a plate of 15 by 9 cells by 6 % of its displacement.
+    pub const WARN_SEAM_AT_SURFACE: f64 = 0.01;
     /// As [`REFUSE`], where the seam meets a surface: an incomplete family alone leaves less than 1. Surfaces alone are warned of, never refused: of rows that
     /// are nearly alike the one that is judged hangs on round-off, and so does the number.
     pub const REFUSE_SURFACE: f64 = 2.0;
@@ -163,7 +165,7 @@ fn verdict(rows: &Unbalanced, is_lattice: bool, is_truncated: bool) -> Option<Fi
         RowClass::SeamAtSurface => (
             "where the seam meets the surface of the body",
             "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface",
-            [limits::WARN_SURFACE, limits::REFUSE_SURFACE],
+            [limits::WARN_SEAM_AT_SURFACE, limits::REFUSE_SURFACE],
         ),
         RowClass::Transition => (
             "where the transition zone meets the surface of the body, which its rows know nothing of,",
