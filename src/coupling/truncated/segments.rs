@@ -132,9 +132,11 @@ impl<'a, const D: usize> Segments<'a, D> {
     }
 
     /// Counts the neighbours of the points at the seam as at the seam.
-    pub fn widen(&mut self) {
+    pub fn widen(&mut self) -> bool {
         let wide = self.with_neighbours();
+        let changes = wide != self.at_seam;
         self.at_seam = wide;
+        changes
     }
 
     /// The points at the seam, and those that a bond joins to one.

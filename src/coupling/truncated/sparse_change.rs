@@ -43,6 +43,9 @@ const MOST_LED: usize = 3000;
 /// And times the conditions, each of which costs an iteration more the more there are: 57 630 beside a ball in space take 0.6 s each.
 const MOST_LED_CONDITIONS: usize = 10_000_000;
 
+/// The same in one step, where steps with factors of their own come next: these take a tenth of the time of a step that needs more.
+const MOST_LED_STEP: usize = 100;
+
 /// Newton steps with factors of their own.
 const MOST_DIRECT_STEPS: usize = 60;
 
@@ -52,13 +55,25 @@ const MOST_DIRECT: usize = 6000;
 /// What may be left of the target, relative, where no second search is needed.
 const MET: f64 = 1e-12;
 
+/// What two searches may leave of the target, relative, where a longer one is made.
+const NEARLY_MET: f64 = 1e-3;
+
 /// How the steps of Newton's method are found.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Steps {
-    /// By conjugate gradients, led by the factors of the equations of all changes.
-    Gradients,
+    /// By conjugate gradients, led by the factors of the equations of all changes; at most so many iterations with factors in all, and in one step.
+    Gradients(usize, usize),
     /// By the factors of the equations of the changes off the floor.
     Direct,
+}
+
+/// The change that came nearest.
+struct Found {
+    /// The norm of what it leaves.
+    left: f64,
+    change: Vec<f64>,
+    /// Whether changes that meet the conditions are shown to be far too large.
+    is_far: bool,
 }
 
 /// Conditions on changes, one column per change.
@@ -264,18 +279,38 @@ impl Conditions {
     /// Minimises `½ Σ x²` subject to `A x = missing` and `x ≥ floor`.
     ///
     /// As for the weights of a family the dual is smooth, `x = max(floor, Aᵀ λ)`; Newton's method, its steps by conjugate gradients with the normal equations of the changes off
-    /// the floor, led by the factors of those of all changes. What these leave is made up for by the factors alone, in `Aᵀ λ` itself. With many changes at the floor the conditions on the others nearly depend on each other, and such steps end before they are of use: where something is left, the search
+    /// the floor, led by the factors of those of all changes. What these leave is made up for by the factors alone, in `Aᵀ λ` itself.
+    /// With many changes at the floor the conditions on the others nearly depend on each other, and such steps end before they are of use: where something is left, the search
     /// begins again with steps that factorise the equations of the changes off the floor, a little added to their diagonal. No change that meets the conditions has less than twice the dual as its square, so a search ends when only changes far too large are left. Where the conditions contradict each other or the floor, the change
     /// that came nearest is returned: the caller looks at what is still missing.
     pub fn least_change(&self, missing: &[f64], floor: f64) -> Vec<f64> {
         // all rows to the same size, or conjugate gradients take ages
         let (scaled, target) = self.scaled(missing);
-        let (left, change) = scaled.newton(&target, floor, Steps::Gradients);
-        if left <= MET * norm(&target) || floor == f64::NEG_INFINITY || self.count > MOST_DIRECT {
-            return change;
+        let most = MOST_LED.min(MOST_LED_CONDITIONS / self.count.max(1));
+        let is_last = floor == f64::NEG_INFINITY || self.count > MOST_DIRECT;
+        let ways: &[Steps] = match is_last {
+            true => &[Steps::Gradients(most, most)],
+            false => &[
+                Steps::Gradients(most, MOST_LED_STEP),
+                Steps::Direct,
+                Steps::Gradients(most, most),
+            ],
+        };
+        let (mut least, mut change) = (f64::INFINITY, Vec::new());
+        for (tried, way) in ways.iter().enumerate() {
+            // a gap that both have left open is there to stay; one that is nearly closed may be conditions that follow from each other
+            if tried == 2 && least > NEARLY_MET * norm(&target) {
+                break;
+            }
+            let found = scaled.newton(&target, floor, *way);
+            if found.left < least {
+                (least, change) = (found.left, found.change);
+            }
+            if least <= MET * norm(&target) || found.is_far {
+                break;
+            }
         }
-        let (less, other) = scaled.newton(&target, floor, Steps::Direct);
-        if less < left { other } else { change }
+        change
     }
 
     /// The dual of a change, to be made large; `z` is `Aᵀ λ`.
@@ -291,9 +326,10 @@ impl Conditions {
         dot(multiplier, target) - penalty.sum::<f64>()
     }
 
-    /// Newton's method for the dual, of rows of the norm 1; what is left, and the change.
-    fn newton(&self, target: &[f64], floor: f64, steps: Steps) -> (f64, Vec<f64>) {
+    /// Newton's method for the dual, of rows of the norm 1.
+    fn newton(&self, target: &[f64], floor: f64, steps: Steps) -> Found {
         let goal = 1e-15 * norm(target);
+
         let lifted = |z: &[f64]| -> Vec<f64> {
             let all = z.iter().enumerate();
             all.map(|(k, z)| z.max(self.floor_of(k, floor))).collect()
@@ -307,20 +343,22 @@ impl Conditions {
         let mut gap = left(&lifted(&z));
         let mut best = (norm(&gap), z.clone());
         let (most, factors) = match steps {
-            Steps::Gradients => (MOST_STEPS, self.factors(|_| true)),
+            Steps::Gradients(..) => (MOST_STEPS, self.factors(|_| true)),
             Steps::Direct => (MOST_DIRECT_STEPS, None),
         };
-        let mut led = 0;
+        let (mut led, mut is_far, mut is_slow) = (0, false, false);
         for _ in 0..most {
             if best.0 <= goal {
                 break;
             }
             let is_free = |k: usize| z[k] >= self.floor_of(k, floor);
             let direction = match steps {
-                Steps::Gradients => {
-                    let (direction, iterations) = self.newton_step(&gap, is_free, factors.as_ref());
-                    if factors.is_some() {
+                Steps::Gradients(_, in_step) => {
+                    let led_by = factors.as_ref().map(|f| (f, in_step));
+                    let (direction, iterations) = self.newton_step(&gap, is_free, led_by);
+                    if led_by.is_some() {
                         led += iterations;
+                        is_slow = iterations >= in_step;
                     }
                     direction
                 }
@@ -360,12 +398,20 @@ impl Conditions {
                 break;
             }
             let reached = norm(&gap);
+            // at round-off factors gain nothing more
+            let is_met = steps == Steps::Direct
+                && best.0 <= MET * norm(target)
+                && reached > STALLED * best.0;
             if reached < best.0 {
                 best = (reached, z.clone());
             }
             let is_stalled = floor == f64::NEG_INFINITY && reached > STALLED * was;
-            let is_far = self.dual(target, &multiplier, &z, floor) > bound;
-            if is_stalled || is_far || led > MOST_LED.min(MOST_LED_CONDITIONS / self.count.max(1)) {
+            is_far = self.dual(target, &multiplier, &z, floor) > bound;
+            if is_stalled
+                || is_far
+                || is_met
+                || matches!(steps, Steps::Gradients(most, _) if led > most || is_slow)
+            {
                 break;
             }
         }
@@ -382,7 +428,11 @@ impl Conditions {
                 }
             }
         }
-        (reached, lifted(&z))
+        Found {
+            left: reached,
+            change: lifted(&z),
+            is_far,
+        }
     }
 
     /// The factors of the normal equations of the changes that count, if there are many; rows are those of norm 1.
@@ -451,15 +501,16 @@ impl Conditions {
         Some(Dense::new(n, normal)?.solved(gap))
     }
 
-    /// Solves the normal equations of the changes off the floor as far as their residual falls; `factors`, of those of all changes or of as many as are off it, make that a matter of few iterations. Returns how many it took.
+    /// Solves the normal equations of the changes off the floor as far as their residual falls; the factors of those of all changes that `led_by` has make that a matter of few iterations, and it has the most of them. Returns how many it took.
     fn newton_step(
         &self,
         gap: &[f64],
         is_free: impl Fn(usize) -> bool,
-        factors: Option<&Llt<usize, f64>>,
+        led_by: Option<(&Llt<usize, f64>, usize)>,
     ) -> (Vec<f64>, usize) {
-        let lead = |residual: &[f64]| match factors {
-            Some(factors) => solved(factors, residual),
+        let most = led_by.map_or(MOST_ITERATIONS, |(_, most)| most);
+        let lead = |residual: &[f64]| match led_by {
+            Some((factors, _)) => solved(factors, residual),
             None => residual.to_vec(),
         };
         let apply = |v: &[f64]| {
@@ -479,7 +530,7 @@ impl Conditions {
         let mut best = (dot(gap, gap), solution.clone());
         let goal = best.0 * 1e-20;
         let mut iterations = 0;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..most {
             iterations += 1;
             let along = apply(&direction);
             let curvature = dot(&direction, &along);

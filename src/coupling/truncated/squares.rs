@@ -55,8 +55,8 @@ pub(super) fn fit_factors<const D: usize>(segments: &mut Segments<'_, D>, is_sta
     let mut left = f64::INFINITY;
     // a lattice with few bonds may need a second layer of points, faces that are small or meet at sharp corners other traces
     for (is_wide, is_shifted) in [(false, false), (true, false), (true, true)] {
-        if is_wide && !is_shifted {
-            segments.widen();
+        if is_wide && !is_shifted && !segments.widen() {
+            continue;
         }
         let parts = parts(segments);
         let columns = columns(segments, &parts, is_state);
