@@ -205,6 +205,18 @@ pub enum ModelError {
         /// What remained, relative to the largest traction of a face.
         residual: f64,
     },
+    /// The conditions of a seam are more than can be met in minutes.
+    #[error(
+        "the faces of the nonlocal zone cut the lattice, and fitting truncated bonds to them takes factors of {conditions} conditions, {operations:.0e} operations or more where {most:.0e} are the limit; let the faces follow the lattice (element edges a whole number of spacings long), take a larger spacing or a smaller zone, or couple by splice"
+    )]
+    SeamTooLarge {
+        /// Conditions on the energies of bonds that the seam cuts.
+        conditions: usize,
+        /// What their factorisation takes, a bound from below.
+        operations: f64,
+        /// The most that it may take.
+        most: f64,
+    },
     /// A combination that is not offered.
     #[error("{what} is not offered: {remedy}")]
     Unsupported {

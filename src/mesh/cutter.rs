@@ -99,8 +99,10 @@ impl<const D: usize> SegmentCutter<D> {
         let extent = (hi - lo).amax().max(f64::MIN_POSITIVE);
         // about one facet per grid cell that the boundary passes, and never more than a few hundred cells along an axis
         let most = [1 << 20, 1 << 10, 1 << 8][D.min(3) - 1] as f64;
-        let cell_size = (size / facets.len().max(1) as f64)
-            .max(extent / most)
+        let count = facets.len().max(1) as f64;
+        // the ends of a bar have no size, and a bond would pass a million cells between them
+        let cell_size = (size / count)
+            .max(extent / most.min(count))
             .max(f64::MIN_POSITIVE);
         let counts = std::array::from_fn(|k| ((hi[k] - lo[k]) / cell_size) as usize + 1);
         let mut grid = Self {

@@ -49,6 +49,7 @@ impl RunError {
                 | Self::Unproven(_)
                 | Self::Model(
                     ModelError::Seam { .. }
+                        | ModelError::SeamTooLarge { .. }
                         | ModelError::Unsupported { .. }
                         | ModelError::Family { .. }
                         | ModelError::OtherMaterial { .. }

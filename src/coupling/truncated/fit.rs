@@ -195,7 +195,7 @@ fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
 /// Fits the seam unless it follows the lattice; returns whether it did.
 ///
 /// # Errors
-/// [`ModelError::Seam`] with what is left if no positive factors meet the conditions.
+/// [`ModelError::Seam`] with what is left if no positive factors meet the conditions, [`ModelError::SeamTooLarge`] if they are too many.
 pub(super) fn fit<const D: usize>(
     segments: &mut Segments<'_, D>,
     strings: &Strings<D>,
@@ -224,7 +224,7 @@ pub(super) fn fit<const D: usize>(
         });
     }
     let mut trial = segments.clone();
-    let mut left = fit_factors(&mut trial, state.is_some());
+    let mut left = fit_factors(&mut trial, state.is_some())?;
     if left <= MET + rounding {
         trial.is_squares = state.is_some();
         *segments = trial;
@@ -241,7 +241,7 @@ pub(super) fn fit<const D: usize>(
     };
     // the pairwise part by itself, and shares of dilatations for it
     let mut trial = segments.clone();
-    left = fit_factors(&mut trial, false);
+    left = fit_factors(&mut trial, false)?;
     if left <= MET + rounding {
         let parts = parts(&trial);
         let rest = state_change(&mut trial, &parts, &nodes, state);

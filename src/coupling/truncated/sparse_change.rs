@@ -1,6 +1,9 @@
 //! The smallest change that meets many sparse linear conditions.
 
 use faer::prelude::Solve;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymmetricOrdering, factorize_symbolic_cholesky,
+};
 use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
 use rayon::prelude::*;
@@ -45,6 +48,9 @@ const MOST_LED_CONDITIONS: usize = 10_000_000;
 
 /// The same in one step, where steps with factors of their own come next: these take a tenth of the time of a step that needs more.
 const MOST_LED_STEP: usize = 100;
+
+/// Conditions from which on the cost of their factors is asked for: below it is seconds.
+const MANY: usize = 20_000;
 
 /// Newton steps with factors of their own.
 const MOST_DIRECT_STEPS: usize = 60;
@@ -122,6 +128,11 @@ impl Conditions {
     /// Ends a column.
     pub fn close(&mut self) {
         self.offsets.push(self.rows.len());
+    }
+
+    /// Number of conditions.
+    pub fn count(&self) -> usize {
+        self.count
     }
 
     /// Number of changes.
@@ -435,11 +446,34 @@ impl Conditions {
         }
     }
 
+    /// Operations that the factors of the normal equations of all changes take, a bound from below; zero for few conditions.
+    pub fn operations(&self) -> f64 {
+        if self.count < MANY {
+            return 0.0;
+        }
+        let Some(normal) = self.normal(|_| true) else {
+            return 0.0;
+        };
+        let symbolic = factorize_symbolic_cholesky(
+            normal.symbolic(),
+            faer::Side::Lower,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams::default(),
+        );
+        // the sum of the squares of all columns of the factor is least where they have the same length
+        symbolic.map_or(0.0, |s| (s.len_val() as f64).powi(2) / self.count as f64)
+    }
+
     /// The factors of the normal equations of the changes that count, if there are many; rows are those of norm 1.
     fn factors(&self, counts: impl Fn(usize) -> bool + Sync) -> Option<Llt<usize, f64>> {
         if self.count < FACTORISED {
             return None;
         }
+        self.normal(counts)?.sp_cholesky(faer::Side::Lower).ok()
+    }
+
+    /// The normal equations of the changes that count.
+    fn normal(&self, counts: impl Fn(usize) -> bool + Sync) -> Option<SparseColMat<usize, f64>> {
         let mut of_row: Vec<Vec<(usize, f64)>> = vec![Vec::new(); self.count];
         for k in (0..self.changes()).filter(|&k| counts(k)) {
             for (r, v) in self.column(k) {
@@ -471,8 +505,7 @@ impl Conditions {
         let entries: Vec<Vec<Triplet<usize, usize, f64>>> = rows.collect();
         let entries = entries.concat();
         // without factors all goes as before, and takes longer
-        let normal = SparseColMat::try_new_from_triplets(self.count, self.count, &entries).ok()?;
-        normal.sp_cholesky(faer::Side::Lower).ok()
+        SparseColMat::try_new_from_triplets(self.count, self.count, &entries).ok()
     }
 
     /// Solves the normal equations of the changes off the floor, with as much added to their diagonal as still tells conditions apart.

@@ -21,10 +21,13 @@ use super::{
     segments::{End, Segments},
     sparse_change::Conditions,
 };
-use crate::tensor::Vector;
+use crate::{coupling::ModelError, tensor::Vector};
 
 /// Pieces shorter than this part of the spacing get less stiffness to begin with, or their `k/s` would make the stable step arbitrarily short. Half a spacing is the shortest piece where faces follow the lattice.
 const SHORT: f64 = 0.5;
+
+/// The most operations of a factorisation of the conditions: some ten seconds, and every iteration takes a hundredth of that.
+const MOST_OPERATIONS: f64 = 3e11;
 
 /// How much of a trace may change for the price at which a factor doubles.
 const SHIFTED: f64 = 0.5;
@@ -41,7 +44,13 @@ struct Column {
 /// Fits a pairwise law with one factor for each part, or an LPS with one for each end of a part; returns what is left, relative to the largest traction.
 ///
 /// Where that is more than round-off the factors are of no use.
-pub(super) fn fit_factors<const D: usize>(segments: &mut Segments<'_, D>, is_state: bool) -> f64 {
+///
+/// # Errors
+/// [`ModelError::SeamTooLarge`] before anything is factorised.
+pub(super) fn fit_factors<const D: usize>(
+    segments: &mut Segments<'_, D>,
+    is_state: bool,
+) -> Result<f64, ModelError> {
     let nodes = loaded_nodes(segments);
     let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
     let tensor = pair_tensor(segments);
@@ -74,6 +83,14 @@ pub(super) fn fit_factors<const D: usize>(segments: &mut Segments<'_, D>, is_sta
             };
             system(segments, &parts, &columns, &shifts, &nodes, traction)
         };
+        let operations = conditions.operations();
+        if operations > MOST_OPERATIONS {
+            return Err(ModelError::SeamTooLarge {
+                conditions: conditions.count(),
+                operations,
+                most: MOST_OPERATIONS,
+            });
+        }
         // without the floor first: where even that fails, nothing else has to be tried
         let (mut change, mut rest) = finish(&conditions, &target, f64::NEG_INFINITY);
         if rest <= 1e-3 * scale && change[..columns.len()].iter().any(|&c| c < FLOOR - 1.0) {
@@ -92,7 +109,7 @@ pub(super) fn fit_factors<const D: usize>(segments: &mut Segments<'_, D>, is_sta
             break;
         }
     }
-    left
+    Ok(left)
 }
 
 /// The pairwise stiffness of the whole bond that the end of a part gets, or that of both.
