@@ -198,7 +198,7 @@ impl Tally {
 /// where bondline warns of nothing a scene at rest agrees with its elements alone within what was predicted.
 ///
 /// `BONDLINE_TYPED_SCENES` and `BONDLINE_RANDOM_FROM` say how many and from which number on; scene `n` is the same wherever it is made. With
-/// `BONDLINE_SHOW` set the text of each that disagrees is shown; in the folder `BONDLINE_KEEP` the last one stays, with its meshes.
+/// `BONDLINE_SHOW` set the text of each that disagrees is shown; in the folder `BONDLINE_KEEP` the last one stays.
 #[test]
 fn typed_scenes_are_proved_warned_of_or_refused() {
     let count = from_environment("BONDLINE_TYPED_SCENES", 40);

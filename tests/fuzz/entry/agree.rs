@@ -61,13 +61,7 @@ pub fn typed_scene(data: &[u8]) -> Told {
         std::fs::write(folder.path().join(name), mesh)
             .expect("the folder for temporary files can be written");
     }
-    // for whoever wants to look at it
-    if let Some(kept) = std::env::var_os("BONDLINE_KEEP") {
-        let files = scene.meshes.iter().map(|(n, mesh)| (n.as_str(), mesh));
-        for (name, text) in files.chain([("typed.toml", &scene.text)]) {
-            std::fs::write(Path::new(&kept).join(name), text).expect("BONDLINE_KEEP is a folder");
-        }
-    }
+    super::keep(&scene.text, &scene.meshes);
     let told = |outcome, warned| Told {
         outcome,
         warned,

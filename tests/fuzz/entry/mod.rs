@@ -155,7 +155,22 @@ fn variant(error: &impl std::fmt::Debug) -> String {
 /// # Panics
 /// As [`scene_text`].
 pub fn random_scene(data: &[u8]) -> Outcome {
-    run_text(&random_text(data), &fixtures())
+    let text = random_text(data);
+    keep(&text, &[]);
+    run_text(&text, &fixtures())
+}
+
+/// Writes a scene and its meshes into the folder `BONDLINE_KEEP`, for whoever wants to look at it.
+fn keep(text: &str, meshes: &[(String, String)]) {
+    let Some(kept) = std::env::var_os("BONDLINE_KEEP") else {
+        return;
+    };
+    let files = meshes
+        .iter()
+        .map(|(name, mesh)| (name.as_str(), mesh.as_str()));
+    for (name, text) in files.chain([("scene.toml", text)]) {
+        std::fs::write(Path::new(&kept).join(name), text).expect("BONDLINE_KEEP is a folder");
+    }
 }
 
 /// The text of [`random_scene`].
