@@ -24,7 +24,7 @@
 //! | `wave` | energy and momentum over 100 000 steps |
 //! | `reflection` | what a seam sends back of a pulse |
 //! | `extremes` | units, places, laws, shapes and steps at their limits |
-//! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is the model |
+//! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is their scene |
 //!
 //! `page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 

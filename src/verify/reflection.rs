@@ -146,7 +146,7 @@ impl Crossing {
     /// # Errors
     /// Why a bar cannot be built or moved.
     pub fn measure(&self) -> Result<Reflected, String> {
-        let build = |kind| Strip::new::<1>(&self.case(kind)).map_err(|e| e.to_string());
+        let build = |kind| Strip::new::<1>(&self.case(kind));
         let (mut coupled, mut pure) =
             (build(Kind::Coupled(self.method))?, build(self.side.pure())?);
         let limit = |s: &Strip| {

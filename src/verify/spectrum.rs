@@ -154,14 +154,12 @@ fn partial_stress() -> [Kind; 3] {
 
 /// The growth exponent per crossing, with the verdict that a run would get.
 fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row {
-    let found = Strip::new::<D>(case)
-        .map_err(|e| e.to_string())
-        .and_then(|strip| {
-            let length: f64 = case.lengths.iter().map(|l| f64::from(*l)).sum();
-            growth::growth(&strip.motion, &[], 0.5, 0)
-                .map(|g| g.rate * length)
-                .map_err(|e| e.to_string())
-        });
+    let found = Strip::new::<D>(case).and_then(|strip| {
+        let length: f64 = case.lengths.iter().map(|l| f64::from(*l)).sum();
+        growth::growth(&strip.motion, &[], 0.5, 0)
+            .map(|g| g.rate * length)
+            .map_err(|e| e.to_string())
+    });
     match found {
         Err(reason) => Row::refused(name, quantity, reason),
         Ok(growth) if growth * CROSSINGS > LARGEST_GAIN => Row {

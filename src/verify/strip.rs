@@ -1,26 +1,19 @@
-//! A strip of finite elements, transition, peridynamics, transition and finite elements that moves: the model of the suites `spectrum`, `wave` and `reflection`.
+//! A strip of finite elements, transition, peridynamics, transition and finite elements that moves, as a scene: that of the suites `spectrum`, `wave` and `reflection`.
 //!
 //! Units are those of the lattice: spacing h = 1, modulus `C_1111` = 1 and density 1, so that long waves run one spacing in a unit of time.
 
-use std::sync::Arc;
+use std::fmt::Write as _;
 
 use crate::{
-    coupling::{
-        Coupling, Local, Model, ModelError, Nonlocal, Peridynamics, PointSource, Problem, Surfaces,
-        Zone,
-    },
-    mesh::{
-        MeshError,
-        generate::{Axis, Grid},
-    },
+    coupling::BlendingFunction,
+    coupling::FitDegree,
     peridynamics::{
-        BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
-        Micromodulus, PartialVolume,
+        Influence, Micromodulus,
+        influence::{Alpha, Degree},
     },
-    progress::Silent,
+    scene::LinearModel,
     system::LinearMotion,
-    tensor::Vector,
-    verify::enclosed::Method,
+    verify::{enclosed::Method, meshes::scene},
 };
 
 /// The law of the points.
@@ -35,13 +28,47 @@ pub enum StripLaw {
 }
 
 impl StripLaw {
-    fn law<const D: usize>(self) -> Box<dyn BondLaw<D>> {
-        // λ = μ is plane strain or a solid at ν = 1/4; C_1111 = 3 μ
-        let mu = 1.0 / 3.0;
+    /// The material's table, and the influence function where the law has one.
+    fn text(self, dimension: usize) -> (String, String) {
+        // λ = μ and C_1111 = 1: ν = 1/4 in the plane; in a bar 1/2, which no solid quite has
+        let (modulus, ratio) = match dimension {
+            1 => (1.0, 0.4999999),
+            _ => (5.0 / 6.0, 0.25),
+        };
+        let ratio = format!("poisson-ratio = {ratio}");
+        let table = |name: &str, rest: &str| {
+            format!("[materials.m.{name}]\nyoungs-modulus = {modulus}\ndensity = 1\n{rest}\n")
+        };
+        let influence = |w| format!("influence = {}\n", influence(w));
         match self {
-            Self::BondBased(kernel) => Box::new(BondBased::<D>::new(kernel, mu)),
-            Self::Lps(w) => Box::new(LinearPeridynamicSolid::<D>::new(w, mu, mu)),
-            Self::Correspondence(w) => Box::new(Correspondence::<D>::new(w, mu, mu, 1.0)),
+            Self::BondBased(kernel) => {
+                let kernel = match kernel {
+                    Micromodulus::InverseDistance => "\"inverse-distance\"".to_owned(),
+                    Micromodulus::Uniform => "\"uniform\"".to_owned(),
+                    Micromodulus::Constant => "\"constant\"".to_owned(),
+                    Micromodulus::Triangular => "\"triangular\"".to_owned(),
+                    Micromodulus::Influence(w) => {
+                        format!("{{ influence = {} }}", self::influence(w))
+                    }
+                };
+                (
+                    table("bond-based", &format!("micromodulus = {kernel}")),
+                    String::new(),
+                )
+            }
+            Self::Lps(w) => (table("lps", &ratio), influence(w)),
+            Self::Correspondence(w) => (table("correspondence", &ratio), influence(w)),
+        }
+    }
+}
+
+/// An influence function as a scene has it.
+fn influence(w: Influence) -> String {
+    match w {
+        Influence::Gaussian => "\"gaussian\"".to_owned(),
+        Influence::Polynomial { degree, alpha } => {
+            let alpha = u8::from(alpha == Alpha::One);
+            format!("{{ degree = {}, alpha = {alpha} }}", Degree::order(degree))
         }
     }
 }
@@ -67,11 +94,32 @@ impl Kind {
         }
     }
 
-    fn coupling<const D: usize>(self) -> Box<dyn Coupling<D>> {
-        match self {
-            Self::Local => Box::new(Local),
-            Self::Nonlocal => Box::new(Nonlocal),
-            Self::Coupled(method) => method.coupling(),
+    /// The coupling as a scene has it.
+    fn text(self) -> String {
+        let beta = |function| match function {
+            BlendingFunction::Constant => "constant",
+            BlendingFunction::Linear => "linear",
+            BlendingFunction::Smooth => "smooth",
+        };
+        let method = match self {
+            Self::Local => return "\"local\"".to_owned(),
+            Self::Nonlocal => return "\"nonlocal\"".to_owned(),
+            Self::Coupled(method) => method,
+        };
+        match method {
+            Method::Splice => "\"splice\"".to_owned(),
+            Method::Truncated => "\"truncated\"".to_owned(),
+            Method::Balanced => "\"balanced\"".to_owned(),
+            Method::Blending(f) => format!("{{ blending = {{ beta = \"{}\" }} }}", beta(f)),
+            Method::BalancedOver(f) => format!("{{ balanced = {{ beta = \"{}\" }} }}", beta(f)),
+            Method::Meshfree(_) => "{ partial-stress = { form = \"meshfree\" } }".to_owned(),
+            Method::Elements(fit) => {
+                let fit = match fit {
+                    FitDegree::Affine => "affine",
+                    FitDegree::Quadratic => "quadratic",
+                };
+                format!("{{ partial-stress = {{ interface = \"{fit}\" }} }}")
+            }
         }
     }
 }
@@ -95,17 +143,6 @@ pub struct StripCase {
     pub across: u32,
 }
 
-/// Why a strip was not built.
-#[derive(Debug, thiserror::Error)]
-pub enum StripError {
-    /// The mesh.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// The model.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-}
-
 /// A strip that can move.
 pub struct Strip {
     /// Stiffness and masses.
@@ -124,85 +161,91 @@ impl Strip {
     /// Builds and assembles a strip.
     ///
     /// # Errors
-    /// [`StripError`] of the mesh or the model.
-    pub fn new<const D: usize>(case: &StripCase) -> Result<Strip, StripError> {
-        let mut borders = [0.0; 6];
-        for (k, length) in case.lengths.iter().enumerate() {
-            borders[k + 1] = borders[k] + f64::from(*length);
-        }
-        let cell = case.cell.max(1);
-        let grid = Grid::<D>::new(std::array::from_fn(|a| Axis::Uniform {
-            min: 0.0,
-            max: if a == 0 {
-                borders[5]
-            } else {
-                f64::from(case.across * cell)
-            },
-            cells: if a == 0 {
-                (case.lengths.iter().sum::<u32>() / cell) as usize
-            } else {
-                case.across as usize
-            },
-        }));
-        let mesh = grid.mesh()?;
-        let zones: Vec<Zone> = (0..mesh.cell_count())
-            .map(|c| {
-                let x = mesh.centroid(c)[0];
-                if x < borders[1] || x > borders[4] {
-                    Zone::Local
-                } else if x < borders[2] || x > borders[3] {
-                    Zone::Transition
-                } else {
-                    Zone::Nonlocal
-                }
-            })
-            .collect();
-        let law = case.law.law::<D>();
-        let tensor = *law.tensor();
-        let (ratio, edge) = (case.ratio, case.edge_ratio);
-        let horizon = move |x: &Vector<D>| {
-            let left = (x[0] - borders[1]) / (borders[2] - borders[1]).max(1.0);
-            let right = (borders[4] - x[0]) / (borders[4] - borders[3]).max(1.0);
-            edge + (ratio - edge) * left.min(right).clamp(0.0, 1.0)
-        };
-        let problem = Problem {
-            cell_material: vec![0; mesh.cell_count()],
-            mesh,
-            zones,
-            tensors: vec![tensor],
-            peridynamic_material: 0,
-            peridynamics: Some(Peridynamics {
-                law,
-                horizon: Arc::new(horizon),
-                points: PointSource::Lattice {
-                    spacing: 1.0,
-                    origin: Vector::zeros(),
-                },
-                weights: BondWeights::Isotropic,
-                volumes: PartialVolume::Full,
-                barriers: Vec::new(),
-                voids: Vec::new(),
-                surfaces: Surfaces::Uncut,
-            }),
-            coupling: case.kind.coupling(),
-        };
-        let (model, coupling) = Model::new(problem, &Silent)?;
-        let operator = coupling.operator(&model)?;
-        let stiffness = model.assemble(operator.as_ref(), &Silent);
+    /// The message of the refusal of its scene.
+    pub fn new<const D: usize>(case: &StripCase) -> Result<Strip, String> {
+        let borders = case.borders();
+        let LinearModel {
+            motion,
+            position,
+            beta,
+        } = scene::linear_model(&case.text::<D>())?;
         Ok(Strip {
-            beta: (0..model.sites.len()).map(|s| operator.beta(s)).collect(),
-            x: model.sites.iter().map(|s| s.position[0]).collect(),
-            y: model
-                .sites
-                .iter()
-                .map(|s| if D > 1 { s.position[1] } else { 0.0 })
-                .collect(),
-            motion: LinearMotion {
-                stiffness,
-                mass: model.sites.iter().map(|s| s.volume).collect(),
-                symmetry: coupling.symmetry(),
-            },
+            beta,
+            x: position.iter().map(|x| x[0]).collect(),
+            y: position.iter().map(|x| x[1]).collect(),
+            motion,
             borders: [borders[1], borders[2], borders[3], borders[4]],
         })
+    }
+}
+
+impl StripCase {
+    /// Both ends, and where zones meet.
+    fn borders(&self) -> [f64; 6] {
+        let mut borders = [0.0; 6];
+        for (k, length) in self.lengths.iter().enumerate() {
+            borders[k + 1] = borders[k] + f64::from(*length);
+        }
+        borders
+    }
+
+    /// The strip as a scene.
+    fn text<const D: usize>(&self) -> String {
+        let borders = self.borders();
+        let cell = self.cell.max(1);
+        let width = self.across * cell;
+        let (material, influence) = self.law.text(D);
+        let along = self.lengths.iter().sum::<u32>() / cell;
+        let (kinematics, mesh) = match D {
+            1 => (
+                "bar",
+                format!("line]\nmin = 0\nmax = {}\nx.cells = {along}\n", borders[5]),
+            ),
+            _ => (
+                "plane-strain",
+                format!(
+                    "rectangle]\nmin = [0, 0]\nmax = [{}, {width}]\nx.cells = {along}\ny.cells = {}\n",
+                    borders[5], self.across
+                ),
+            ),
+        };
+        let mut text = format!(
+            "kinematics = \"{kinematics}\"\ncoupling = {}\n[mesh.{mesh}{material}[solve.explicit]\nduration = 1\n[output]\nvtu = false\n",
+            self.kind.text()
+        );
+        if self.kind != Kind::Local {
+            let horizon = match self.ratio == self.edge_ratio {
+                true => self.ratio.to_string(),
+                // straight from the edge ratio at the finite elements to the ratio of the points
+                false => format!(
+                    "\"{} + {} * max(0, min(1, min((x - {}) / {}, ({} - x) / {})))\"",
+                    self.edge_ratio,
+                    self.ratio - self.edge_ratio,
+                    borders[1],
+                    (borders[2] - borders[1]).max(1.0),
+                    borders[4],
+                    (borders[4] - borders[3]).max(1.0)
+                ),
+            };
+            let origin = if D == 1 { "0" } else { "[0, 0]" };
+            let _ = write!(
+                text,
+                "[peridynamics]\nhorizon = {horizon}\npoints.lattice = {{ spacing = 1, origin = {origin} }}\n{influence}"
+            );
+        }
+        if let Kind::Coupled(method) = self.kind {
+            let part = |from: f64, to: f64| match D {
+                1 => format!("{{ box = {{ min = {from}, max = {to} }} }}"),
+                _ => format!(
+                    "{{ box = {{ min = [{from}, -1], max = [{to}, {}] }} }}",
+                    width + 1
+                ),
+            };
+            let _ = writeln!(text, "[zones]\nnonlocal = {}", part(borders[2], borders[3]));
+            if method.has_transition() {
+                let _ = writeln!(text, "transition = {}", part(borders[1], borders[4]));
+            }
+        }
+        text
     }
 }

@@ -247,7 +247,7 @@ fn coupled_rows(name: &str, case: &StripCase) -> Vec<Row> {
         _ => REMEDY_SEAM,
     };
     let measured = || -> Result<Vec<Row>, String> {
-        let mut strip = Strip::new::<1>(case).map_err(|e| e.to_string())?;
+        let mut strip = Strip::new::<1>(case)?;
         let limit = stable_step::stable_step(&strip.motion, &[]).map_err(|e| e.to_string())?;
         let step = FRACTION * limit.stable;
         let growth = growth::growth(&strip.motion, &[], step, STEPS).map_err(|e| e.to_string())?;
@@ -293,14 +293,13 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
                 lengths: [100, 6, 100, 6, 100],
                 ..strip_case(kind, law, 3)
             };
-            let text = |e: crate::verify::strip::StripError| e.to_string();
             symmetric.push((
                 format!("{}, {law_name}, 1D", kind.name()),
-                Strip::new::<1>(&line).map_err(text),
+                Strip::new::<1>(&line),
             ));
             symmetric.push((
                 format!("{}, {law_name}, 2D", kind.name()),
-                Strip::new::<2>(&small(kind, law, 8)).map_err(text),
+                Strip::new::<2>(&small(kind, law, 8)),
             ));
         }
     }
@@ -355,7 +354,7 @@ mod tests {
                 3,
             )
         };
-        let rows = symmetric_rows("", Strip::new::<1>(&case).map_err(|e| e.to_string()));
+        let rows = symmetric_rows("", Strip::new::<1>(&case));
         assert!(
             rows.len() == 2 && rows.iter().all(|r| r.verdict == Verdict::Pass),
             "{rows:?}"

@@ -20,6 +20,8 @@ pub(super) mod limits {
     /// As [`REFUSE`], where the seam meets a surface: an incomplete family alone leaves less than 1. Surfaces alone are warned of, never refused: of rows that
     /// are nearly alike the one that is judged hangs on round-off, and so does the number.
     pub const REFUSE_SURFACE: f64 = 2.0;
+    /// As [`WARN`], where points of a transition zone lie at a surface that their rows know nothing of: there is no reason to end one there.
+    pub const WARN_TRANSITION: f64 = 0.002;
     /// As [`REFUSE`], where points of a transition zone lie at a surface: what is local of their rows knows nothing of a boundary, and a patch shows a third of what the whole zone does. Small zones
     /// beside one surface lie near 0.5.
     pub const REFUSE_TRANSITION: f64 = 1.0;
@@ -170,7 +172,7 @@ fn verdict(rows: &Unbalanced, is_lattice: bool, is_truncated: bool) -> Option<Fi
         RowClass::Transition => (
             "where the transition zone meets the surface of the body, which its rows know nothing of,",
             "end the transition zone two horizons from the surface, or use coupling.truncated",
-            [limits::WARN_SURFACE, limits::REFUSE_TRANSITION],
+            [limits::WARN_TRANSITION, limits::REFUSE_TRANSITION],
         ),
         RowClass::FreeSurface | RowClass::LoadedSurface => (
             "at a surface that crosses the peridynamic zone, where families lack points",

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::{
     observe::summary::RunSummary,
     progress::Silent,
-    scene::{AnyScene, Prediction, Scene, Solved, Source, solve_with},
+    scene::{AnyScene, LinearModel, Prediction, Scene, Solved, Source, solve_with},
     tensor::Vector,
 };
 
@@ -102,6 +102,17 @@ pub fn check(text: &str, overrides: &[&str], files: &[(&str, &str)]) -> Result<P
     let folder = Folder::with(files)?;
     let scene = load(text, overrides, &folder)?;
     scene.predict(&Silent).map_err(|e| e.to_string())
+}
+
+/// A scene as matrices.
+///
+/// # Errors
+/// The message of a refusal.
+pub fn linear_model(text: &str) -> Result<LinearModel, String> {
+    let folder = Folder::with(&[])?;
+    load(text, &[], &folder)?
+        .linear_model()
+        .map_err(|e| e.to_string())
 }
 
 /// A site of a solved static scene: its place, its displacement, and the volume that it stands for.
