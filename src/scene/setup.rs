@@ -14,6 +14,7 @@ use super::validate::{Output, Scene, Solver};
 use crate::coupling::{self, Model, PointSource, Problem, Surfaces, Zone};
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Choice;
+use crate::peridynamics::influence::{Alpha, Degree};
 use crate::peridynamics::{
     BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
     PartialVolume,
@@ -68,6 +69,12 @@ pub(super) fn law<const D: usize>(material: &Material<D>) -> Box<dyn BondLaw<D>>
     }
 }
 
+/// `P_1/|ξ|`, ω of the divergence of the partial stress of bonds that have none of their own: stable in motion (`docs/dynamics.md`), where a Gaussian is not.
+const DIVERGENCE: Influence = Influence::Polynomial {
+    degree: Degree::P1,
+    alpha: Alpha::One,
+};
+
 /// The problem of a scene, and what remains of the scene.
 pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
     let material = scene
@@ -79,7 +86,7 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
     let stuff = &scene.materials[material as usize];
     let influence = match stuff.law {
         Law::Lps(i) | Law::Correspondence(i, _) => i,
-        Law::BondBased(_) => Influence::Gaussian,
+        Law::BondBased(_) => DIVERGENCE,
     };
     let law = law(stuff);
     let ratio = Ratio::new(stuff.lame, scene.kinematics);
