@@ -46,6 +46,9 @@ const MOST_LED: usize = 3000;
 /// And times the conditions, each of which costs an iteration more the more there are: 57 630 beside a ball in space take 0.6 s each.
 const MOST_LED_CONDITIONS: usize = 10_000_000;
 
+/// The same where nothing else is left to try: 64 192 beside a ring of quadrilaterals take 250.
+const MOST_LED_LAST: usize = 50_000_000;
+
 /// The same in one step, where steps with factors of their own come next: these take a tenth of the time of a step that needs more.
 const MOST_LED_STEP: usize = 100;
 
@@ -91,6 +94,8 @@ pub(super) struct Conditions {
     values: Vec<f64>,
     /// From this column on changes have no floor.
     free: usize,
+    /// Iterations with factors times conditions.
+    most_led: usize,
 }
 
 impl Conditions {
@@ -102,12 +107,18 @@ impl Conditions {
             rows: Vec::new(),
             values: Vec::new(),
             free: usize::MAX,
+            most_led: MOST_LED_CONDITIONS,
         }
     }
 
     /// Lets the columns that follow be without a floor.
     pub fn free_from_here(&mut self) {
         self.free = self.changes();
+    }
+
+    /// Lets a search go on for longer, since it is the last one.
+    pub fn last(&mut self) {
+        self.most_led = MOST_LED_LAST;
     }
 
     /// The floor of a change.
@@ -297,7 +308,7 @@ impl Conditions {
     pub fn least_change(&self, missing: &[f64], floor: f64) -> Vec<f64> {
         // all rows to the same size, or conjugate gradients take ages
         let (scaled, target) = self.scaled(missing);
-        let most = MOST_LED.min(MOST_LED_CONDITIONS / self.count.max(1));
+        let most = MOST_LED.min(self.most_led / self.count.max(1));
         let is_last = floor == f64::NEG_INFINITY || self.count > MOST_DIRECT;
         let ways: &[Steps] = match is_last {
             true => &[Steps::Gradients(most, most)],

@@ -73,7 +73,7 @@ pub(super) fn fit_factors<const D: usize>(
             true => shifts(segments, &nodes, SHORT * segments.model.spacing()),
             false => Vec::new(),
         };
-        let (conditions, target) = {
+        let (mut conditions, target) = {
             let traction = |b: &Vector<D>| {
                 let mut of = [0.0; MOST_TRIPLES];
                 of.iter_mut()
@@ -83,6 +83,9 @@ pub(super) fn fit_factors<const D: usize>(
             };
             system(segments, &parts, &columns, &shifts, &nodes, traction)
         };
+        if is_shifted {
+            conditions.last();
+        }
         let operations = conditions.operations();
         if operations > MOST_OPERATIONS {
             return Err(ModelError::SeamTooLarge {

@@ -408,9 +408,7 @@ const METHODS: &[Method] = &[
         typed: "coupling = \"truncated\"",
         has_transition: false,
         finer: 2,
-        dear: Some(
-            "left out: the seam of its third mesh has 57 630 conditions, whose fit took more than six minutes",
-        ),
+        dear: None,
     },
 ];
 
@@ -526,7 +524,7 @@ fn measured(problem: &Problem, effort: Effort) -> Result<Vec<Row>, String> {
             let case = format!("{}, {}", problem.name, method.name);
             match method.dear {
                 Some(why) if is_solid => {
-                    vec![Row::info(case, "order", f64::NAN).because(why)]
+                    vec![Row::refused(case, "order", why)]
                 }
                 _ => judged(
                     &case,
