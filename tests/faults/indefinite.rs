@@ -78,3 +78,26 @@ fn strings_along_the_edges_of_a_zone_are_shown_definite_by_factors() {
         "{proof}"
     );
 }
+
+/// The lattice has its points a horizon apart to round-off, where `P_1/|ξ|` vanishes for one end of a bond and is 1e-31 for the other.
+const HORIZON_APART: &str = r#"
+kinematics = "plane-stress"
+coupling = "truncated"
+mesh.file.path = "MESH"
+materials.m.lps = { youngs-modulus = 1, poisson-ratio = 0.35, density = 1 }
+peridynamics = { horizon = 0.9, points.lattice = { spacing = 0.3 }, influence = { degree = 1, alpha = 1 } }
+zones.nonlocal.box = { min = [6.13, 5.88], max = [14.21, 13.77] }
+initial.kick.velocity = { x = "1e-3*sin(x)" }
+solve.explicit = { duration = 0.1, outputs = 0 }
+output.vtu = false
+"#;
+
+#[test]
+fn weights_that_vanish_at_the_horizon_to_round_off_are_none() {
+    // the fit divided one by the other, and what was left was called indefinite
+    let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/graded_triangles.msh");
+    let case = Case::new(&HORIZON_APART.replace("MESH", mesh));
+    let summary = case.run(&[]).expect("it runs");
+    let proof = summary["proof"].to_string();
+    assert!(proof.contains("a sum of squares"), "{proof}");
+}

@@ -375,10 +375,14 @@ pub(super) struct OwnSpring<const D: usize> {
     pub origin: Origin,
 }
 
+/// A stiffness below this part of the largest is none.
+const ROUND_OFF: f64 = 1e-14;
+
 impl<const D: usize> Springs<D> {
-    /// Whether no spring has a negative stiffness.
+    /// Whether no spring has a negative stiffness, but for what round-off leaves at the horizon, where weights vanish.
     pub fn is_positive(&self) -> bool {
-        self.stiffness.iter().all(|k| *k >= 0.0)
+        let least = -ROUND_OFF * self.stiffness.iter().copied().fold(0.0, f64::max);
+        self.stiffness.iter().all(|k| *k >= least)
     }
 
     /// All pieces, the whole bonds that a fit has changed, and the other whole bonds of the points that `listed` names.

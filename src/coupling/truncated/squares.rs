@@ -29,6 +29,9 @@ const SHORT: f64 = 0.5;
 /// The most operations of a factorisation of the conditions: some ten seconds, and every iteration takes a hundredth of that.
 const MOST_OPERATIONS: f64 = 3e11;
 
+/// A stiffness below this part of the largest is round-off.
+const NOTHING: f64 = 1e-12;
+
 /// How much of a trace may change for the price at which a factor doubles.
 const SHIFTED: f64 = 0.5;
 
@@ -135,6 +138,8 @@ fn columns<const D: usize>(
 ) -> Vec<Column> {
     let short = SHORT * segments.model.spacing();
     let mut columns = Vec::with_capacity(2 * parts.len());
+    let all: Vec<f64> = parts.iter().map(|p| strength(segments, p, None)).collect();
+    let least = NOTHING * all.iter().copied().fold(0.0, f64::max);
     for (part, of) in parts.iter().enumerate() {
         let shape = of.shape(segments);
         let base = (shape.length * shape.xi.norm() / short).min(1.0);
@@ -150,9 +155,9 @@ fn columns<const D: usize>(
             End::Point(p) => Some((side, p)),
             End::Face(_) => None,
         });
-        let all = strength(segments, of, None);
-        if all == 0.0 {
-            // at the horizon itself ω may vanish
+        let all = all[part];
+        if all <= least {
+            // at the horizon itself ω vanishes, to round-off, which may be zero for one end alone
             continue;
         }
         for end in points.into_iter().flatten() {
