@@ -8,6 +8,7 @@
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
 //! | `states.rs` | those dilatations where pieces turn, stretch and break |
 //! | `edges.rs` | strings along the edges of a zone in 3D |
+//! | `factors.rs` | factors of the normal equations of the fit, and what they cost |
 //! | `feet.rs` | other traces at the ends of pieces, where factors alone do not do |
 //! | `squares.rs` | factors of pieces where faces cut the lattice anywhere, and an LPS as a sum of squares |
 //! | `fit.rs`, `sparse_change.rs` | the same for an LPS with few bonds, shares of dilatations apart; the smallest change |
@@ -24,6 +25,7 @@
 
 mod dilatation;
 mod edges;
+mod factors;
 mod feet;
 mod fit;
 mod moving;

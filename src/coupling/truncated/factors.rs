@@ -1,0 +1,128 @@
+//! Factors of the normal equations of conditions, and what they cost.
+
+use faer::prelude::Solve;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::linalg::solvers::Llt;
+use faer::sparse::{SparseColMat, Triplet};
+use rayon::prelude::*;
+
+use super::{
+    normal::Dense,
+    sparse_change::{Conditions, norm},
+};
+
+/// Conditions from which on their normal equations are factorised: conjugate gradients alone take as many iterations as a long seam has points.
+const FACTORISED: usize = 300;
+
+/// What is added to the diagonal of those, whose entries are 1: conditions may follow from each other.
+const REGULAR: f64 = 1e-8;
+
+/// Conditions up to which factors of a step are dense.
+const DENSE: usize = 2500;
+
+/// Conditions from which on the cost of their factors is asked for: below it is seconds.
+const MANY: usize = 20_000;
+
+impl Conditions {
+    /// Operations that the factors of the normal equations of all changes take, a bound from below; zero for few conditions.
+    pub fn operations(&self) -> f64 {
+        if self.count < MANY {
+            return 0.0;
+        }
+        let Some(normal) = self.normal(|_| true) else {
+            return 0.0;
+        };
+        let symbolic = factorize_symbolic_cholesky(
+            normal.symbolic(),
+            faer::Side::Lower,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams::default(),
+        );
+        // the sum of the squares of all columns of the factor is least where they have the same length
+        symbolic.map_or(0.0, |s| (s.len_val() as f64).powi(2) / self.count as f64)
+    }
+
+    /// The factors of the normal equations of the changes that count, if there are many; rows are those of norm 1.
+    pub(super) fn factors(&self, counts: impl Fn(usize) -> bool + Sync) -> Option<Llt<usize, f64>> {
+        if self.count < FACTORISED {
+            return None;
+        }
+        self.normal(counts)?.sp_cholesky(faer::Side::Lower).ok()
+    }
+
+    /// The normal equations of the changes that count.
+    fn normal(&self, counts: impl Fn(usize) -> bool + Sync) -> Option<SparseColMat<usize, f64>> {
+        let mut of_row: Vec<Vec<(usize, f64)>> = vec![Vec::new(); self.count];
+        for k in (0..self.changes()).filter(|&k| counts(k)) {
+            for (r, v) in self.column(k) {
+                of_row[r].push((k, v));
+            }
+        }
+        // a row at a time: a change of a trace has a hundred entries, and its square ten thousand
+        let rows = of_row.par_iter().enumerate().map_init(
+            || vec![0.0; self.count],
+            |sums, (r, of)| {
+                let mut touched = vec![r];
+                sums[r] = REGULAR;
+                for &(k, v) in of {
+                    for (s, w) in self.column(k).filter(|&(s, _)| s <= r) {
+                        if sums[s] == 0.0 {
+                            touched.push(s);
+                        }
+                        sums[s] += v * w;
+                    }
+                }
+                touched.sort_unstable();
+                touched.dedup();
+                let row = touched
+                    .iter()
+                    .map(|&s| Triplet::new(r, s, std::mem::take(&mut sums[s])));
+                row.collect::<Vec<_>>()
+            },
+        );
+        let entries: Vec<Vec<Triplet<usize, usize, f64>>> = rows.collect();
+        let entries = entries.concat();
+        // without factors all goes as before, and takes longer
+        SparseColMat::try_new_from_triplets(self.count, self.count, &entries).ok()
+    }
+
+    /// Solves the normal equations of the changes off the floor, with as much added to their diagonal as still tells conditions apart.
+    pub(super) fn direct_step(
+        &self,
+        gap: &[f64],
+        whole: f64,
+        is_free: impl Fn(usize) -> bool + Sync,
+    ) -> Option<Vec<f64>> {
+        let n = self.count;
+        if n > DENSE {
+            return Some(solved(&self.factors(is_free)?, gap));
+        }
+        let mut normal = vec![0.0; n * n];
+        for k in (0..self.changes()).filter(|&k| is_free(k)) {
+            for (r, v) in self.column(k) {
+                for (s, w) in self.column(k).filter(|&(s, _)| s >= r) {
+                    normal[r * n + s] += v * w;
+                }
+            }
+        }
+        let regular = (REGULAR * norm(gap) / whole).clamp(1e-12, REGULAR);
+        for r in 0..n {
+            normal[r * n + r] += regular;
+        }
+        Some(Dense::new(n, normal)?.solved(gap))
+    }
+}
+
+/// What solves the normal equations of all changes, but for what is added to their diagonal.
+pub(super) fn solved(factors: &Llt<usize, f64>, wanted: &[f64]) -> Vec<f64> {
+    let mut solution = wanted.to_vec();
+    let rows = solution.len();
+    factors.solve_in_place(faer::MatMut::from_column_major_slice_mut(
+        &mut solution,
+        rows,
+        1,
+    ));
+    solution
+}
