@@ -17,7 +17,7 @@ use crate::observe::summary::Choice;
 use crate::peridynamics::influence::{Alpha, Degree};
 use crate::peridynamics::{
     BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
-    PartialVolume,
+    Micromodulus, PartialVolume,
 };
 use crate::tensor::{Vector, padded};
 
@@ -69,7 +69,7 @@ pub(super) fn law<const D: usize>(material: &Material<D>) -> Box<dyn BondLaw<D>>
     }
 }
 
-/// `P_1/|ξ|`, ω of the divergence of the partial stress of bonds that have none of their own: stable in motion (`docs/dynamics.md`), where a Gaussian is not.
+/// `P_1/|ξ|`, ω of the divergence of the partial stress beside a triangular micromodulus, which is `P_1/|ξ|` too: stable in motion, where a Gaussian grows. Beside the inverse distance it is the other way round.
 const DIVERGENCE: Influence = Influence::Polynomial {
     degree: Degree::P1,
     alpha: Alpha::One,
@@ -86,7 +86,8 @@ pub(super) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
     let stuff = &scene.materials[material as usize];
     let influence = match stuff.law {
         Law::Lps(i) | Law::Correspondence(i, _) => i,
-        Law::BondBased(_) => DIVERGENCE,
+        Law::BondBased(Micromodulus::Triangular) => DIVERGENCE,
+        Law::BondBased(_) => Influence::Gaussian,
     };
     let law = law(stuff);
     let ratio = Ratio::new(stuff.lame, scene.kinematics);
