@@ -423,9 +423,13 @@ mod tests {
             let row = row::<1>(String::new(), String::new(), &case(kind, stable, 3));
             assert_eq!(row.verdict, Verdict::Pass, "{kind:?} {}", row.value);
         }
-        // a constant micromodulus has a partial stress of the wrong sign for short waves; in meshfree form a scene pairs it with a Gaussian, whose sign is wrong with it
-        for kind in partial_stress().into_iter().skip(1) {
+        // a constant micromodulus has a partial stress of the wrong sign for short waves; in meshfree form a scene pairs it with a Gaussian, whose sign turns with it
+        for kind in partial_stress() {
             let row = row::<1>(String::new(), String::new(), &case(kind, wrong, 3));
+            if matches!(kind, Kind::Coupled(Method::Meshfree(_))) {
+                assert_eq!(row.verdict, Verdict::Pass, "{kind:?} {}", row.value);
+                continue;
+            }
             assert!(
                 row.verdict == Verdict::Refused && row.value > 10.0,
                 "{kind:?} {}",

@@ -53,8 +53,13 @@ const NEARLY_MET: f64 = 1e-3;
 /// How the steps of Newton's method are found.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Steps {
-    /// By conjugate gradients, led by the factors of the equations of all changes; at most so many iterations with factors in all, and in one step.
-    Gradients(usize, usize),
+    /// By conjugate gradients, led by the factors of the equations of all changes.
+    Gradients {
+        /// Most iterations with factors in all.
+        most: usize,
+        /// Most such iterations in one step.
+        in_step: usize,
+    },
     /// By the factors of the equations of the changes off the floor.
     Direct,
 }
@@ -293,12 +298,19 @@ impl Conditions {
         let (scaled, target) = self.scaled(missing);
         let most = MOST_LED.min(self.most_led / self.count.max(1));
         let is_last = floor == f64::NEG_INFINITY || self.count > MOST_DIRECT;
+        let long = Steps::Gradients {
+            most,
+            in_step: most,
+        };
         let ways: &[Steps] = match is_last {
-            true => &[Steps::Gradients(most, most)],
+            true => &[long],
             false => &[
-                Steps::Gradients(most, MOST_LED_STEP),
+                Steps::Gradients {
+                    most,
+                    in_step: MOST_LED_STEP,
+                },
                 Steps::Direct,
-                Steps::Gradients(most, most),
+                long,
             ],
         };
         let (mut least, mut change) = (f64::INFINITY, Vec::new());
@@ -348,7 +360,7 @@ impl Conditions {
         let mut gap = left(&lifted(&z));
         let mut best = (norm(&gap), z.clone());
         let (most, factors) = match steps {
-            Steps::Gradients(..) => (MOST_STEPS, self.factors(|_| true)),
+            Steps::Gradients { .. } => (MOST_STEPS, self.factors(|_| true)),
             Steps::Direct => (MOST_DIRECT_STEPS, None),
         };
         let (mut led, mut is_far, mut is_slow) = (0, false, false);
@@ -358,7 +370,7 @@ impl Conditions {
             }
             let is_free = |k: usize| z[k] >= self.floor_of(k, floor);
             let direction = match steps {
-                Steps::Gradients(_, in_step) => {
+                Steps::Gradients { in_step, .. } => {
                     let led_by = factors.as_ref().map(|f| (f, in_step));
                     let (direction, iterations) = self.newton_step(&gap, is_free, led_by);
                     if led_by.is_some() {
@@ -415,7 +427,7 @@ impl Conditions {
             if is_stalled
                 || is_far
                 || is_met
-                || matches!(steps, Steps::Gradients(most, _) if led > most || is_slow)
+                || matches!(steps, Steps::Gradients { most, .. } if led > most || is_slow)
             {
                 break;
             }

@@ -40,12 +40,12 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             tables.push(table);
         }
     }
-    // these take an hour, and tell of each problem by themselves
+    // these take the longest, and tell of each problem by themselves
     tables.extend(order::order(effort, progress));
     tables
 }
 
-/// Shows a table of the full suite as soon as it is there: the suite takes more than an hour.
+/// Shows a table of the full suite as soon as it is there: the suite takes half an hour.
 fn tell(table: &Table, effort: Effort, progress: &dyn Progress) {
     if effort == Effort::Full {
         progress.note(&table.text());

@@ -10,7 +10,7 @@ use toml::Spanned;
 pub const MOST_CELLS: usize = 700;
 /// The most cells of a solid, whose factors fill.
 const MOST_SOLID_CELLS: usize = 300;
-/// The most points of a lattice, were it to fill the mesh; each load step counts as much as the mesh, since relaxing it takes thousands of passes.
+/// The most points of a lattice, were it to fill the mesh.
 const MOST_POINTS: f64 = 3000.0;
 /// The most samples of all lines, and load steps.
 const MOST_SAMPLES: usize = 2000;
@@ -19,15 +19,11 @@ const MOST_LOAD_STEPS: usize = 12;
 pub fn is_small(spec: &SceneSpec) -> bool {
     let samples = spec.output.lines.values().map(|l| l.samples.value);
     let samples = samples.fold(0usize, usize::saturating_add);
-    let steps = load_steps(spec);
-    cells_and_points_are_few(spec) && samples <= MOST_SAMPLES && steps <= MOST_LOAD_STEPS
-}
-
-fn load_steps(spec: &SceneSpec) -> usize {
-    match spec.solve.as_ref().map(Spanned::get_ref) {
+    let steps = match spec.solve.as_ref().map(Spanned::get_ref) {
         Some(SolveSpec::QuasiStatic(q)) => q.steps.value,
         _ => 0,
-    }
+    };
+    cells_and_points_are_few(spec) && samples <= MOST_SAMPLES && steps <= MOST_LOAD_STEPS
 }
 
 fn cells_and_points_are_few(spec: &SceneSpec) -> bool {
@@ -82,7 +78,7 @@ fn points(spec: &SceneSpec, lengths: &[f64]) -> bool {
             .iter()
             .map(|l| (l / spacing.value.abs()).max(1.0))
             .product();
-        count * (1 + load_steps(spec)) as f64 <= MOST_POINTS
+        count <= MOST_POINTS
     };
     let lattice = match spec.peridynamics.as_ref().and_then(|p| p.points.as_ref()) {
         Some(PointsSpec::Lattice(l)) => few(&l.spacing),
