@@ -14,6 +14,7 @@ use crate::scene::conditions::{Condition, Support};
 use crate::scene::loads::holders;
 use crate::scene::run_error::RunError;
 use crate::scene::spec::PrecisionSpec;
+use crate::system::BlockCsr;
 use crate::tensor::{Tensor, Tensor4, Vector};
 
 /// Most rows whose kind is found out one by one; of more, a sample of the worst.
@@ -26,6 +27,7 @@ const ALIKE: f64 = 1.0e-6;
 struct Subject<'a, const D: usize> {
     model: &'a Model<D>,
     operator: &'a dyn Operator<D>,
+    stiffness: Option<&'a BlockCsr>,
     conditions: &'a [Condition<D>],
     /// The condition that holds each dof.
     holder: Vec<Option<usize>>,
@@ -78,6 +80,7 @@ pub(super) fn part<const D: usize>(
     let subject = Subject {
         model,
         operator: proved.operator,
+        stiffness: proved.stiffness,
         conditions: &proved.rest.conditions,
         holder: holders(model, &proved.rest.conditions)?,
         damaged: proved.system.map_or(Vec::new(), |s| s.damaged_sites()),
@@ -239,6 +242,7 @@ fn unbalanced<const D: usize>(
     let around = Around {
         model,
         operator: subject.operator,
+        stiffness: subject.stiffness,
         boundary: &boundary,
         held: &held,
         reach,
@@ -330,21 +334,24 @@ fn class<const D: usize>(
     let model = subject.model;
     let x = &model.sites[site as usize].position;
     let reach = reach + cut_bonds_reach(model, site);
-    let mut nearest: Option<(usize, f64)> = None;
-    for (f, distance) in boundary.near(x, reach) {
-        if nearest.is_none_or(|(_, d)| distance < d) {
-            nearest = Some((f, distance));
-        }
-    }
+    let near: Vec<(usize, f64)> = boundary.near(x, reach).collect();
+    // of equal distances, the first
+    let nearest = near.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     let is_alone = nearest.is_some_and(|(m, _)| {
-        let n = &boundary.normals[m];
-        boundary
-            .near(x, reach)
-            .all(|(f, _)| boundary.normals[f].dot(n) > 0.99)
+        let n = &boundary.normals[*m];
+        let mut others = near.iter();
+        others.all(|(f, _)| boundary.normals[*f].dot(n) > 0.99)
     });
-    let facet = nearest.map(|(f, _)| f);
-    subject.operator.add_row(site as usize, row);
-    let columns = row.take_columns();
+    let facet = nearest.map(|(f, _)| *f);
+    let taken;
+    let columns: &[u32] = match subject.stiffness {
+        Some(stiffness) => stiffness.row(site as usize).0,
+        None => {
+            subject.operator.add_row(site as usize, row);
+            taken = row.take_columns();
+            &taken
+        }
+    };
     let points = columns
         .iter()
         .filter(|&&c| matches!(model.sites[c as usize].kind, SiteKind::Point(_)))

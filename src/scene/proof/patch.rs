@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::surface::{Boundary, FacetKind};
-use crate::assembly;
+use crate::assembly::{self, Row};
 use crate::coupling::{Model, Operator, SiteKind};
 use crate::fem;
 use crate::progress::Silent;
@@ -20,6 +20,8 @@ const SITES: [usize; 3] = [200, 500, 250];
 pub(super) struct Around<'a, const D: usize> {
     pub model: &'a Model<D>,
     pub operator: &'a dyn Operator<D>,
+    /// The assembled stiffness, where the run has one.
+    pub stiffness: Option<&'a BlockCsr>,
     pub boundary: &'a Boundary<'a, D>,
     /// Which dofs are prescribed.
     pub held: &'a [bool],
@@ -69,19 +71,15 @@ pub(super) fn stress_errors<const D: usize>(
         list.truncate(count);
     }
     list.sort_unstable();
-    let rows = assembly::assemble_rows::<D>(
-        count,
-        model.sites.len(),
-        |_| (),
-        |r, row| model.add_scaled_row(around.operator, list[r] as usize, row),
-    );
-    let (matrix, free, keeps) = local(around, &rows, &list, main);
+    let keeps: Vec<bool> = list.iter().map(|&s| keeps_field(around, s, main)).collect();
     let is_point = |s: u32| matches!(model.sites[s as usize].kind, SiteKind::Point(_));
     let mut points = list.iter().zip(&keeps).filter(|(s, _)| is_point(**s));
     // a patch that keeps the field everywhere would show no error whatever its rows are
     if main.is_some() && points.clone().next().is_some() && points.all(|(_, keeps)| *keeps) {
         return None;
     }
+    let rows = rows(around, &list);
+    let (matrix, free) = local(around, &rows, &list, &keeps);
     let positions: Vec<[f64; 3]> = list
         .iter()
         .map(|&s| padded(&model.sites[s as usize].position))
@@ -128,22 +126,49 @@ pub(super) fn stress_errors<const D: usize>(
     Some(errors.collect())
 }
 
-/// The rows of a patch among its own sites, which of their dofs are released, and which sites keep the field whatever the row asks for.
+/// Whether a site of a patch keeps the field whatever its row asks for.
+fn keeps_field<const D: usize>(around: &Around<'_, D>, site: u32, main: Option<usize>) -> bool {
+    let boundary = around.boundary;
+    let x = &around.model.sites[site as usize].position;
+    let lies_in = |f: usize| {
+        let n = &boundary.normals[f];
+        main.is_some_and(|m| {
+            n.dot(&boundary.normals[m]) > 0.99 || boundary.kinds[f] == FacetKind::Held
+        })
+    };
+    boundary.is_near_crack(x, around.reach)
+        || (boundary.near_of(x, around.reach, |f| !lies_in(f)).next()).is_some()
+}
+
+/// The rows of the sites of a patch.
+fn rows<const D: usize>(around: &Around<'_, D>, list: &[u32]) -> BlockCsr {
+    let (model, sites) = (around.model, around.model.sites.len());
+    let add_row = |r: usize, row: &mut Row<D>| match around.stiffness {
+        Some(stiffness) => {
+            let (columns, values) = stiffness.row(list[r] as usize);
+            for (&column, block) in columns.iter().zip(values.chunks_exact(D * D)) {
+                row.add_site(column, &Tensor::from_row_slice(block));
+            }
+        }
+        None => model.add_scaled_row(around.operator, list[r] as usize, row),
+    };
+    assembly::assemble_rows::<D>(list.len(), sites, |_| (), add_row)
+}
+
+/// The rows of a patch among its own sites, and which of their dofs are released.
 fn local<const D: usize>(
     around: &Around<'_, D>,
     rows: &BlockCsr,
     list: &[u32],
-    main: Option<usize>,
-) -> (BlockCsr, FreeDofs, Vec<bool>) {
-    let boundary = around.boundary;
+    keeps: &[bool],
+) -> (BlockCsr, FreeDofs) {
     let mut matrix = BlockCsr {
         block: D,
         row_offsets: vec![0],
         ..BlockCsr::default()
     };
     let mut prescribed = Vec::with_capacity(list.len() * D);
-    let mut all_keep = Vec::with_capacity(list.len());
-    for (r, &s) in list.iter().enumerate() {
+    for (r, (&s, keeps)) in list.iter().zip(keeps).enumerate() {
         let (columns, blocks) = rows.row(r);
         for (c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
             if let Ok(place) = list.binary_search(c) {
@@ -152,20 +177,10 @@ fn local<const D: usize>(
             }
         }
         matrix.row_offsets.push(matrix.columns.len());
-        let x = &around.model.sites[s as usize].position;
-        let lies_in = |f: usize| {
-            let n = &boundary.normals[f];
-            main.is_some_and(|m| {
-                n.dot(&boundary.normals[m]) > 0.99 || boundary.kinds[f] == FacetKind::Held
-            })
-        };
-        let keeps = boundary.is_near_crack(x, around.reach)
-            || boundary.near(x, around.reach).any(|(f, _)| !lies_in(f));
-        all_keep.push(keeps);
         let held = &around.held[s as usize * D..][..D];
-        prescribed.extend(held.iter().map(|h| (*h || keeps).then_some(0.0)));
+        prescribed.extend(held.iter().map(|h| (*h || *keeps).then_some(0.0)));
     }
-    (matrix, FreeDofs::from_prescribed(&prescribed, D), all_keep)
+    (matrix, FreeDofs::from_prescribed(&prescribed, D))
 }
 
 /// The largest difference of the stress of points and elements of a patch from that of the field.

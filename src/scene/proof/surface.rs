@@ -25,6 +25,8 @@ pub(super) struct Boundary<'a, const D: usize> {
     pub facets: Vec<BoundaryFacet>,
     pub kinds: Vec<FacetKind>,
     pub normals: Vec<Vector<D>>,
+    /// The box around each facet.
+    bounds: Vec<(Vector<D>, Vector<D>)>,
     bins: FxHashMap<[i64; D], Vec<u32>>,
     reach: f64,
     barriers: Barriers<D>,
@@ -48,8 +50,8 @@ impl<'a, const D: usize> Boundary<'a, D> {
         let normals: Vec<Vector<D>> = facets.iter().map(unit).collect();
         let kinds = kinds(model, conditions, &facets, &normals);
         let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
-        for (number, facet) in facets.iter().enumerate() {
-            let (low, high) = mesh.bounds_of(&facet.nodes);
+        let bounds: Vec<_> = facets.iter().map(|f| mesh.bounds_of(&f.nodes)).collect();
+        for (number, (low, high)) in bounds.iter().enumerate() {
             let from = bin(&(low - Vector::repeat(reach)), reach);
             let to = bin(&(high + Vector::repeat(reach)), reach);
             let counts: [usize; D] = std::array::from_fn(|i| (to[i] - from[i] + 1) as usize);
@@ -69,6 +71,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
             facets,
             kinds,
             normals,
+            bounds,
             bins,
             reach,
             barriers: Barriers::new(barriers.map_or(Vec::new(), |p| p.barriers.clone())),
@@ -81,9 +84,25 @@ impl<'a, const D: usize> Boundary<'a, D> {
         x: &'s Vector<D>,
         limit: f64,
     ) -> impl Iterator<Item = (usize, f64)> + 's {
+        self.near_of(x, limit, |_| true)
+    }
+
+    /// As [`Boundary::near`], of the facets that are `wanted`.
+    pub fn near_of<'s>(
+        &'s self,
+        x: &'s Vector<D>,
+        limit: f64,
+        wanted: impl Fn(usize) -> bool + 's,
+    ) -> impl Iterator<Item = (usize, f64)> + 's {
         let list = self.bins.get(&bin(x, self.reach));
         list.into_iter().flatten().filter_map(move |&f| {
             let f = f as usize;
+            let (low, high) = &self.bounds[f];
+            // a distance takes far longer than that to the box
+            let outside = (low - x).sup(&(x - high)).sup(&Vector::zeros());
+            if !wanted(f) || outside.norm_squared() >= limit * limit {
+                return None;
+            }
             let distance = self.model.mesh.distance_to_facet(x, &self.facets[f].nodes);
             (distance < limit).then_some((f, distance))
         })
