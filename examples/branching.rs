@@ -13,7 +13,7 @@ use bondline::{
         report::{self, Row, Table},
         summary::{Ended, MotionSummary},
     },
-    trade::distance_from_path,
+    study::trade::distance_from_path,
 };
 use shared::{Columns, Failure, argument, run};
 

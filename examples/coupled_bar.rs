@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use bondline::coupling::Zone;
 use bondline::observe::progress::TerminalProgress;
 use bondline::observe::report::{Columns, Format, Row, Table, exit_code, render};
-use bondline::scene::AnyScene;
+use bondline::run::AnyScene;
 use bondline::verify::bar::{self, Bar, ENCLOSED, EXACT, METHODS, PLANE_MEANS, Write};
 use bondline::verify::variable_horizon;
 use clap::Parser;

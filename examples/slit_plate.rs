@@ -24,7 +24,8 @@ use bondline::{
         summary::RunSummary,
     },
     progress::Progress,
-    scene::{AnyScene, Condition, Field, Scene, Solved},
+    run::{AnyScene, PlacedScene, Solved},
+    scene::{Condition, Field},
     tensor::{Vector, strain},
 };
 
@@ -117,7 +118,7 @@ impl Case {
     }
 }
 
-fn load(scene: &str, overrides: &[String]) -> Result<Box<Scene<2>>, Failure> {
+fn load(scene: &str, overrides: &[String]) -> Result<Box<PlacedScene<2>>, Failure> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
         .join(scene);
@@ -128,20 +129,20 @@ fn load(scene: &str, overrides: &[String]) -> Result<Box<Scene<2>>, Failure> {
 }
 
 fn solve(
-    scene: Scene<2>,
+    scene: PlacedScene<2>,
     n: usize,
     progress: &dyn Progress,
     figure: Option<&Path>,
 ) -> Result<Case, Failure> {
     let mut lattice = None;
     let mut drawn = Ok(());
-    let summary = bondline::scene::solve_with(scene, progress, |output, solved| {
+    let summary = bondline::run::solve_with(scene, progress, |output, solved| {
         lattice = Some(Lattice::of(solved, n));
         if let Some(path) = figure {
             drawn = draw(solved, path);
         }
         if output.vtu {
-            bondline::scene::write(output, solved)
+            bondline::run::write(output, solved)
         } else {
             Ok(Vec::new())
         }

@@ -77,7 +77,9 @@
 //! | [`progress`] | what a long computation tells |
 //! | [`observe`] | the only writers: VTU, CSV, JSON, pictures, progress bars |
 //! | [`verify`] | the suites that `bondline verify` prints |
-//! | [`scene`] | TOML to a validated problem to its results; the only module that knows TOML |
+//! | [`scene`] | TOML to a validated scene; the only module that knows TOML |
+//! | [`run`] | one run of a scene: laid out, proved, solved, written |
+//! | [`study`] | many runs: what one needs, its error, convergence, speed against accuracy |
 //!
 //! # From a scene
 //!
@@ -167,12 +169,13 @@ pub mod observe;
 pub mod peridynamics;
 pub mod progress;
 mod regular_file;
+pub mod run;
 pub mod scene;
 pub mod shape;
 pub mod solve;
+pub mod study;
 pub mod system;
 pub mod tensor;
-pub mod trade;
 pub mod verify;
 
 pub use coupling::{
@@ -187,7 +190,8 @@ pub use peridynamics::{
     Micromodulus, PdBody,
 };
 pub use progress::{Progress, Silent};
-pub use scene::{AnyScene, RunError, Scene, SceneError};
+pub use run::{AnyScene, RunError};
+pub use scene::{Scene, SceneError};
 pub use shape::{Barrier, Shape};
 pub use solve::statics::{StaticError, StaticParams, StaticProblem, StaticSolution};
 pub use system::{BlockCsr, Symmetry};

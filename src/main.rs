@@ -11,11 +11,10 @@ use bondline::observe::checkpoint::Pace;
 use bondline::observe::progress::TerminalProgress;
 use bondline::observe::report;
 use bondline::observe::summary::Ended;
-use bondline::scene::{
-    self, AnyScene, CheckError, ConvergeError, ConvergeParams, Refinement, RunOptions, StartFrom,
-    Template,
-};
-use bondline::trade::{self, CostBy, Reference, TradeEnd, TradeParams};
+use bondline::run::{AnyScene, RunOptions, StartFrom};
+use bondline::scene::{self, Template};
+use bondline::study::trade::{self, CostBy, Reference, TradeEnd, TradeParams};
+use bondline::study::{self, CheckError, ConvergeError, ConvergeParams, Refinement};
 use bondline::verify::page::{Outcome, page};
 use bondline::verify::{self, Effort};
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -349,7 +348,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             json,
         } => {
             let progress = TerminalProgress::on_stderr();
-            let found = scene::check(&scene.scene, &scene.overrides, pilots, &progress);
+            let found = study::check(&scene.scene, &scene.overrides, pilots, &progress);
             let prediction = found.map_err(|e| match e {
                 CheckError::Scene(e) => e.report(),
                 CheckError::Run(e) => miette::miette!("{e}"),
@@ -375,7 +374,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                 factor,
             };
             let progress = TerminalProgress::on_stderr();
-            let found = scene::converge(&scene.scene, &scene.overrides, &params, &progress)
+            let found = study::converge(&scene.scene, &scene.overrides, &params, &progress)
                 .map_err(|e| match e {
                     ConvergeError::Scene(e) => e.report(),
                     other => miette::miette!("{other}"),

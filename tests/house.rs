@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of `src`, the lowest first.
-const FLOORS: [&str; 17] = [
+const FLOORS: [&str; 18] = [
     "tensor",
     "progress",
     "regular_file",
@@ -19,7 +19,8 @@ const FLOORS: [&str; 17] = [
     "observe",
     "coupling",
     "scene",
-    "trade",
+    "run",
+    "study",
     "verify",
     "command",
 ];

@@ -1,7 +1,8 @@
 //! Wrong scenes: each message names the place, the value and the remedy, and underlines the token at fault.
 
 use bondline::coupling::Zone;
-use bondline::scene::{AnyScene, SceneError, SceneErrorKind, SceneSpec, Source, Template};
+use bondline::run::AnyScene;
+use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source, Template};
 
 /// A scene with nothing wrong in it.
 const RIGHT: &str = r#"

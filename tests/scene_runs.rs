@@ -1,7 +1,8 @@
 //! Right scenes, run end to end against closed forms.
 
 use bondline::progress::Silent;
-use bondline::scene::{AnyScene, Source, Template};
+use bondline::run::AnyScene;
+use bondline::scene::{Source, Template};
 
 /// Runs a template with overrides; returns the summary and the named CSV as rows of numbers.
 fn run(

@@ -5,7 +5,8 @@ use std::process::Command;
 
 use bondline::observe::summary::RunSummary;
 use bondline::progress::Silent;
-use bondline::scene::{AnyScene, Source, solve_with};
+use bondline::run::{AnyScene, solve_with};
+use bondline::scene::Source;
 
 /// The first argument of a child.
 pub const CHILD: &str = "symmetric-child";

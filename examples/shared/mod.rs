@@ -11,7 +11,7 @@ use bondline::{
         report::{Format, Row, Table, exit_code, render},
         summary::RunSummary,
     },
-    scene::AnyScene,
+    run::AnyScene,
 };
 
 pub type Failure = Box<dyn std::error::Error>;

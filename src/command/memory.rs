@@ -1,13 +1,13 @@
 //! The limit of memory, and the end of a run that exceeds it: a message and an exit status instead of an abort.
 //!
-//! Scenes that are too large are refused by their counts before anything is laid out (`scene/budget.rs`). What is here catches what no count foresaw: large
+//! Scenes that are too large are refused by their counts before anything is laid out (`run/budget.rs`). What is here catches what no count foresaw: large
 //! allocations are added up, and where they exceed the limit, or the system gives no more, the program ends in order. Files are written beside their place and renamed, so none is left half written.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bondline::scene;
+use bondline::run;
 
 /// Exit status of a run that got no more memory.
 pub const EXHAUSTED: u8 = 4;
@@ -93,7 +93,7 @@ fn exhausted(size: usize) -> ! {
 /// Limits the memory of this program: to `typed` bytes, else to all that the machine has.
 pub fn limit(typed: Option<u64>) {
     if let Some(bytes) = typed {
-        scene::set_memory_budget(bytes);
+        run::set_memory_budget(bytes);
     }
     if let Some(bytes) = typed.or_else(installed) {
         MOST.store(

@@ -10,7 +10,7 @@ use crate::mesh::Mesh;
 use crate::observe::report::number;
 
 /// The core gives all points one law.
-pub(super) fn one_peridynamic_material<const D: usize>(
+pub(crate) fn one_peridynamic_material<const D: usize>(
     spec: &SceneSpec,
     found: &[Material<D>],
     cell_material: &[u16],
@@ -43,7 +43,7 @@ pub(super) fn one_peridynamic_material<const D: usize>(
 }
 
 /// Refuses a horizon below the spacing of the points.
-pub(super) fn horizon<const D: usize>(
+pub(crate) fn horizon<const D: usize>(
     spec: &SceneSpec,
     p: &Peridynamics<D>,
     mesh: &Mesh<D>,

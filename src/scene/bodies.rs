@@ -10,7 +10,7 @@ use crate::coupling::{Lattice, Zone};
 use crate::mesh::Mesh;
 
 /// Gives the bodies of `zones.bodies` their lattices, and makes elements of the cells that touch a body from the rest of the zone.
-pub(super) fn bodies<const D: usize>(
+pub(crate) fn bodies<const D: usize>(
     spec: &SceneSpec,
     joining: Joining,
     p: Peridynamics<D>,

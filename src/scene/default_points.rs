@@ -28,7 +28,7 @@ pub(crate) fn fraction_of_cells(cell: f64, horizon: f64) -> f64 {
 /// The lattice of a scene that does not place its points, and why it is that one.
 ///
 /// `horizon` gives that of each cell \[m\].
-pub(super) fn default_points<const D: usize>(
+pub(crate) fn default_points<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],
     start: LatticeStart,

@@ -7,7 +7,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::region::Region;
 use super::solve::{Clock, Pacing, still};
 use super::spec::{InitialFieldSpec, InitialSpec};
-use super::validate::Scene;
+use super::validated::Scene;
 use super::value::Text;
 use crate::mesh::Mesh;
 

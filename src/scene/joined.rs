@@ -4,7 +4,6 @@
 //! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere or an LPS has a low
 //! Poisson's ratio, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
 
-use super::automatic::Placed;
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::{Law, Material};
 use super::peridynamics::{self, Points};
@@ -13,7 +12,7 @@ use super::spec::{
     CouplingSpec, Joining, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, TruncatedSpec,
     WeightsSpec,
 };
-use super::zones;
+use super::zones::{self, Placed};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::tensor::Vector;
@@ -30,7 +29,7 @@ enum Obstacle {
 }
 
 /// A coupling, and why it was chosen if the scene names none.
-pub(super) struct Joined {
+pub(crate) struct Joined {
     /// The coupling to go on with if this one turns out not to hold.
     pub otherwise: Option<CouplingSpec>,
     pub coupling: CouplingSpec,
@@ -44,7 +43,7 @@ pub(super) struct Joined {
 ///
 /// # Errors
 /// Those of the zones and of the lattice, which the choice looks at.
-pub(super) fn joined<const D: usize>(
+pub(crate) fn joined<const D: usize>(
     spec: &SceneSpec,
     found: &[Material<D>],
     mesh: &Mesh<D>,
@@ -206,7 +205,8 @@ fn follows<const D: usize>(
 mod tests {
     use std::path::Path;
 
-    use crate::scene::{AnyScene, Source};
+    use crate::run::AnyScene;
+    use crate::scene::Source;
 
     const PLATE: &str = r#"
 kinematics = "plane-strain"
@@ -236,7 +236,7 @@ y = 0
             source.push_override(o).expect("an override");
         }
         match AnyScene::from_source(&source, Path::new("."), "plate").expect("a scene") {
-            AnyScene::Plane(s) => (s.coupling.joining().name, s.coupling_why),
+            AnyScene::Plane(s) => (s.coupling.joining().name, s.scene.coupling_why),
             other => panic!("a plate is plane: {other:?}"),
         }
     }

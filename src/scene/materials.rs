@@ -13,6 +13,29 @@ use crate::mesh::Mesh;
 use crate::peridynamics::{Influence, Micromodulus};
 use crate::tensor::Tensor4;
 
+/// The Poisson ratio of a material, and that at which its bonds would act alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ratio {
+    pub typed: f64,
+    pub pairwise: f64,
+}
+
+impl Ratio {
+    /// Of the Lamé parameters of a body; those of plane stress are the plane ones.
+    pub fn new((lambda, mu): (f64, f64), kinematics: Kinematics) -> Self {
+        match kinematics {
+            Kinematics::PlaneStress => Self {
+                typed: lambda / (lambda + 2.0 * mu),
+                pairwise: 1.0 / 3.0,
+            },
+            _ => Self {
+                typed: 0.5 * lambda / (lambda + mu),
+                pairwise: 0.25,
+            },
+        }
+    }
+}
+
 /// The law that bonds of a material follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {

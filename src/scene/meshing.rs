@@ -254,7 +254,7 @@ fn axis(
 }
 
 /// Adds a mesh to the fingerprint of a scene: one from a file may change while its name stays.
-pub(super) fn add_mesh<const D: usize>(mesh: &Mesh<D>, print: &mut Fingerprint) {
+pub(crate) fn add_mesh<const D: usize>(mesh: &Mesh<D>, print: &mut Fingerprint) {
     for x in mesh.nodes.iter().flatten() {
         print.add(&x.to_le_bytes());
     }

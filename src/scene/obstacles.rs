@@ -14,7 +14,7 @@ use crate::tensor::Vector;
 type Obstacles<const D: usize> = (Vec<Shape<D>>, Vec<Barrier<D>>);
 
 /// Voids, and the barriers that they and cracks are.
-pub(super) fn obstacles<const D: usize>(
+pub(crate) fn obstacles<const D: usize>(
     spec: &SceneSpec,
     mesh: &Mesh<D>,
     zones: &[Zone],

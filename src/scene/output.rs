@@ -5,7 +5,7 @@ use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::region;
 use super::spec::{SceneSpec, TipSpec};
-use super::validate::{Output, Scene, Tip};
+use super::validated::{Output, Scene, Tip};
 use super::value::Text;
 use crate::fem::Locator;
 use crate::mesh::Mesh;
@@ -14,10 +14,10 @@ use crate::observe::claim::{Claim, Files};
 use crate::shape::Shape;
 
 /// The table of all probes; lines have tables by their own names beside it.
-pub(super) const PROBES: &str = "probes";
+pub(crate) const PROBES: &str = "probes";
 
 /// The outputs of a scene whose files are named `name` by default.
-pub(super) fn output<const D: usize>(
+pub(crate) fn output<const D: usize>(
     spec: &SceneSpec,
     mesh: &Mesh<D>,
     voids: &[Shape<D>],
@@ -101,7 +101,7 @@ impl<const D: usize> Output<D> {
     ///
     /// # Errors
     /// As [`Claim::take`].
-    pub(super) fn claim(&self, scene: &str, moves: bool) -> Result<Option<Claim>, ObserveError> {
+    pub(crate) fn claim(&self, scene: &str, moves: bool) -> Result<Option<Claim>, ObserveError> {
         let files = self.files(moves);
         if files.files.is_empty() {
             return Ok(None);

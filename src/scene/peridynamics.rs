@@ -182,7 +182,9 @@ mod tests {
     };
     use crate::peridynamics::kernel::Kinematics as BondKinematics;
     use crate::progress::Silent;
-    use crate::scene::{AnyScene, Solved, Source, solve_with};
+    use crate::run::AnyScene;
+    use crate::run::{Solved, solve_with};
+    use crate::scene::Source;
     use crate::system::{Breakage, Dynamic, Symmetry};
     use crate::tensor::Tensor4;
 
@@ -225,7 +227,7 @@ y = "-5e-4*x+1e-3*y"
             source.push_override(o)?;
         }
         match AnyScene::from_source(&source, Path::new(""), "plate")? {
-            AnyScene::Plane(scene) => Ok(*scene),
+            AnyScene::Plane(scene) => Ok(scene.scene),
             _ => unreachable!("a plate is plane"),
         }
     }

@@ -3,6 +3,8 @@
 //! The file and every `--set` stand one after another on one axis of byte positions, so that an error in an override is
 //! underlined in the override and one in the file in the file.
 
+use std::path::Path;
+
 use miette::NamedSource;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -10,6 +12,7 @@ use toml::de::{DeTable, DeValue};
 use super::choice;
 use super::error::{SceneError, SceneErrorKind};
 use crate::observe::checkpoint::Fingerprint;
+use crate::regular_file;
 
 /// A range of bytes of a [`Source`].
 pub type Span = std::ops::Range<usize>;
@@ -264,4 +267,30 @@ fn add_value(value: &DeValue<'_>, path: &mut Vec<String>, print: &mut Fingerprin
         DeValue::Boolean(b) => print.add(&[u8::from(*b)]),
         DeValue::Datetime(d) => print.add(d.to_string().as_bytes()),
     }
+}
+
+/// The source of a scene file with overrides, the folder that its paths are relative to, and the name of its files.
+///
+/// # Errors
+/// A [`SceneError`] for a file that cannot be read or an override without `=`.
+pub(crate) fn read<'p>(
+    path: &'p Path,
+    overrides: &[String],
+) -> Result<(Source, &'p Path, String), SceneError> {
+    let text = regular_file::read_scene(path).map_err(|error| {
+        SceneError::new(
+            SceneErrorKind::File,
+            format!("cannot read the scene {}: {error}", path.display()),
+        )
+        .help("check the path; `bondline new scene.toml` writes a template")
+    })?;
+    let mut source = Source::new(path.display().to_string(), text);
+    for text in overrides {
+        source.push_override(text)?;
+    }
+    let directory = path.parent().unwrap_or(Path::new(""));
+    let name = path
+        .file_stem()
+        .map_or("scene".into(), |s| s.to_string_lossy().into_owned());
+    Ok((source, directory, name))
 }

@@ -6,7 +6,7 @@
 use super::peridynamics::{Peridynamics, Points};
 use super::region::Region;
 use super::spec::{SceneSpec, ZonesNeeded};
-use super::validate::Scene;
+use super::validated::Scene;
 use crate::coupling::Zone;
 use crate::observe::report::number;
 use crate::shape::Barrier;
@@ -19,7 +19,7 @@ const LOOKED_AT: usize = 4_000_000;
 const BESIDE: usize = 2000;
 
 /// A scene as it is typed, and as it is laid out.
-pub(super) struct Parts<'a, const D: usize> {
+pub(crate) struct Parts<'a, const D: usize> {
     pub spec: &'a SceneSpec,
     pub scene: &'a Scene<D>,
 }

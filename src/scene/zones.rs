@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::automatic::Placed;
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
@@ -13,6 +12,15 @@ use super::spec::{SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::tensor::{Vector, padded};
+
+/// The nonlocal zone that a scene needs.
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    /// One entry per cell.
+    pub nonlocal: Vec<bool>,
+    /// Where the scene asks for it.
+    pub span: Span,
+}
 
 /// The model of each cell; `placed` is the nonlocal zone of a scene that does not draw it.
 pub(crate) fn zones<const D: usize>(

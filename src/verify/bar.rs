@@ -8,19 +8,17 @@
 
 use std::{fmt, path::Path};
 
-use crate::{
-    coupling::{SiteKind, Zone},
-    observe::{
-        ObserveError,
-        figure::{LinePlot, Series, Stroke},
-        map::FieldMap,
-        report::{Columns, Row, Table},
-        summary::RunSummary,
-    },
-    progress::Progress,
-    scene::{AnyScene, RunError, Scene, SceneError, Solved, Source, solve_with},
-    verify::Effort,
-};
+use crate::coupling::{SiteKind, Zone};
+use crate::observe::ObserveError;
+use crate::observe::figure::{LinePlot, Series, Stroke};
+use crate::observe::map::FieldMap;
+use crate::observe::report::{Columns, Row, Table};
+use crate::observe::summary::RunSummary;
+use crate::progress::Progress;
+use crate::run::AnyScene;
+use crate::run::{RunError, Solved, solve_with};
+use crate::scene::{Scene, SceneError, Source};
+use crate::verify::Effort;
 
 /// The scene of the bar in one dimension.
 pub const SCENE_1D: &str = include_str!("../../examples/coupled_bar.toml");
@@ -186,9 +184,9 @@ pub enum Write {
 /// [`RunError`] if the model cannot be built or solved, or a file not written.
 pub fn solve_and(scene: AnyScene, write: Write, progress: &dyn Progress) -> Result<Bar, RunError> {
     match scene {
-        AnyScene::Bar(s) => solve_dimension(*s, write, progress),
-        AnyScene::Plane(s) => solve_dimension(*s, write, progress),
-        AnyScene::Solid(s) => solve_dimension(*s, write, progress),
+        AnyScene::Bar(s) => solve_dimension(s.scene, write, progress),
+        AnyScene::Plane(s) => solve_dimension(s.scene, write, progress),
+        AnyScene::Solid(s) => solve_dimension(s.scene, write, progress),
     }
 }
 
@@ -214,7 +212,7 @@ fn solve_dimension<const D: usize>(
         slice = slice_of(solved);
         match write {
             Write::Nothing => Ok(Vec::new()),
-            Write::Outputs => crate::scene::write(output, solved),
+            Write::Outputs => crate::run::write(output, solved),
         }
     })?;
     let pull = summary

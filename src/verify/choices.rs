@@ -2,16 +2,17 @@
 //! candidate that meets it, and how near the predictions of error and time are.
 //!
 //! Errors are against a finer run: elements alone where nothing is cut, peridynamics everywhere with the same horizon and more points where
-//! cracks are. Constants of the choice (`scene/accuracy/estimate.rs`) come from the calibration half only.
+//! cracks are. Constants of the choice (`study/accuracy/estimate.rs`) come from the calibration half only.
 
 use std::path::Path;
 
 use crate::observe::report::{Columns, Row, Table};
 use crate::progress::{Progress, Silent};
-use crate::scene::accuracy::{
+use crate::run::AnyScene;
+use crate::scene::{SceneSpec, Source};
+use crate::study::accuracy::{
     Bench, Candidate, Chosen, LEAST, SPREAD, completed, difference, error_of,
 };
-use crate::scene::{AnyScene, SceneSpec, Source};
 use crate::verify::Effort;
 
 /// The share of scenes that must meet the wanted error, and of predictions within their factor.

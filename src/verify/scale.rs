@@ -4,15 +4,13 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use crate::{
-    observe::{
-        report::{Columns, Row, Table},
-        summary::{RunSummary, peak_memory_bytes},
-    },
-    progress::Progress,
-    scene::{AnyScene, Source, solve_with},
-    verify::Effort,
-};
+use crate::observe::report::{Columns, Row, Table};
+use crate::observe::summary::{RunSummary, peak_memory_bytes};
+use crate::progress::Progress;
+use crate::run::AnyScene;
+use crate::run::solve_with;
+use crate::scene::Source;
+use crate::verify::Effort;
 
 /// Most iterations with 480² points over those with 120².
 pub const GROWTH_LIMIT: f64 = 1.3;

@@ -5,25 +5,17 @@
 
 use rayon::prelude::*;
 
-use crate::{
-    coupling::{BlendingFunction, FitDegree},
-    observe::report::{Columns, Row, Table, Verdict},
-    peridynamics::{
-        Influence, Micromodulus,
-        influence::{Alpha, Degree},
-    },
-    progress::Progress,
-    scene::{REMEDY, REMEDY_SEAM},
-    solve::{
-        growth::{self, LARGEST_GAIN},
-        stable_step,
-    },
-    verify::{
-        Effort,
-        enclosed::{INFLUENCE, Method},
-        strip::{Kind, Strip, StripCase, StripLaw},
-    },
-};
+use crate::coupling::{BlendingFunction, FitDegree};
+use crate::observe::report::{Columns, Row, Table, Verdict};
+use crate::peridynamics::influence::{Alpha, Degree};
+use crate::peridynamics::{Influence, Micromodulus};
+use crate::progress::Progress;
+use crate::solve::growth::{self, LARGEST_GAIN};
+use crate::solve::growth::{REMEDY, REMEDY_SEAM};
+use crate::solve::stable_step;
+use crate::verify::Effort;
+use crate::verify::enclosed::{INFLUENCE, Method};
+use crate::verify::strip::{Kind, Strip, StripCase, StripLaw};
 
 /// Growth exponent per crossing of the strip that is round-off: eigenvalues that are zero or nearly double come out to half of the digits.
 pub const ROUND_OFF: f64 = 1e-4;

@@ -4,17 +4,13 @@
 
 use std::fmt::Write as _;
 
-use crate::{
-    coupling::BlendingFunction,
-    coupling::FitDegree,
-    peridynamics::{
-        Influence, Micromodulus,
-        influence::{Alpha, Degree},
-    },
-    scene::LinearModel,
-    system::LinearMotion,
-    verify::{enclosed::Method, meshes::scene},
-};
+use crate::coupling::{BlendingFunction, FitDegree};
+use crate::peridynamics::influence::{Alpha, Degree};
+use crate::peridynamics::{Influence, Micromodulus};
+use crate::run::LinearModel;
+use crate::system::LinearMotion;
+use crate::verify::enclosed::Method;
+use crate::verify::meshes::scene;
 
 /// The law of the points.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,24 +8,17 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::{
-    observe::report::{Columns, Row, Table},
-    peridynamics::Micromodulus,
-    progress::Progress,
-    scene::{REMEDY, REMEDY_SEAM},
-    solve::{
-        explicit::{Explicit, ExplicitParams, State, Undriven},
-        growth,
-        krylov::dot,
-        stable_step::{self, StepLimit},
-    },
-    system::{LinearMotion, Symmetry},
-    verify::{
-        Effort,
-        enclosed::{INFLUENCE, Method},
-        strip::{Kind, Strip, StripCase, StripLaw},
-    },
-};
+use crate::observe::report::{Columns, Row, Table};
+use crate::peridynamics::Micromodulus;
+use crate::progress::Progress;
+use crate::solve::explicit::{Explicit, ExplicitParams, State, Undriven};
+use crate::solve::growth::{self, REMEDY, REMEDY_SEAM};
+use crate::solve::krylov::dot;
+use crate::solve::stable_step::{self, StepLimit};
+use crate::system::{LinearMotion, Symmetry};
+use crate::verify::Effort;
+use crate::verify::enclosed::{INFLUENCE, Method};
+use crate::verify::strip::{Kind, Strip, StripCase, StripLaw};
 
 /// Steps of every motion.
 pub const STEPS: u64 = 100_000;

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use bondline::scene::{AnyScene, SceneError, SceneErrorKind, SceneSpec, Source};
+use bondline::run::AnyScene;
+use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source};
 
 use crate::{BREAKING, MODE};
 

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use crate::{
-    coupling::Sampler,
-    observe::summary::MotionSummary,
-    progress::Silent,
-    scene::{AnyScene, RunError, Scene, Solved as Solution, Source, solve_with},
-    tensor::{Vector, padded},
-};
+use crate::coupling::Sampler;
+use crate::observe::summary::MotionSummary;
+use crate::progress::Silent;
+use crate::run::AnyScene;
+use crate::run::{RunError, Solved as Solution, solve_with};
+use crate::scene::{Scene, Source};
+use crate::tensor::{Vector, padded};
 
 /// Couplings that join two models.
 pub const METHODS: [&str; 5] = [
@@ -260,9 +260,9 @@ pub fn solve_in(folder: &Path, text: &str) -> Result<Solved, String> {
     let scene =
         AnyScene::from_source(&source, folder, "extreme").map_err(|e| e.message().to_owned())?;
     match scene {
-        AnyScene::Bar(s) => of(*s),
-        AnyScene::Plane(s) => of(*s),
-        AnyScene::Solid(s) => of(*s),
+        AnyScene::Bar(s) => of(s.scene),
+        AnyScene::Plane(s) => of(s.scene),
+        AnyScene::Solid(s) => of(s.scene),
     }
     .map_err(|e| e.to_string())
 }

@@ -4,13 +4,13 @@ use super::{
     body::{Body, METHODS, moved, sampled},
     kept, refused,
 };
-use crate::{
-    coupling::Sampler,
-    observe::{report::Row, summary::MotionSummary},
-    scene::{Source, doubts},
-    tensor::Vector,
-    verify::Effort,
-};
+use crate::coupling::Sampler;
+use crate::observe::report::Row;
+use crate::observe::summary::MotionSummary;
+use crate::run::warnings;
+use crate::scene::Source;
+use crate::tensor::Vector;
+use crate::verify::Effort;
 
 /// Change of energies where a piece is cut off instead of left out, over them.
 pub const PIECE_LIMIT: f64 = 1e-8;
@@ -182,12 +182,12 @@ pub(super) fn beside_seam(effort: Effort) -> Vec<Row> {
     };
     for &(cells, ratio) in finenesses {
         for (coupling, warned) in [
-            ("splice", doubts::SPLICE),
+            ("splice", warnings::SPLICE),
             ("blending", 0.0),
             ("balanced", 0.0),
             ("truncated", 0.0),
-            ("partial-stress elements", doubts::STRESS_ELEMENTS),
-            ("partial-stress meshfree", doubts::MESHFREE),
+            ("partial-stress elements", warnings::STRESS_ELEMENTS),
+            ("partial-stress meshfree", warnings::MESHFREE),
         ] {
             let h = 1.0 / cells as f64;
             let opening = |horizons: f64| {

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::{
-    observe::summary::RunSummary,
-    progress::Silent,
-    scene::{AnyScene, LinearModel, Prediction, Scene, Solved, Source, solve_with},
-    tensor::Vector,
-};
+use crate::observe::summary::RunSummary;
+use crate::progress::Silent;
+use crate::run::AnyScene;
+use crate::run::{LinearModel, Solved, solve_with};
+use crate::scene::{Scene, Source};
+use crate::study::Prediction;
+use crate::tensor::Vector;
 
 /// A folder that is removed with all its files when it is dropped.
 #[derive(Debug)]
@@ -137,9 +138,9 @@ pub fn solve(
 ) -> Result<(RunSummary, Vec<Site>), String> {
     let folder = Folder::with(files)?;
     match load(text, overrides, &folder)? {
-        AnyScene::Bar(s) => sites(*s),
-        AnyScene::Plane(s) => sites(*s),
-        AnyScene::Solid(s) => sites(*s),
+        AnyScene::Bar(s) => sites(s.scene),
+        AnyScene::Plane(s) => sites(s.scene),
+        AnyScene::Solid(s) => sites(s.scene),
     }
 }
 

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use arbitrary::Unstructured;
-use bondline::scene::{AnyScene, Source};
+use bondline::run::AnyScene;
+use bondline::scene::Source;
 use bondline::{RunSummary, Silent};
 
 use super::examine::{Outcome, ended, refused};

@@ -7,7 +7,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use bondline::Silent;
 use bondline::observe::checkpoint::CheckpointFile;
-use bondline::scene::{AnyScene, RunError, RunOptions, Source, StartFrom};
+use bondline::run::{AnyScene, RunError, RunOptions, StartFrom};
+use bondline::scene::Source;
 
 use super::{Outcome, folder, mesh_file, variant};
 

@@ -22,7 +22,8 @@ use std::path::{Path, PathBuf};
 
 use arbitrary::Unstructured;
 use bondline::mesh::{MeshError, quality, read};
-use bondline::scene::{AnyScene, SceneSpec, Source};
+use bondline::run::AnyScene;
+use bondline::scene::{SceneSpec, Source};
 
 #[allow(unused_imports)] // each target calls its own
 pub use agree::{Agreement, typed_scene, typed_text};

@@ -1,0 +1,177 @@
+//! A scene whose zone is placed, of any dimension: what is run.
+
+use std::ops::{Deref, DerefMut};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::budget;
+use super::error::RunError;
+use super::motion::RunOptions;
+use super::placement::{self, Kept};
+use super::statics;
+use crate::material::Kinematics;
+use crate::observe::checkpoint::Fingerprint;
+use crate::observe::summary::{Choice, RunSummary};
+use crate::progress::Progress;
+use crate::scene::draft::Draft;
+use crate::scene::spec::KinematicsSpec;
+use crate::scene::{Scene, SceneError, SceneSpec, Solve, Source};
+
+/// A validated scene with its nonlocal zone, and with the solution by which that was placed.
+#[derive(Clone, Debug)]
+pub struct PlacedScene<const D: usize> {
+    /// The scene.
+    pub scene: Scene<D>,
+    pub(super) kept: Option<Arc<Kept<D>>>,
+}
+
+impl<const D: usize> From<Scene<D>> for PlacedScene<D> {
+    fn from(scene: Scene<D>) -> Self {
+        Self { scene, kept: None }
+    }
+}
+
+impl<const D: usize> Deref for PlacedScene<D> {
+    type Target = Scene<D>;
+
+    fn deref(&self) -> &Scene<D> {
+        &self.scene
+    }
+}
+
+impl<const D: usize> DerefMut for PlacedScene<D> {
+    fn deref_mut(&mut self) -> &mut Scene<D> {
+        &mut self.scene
+    }
+}
+
+/// Validates a scene and places its zone, if it leaves that to the program.
+fn placed<const D: usize>(
+    spec: &SceneSpec,
+    kinematics: Kinematics,
+    directory: &Path,
+    name: &str,
+    fingerprint: Fingerprint,
+) -> Result<Box<PlacedScene<D>>, SceneError> {
+    let draft = Draft::new(spec, kinematics, directory, name, fingerprint)?;
+    let Some(found) = placement::placed(&draft)? else {
+        return Ok(Box::new(draft.scene(None)?.into()));
+    };
+    let mut scene = draft.scene(Some(&found.zone))?;
+    scene.placement = Some(found.placement);
+    let kept = found.kept.map(Arc::new);
+    Ok(Box::new(PlacedScene { scene, kept }))
+}
+
+/// A validated scene of any dimension.
+#[derive(Clone, Debug)]
+pub enum AnyScene {
+    /// One dimension.
+    Bar(Box<PlacedScene<1>>),
+    /// Two dimensions.
+    Plane(Box<PlacedScene<2>>),
+    /// Three dimensions.
+    Solid(Box<PlacedScene<3>>),
+}
+
+impl AnyScene {
+    /// Keeps what was chosen for an accuracy, to be told with the results.
+    pub(crate) fn chose(&mut self, choices: Vec<Choice>) {
+        let known = match self {
+            Self::Bar(s) => &mut s.choices,
+            Self::Plane(s) => &mut s.choices,
+            Self::Solid(s) => &mut s.choices,
+        };
+        known.splice(0..0, choices);
+    }
+
+    /// Validates a scene that leaves nothing open.
+    pub(crate) fn complete(
+        source: &Source,
+        directory: &Path,
+        name: &str,
+    ) -> Result<Self, SceneError> {
+        let spec = SceneSpec::parse(source)?;
+        let print = source.fingerprint()?;
+        let found = match spec.kinematics.get_ref() {
+            KinematicsSpec::Bar => {
+                placed(&spec, Kinematics::Bar, directory, name, print).map(Self::Bar)
+            }
+            KinematicsSpec::PlaneStress => {
+                placed(&spec, Kinematics::PlaneStress, directory, name, print).map(Self::Plane)
+            }
+            KinematicsSpec::PlaneStrain => {
+                placed(&spec, Kinematics::PlaneStrain, directory, name, print).map(Self::Plane)
+            }
+            KinematicsSpec::Solid => {
+                placed(&spec, Kinematics::Solid, directory, name, print).map(Self::Solid)
+            }
+        };
+        found.map_err(|error| error.shown_in(source))
+    }
+
+    /// Writes all files into another folder than the scene's.
+    pub fn set_output_directory(&mut self, directory: PathBuf) {
+        match self {
+            Self::Bar(s) => s.output.directory = directory,
+            Self::Plane(s) => s.output.directory = directory,
+            Self::Solid(s) => s.output.directory = directory,
+        }
+    }
+
+    /// Whether the scene has a history, so that it can be interrupted and resumed.
+    pub fn moves(&self) -> bool {
+        let solve = match self {
+            Self::Bar(s) => &s.solve,
+            Self::Plane(s) => &s.solve,
+            Self::Solid(s) => &s.solve,
+        };
+        *solve != Solve::Static
+    }
+
+    /// Runs the scene from its beginning and writes its outputs.
+    ///
+    /// # Errors
+    /// [`RunError`], each with place and remedy.
+    pub fn run(self, progress: &dyn Progress) -> Result<RunSummary, RunError> {
+        self.run_with(&RunOptions::default(), progress)
+    }
+
+    /// Runs the scene and writes its outputs.
+    ///
+    /// # Errors
+    /// [`RunError`], each with place and remedy.
+    pub fn run_with(
+        self,
+        options: &RunOptions<'_>,
+        progress: &dyn Progress,
+    ) -> Result<RunSummary, RunError> {
+        self.fits()?;
+        let unused = self.unused().to_vec();
+        let mut summary = match self {
+            Self::Bar(s) => statics::run(*s, options, progress),
+            Self::Plane(s) => statics::run(*s, options, progress),
+            Self::Solid(s) => statics::run(*s, options, progress),
+        }?;
+        summary.warnings.extend(unused);
+        Ok(summary)
+    }
+
+    /// Warnings of parts of the scene that touch nothing.
+    pub fn unused(&self) -> &[String] {
+        match self {
+            Self::Bar(s) => &s.unused,
+            Self::Plane(s) => &s.unused,
+            Self::Solid(s) => &s.unused,
+        }
+    }
+
+    /// Refuses what needs more memory than there is, before anything of it is laid out.
+    pub(crate) fn fits(&self) -> Result<(), RunError> {
+        match self {
+            Self::Bar(s) => budget::fits(s),
+            Self::Plane(s) => budget::fits(s),
+            Self::Solid(s) => budget::fits(s),
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! What a run does when the coupling that was chosen for it does not hold: it goes on with the next one, and says so.
+
+use crate::coupling::ModelError;
+use crate::run::error::RunError;
+use crate::scene::validated::Scene;
+
+/// Does something with a scene; where its coupling was chosen and turns out not to hold, with the other choice, which then says what was tried.
+///
+/// # Errors
+/// Those of `then`; [`RunError::NoCoupling`] if neither choice holds.
+pub(crate) fn with_choice<const D: usize, T>(
+    mut scene: Scene<D>,
+    mut then: impl FnMut(Scene<D>) -> Result<T, RunError>,
+) -> Result<T, RunError> {
+    let Some(mut other) = scene.otherwise.take() else {
+        return then(scene);
+    };
+    // what whoever holds the scene has set since it was read; its layout is its own
+    other.output = scene.output.clone();
+    other.solve = scene.solve.clone();
+    other.solver = scene.solver;
+    other.title = scene.title.clone();
+    let (first, second) = (scene.coupling.joining().name, other.coupling.joining().name);
+    match then(scene) {
+        Err(reason) if reason.is_of_coupling() => {
+            other.coupling_why = Some(format!(
+                "the scene names none; `{first}` was tried and does not hold: {reason}"
+            ));
+            then(*other).map_err(|error| match error.is_of_coupling() {
+                true => RunError::NoCoupling {
+                    first,
+                    reason: Box::new(reason),
+                    second,
+                    error: Box::new(error),
+                },
+                false => error,
+            })
+        }
+        done => done,
+    }
+}
+
+impl RunError {
+    /// Whether another coupling might do: the seam refuses, or the proof does.
+    pub(crate) fn is_of_coupling(&self) -> bool {
+        matches!(
+            self,
+            Self::Indefinite { .. }
+                | Self::Unproven(_)
+                | Self::Model(
+                    ModelError::Seam { .. }
+                        | ModelError::SeamTooLarge { .. }
+                        | ModelError::Unsupported { .. }
+                        | ModelError::Family { .. }
+                        | ModelError::OtherMaterial { .. }
+                        | ModelError::Fit { .. }
+                        | ModelError::Derivative { .. }
+                )
+        )
+    }
+}

@@ -1,0 +1,102 @@
+//! Whether a seam whose energy is no sum of squares is stable: its stiffness is factorised, and refused if that fails.
+//!
+//! Truncated bonds of an LPS below the Poisson ratio of a pairwise law have dilatations of negative stiffness. Whole bonds outweigh them down to a bulk modulus of zero, pieces need not: the matrix at hand decides.
+
+use crate::coupling::{Definiteness, Model, Operator};
+use crate::observe::summary::Choice;
+use crate::progress::Progress;
+use crate::run::error::RunError;
+use crate::scene::materials::Ratio;
+use crate::solve::FreeDofs;
+use crate::solve::direct::{Analysis, DirectError, DirectParams, Factor};
+use crate::solve::ordering::Ordering;
+use crate::system::Symmetry;
+use crate::tensor::padded;
+
+/// What is added to the matrix, as a part of its diagonal: far above what round-off leaves of the motions of a free body (6e-13), and no mode that it hides grows by more than e² in 100 000 steps.
+const SHIFT: f64 = 1e-10;
+
+/// Refuses a model that has negative eigenvalues; its matrix is looked at only if it may.
+///
+/// # Errors
+/// [`RunError::Indefinite`] if the matrix has a negative eigenvalue, or is too large to be factorised.
+pub(crate) fn check<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    ratio: Ratio,
+    choices: &mut Vec<Choice>,
+    progress: &dyn Progress,
+) -> Result<(), RunError> {
+    if operator.definiteness() != Definiteness::NegativeTerms {
+        return Ok(());
+    }
+    let refused = |what: String| RunError::Indefinite {
+        what,
+        typed: ratio.typed,
+        pairwise: ratio.pairwise,
+    };
+    match factorised(model, operator, f64::INFINITY, progress) {
+        Ok(()) => {
+            choices.push(Choice {
+                choice: "the seam is stable".to_owned(),
+                why: format!(
+                    "Poisson's ratio {:.4} is below {:.4}, so its dilatations have a negative stiffness; a Cholesky factorisation of the matrix at rest found no negative eigenvalue",
+                    ratio.typed, ratio.pairwise
+                ),
+            });
+            Ok(())
+        }
+        Err(Open::Negative { site }) => {
+            let x = model.sites[site].position;
+            let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
+            Err(refused(format!(
+                "the stiffness at rest has a negative eigenvalue (found near ({}))",
+                x.join(", ")
+            )))
+        }
+        Err(Open::NotFactorised(error)) => {
+            Err(refused(format!("nothing shows that it has none: {error}")))
+        }
+    }
+}
+
+/// Why a matrix is not shown to have no negative eigenvalue.
+pub(crate) enum Open {
+    /// A pivot of a site is negative.
+    Negative { site: usize },
+    /// It could not be factorised, or not at the price.
+    NotFactorised(String),
+}
+
+/// Factorises the matrix at rest of all sites, none of them held, if that takes at most so many operations.
+pub(crate) fn factorised<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    most_flops: f64,
+    progress: &dyn Progress,
+) -> Result<(), Open> {
+    let mut matrix = model.assemble(operator, progress);
+    matrix.raise_diagonal(SHIFT);
+    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+    let free = FreeDofs::from_prescribed(&vec![None; matrix.dofs()], D);
+    let params = DirectParams {
+        symmetry: Symmetry::Symmetric,
+        smallest_pivot: 0.0,
+        ..DirectParams::default()
+    };
+    let analysis = Analysis::new(&matrix, &free, &positions, Ordering::default())
+        .map_err(|error| Open::NotFactorised(error.to_string()))?;
+    let flops = analysis.cost(params.symmetry).flops;
+    if flops > most_flops {
+        return Err(Open::NotFactorised(format!(
+            "it would take {flops:.1e} operations"
+        )));
+    }
+    match Factor::new(&matrix, &free, analysis, &params, progress) {
+        Ok(_) => Ok(()),
+        Err(DirectError::NotPositive { site } | DirectError::Singular { site, .. }) => {
+            Err(Open::Negative { site })
+        }
+        Err(error @ DirectError::TooLarge { .. }) => Err(Open::NotFactorised(error.to_string())),
+    }
+}

@@ -1,0 +1,370 @@
+//! Conditions of a scene on the sites of its model: which sites are held, and what force each takes.
+
+use rayon::prelude::*;
+
+use crate::coupling::tributary::{Detail, Parts};
+use crate::coupling::{CellRole, Model, SiteKind};
+use crate::fem;
+use crate::mesh::Facet;
+use crate::mesh::boundary::BoundaryFacet;
+use crate::observe::summary::Applied;
+use crate::run::error::RunError;
+use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::region::Region;
+use crate::tensor::Vector;
+
+/// How far from a set a peridynamic point may lie, in its own spacings, to be held with the set in any case.
+///
+/// The first layer lies on the set or half a spacing away, at the corner of a square 0.71 of one; the second layer at least one. Where the first layer lies farther off, the points are held that the set's own places follow.
+const FIRST_LAYER: f64 = 0.75;
+
+/// For each node of the mesh its site, if it is one.
+pub(crate) fn site_of_node<const D: usize>(model: &Model<D>) -> Vec<Option<u32>> {
+    let mut site_of = vec![None; model.mesh.nodes.len()];
+    for (site, s) in model.sites.iter().enumerate() {
+        if let SiteKind::Node(n) = s.kind {
+            site_of[n as usize] = Some(site as u32);
+        }
+    }
+    site_of
+}
+
+/// The points in the first layer along facets or nodes.
+fn first_layer<const D: usize>(model: &Model<D>, nodes: &[u32], facets: &[Facet]) -> Vec<usize> {
+    let mesh = &model.mesh;
+    let (mut lo, mut hi) = (
+        Vector::<D>::repeat(f64::INFINITY),
+        Vector::<D>::repeat(f64::NEG_INFINITY),
+    );
+    for &n in nodes {
+        lo = lo.inf(&mesh.nodes[n as usize]);
+        hi = hi.sup(&mesh.nodes[n as usize]);
+    }
+    (0..model.sites.len())
+        .into_par_iter()
+        .filter_map(|site| {
+            let s = &model.sites[site];
+            let (body, point) = model.point_of(site)?;
+            let reach = FIRST_LAYER * body.cloud.volume[point].powf(1.0 / D as f64);
+            let x = &s.position;
+            if (0..D).any(|k| x[k] < lo[k] - reach || x[k] > hi[k] + reach) {
+                return None;
+            }
+            let near = if facets.is_empty() {
+                nodes
+                    .iter()
+                    .any(|&n| (mesh.nodes[n as usize] - x).norm() <= reach)
+            } else {
+                facets.iter().any(|f| mesh.distance_to_facet(x, f) <= reach)
+            };
+            near.then_some(site)
+        })
+        .collect()
+}
+
+/// The points nearest to a set where it bounds the peridynamic zone: of each piece of its facets, a spacing wide, or of each node of a set without facets, the nearest of the points that it follows.
+pub(crate) fn nearest_points<const D: usize>(
+    model: &Model<D>,
+    site_of: &[Option<u32>],
+    nodes: &[u32],
+    facets: &[Facet],
+) -> Vec<(Vector<D>, usize)> {
+    if model.body().is_none() {
+        return Vec::new();
+    }
+    let parts = if facets.is_empty() {
+        let free = nodes.iter().filter(|&&n| site_of[n as usize].is_none());
+        let free: Vec<Vector<D>> = free.map(|&n| model.mesh.nodes[n as usize]).collect();
+        Parts::of_places(model, &free)
+    } else if !may_bound_zone(model, facets) {
+        return Vec::new();
+    } else {
+        let located = model.mesh.locate_facets(facets).unwrap_or_default();
+        let mut zone = located;
+        zone.retain(|f| !model.is_element(f.cell as usize));
+        Parts::of_facets(model, &zone, Detail::Centre)
+    };
+    let is_point = |s: u32| matches!(model.sites[s as usize].kind, SiteKind::Point(_));
+    let nearest = |(x, follows): (&Vector<D>, &[(u32, f64, Vector<D>)])| {
+        let distance = |s: u32| (model.sites[s as usize].position - x).norm();
+        let points = follows.iter().map(|f| f.0).filter(|&s| is_point(s));
+        let first = points.min_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)))?;
+        // a place on the seam is held with the nodes there
+        let on_node = follows
+            .iter()
+            .any(|f| !is_point(f.0) && distance(f.0) < distance(first));
+        (!on_node).then_some((*x, first as usize))
+    };
+    parts.places().filter_map(nearest).collect()
+}
+
+/// The condition that holds each dof, by its number: the last one that does.
+///
+/// # Errors
+/// [`RunError::Idle`] for a condition that meets no site.
+pub(crate) fn holders<const D: usize>(
+    model: &Model<D>,
+    conditions: &[Condition<D>],
+) -> Result<Vec<Option<usize>>, RunError> {
+    let mut holder = vec![None; model.sites.len() * D];
+    let site_of = site_of_node(model);
+    let (lo, hi) = model.mesh.bounds();
+    let tolerance = 1e-9 * (hi - lo).norm();
+    for (number, condition) in conditions.iter().enumerate() {
+        if let Prescribed::Field(field) = &condition.prescribed {
+            for (site, s) in model.sites.iter().enumerate() {
+                if field.at(&s.position).is_some() {
+                    holder[site * D..][..D].fill(Some(number));
+                }
+            }
+        }
+        let Some(support) = condition.support() else {
+            continue;
+        };
+        let sites: Vec<usize> = match support {
+            Support::Set { nodes, facets, .. } => {
+                let on_nodes = nodes.iter().filter_map(|&n| site_of[n as usize]);
+                let nearest = nearest_points(model, &site_of, nodes, facets);
+                on_nodes
+                    .map(|s| s as usize)
+                    .chain(first_layer(model, nodes, facets))
+                    .chain(nearest.into_iter().map(|(_, s)| s))
+                    .collect()
+            }
+            Support::Inside(region) => (0..model.sites.len())
+                .filter(|&s| region.contains(&model.sites[s].position, tolerance))
+                .collect(),
+        };
+        if sites.is_empty() {
+            return Err(RunError::Idle {
+                condition: condition.name.clone(),
+                remedy: "name a set on the boundary, or enlarge the shape to hold nodes or points",
+            });
+        }
+        for site in sites {
+            for k in (0..D).filter(|&k| condition.components.0[k].is_some()) {
+                holder[site * D + k] = Some(number);
+            }
+        }
+    }
+    Ok(holder)
+}
+
+/// The prescribed displacement of a dof that the condition `holder` holds, at time `t`.
+pub(crate) fn displacement<const D: usize>(
+    model: &Model<D>,
+    holder: &Condition<D>,
+    dof: usize,
+    t: f64,
+) -> f64 {
+    let x = &model.sites[dof / D].position;
+    match &holder.prescribed {
+        Prescribed::Field(field) => field.at(x).map_or(0.0, |u| u[dof % D]),
+        _ => holder.components.at_time(dof % D, x, t).unwrap_or(0.0),
+    }
+}
+
+type Held = (Vec<Option<f64>>, Vec<Option<usize>>);
+
+/// The prescribed displacement of each dof at time `t`, and the condition that prescribes it.
+///
+/// # Errors
+/// As [`holders`].
+pub(crate) fn supports<const D: usize>(
+    model: &Model<D>,
+    conditions: &[Condition<D>],
+    t: f64,
+) -> Result<Held, RunError> {
+    let holder = holders(model, conditions)?;
+    let prescribed = holder
+        .iter()
+        .enumerate()
+        .map(|(dof, holder)| holder.map(|h| displacement(model, &conditions[h], dof, t)))
+        .collect();
+    Ok((prescribed, holder))
+}
+
+/// What a load acts on; the force of any field follows from it without another search.
+#[derive(Clone, Debug)]
+struct Bearer<const D: usize> {
+    condition: usize,
+    /// Facets of finite elements.
+    facets: Vec<Facet>,
+    /// Finite elements.
+    cells: Vec<usize>,
+    /// The rest, of which points have the load.
+    parts: Parts<D>,
+    detail: Detail,
+}
+
+/// The loads of a scene on the sites of its model.
+///
+/// By virtual work: a finite element gives its nodes their consistent forces, a part of the peridynamic zone or of its surface gives the sites that it follows the force on it. Total and first moment are those of the load itself.
+pub(crate) struct Loads<'a, const D: usize> {
+    model: &'a Model<D>,
+    bearers: Vec<Bearer<D>>,
+}
+
+impl<'a, const D: usize> Loads<'a, D> {
+    /// Finds what each load of `conditions` acts on.
+    ///
+    /// # Errors
+    /// [`RunError::Idle`] for a load that meets no site.
+    pub fn new(model: &'a Model<D>, conditions: &[Condition<D>]) -> Result<Self, RunError> {
+        let mut loads = Self {
+            model,
+            bearers: Vec::new(),
+        };
+        for (number, condition) in conditions.iter().enumerate() {
+            let detail = match condition.components.depends_on_position() {
+                true => Detail::Quadrature,
+                false => Detail::Centre,
+            };
+            let (facets, cells, parts) = match &condition.prescribed {
+                Prescribed::Traction(facets) => {
+                    let (own, zone) = split_facets(model, facets);
+                    let parts = Parts::of_facets(model, &zone, detail);
+                    (own, Vec::new(), parts)
+                }
+                Prescribed::BodyForce(region) => {
+                    let inside = cells_of(model, region);
+                    let own = (0..inside.len()).filter(|&c| inside[c] && model.is_element(c));
+                    let own = own.collect();
+                    let zone: Vec<bool> = (0..inside.len())
+                        .map(|c| inside[c] && model.roles[c] == CellRole::Points)
+                        .collect();
+                    let parts = match zone.contains(&true) {
+                        true => Parts::of_cells(model, &zone, detail),
+                        false => Parts::default(),
+                    };
+                    (Vec::new(), own, parts)
+                }
+                _ => continue,
+            };
+            let bearer = Bearer {
+                condition: number,
+                facets,
+                cells,
+                parts,
+                detail,
+            };
+            let mut met = false;
+            loads.each(&bearer, |_| Vector::zeros(), |_, _| met = true);
+            if !met {
+                return Err(RunError::Idle {
+                    condition: condition.name.clone(),
+                    remedy: "name a set on the boundary of the body, or enlarge the shape: it acts on the cells whose centroid it holds",
+                });
+            }
+            loads.bearers.push(bearer);
+        }
+        Ok(loads)
+    }
+
+    /// The conditions that load, by their numbers.
+    pub fn conditions(&self) -> impl Iterator<Item = usize> + '_ {
+        self.bearers.iter().map(|b| b.condition)
+    }
+
+    /// Adds the force of one condition with the field `field` to `load`; returns the sum of what it added.
+    pub fn add(
+        &self,
+        condition: usize,
+        field: impl Fn(&Vector<D>) -> Vector<D>,
+        load: &mut [f64],
+    ) -> Vector<D> {
+        let mut sum = Vector::zeros();
+        for bearer in self.bearers.iter().filter(|b| b.condition == condition) {
+            self.each(bearer, &field, |site, f| {
+                sum += f;
+                for k in 0..D {
+                    load[site * D + k] += f[k];
+                }
+            });
+        }
+        sum
+    }
+
+    /// Hands each site's force to `add`.
+    fn each(
+        &self,
+        bearer: &Bearer<D>,
+        field: impl Fn(&Vector<D>) -> Vector<D>,
+        mut add: impl FnMut(usize, Vector<D>),
+    ) {
+        let mesh = &self.model.mesh;
+        let mut on_node = |n: u32, f: Vector<D>| {
+            // a node at the seam that is no site hands its force to those that it follows
+            for (site, w) in self.model.node_transfer.row(n as usize) {
+                add(site as usize, f * w);
+            }
+        };
+        for facet in &bearer.facets {
+            for (n, f) in fem::traction_vector(mesh, facet, &field) {
+                on_node(n, f);
+            }
+        }
+        for &c in &bearer.cells {
+            for (n, f) in fem::body_force_vector(mesh, c, &field) {
+                on_node(n, f);
+            }
+        }
+        bearer.parts.each(bearer.detail, field, add);
+    }
+}
+
+/// The cells that a body force acts on: those whose centroid its region holds.
+pub(crate) fn cells_of<const D: usize>(model: &Model<D>, region: &Region<D>) -> Vec<bool> {
+    let mesh = &model.mesh;
+    (0..mesh.cell_count())
+        .map(|c| region.contains(&mesh.centroid(c), 0.0))
+        .collect()
+}
+
+/// Whether any of the facets may belong to a cell that holds points: all of its nodes do. To find the cells themselves takes all facets of the mesh.
+pub(crate) fn may_bound_zone<const D: usize>(model: &Model<D>, facets: &[Facet]) -> bool {
+    let at_zone = |facet: &Facet| facet.iter().all(|&n| model.touches_points(n));
+    facets.iter().any(at_zone)
+}
+
+/// Facets of finite elements, and those of cells that hold points.
+pub(crate) fn split_facets<const D: usize>(
+    model: &Model<D>,
+    facets: &[Facet],
+) -> (Vec<Facet>, Vec<BoundaryFacet>) {
+    if !may_bound_zone(model, facets) {
+        return (facets.to_vec(), Vec::new());
+    }
+    // a facet without a cell is an element's as far as anybody knows
+    let Ok(located) = model.mesh.locate_facets(facets) else {
+        return (facets.to_vec(), Vec::new());
+    };
+    let (own, zone): (Vec<_>, Vec<_>) = located
+        .into_iter()
+        .partition(|f| model.is_element(f.cell as usize));
+    (own.into_iter().map(|f| f.nodes).collect(), zone)
+}
+
+/// The applied force of each dof at time `t`, and that of each condition.
+///
+/// # Errors
+/// As [`Loads::new`].
+pub(crate) fn loads<const D: usize>(
+    model: &Model<D>,
+    conditions: &[Condition<D>],
+    t: f64,
+) -> Result<(Vec<f64>, Vec<Applied>), RunError> {
+    let loads = Loads::new(model, conditions)?;
+    let mut load = vec![0.0; model.sites.len() * D];
+    let mut applied = Vec::new();
+    for number in loads.conditions() {
+        let condition = &conditions[number];
+        let field = |x: &Vector<D>| condition.components.vector(x, t);
+        let force = loads.add(number, field, &mut load);
+        applied.push(Applied {
+            condition: condition.name.clone(),
+            force: force.iter().copied().collect(),
+        });
+    }
+    Ok((load, applied))
+}

@@ -1,0 +1,45 @@
+//! One run of a scene: its model laid out, proved, solved and written.
+//!
+//! | file | what |
+//! |---|---|
+//! | `any_scene.rs` | a scene of any dimension with its zone placed: what is run |
+//! | `placement/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
+//! | `setup.rs` | `Scene` to the problem that is coupled, and the settings that a run keeps |
+//! | `budget.rs` | the memory that a run may take, and the refusal of what needs more before anything is laid out |
+//! | `chosen.rs` | the next coupling where the one that was chosen does not hold |
+//! | `definiteness.rs` | whether a seam that may be unstable is |
+//! | `loads.rs` | which sites conditions hold, and the force that each site takes |
+//! | `proof/` | what is shown about a model before it is solved |
+//! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
+//! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
+//! | `linear.rs` | stiffness and masses alone, for studies of eigenvalues and waves |
+//! | `rotation.rs`, `warnings.rs` | how far elements rotate; what of a model makes its results doubtful |
+//! | `write.rs` | the files of a run |
+//! | `error.rs` | what cannot be run, with place and remedy |
+
+mod any_scene;
+pub(crate) mod budget;
+pub(crate) mod chosen;
+mod definiteness;
+pub(crate) mod equilibrium;
+pub(crate) mod error;
+mod linear;
+pub(crate) mod loads;
+pub(crate) mod motion;
+mod placement;
+pub(crate) mod proof;
+mod rotation;
+pub(crate) mod setup;
+pub(crate) mod solution;
+mod statics;
+pub(crate) mod warnings;
+pub(crate) mod write;
+
+pub use any_scene::{AnyScene, PlacedScene};
+pub use budget::{Share, memory_budget, set_memory_budget};
+pub use error::RunError;
+pub use linear::LinearModel;
+pub use motion::{RunOptions, StartFrom};
+pub use solution::Solved;
+pub use statics::solve_with;
+pub use write::write;

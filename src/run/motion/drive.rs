@@ -1,0 +1,291 @@
+//! What drives a scene: its loads and prescribed motion as functions of time.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::coupling::Model;
+use crate::run::error::RunError;
+use crate::run::loads::{Loads, displacement, holders};
+use crate::scene::conditions::{Condition, Prescribed};
+use crate::solve::explicit::Drive;
+use crate::tensor::Vector;
+
+/// The conditions of a scene on the sites of its model.
+///
+/// What does not change with time is evaluated once; what depends on time alone, once per step and condition; the rest
+/// at every place and every step.
+pub(crate) struct SceneDrive<'a, const D: usize> {
+    model: &'a Model<D>,
+    conditions: &'a [Condition<D>],
+    loads: Loads<'a, D>,
+    /// The load that does not change.
+    steady: Vec<f64>,
+    /// Loads that depend on time alone.
+    by_time: Vec<TimedLoad>,
+    /// Loads that depend on time and place.
+    by_both: Vec<usize>,
+    prescribed: Vec<u32>,
+    /// The condition that holds each prescribed dof.
+    holder: Vec<u32>,
+    /// Displacement at time zero of each prescribed dof, from which a prescribed velocity begins.
+    start: Vec<f64>,
+    /// The way of each prescribed velocity that changes with time, by condition and axis.
+    ways: Vec<[Option<Way>; D]>,
+    step: f64,
+}
+
+/// One component of a load that depends on time alone.
+struct TimedLoad {
+    condition: usize,
+    axis: usize,
+    /// Dofs with the force of a unit field.
+    forces: Vec<(u32, f64)>,
+}
+
+impl<'a, const D: usize> SceneDrive<'a, D> {
+    /// The conditions of a scene over `steps` steps of `step`, from the displacement `start` of all dofs.
+    ///
+    /// # Errors
+    /// [`RunError::Idle`] for a condition that meets no site.
+    pub fn new(
+        model: &'a Model<D>,
+        conditions: &'a [Condition<D>],
+        start: &[f64],
+        step: f64,
+        steps: u64,
+    ) -> Result<Self, RunError> {
+        let dofs = model.sites.len() * D;
+        let loads = Loads::new(model, conditions)?;
+        let mut steady = vec![0.0; dofs];
+        let (mut by_time, mut by_both) = (Vec::new(), Vec::new());
+        for number in loads.conditions() {
+            let components = &conditions[number].components;
+            if !components.depends_on_time() {
+                loads.add(number, |x| components.vector(x, 0.0), &mut steady);
+            } else if components.depends_on_position() {
+                by_both.push(number);
+            } else {
+                for axis in (0..D).filter(|&k| components.0[k].is_some()) {
+                    let mut unit = vec![0.0; dofs];
+                    let along = Vector::<D>::from_fn(|k, _| f64::from(u8::from(k == axis)));
+                    loads.add(number, |_| along, &mut unit);
+                    let forces = unit.iter().enumerate().filter(|(_, f)| **f != 0.0);
+                    let forces = forces.map(|(dof, f)| (dof as u32, *f)).collect();
+                    by_time.push(TimedLoad {
+                        condition: number,
+                        axis,
+                        forces,
+                    });
+                }
+            }
+        }
+        let held = holders(model, conditions)?;
+        let (prescribed, holder): (Vec<u32>, Vec<u32>) = held
+            .iter()
+            .enumerate()
+            .filter_map(|(dof, h)| h.map(|h| (dof as u32, h as u32)))
+            .unzip();
+        let ways = conditions
+            .iter()
+            .map(|c| std::array::from_fn(|axis| Way::of(c, axis, step, steps)))
+            .collect();
+        Ok(Self {
+            model,
+            conditions,
+            loads,
+            steady,
+            by_time,
+            by_both,
+            start: prescribed.iter().map(|&k| start[k as usize]).collect(),
+            prescribed,
+            holder,
+            ways,
+            step,
+        })
+    }
+
+    /// Each prescribed dof with the condition that holds it.
+    pub fn holders(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.prescribed
+            .iter()
+            .copied()
+            .zip(self.holder.iter().copied())
+    }
+
+    /// Whether a load changes with place and time, so that it is evaluated everywhere at every step.
+    pub fn evaluates_everywhere(&self) -> bool {
+        !self.by_both.is_empty()
+    }
+
+    /// The value of a component of a condition that depends on time at most.
+    fn uniform(&self, condition: usize, axis: usize, time: f64) -> f64 {
+        let origin = Vector::zeros();
+        let components = &self.conditions[condition].components;
+        components.at_time(axis, &origin, time).unwrap_or(0.0)
+    }
+
+    /// Hands the number, dof and condition of each prescribed dof, and the uniform value of its component if it has
+    /// one, to `set`.
+    fn each_prescribed(
+        &self,
+        time: f64,
+        values: &mut [f64],
+        set: impl Fn(usize, usize, &Condition<D>, Option<f64>) -> f64,
+    ) {
+        let uniform: Vec<[Option<f64>; D]> = self
+            .conditions
+            .iter()
+            .enumerate()
+            .map(|(number, c)| {
+                std::array::from_fn(|axis| {
+                    let e = c.components.0[axis].as_ref()?;
+                    (!e.depends_on_position()).then(|| self.uniform(number, axis, time))
+                })
+            })
+            .collect();
+        for (p, value) in values.iter_mut().enumerate() {
+            let (dof, holder) = (self.prescribed[p] as usize, self.holder[p] as usize);
+            *value = set(p, dof, &self.conditions[holder], uniform[holder][dof % D]);
+        }
+    }
+
+    /// Displacement of a dof whose velocity is prescribed; `ways` are those that change with time.
+    fn moved(&self, p: usize, dof: usize, time: f64, ways: &[[Option<f64>; D]]) -> f64 {
+        let holder = self.holder[p] as usize;
+        let way = ways[holder][dof % D]
+            .unwrap_or_else(|| displacement(self.model, &self.conditions[holder], dof, 0.0) * time);
+        self.start[p] + way
+    }
+
+    /// The way of a condition along an axis from time zero to `time`, if its velocity changes with time.
+    fn way(&self, condition: usize, axis: usize, time: f64) -> Option<f64> {
+        let way = self.ways[condition][axis].as_ref()?;
+        let condition = &self.conditions[condition];
+        let index = (time / self.step + 1e-6).floor().max(0.0);
+        let known = way.after(index as u64, condition, axis);
+        // steps that have changed their size in between do not end where those of the way do
+        let rest = time - index * self.step;
+        Some(if rest > 1e-5 * self.step {
+            known + simpson(condition, axis, index * self.step, rest)
+        } else {
+            known
+        })
+    }
+}
+
+/// The integral of a prescribed velocity that depends on time alone, step by step by Simpson's rule, as far as it has been asked for.
+struct Way {
+    step: f64,
+    /// Two beyond the last step: nothing moves on from there.
+    steps: u64,
+    known: Mutex<Known>,
+}
+
+/// What is known of a way: the sum after so many steps, and after every [`MARK`]-th step before.
+struct Known {
+    after: u64,
+    sum: f64,
+    marks: Vec<f64>,
+}
+
+/// Steps between sums that are kept: a run of any length keeps few of them, and none is far from the next.
+const MARK: u64 = 1024;
+
+impl Way {
+    fn of<const D: usize>(
+        condition: &Condition<D>,
+        axis: usize,
+        step: f64,
+        steps: u64,
+    ) -> Option<Self> {
+        let expression = condition.components.0[axis].as_ref()?;
+        let is_velocity = matches!(condition.prescribed, Prescribed::Velocity(_));
+        (is_velocity && expression.depends_on_time()).then(|| Self {
+            step,
+            steps: steps.saturating_add(2),
+            known: Mutex::new(Known {
+                after: 0,
+                sum: 0.0,
+                marks: vec![0.0],
+            }),
+        })
+    }
+
+    /// The way after `step` steps: the same sum in the same order whatever was asked for before.
+    fn after<const D: usize>(&self, step: u64, condition: &Condition<D>, axis: usize) -> f64 {
+        let step = step.min(self.steps);
+        // sums are whole whoever panicked while holding them
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if step < known.after {
+            let mark = (step / MARK) as usize;
+            (known.after, known.sum) = (mark as u64 * MARK, known.marks[mark]);
+        }
+        while known.after < step {
+            known.sum += simpson(condition, axis, known.after as f64 * self.step, self.step);
+            known.after += 1;
+            if known.after == known.marks.len() as u64 * MARK {
+                let sum = known.sum;
+                known.marks.push(sum);
+            }
+        }
+        known.sum
+    }
+}
+
+/// The integral of a prescribed velocity over `step` from `t` on, by Simpson's rule.
+fn simpson<const D: usize>(condition: &Condition<D>, axis: usize, t: f64, step: f64) -> f64 {
+    let v = |t: f64| {
+        let e = condition.components.0[axis].as_ref();
+        e.map_or(0.0, |e| e.eval_at(&[0.0; 3], t))
+    };
+    step / 6.0 * (v(t) + 4.0 * v(t + 0.5 * step) + v(t + step))
+}
+
+impl<const D: usize> Drive for SceneDrive<'_, D> {
+    fn load_into(&self, time: f64, load: &mut [f64]) {
+        load.copy_from_slice(&self.steady);
+        for timed in &self.by_time {
+            let value = self.uniform(timed.condition, timed.axis, time);
+            for (dof, f) in &timed.forces {
+                load[*dof as usize] += f * value;
+            }
+        }
+        for &number in &self.by_both {
+            let components = &self.conditions[number].components;
+            self.loads.add(number, |x| components.vector(x, time), load);
+        }
+    }
+
+    fn is_steady(&self) -> bool {
+        self.by_time.is_empty() && self.by_both.is_empty()
+    }
+
+    fn prescribed(&self) -> &[u32] {
+        &self.prescribed
+    }
+
+    fn displacement_into(&self, time: f64, values: &mut [f64]) {
+        let ways: Vec<[Option<f64>; D]> = (0..self.conditions.len())
+            .map(|c| std::array::from_fn(|axis| self.way(c, axis, time)))
+            .collect();
+        self.each_prescribed(time, values, |p, dof, condition, uniform| {
+            match (&condition.prescribed, uniform) {
+                (Prescribed::Velocity(_), _) => self.moved(p, dof, time, &ways),
+                (_, Some(value)) => value,
+                (_, None) => displacement(self.model, condition, dof, time),
+            }
+        });
+    }
+
+    fn velocity_into(&self, time: f64, values: &mut [f64]) {
+        let h = self.step;
+        self.each_prescribed(time, values, |_, dof, condition, uniform| {
+            let at = |t: f64| displacement(self.model, condition, dof, t);
+            match (&condition.prescribed, uniform) {
+                (Prescribed::Velocity(_), Some(value)) => value,
+                (Prescribed::Velocity(_), None) => at(time),
+                // a displacement that changes: one-sided, for before the start there is nothing
+                _ => (4.0 * at(time + h) - 3.0 * at(time) - at(time + 2.0 * h)) / (2.0 * h),
+            }
+        });
+    }
+}

@@ -1,0 +1,159 @@
+//! What is watched while a run goes on: energy that nobody put in, and elements that rotate.
+//!
+//! A model whose stiffness is symmetric and positive keeps its energy, and is not asked. Every other may feed its modes at the seam, whatever was computed before the first step:
+//!
+//! ```text
+//! gain = (kinetic + stored + dissipated − work − start) / (largest of |kinetic + stored| and |work| so far)
+//! ```
+//!
+//! Energies are those of the rows of the history, and of every hundredth step where rows are farther apart, so that watching costs less than one per cent.
+
+use serde::{Deserialize, Serialize};
+
+use super::record::{Moment, Row};
+use crate::coupling::Model;
+use crate::observe::summary::{Ended, EnergyGain, Rotation};
+use crate::run::rotation::Rotations;
+use crate::scene::solve::Explicit as Spec;
+
+/// Steps between two looks, at least.
+const STEPS: u64 = 100;
+
+/// Looks at a whole run, at most, beside those at rows of the history.
+const LOOKS: u64 = 1000;
+
+/// A gain of this part is told.
+pub(crate) const TOLD: f64 = 0.01;
+
+/// What was seen so far: part of a checkpoint.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Seen {
+    /// The largest energy or work so far.
+    largest: f64,
+    /// Where the gain went beyond [`TOLD`]: part, step, time.
+    told: Option<(f64, u64, f64)>,
+    /// The largest gain: part, step, time.
+    most: Option<(f64, u64, f64)>,
+    /// The largest rotation: degrees, cell, step, time, and the strain energy that it costs.
+    rotated: Option<Rotated>,
+}
+
+/// An element that has rotated.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Rotated {
+    degrees: f64,
+    place: [f64; 3],
+    step: u64,
+    time: f64,
+    energy: f64,
+}
+
+/// Whether the balance of energy is watched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Balance {
+    /// It closes by construction.
+    Proved,
+    /// Nothing shows that it closes.
+    Watched,
+}
+
+/// The limits of a run, and what was seen of them.
+pub(crate) struct Guard<'m, const D: usize> {
+    balance: Balance,
+    largest_gain: f64,
+    largest_rotation: f64,
+    every: u64,
+    rotations: Rotations<'m, D>,
+    pub seen: Seen,
+}
+
+impl<'m, const D: usize> Guard<'m, D> {
+    /// For a run of so many steps.
+    pub fn new(
+        model: &'m Model<D>,
+        balance: Balance,
+        spec: &Spec,
+        is_linear: bool,
+        steps: u64,
+        seen: Seen,
+    ) -> Self {
+        Self {
+            balance,
+            largest_gain: spec.largest_energy_gain,
+            largest_rotation: spec.largest_rotation.unwrap_or(f64::INFINITY),
+            every: STEPS.max(steps / LOOKS),
+            rotations: Rotations::new(model, is_linear),
+            seen,
+        }
+    }
+
+    /// Whether energies are wanted after a step, be there a row of the history or not.
+    pub fn wants_energies(&self, step: u64) -> bool {
+        self.balance == Balance::Watched && step.is_multiple_of(self.every)
+    }
+
+    /// Looks at the energies of a state; returns why the run has to end.
+    pub fn look_at_energies(&mut self, moment: &Moment<'_>, row: &Row) -> Option<Ended> {
+        let energy = (row.kinetic + row.stored).abs().max(row.work.abs());
+        let seen = &mut self.seen;
+        seen.largest = seen.largest.max(energy);
+        // the first steps from rest under a load have energies of the order of what a step makes of them: 12 % at the first one
+        let begins = moment.state.step < STEPS;
+        if self.balance == Balance::Proved || seen.largest == 0.0 || begins {
+            return None;
+        }
+        let gain = (row.dissipated - row.missing) / seen.largest;
+        let now = (gain, moment.state.step, moment.state.time);
+        if gain > TOLD && seen.told.is_none() {
+            seen.told = Some(now);
+        }
+        if seen.most.is_none_or(|(most, ..)| gain > most) {
+            seen.most = Some(now);
+        }
+        (gain > self.largest_gain).then_some(Ended::EnergyGained)
+    }
+
+    /// Looks at the rotation of elements, where that is due; returns why the run has to end.
+    pub fn look_at_rotation(&mut self, moment: &Moment<'_>, is_last: bool) -> Option<Ended> {
+        let state = moment.state;
+        if !(is_last || state.step.is_multiple_of(self.every)) {
+            return None;
+        }
+        let found = self.rotations.largest(&state.u)?;
+        if self.seen.rotated.is_none_or(|r| found.degrees > r.degrees) {
+            self.seen.rotated = Some(Rotated {
+                degrees: found.degrees,
+                place: found.place,
+                step: state.step,
+                time: state.time,
+                energy: found.energy,
+            });
+        }
+        (found.degrees > self.largest_rotation).then_some(Ended::ElementsRotated)
+    }
+
+    /// What the summary tells of energy; none of a run whose balance closes by construction.
+    pub fn energy_gain(&self) -> Option<EnergyGain> {
+        let (most, step, time) = self.seen.most?;
+        let (_, told_step, told_time) = self.seen.told.unwrap_or((most, step, time));
+        Some(EnergyGain {
+            largest: most,
+            step,
+            time,
+            limit: self.largest_gain,
+            first_told: self.seen.told.map(|_| (told_step, told_time)),
+        })
+    }
+
+    /// What the summary tells of rotation; none where no element has rotated enough to matter.
+    pub fn rotation(&self) -> Option<Rotation> {
+        let r = self.seen.rotated?;
+        self.rotations.told(
+            r.degrees,
+            r.place,
+            r.energy,
+            self.seen.largest,
+            Some((r.step, r.time)),
+        )
+    }
+}

@@ -1,0 +1,87 @@
+//! Scenes in time and under a load that grows: what moves, what drives it, what is written meanwhile.
+//!
+//! | file | what |
+//! |---|---|
+//! | `laid_out.rs` | what every run begins with |
+//! | `system.rs` | what moves, its masses, its start |
+//! | `drive.rs` | loads and prescribed motion as functions of time |
+//! | `explicit.rs` | the run in time |
+//! | `ready.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
+//! | `quasi_static.rs` | the run under a load that grows |
+//! | `pace.rs` | the time step, with sub-cycling |
+//! | `guard.rs` | what is watched meanwhile: energy, rotation of elements |
+//! | `watch.rs` | where a zone that follows the crack is wanted |
+//! | `switching.rs` | what a change of the zone carries over, and what it costs |
+//! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
+
+pub(crate) mod cells;
+pub(crate) mod drive;
+pub(crate) mod explicit;
+pub(crate) mod guard;
+pub(crate) mod laid_out;
+pub(crate) mod pace;
+pub(crate) mod quasi_static;
+pub(crate) mod ready;
+pub(crate) mod record;
+pub(crate) mod switching;
+pub(crate) mod system;
+pub(crate) mod watch;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::observe::checkpoint::Pace;
+use crate::observe::summary::RunSummary;
+use crate::progress::Progress;
+use crate::run::error::RunError;
+use crate::scene::solve::Solve;
+use crate::scene::validated::Scene;
+
+/// Where a run starts from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartFrom {
+    /// The beginning; files of an earlier run go.
+    #[default]
+    Beginning,
+    /// The last checkpoint in the output folder; the beginning if there is none yet.
+    Checkpoint,
+}
+
+/// What the caller of a run decides, beside the scene. None of it changes a result.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RunOptions<'a> {
+    /// Where the run starts from.
+    pub start: StartFrom,
+    /// How often a checkpoint is written, instead of what the scene says.
+    pub checkpoint_every: Option<Pace>,
+    /// Set by another thread to end the run after the step at hand, with a checkpoint.
+    pub interrupt: Option<&'a AtomicBool>,
+    /// Set by the run from its first step on, when it looks at `interrupt` after every step; before, ending the process loses nothing.
+    pub heeds: Option<&'a AtomicBool>,
+}
+
+impl RunOptions<'_> {
+    /// Says that steps begin.
+    fn begin_steps(&self) {
+        if let Some(heeds) = self.heeds {
+            heeds.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+pub(crate) const STILL: RunError = RunError::Later {
+    what: "a static scene does not move",
+    remedy: "use AnyScene::run, which solves it",
+};
+
+/// Runs a scene in time or under a load that grows.
+pub(crate) fn run<const D: usize>(
+    scene: Scene<D>,
+    options: &RunOptions<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, RunError> {
+    match scene.solve.clone() {
+        Solve::Explicit(solve) => explicit::run(scene, &solve, options, progress),
+        Solve::QuasiStatic(solve) => quasi_static::run(scene, &solve, options, progress),
+        Solve::Static => Err(STILL),
+    }
+}

@@ -1,0 +1,194 @@
+//! Growth of modes: whether a motion stays bounded, asked before the first step, and told with the resolution of the answer.
+
+use crate::coupling::{Definiteness, Model, Operator};
+use crate::observe::proof::{Figure, Finding, Part, Severity};
+use crate::observe::report::number;
+use crate::progress::Progress;
+use crate::run::definiteness::factorised;
+use crate::run::error::RunError;
+use crate::scene::spec::{CouplingSpec, GrowingModesSpec};
+use crate::solve::growth::{Evidence, Growth, LARGEST_GAIN, REMEDY, REMEDY_SEAM, growth};
+use crate::system::{Dynamic, Symmetry};
+
+/// The largest factor by which a mode that is not seen may grow over the run, if the answer is to be that none grows.
+const UNSEEN: f64 = 1.1;
+
+/// Growth by less than `exp` of this over a run is told as none: what rounding makes of double eigenvalues.
+const LEAST: f64 = 1e-3;
+
+/// The growth exponent from which on a growing mode is warned of: it gains 1 % of energy.
+const TOLD: f64 = 0.005;
+
+/// What is known before a run of a motion that may grow.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked<'a> {
+    /// What to do about it.
+    pub remedy: &'static str,
+    /// What shows that no mode grows, if anything does.
+    pub proved: Option<&'static str>,
+    /// What becomes of a run in which one does.
+    pub policy: GrowingModesSpec,
+    /// Where a site is.
+    pub place: &'a dyn Fn(usize) -> Vec<f64>,
+}
+
+/// What to do about modes that grow with a coupling.
+pub(crate) fn remedy(coupling: &CouplingSpec) -> &'static str {
+    match coupling {
+        CouplingSpec::PartialStress(_) => REMEDY,
+        _ => REMEDY_SEAM,
+    }
+}
+
+/// What shows that no mode grows at rest: a symmetric stiffness whose energy is a sum of squares, or that has been factorised.
+///
+/// The energy of bonds is a sum of squares if no weight is negative, that of a state-based law below the Poisson ratio of its bonds too: its squares are those of volume and shape.
+pub(crate) fn proved<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    system: &dyn Dynamic,
+    progress: &dyn Progress,
+) -> Option<&'static str> {
+    if system.symmetry() != Symmetry::Symmetric {
+        return None;
+    }
+    match operator.definiteness() {
+        Definiteness::SumOfSquares => {}
+        // or the run would have been refused
+        Definiteness::NegativeTerms => return Some(FACTORISED),
+        Definiteness::EdgeTerms => {
+            return factorised(model, operator, MOST_FLOPS, progress)
+                .is_ok()
+                .then_some(FACTORISED);
+        }
+    }
+    let no_weight_is_negative = model.body().is_none_or(|body| {
+        (0..body.families.len()).all(|i| body.kernel(i).0.iter().all(|pair| *pair >= 0.0))
+    });
+    no_weight_is_negative.then_some("the stiffness is symmetric, and its energy a sum of squares")
+}
+
+/// What a factorisation shows.
+const FACTORISED: &str = "a Cholesky factorisation of the stiffness shows no negative eigenvalue";
+
+/// The dearest factorisation that is made only to prove that no mode grows: some seconds of one core.
+const MOST_FLOPS: f64 = 1e10;
+
+/// Looks for modes that grow over a run of `steps` steps of `step`; at most a tenth of its products, and at least 200.
+///
+/// # Errors
+/// [`RunError::Grows`] for a mode that doubles the energy, unless the scene wants to be told only.
+pub(crate) fn check(
+    asked: &Asked<'_>,
+    system: &dyn Dynamic,
+    held: &[u32],
+    (step, steps): (f64, u64),
+) -> Result<Part, RunError> {
+    if let Some(how) = asked.proved {
+        return Ok(Part {
+            name: NAME,
+            line: format!("no mode grows, proved: {how}"),
+            figures: Vec::new(),
+            findings: Vec::new(),
+        });
+    }
+    let found = growth(system, held, step, steps)?;
+    let duration = steps as f64 * step;
+    let exponent = found.rate * duration;
+    // below the least that is told the fastest mode is one that does not show either
+    let unseen = (found.resolution * duration).max(exponent.min(LEAST));
+    let grows = exponent > LEAST;
+    let place = if grows {
+        (asked.place)(found.site)
+    } else {
+        Vec::new()
+    };
+    if exponent > LARGEST_GAIN && asked.policy == GrowingModesSpec::Refuse {
+        return Err(RunError::Grows {
+            place,
+            rate: found.rate,
+            gain: exponent,
+            real: found.eigenvalue[0],
+            imaginary: found.eigenvalue[1],
+            remedy: asked.remedy,
+        });
+    }
+    let how = evidence(&found);
+    let hidden = format!(
+        "growth by less than a factor of {} over the run would not show",
+        factor(unseen)
+    );
+    let line = match grows {
+        true => format!(
+            "a mode grows by a factor of {} over the run, as exp({} t), largest at ({}) ({how}); the energy balance is watched",
+            factor(exponent),
+            number(found.rate),
+            coordinates(&place)
+        ),
+        false if unseen <= UNSEEN.ln() => format!("no mode grows over the run ({how}; {hidden})"),
+        false => format!(
+            "whether a mode grows over the run is not known ({how} showed none; {hidden}); the energy balance is watched"
+        ),
+    };
+    let mut findings = Vec::new();
+    if exponent > TOLD {
+        findings.push(Finding {
+            severity: Severity::Warning,
+            value: exponent.exp(),
+            limit: TOLD.exp(),
+            message: format!(
+                "a mode of the seam grows by a factor of {} over the run, largest at ({}): {}",
+                factor(exponent),
+                coordinates(&place),
+                asked.remedy
+            ),
+            place,
+        });
+    }
+    let figure = |name: &str, value: f64| Figure {
+        name: name.to_owned(),
+        value,
+    };
+    Ok(Part {
+        name: NAME,
+        line,
+        figures: vec![
+            figure("rate", found.rate),
+            figure("resolution", found.resolution),
+            figure("exponent", exponent),
+            figure("exponent that would not show", unseen),
+            figure("products", found.products as f64),
+        ],
+        findings,
+    })
+}
+
+/// What the part is called.
+const NAME: &str = "growth";
+
+fn coordinates(place: &[f64]) -> String {
+    let words: Vec<String> = place.iter().map(|x| format!("{x:.4e}")).collect();
+    words.join(", ")
+}
+
+fn evidence(found: &Growth) -> String {
+    match found.evidence {
+        Evidence::Eigenvalues => "all eigenvalues".to_owned(),
+        Evidence::Noise { neighbourhoods: 0 } => {
+            format!("{} products from noise", found.products)
+        }
+        Evidence::Noise { neighbourhoods } => format!(
+            "{} products from noise, and all eigenvalues of {neighbourhoods} neighbourhood{} of the seam",
+            found.products,
+            if neighbourhoods == 1 { "" } else { "s" }
+        ),
+    }
+}
+
+/// `exp` of an exponent, as such where the number would say nothing.
+fn factor(exponent: f64) -> String {
+    match exponent {
+        e if e < 10.0 => format!("{:.4}", e.exp()),
+        e => format!("exp({})", number(e)),
+    }
+}

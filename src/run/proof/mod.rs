@@ -1,0 +1,82 @@
+//! Proof of a model before it is solved: what must hold whatever the load is checked on the model at hand, and told, warned of, or refused.
+//!
+//! | file | what is shown |
+//! |---|---|
+//! | `loads.rs` | mass, total and first moment of each load against integrals over the mesh; supports held everywhere |
+//! | `affine.rs` | the force of every affine field, row by row, against that of its constant stress |
+//! | `classes.rs`, `fields.rs`, `surface.rs`, `patch.rs` | rows out of balance and what is told of them, the fields and their forces, the boundary of the body, the error of the stress around a row out of balance |
+//! | `symmetry.rs` | whether a stiffness that the coupling promises to be symmetric is |
+//! | `quadratic.rs` | the force of quadratic fields beside the seam |
+//! | `growth.rs` | whether a mode of the motion grows |
+//!
+//! A check is one file with one function and one line in [`prove`]. What it returns is plain data ([`Part`]), so the summary, `check` and `--json` know of it without another line.
+//! Limits stand in `docs/proof.md`, each beside the measurement that chose it.
+
+mod affine;
+mod classes;
+mod fields;
+pub(crate) mod growth;
+mod loads;
+mod patch;
+mod quadratic;
+mod surface;
+mod symmetry;
+
+use super::setup::Rest;
+use crate::coupling::{Coupling, Model, Operator};
+use crate::observe::proof::{Part, Proof, Severity};
+use crate::progress::Progress;
+use crate::run::error::RunError;
+use crate::scene::spec::UnprovenSpec;
+use crate::system::{BlockCsr, Dynamic};
+
+pub(crate) use self::affine::displacements as affine_displacements;
+
+/// What is to be proved: a model laid out, with its conditions.
+pub(crate) struct Subject<'a, const D: usize> {
+    pub model: &'a Model<D>,
+    pub coupling: &'a dyn Coupling<D>,
+    pub operator: &'a dyn Operator<D>,
+    pub rest: &'a Rest<D>,
+    /// The assembled stiffness, where the run has one; else rows come from the operator.
+    pub stiffness: Option<&'a BlockCsr>,
+    /// What moves, in a scene that does; its tangent at rest has the rows.
+    pub system: Option<&'a dyn Dynamic>,
+    /// Forces of the fields of [`affine_displacements`], where they are known already.
+    pub affine_forces: &'a [Vec<f64>],
+}
+
+/// Runs every check that the scene calls for.
+///
+/// # Errors
+/// [`RunError`] of a check that cannot be made.
+pub(crate) fn prove<const D: usize>(
+    subject: &Subject<'_, D>,
+    progress: &dyn Progress,
+) -> Result<Proof, RunError> {
+    let parts: [Option<Part>; 4] = [
+        loads::part(subject)?,
+        affine::part(subject, progress)?,
+        symmetry::part(subject),
+        quadratic::part(subject)?,
+    ];
+    let mut proof = Proof {
+        parts: parts.into_iter().flatten().collect(),
+    };
+    if subject.rest.solver.unproven == UnprovenSpec::Warn {
+        let findings = proof.parts.iter_mut().flat_map(|p| &mut p.findings);
+        findings.for_each(|f| f.severity = Severity::Warning);
+    }
+    Ok(proof)
+}
+
+/// Refuses what a proof does not hold for.
+///
+/// # Errors
+/// [`RunError::Unproven`] with the first refusal.
+pub(crate) fn hold(proof: &Proof) -> Result<(), RunError> {
+    match proof.messages(Severity::Refusal).next() {
+        Some(message) => Err(RunError::Unproven(message.to_owned())),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,163 @@
+//! Rotation of finite elements, which are linear, and what it costs.
+//!
+//! A linear element that rotates by θ without strain has the strain `(cos θ − 1) I` in the plane of the rotation. Where all of a body is linear, it is free to grow by `1/cos θ − 1` instead, and its
+//! lengths are wrong by as much. Where exact bonds keep their lengths in a zone, the elements around it want to be larger than the zone by `e = 1/cos θ − 1`, and both strain each other: a misfit.
+//! Its energy in a body with a round zone is that of Eshelby's inclusion [Eshelby1957] in a body of finite size,
+//!
+//! ```text
+//! W = ½ V_z V_e/(V_z + V_e) ε* : C : (ε* − S : ε*),     ε* = e (I − n ⊗ n)
+//! ```
+//!
+//! with the volumes of the zone and of the elements and the axis `n`: `2 K μ/(K + μ) e²` of a plane with `K = λ + μ`, and the sum of its volumetric and deviatoric part in space. It is taken from the motion.
+
+use crate::coupling::{Model, SiteKind};
+use crate::fem;
+use crate::observe::summary::Rotation;
+use crate::tensor::{Tensor, padded};
+
+/// Rotation in degrees from which on it is told.
+pub(crate) const TOLD: f64 = 2.0;
+
+/// The finite elements of a model, to measure their rotation.
+pub(crate) struct Rotations<'m, const D: usize> {
+    model: &'m Model<D>,
+    cells: Vec<u32>,
+    volume: Vec<f64>,
+    /// Energy of a misfit of 1 for each unit of the elements' volume; zero where none arises.
+    stiffness: f64,
+}
+
+/// The largest rotation of a state.
+pub(crate) struct Largest {
+    pub degrees: f64,
+    pub place: [f64; 3],
+    /// Energy of the misfit, as predicted.
+    pub energy: f64,
+}
+
+impl<'m, const D: usize> Rotations<'m, D> {
+    /// Of all elements of a model, none in one dimension; `is_linear` tells that bonds are linear too.
+    pub fn new(model: &'m Model<D>, is_linear: bool) -> Self {
+        let all = 0..model.mesh.cell_count();
+        let cells: Vec<u32> = match D {
+            1 => Vec::new(),
+            _ => all
+                .filter(|&c| model.is_element(c))
+                .map(|c| c as u32)
+                .collect(),
+        };
+        let of_cell = |&c: &u32| fem::cell_volume(&model.mesh, c as usize);
+        let volume: Vec<f64> = cells.iter().map(of_cell).collect();
+        let elements: f64 = volume.iter().sum();
+        let points = model
+            .sites
+            .iter()
+            .filter(|s| matches!(s.kind, SiteKind::Point(_)));
+        let zone: f64 = points.map(|s| s.volume).sum();
+        let stiffness = match (is_linear, cells.first()) {
+            (false, Some(&c)) if zone > 0.0 => {
+                misfit_stiffness(model, c as usize) * zone / (zone + elements)
+            }
+            _ => 0.0,
+        };
+        Self {
+            model,
+            cells,
+            volume,
+            stiffness,
+        }
+    }
+
+    /// The largest rotation under a displacement; none without elements.
+    pub fn largest(&self, u: &[f64]) -> Option<Largest> {
+        let transfer = &self.model.node_transfer;
+        let (mut largest, mut energy) = ((-1.0, 0), 0.0);
+        for (&c, volume) in self.cells.iter().zip(&self.volume) {
+            let node = |n: usize| transfer.displacement(n, u);
+            let gradient = fem::displacement_gradient_at_centre(&self.model.mesh, c as usize, node);
+            let angle = rotation(&gradient);
+            if angle > largest.0 {
+                largest = (angle, c);
+            }
+            // beyond 89.5 degrees a linear body has no size
+            let misfit = 1.0 / angle.cos().max(0.01) - 1.0;
+            energy += self.stiffness * volume * misfit * misfit;
+        }
+        self.cells.first()?;
+        let (angle, c) = largest;
+        let nodes = self.model.mesh.cell(c as usize);
+        let sum = nodes.iter().map(|&n| self.model.mesh.nodes[n as usize]);
+        let centre =
+            sum.fold(crate::tensor::Vector::<D>::zeros(), |s, x| s + x) / nodes.len() as f64;
+        Some(Largest {
+            degrees: angle.to_degrees(),
+            place: padded(&centre),
+            energy,
+        })
+    }
+
+    /// What a summary tells, from [`TOLD`] on; `scale` is the largest energy of the run, `when` a step with its time.
+    pub fn told(
+        &self,
+        degrees: f64,
+        place: [f64; 3],
+        energy: f64,
+        scale: f64,
+        when: Option<(u64, f64)>,
+    ) -> Option<Rotation> {
+        (degrees >= TOLD).then(|| Rotation {
+            degrees,
+            place: place[..D].to_vec(),
+            when,
+            length_error: 1.0 / degrees.to_radians().cos().abs().max(0.01) - 1.0,
+            energy_error: (self.stiffness > 0.0 && scale > 0.0).then(|| energy / scale),
+        })
+    }
+}
+
+/// `½ ε* : C : (ε* − S : ε*)` for a misfit of 1.
+fn misfit_stiffness<const D: usize>(model: &Model<D>, cell: usize) -> f64 {
+    let c = model.tensor_of_cell(cell);
+    let (mu, lambda) = (c.get(0, 1, 0, 1), c.get(0, 0, 1, 1));
+    if D == 2 {
+        let bulk = lambda + mu;
+        return 2.0 * bulk * mu / (bulk + mu);
+    }
+    let bulk = lambda + 2.0 / 3.0 * mu;
+    // Eshelby's tensor of a sphere: parts of a volumetric and of a deviatoric strain that remain
+    let volumetric = 3.0 * bulk / (3.0 * bulk + 4.0 * mu);
+    let deviatoric = 1.2 * (bulk + 2.0 * mu) / (3.0 * bulk + 4.0 * mu);
+    // (1, 1, 0) has the trace 2 and the deviatoric square 2/3
+    0.5 * (bulk * 4.0 * (1.0 - volumetric) + 2.0 * mu * 2.0 / 3.0 * (1.0 - deviatoric))
+}
+
+/// Angle of rotation of `F = I + ∇u` in radians; exact without strain, and to first order of it otherwise.
+fn rotation<const D: usize>(gradient: &Tensor<D>) -> f64 {
+    let trace: f64 = (0..D).map(|i| 1.0 + gradient[(i, i)]).sum();
+    let half = |i: usize, j: usize| 0.5 * (gradient[(j, i)] - gradient[(i, j)]);
+    if D == 2 {
+        return half(0, 1).abs().atan2(0.5 * trace);
+    }
+    let axis = half(1, 2).hypot(half(2, 0)).hypot(half(0, 1));
+    axis.atan2(0.5 * (trace - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotation_is_that_of_the_matrix() {
+        for degrees in [0.5_f64, 5.0, 80.0, 120.0, 179.0] {
+            let angle = degrees.to_radians();
+            let plane = nalgebra::Rotation2::new(-angle).into_inner();
+            assert!((rotation::<2>(&(plane - Tensor::<2>::identity())) - angle).abs() < 1e-12);
+            let axis = nalgebra::Unit::new_normalize(nalgebra::Vector3::new(1.0, -2.0, 0.5));
+            let space = nalgebra::Rotation3::from_axis_angle(&axis, angle).into_inner();
+            assert!((rotation::<3>(&(space - Tensor::<3>::identity())) - angle).abs() < 1e-12);
+            // a strain changes it to second order only, and a stretch not at all
+            let stretched = plane * 1.1 - Tensor::<2>::identity();
+            assert!((rotation::<2>(&stretched) - angle).abs() < 1e-12);
+        }
+    }
+}

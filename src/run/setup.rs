@@ -1,0 +1,168 @@
+//! From a validated scene to the problem that is coupled, and the settings that a run keeps.
+
+use std::sync::Arc;
+
+use crate::coupling::{self, Model, PointSource, Problem, Surfaces, Zone};
+use crate::observe::checkpoint::Fingerprint;
+use crate::observe::summary::Choice;
+use crate::peridynamics::influence::{Alpha, Degree};
+use crate::peridynamics::{
+    BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
+    Micromodulus, PartialVolume,
+};
+use crate::scene::breaking::Breaking;
+use crate::scene::conditions::Condition;
+use crate::scene::follow::Follow;
+use crate::scene::initial::Initial;
+use crate::scene::materials::Ratio;
+use crate::scene::materials::{Law, Material};
+use crate::scene::peridynamics::Points;
+use crate::scene::spec::{Joining, SurfacesSpec, WeightsSpec};
+use crate::scene::validated::{Output, Scene, Solver};
+use crate::tensor::{Vector, padded};
+
+/// What of a scene remains once its problem is built.
+pub(crate) struct Rest<const D: usize> {
+    pub conditions: Vec<Condition<D>>,
+    pub solver: Solver,
+    pub output: Output<D>,
+    pub initial: Vec<Initial<D>>,
+    pub breaking: Breaking<D>,
+    /// Poisson's ratio of the points.
+    pub ratio: Ratio,
+    pub follow: Option<Follow>,
+    pub fingerprint: Fingerprint,
+    /// Density of each material.
+    pub density: Vec<f64>,
+    /// The coupling, where the scene names none.
+    pub chosen: Option<Choice>,
+    /// How the zone was placed, where the scene draws none.
+    pub placed: Option<Choice>,
+    /// What was chosen for the accuracy that the scene wants.
+    pub choices: Vec<Choice>,
+}
+
+impl<const D: usize> Rest<D> {
+    /// What was chosen for the accuracy, the zone and the coupling, in this order.
+    pub fn made(&self) -> impl Iterator<Item = &Choice> {
+        self.choices.iter().chain(&self.placed).chain(&self.chosen)
+    }
+
+    /// The coupling as a choice: why it was made, or what it does if the scene names it.
+    pub fn coupling(&self, joining: Joining) -> Choice {
+        self.chosen.clone().unwrap_or_else(|| Choice {
+            choice: format!("coupling {}", joining.name),
+            why: joining.about.to_owned(),
+        })
+    }
+}
+
+/// The law of the bonds of a material.
+pub(crate) fn law<const D: usize>(material: &Material<D>) -> Box<dyn BondLaw<D>> {
+    let (lambda, mu) = material.lame;
+    match material.law {
+        Law::BondBased(micromodulus) => Box::new(BondBased::new(micromodulus, mu)),
+        Law::Lps(influence) => Box::new(LinearPeridynamicSolid::new(influence, lambda, mu)),
+        Law::Correspondence(influence, stabilisation) => {
+            Box::new(Correspondence::new(influence, lambda, mu, stabilisation))
+        }
+    }
+}
+
+/// `P_1/|ξ|`, ω of the divergence of the partial stress beside a triangular micromodulus, which is `P_1/|ξ|` too: stable in motion, where a Gaussian grows. Beside the inverse distance it is the other way round.
+const DIVERGENCE: Influence = Influence::Polynomial {
+    degree: Degree::P1,
+    alpha: Alpha::One,
+};
+
+/// The problem of a scene, and what remains of the scene.
+pub(crate) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
+    let material = scene
+        .zones
+        .iter()
+        .zip(&scene.cell_material)
+        .find(|(zone, _)| **zone != Zone::Local)
+        .map_or(0, |(_, m)| *m);
+    let stuff = &scene.materials[material as usize];
+    let influence = match stuff.law {
+        Law::Lps(i) | Law::Correspondence(i, _) => i,
+        Law::BondBased(Micromodulus::Triangular) => DIVERGENCE,
+        Law::BondBased(_) => Influence::Gaussian,
+    };
+    let law = law(stuff);
+    let ratio = Ratio::new(stuff.lame, scene.kinematics);
+    let method = scene.coupling.build(influence);
+    let chosen = scene.coupling_why.map(|why| Choice {
+        choice: format!("coupling {}", scene.coupling.joining().name),
+        why,
+    });
+    let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
+    let density = scene.materials.iter().map(|m| m.density).collect();
+    let (voids, barriers) = (scene.voids, scene.barriers);
+    let peridynamics = scene.peridynamics.map(|p| {
+        let horizon = p.horizon;
+        coupling::Peridynamics {
+            law,
+            horizon: Arc::new(move |x: &Vector<D>| horizon.eval(&padded(x))),
+            points: match p.points {
+                Points::Cells => PointSource::Cells,
+                Points::Lattice { spacing, origin } => PointSource::Lattice { spacing, origin },
+                Points::Lattices { lattices, of_cell } => {
+                    PointSource::Lattices { lattices, of_cell }
+                }
+            },
+            weights: match p.weights {
+                WeightsSpec::Isotropic => BondWeights::Isotropic,
+                WeightsSpec::Plain => BondWeights::Plain,
+                WeightsSpec::Fitted => BondWeights::Fitted,
+            },
+            volumes: p.volumes,
+            barriers,
+            voids,
+            surfaces: match p.surfaces {
+                SurfacesSpec::Cut => Surfaces::Cut,
+                SurfacesSpec::Uncut => Surfaces::Uncut,
+            },
+        }
+    });
+    (
+        Problem {
+            mesh: scene.mesh,
+            zones: scene.zones,
+            tensors,
+            cell_material: scene.cell_material,
+            peridynamic_material: material,
+            peridynamics,
+            coupling: method,
+        },
+        Rest {
+            conditions: scene.conditions,
+            solver: scene.solver,
+            output: scene.output,
+            initial: scene.initial,
+            breaking: scene.breaking,
+            ratio,
+            follow: scene.follow,
+            fingerprint: scene.fingerprint,
+            density,
+            chosen,
+            placed: scene.placement.map(|p| p.choice),
+            choices: scene.choices,
+        },
+    )
+}
+
+/// Says which partial volumes are in use, if not full ones.
+pub(crate) fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Choice> {
+    let volumes = model.peridynamics.as_ref()?.volumes;
+    let why = match volumes {
+        PartialVolume::Full => return None,
+        PartialVolume::PdLammps => "a ramp over the last half spacing within the horizon",
+        PartialVolume::Hhb => "a ramp over the spacing about the horizon",
+        PartialVolume::Exact => "what the horizon cuts from each cell of the lattice",
+    };
+    Some(Choice {
+        choice: format!("{volumes:?} partial volumes"),
+        why: why.to_owned(),
+    })
+}

@@ -1,0 +1,38 @@
+//! A solved scene, and where its sites lie.
+
+use crate::coupling::{Model, Operator, SiteKind, Zone};
+
+/// A solved scene.
+pub struct Solved<'a, const D: usize> {
+    /// The model.
+    pub model: &'a Model<D>,
+    /// Its rows.
+    pub operator: &'a dyn Operator<D>,
+    /// Displacement, `D` numbers per site.
+    pub displacement: &'a [f64],
+    /// Residual `K u − f` of each dof; on prescribed dofs the reaction.
+    pub residual: &'a [f64],
+    /// Which zone each site lies in.
+    pub zone_of_site: &'a [Zone],
+    /// Bonds that broke in motion, by the sites of their ends, each once for each direction.
+    pub broken: &'a [(u32, u32)],
+}
+
+/// The zone that each site lies in; of a node the most nonlocal one of the elements around it.
+pub(crate) fn zone_of_site<const D: usize>(model: &Model<D>) -> Vec<Zone> {
+    let node_zone = |site: usize| {
+        model
+            .cells_of_site(site)
+            .map(|(c, _)| c)
+            .filter(|&c| model.is_element(c))
+            .map(|c| model.zones[c])
+            .max()
+            .unwrap_or(Zone::Local)
+    };
+    (0..model.sites.len())
+        .map(|site| match model.sites[site].kind {
+            SiteKind::Point(p) => model.zone_of_point(p as usize),
+            SiteKind::Node(_) => node_zone(site),
+        })
+        .collect()
+}

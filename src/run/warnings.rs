@@ -1,0 +1,107 @@
+//! What of a model makes its results doubtful, and is told by `check` and by `run`.
+
+use crate::coupling::{CellRole, Model, Zone};
+use crate::observe::proof::{Proof, Severity};
+use crate::observe::report::number;
+use crate::scene::spec::Joining;
+use crate::shape::Barrier;
+
+/// All doubts about a model.
+pub(crate) fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String> {
+    let all = [one_sided(model), crack_beside_seam(model, joining)];
+    all.into_iter().flatten().collect()
+}
+
+/// The warnings of a proof, then all doubts.
+pub(crate) fn warnings<const D: usize>(
+    model: &Model<D>,
+    joining: Joining,
+    proof: &Proof,
+) -> Vec<String> {
+    let proved = proof.messages(Severity::Warning).map(str::to_owned);
+    proved.chain(doubts(model, joining)).collect()
+}
+
+/// The out-of-balance force, relative to the sum of all nodal loads and reactions, from which on it is told.
+///
+/// A fixed body carries what is applied, so that a reaction that differs from the load is an error of every stress on the way. Rows of couplings by force
+/// are exact under affine fields and out of balance under others. Measured on plates of an LPS with a splice, horizon 3 spacings: 0.033 with a zone a third
+/// of a horizon beside a loaded face, whose reaction is 7 % too large and the displacements 8 %; with `truncated` 4e-15, and 4e-5 of the displacement. Of bars under their weight with `balanced` and `blending` 0.004 to 0.009, and the
+/// displacements 1.2 to 3 %.
+const OUT_OF_BALANCE: f64 = 0.002;
+
+/// A solution whose loads and reactions do not balance.
+pub(crate) fn out_of_balance(force: &[f64], relative: f64, joining: Joining) -> Option<String> {
+    (relative > OUT_OF_BALANCE).then(|| {
+        let force: Vec<String> = force.iter().map(|f| number(*f)).collect();
+        format!(
+            "loads and reactions are out of balance by {:.2} % of the sum of them all, by the force ({}): the seam of coupling `{}` balances affine fields only, and displacements may be wrong by three times as much; couple by truncated, or enclose the zone in more elements, further from surfaces and supports",
+            100.0 * relative,
+            force.join(", "),
+            joining.name
+        )
+    })
+}
+
+/// What partial stress does where its elements meet the surface of the body: measured in `docs/bars.md`.
+fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
+    if D == 1 || !model.roles.contains(&CellRole::StressElement) {
+        return None;
+    }
+    let at_surface = model.mesh.cells_at_boundary();
+    let cells = at_surface.iter().zip(&model.roles);
+    let count = cells
+        .filter(|(outer, role)| **outer && **role == CellRole::StressElement)
+        .count();
+    (count > 0).then(|| {
+        format!(
+            "{count} elements with a partial stress lie at the surface of the body, where families are one-sided: strains of the transition zone may alternate from element to element, the more the wider it is and the larger the horizon over spacing (docs/bars.md); enclose it in elements, or use another coupling"
+        )
+    })
+}
+
+/// Cracks and voids so near to the seam that what is computed on this side of it lacks bonds: `bondline verify extremes`, "Cracks beside the seam".
+fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: Joining) -> Option<String> {
+    let p = model.peridynamics.as_ref()?;
+    let horizons = match joining.name {
+        "splice" => SPLICE,
+        "partial-stress" if model.roles.contains(&CellRole::StressElement) => STRESS_ELEMENTS,
+        "partial-stress" => MESHFREE,
+        _ => return None,
+    };
+    if p.barriers.is_empty() {
+        return None;
+    }
+    let mut is_outside = vec![false; model.mesh.nodes.len()];
+    let cells = (0..model.mesh.cell_count()).filter(|&c| model.zones[c] != Zone::Nonlocal);
+    for c in cells {
+        let nodes = model.mesh.cell(c);
+        nodes.iter().for_each(|&n| is_outside[n as usize] = true);
+    }
+    let outside = model.mesh.nodes.iter().zip(is_outside);
+    let nearest = outside
+        .filter(|(_, is_outside)| *is_outside)
+        .flat_map(|(x, _)| {
+            let distance = |b: &Barrier<D>| b.shape().signed_distance(x).max(0.0) / (p.horizon)(x);
+            p.barriers.iter().map(move |b| (distance(b), x))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (nearest.0 < horizons * (1.0 + 1e-3)).then(|| {
+        let place: Vec<String> = nearest.1.iter().map(|x| format!("{x:.4e}")).collect();
+        format!(
+            "a crack or void lies {:.2} horizons from the seam at ({}), where {} wants more than {horizons}: displacements are off by a few per cent to all of their size (docs/methods.md); enlarge [zones.nonlocal], or use coupling.truncated",
+            nearest.0,
+            place.join(", "),
+            joining.name
+        )
+    })
+}
+
+/// Horizons from crack to seam up to which a splice errs.
+pub(crate) const SPLICE: f64 = 1.0;
+
+/// As [`SPLICE`], of partial stress in elements.
+pub(crate) const STRESS_ELEMENTS: f64 = 1.4;
+
+/// As [`SPLICE`], of meshfree partial stress.
+pub(crate) const MESHFREE: f64 = 1.9;

@@ -1,0 +1,365 @@
+//! Results of a run as files: one VTU with cells and points together, and CSV along lines and at probes.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+use rustc_hash::FxHashSet;
+
+use super::solution::Solved;
+use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
+use crate::fem::{self, Locator};
+use crate::mesh::CellShape;
+use crate::observe::ObserveError;
+use crate::observe::csv::write_table;
+use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
+use crate::scene::output::PROBES;
+use crate::scene::validated::Output;
+use crate::shape::Shape;
+use crate::tensor::{Tensor, Vector, padded, strain};
+
+/// Writes what the scene asks for; returns the files.
+///
+/// # Errors
+/// [`ObserveError`] if a file cannot be written.
+pub fn write<const D: usize>(
+    output: &Output<D>,
+    solved: &Solved<'_, D>,
+) -> Result<Vec<PathBuf>, ObserveError> {
+    let mut files = Vec::new();
+    let solution = Solution::new(solved);
+    if output.vtu {
+        let path = output.directory.join(format!("{}.vtu", output.name));
+        write_vtu(&path, &snapshot(solved, &[], Shown::All), Compression::Zlib)?;
+        files.push(path);
+    }
+    for (name, positions) in &output.lines {
+        let path = output.directory.join(format!("{}_{name}.csv", output.name));
+        table(&path, positions, &solution)?;
+        files.push(path);
+    }
+    if !output.probes.is_empty() {
+        let path = output
+            .directory
+            .join(format!("{}_{PROBES}.csv", output.name));
+        let positions: Vec<Vector<D>> = output.probes.iter().map(|(_, x)| *x).collect();
+        table(&path, &positions, &solution)?;
+        files.push(path);
+    }
+    Ok(files)
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+fn table<const D: usize>(
+    path: &std::path::Path,
+    positions: &[Vector<D>],
+    solution: &Solution<'_, D>,
+) -> Result<(), ObserveError> {
+    let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
+    header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
+    for (i, first) in AXES[..D].iter().enumerate() {
+        header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
+    }
+    header.push("model".to_owned());
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| solution.at(x)).collect();
+    let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
+        // a line may cross a slit: there is nothing to tell in it
+        let sample = sample?;
+        let e = strain(&sample.gradient);
+        let mut row: Vec<f64> = x
+            .iter()
+            .chain(sample.displacement.iter())
+            .copied()
+            .collect();
+        for i in 0..D {
+            row.extend((i..D).map(|j| e[(i, j)]));
+        }
+        row.push(f64::from(label(sample.zone)));
+        Some(row)
+    });
+    write_table(path, &header, told)
+}
+
+/// 0 local, 1 transition, 2 nonlocal.
+fn label(zone: Zone) -> u8 {
+    match zone {
+        Zone::Local => 0,
+        Zone::Transition => 1,
+        Zone::Nonlocal => 2,
+    }
+}
+
+struct Sample<const D: usize> {
+    displacement: Vector<D>,
+    gradient: Tensor<D>,
+    zone: Zone,
+}
+
+/// The solution at sites and between them.
+struct Solution<'a, const D: usize> {
+    solved: &'a Solved<'a, D>,
+    intact: Intact,
+    sampler: Sampler<'a, D>,
+    body: Locator<D>,
+    tolerance: f64,
+}
+
+impl<'a, const D: usize> Solution<'a, D> {
+    fn new(solved: &'a Solved<'a, D>) -> Self {
+        let model = solved.model;
+        let (lo, hi) = model.mesh.bounds();
+        Self {
+            solved,
+            intact: Intact::of(solved),
+            sampler: Sampler::new(model),
+            body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
+            tolerance: 1e-9 * (hi - lo).norm(),
+        }
+    }
+
+    /// Whether a position lies in the mesh and in no void.
+    fn is_inside(&self, x: &Vector<D>) -> bool {
+        let model = self.solved.model;
+        let in_void = model.peridynamics.as_ref().is_some_and(|p| {
+            let inside = |v: &Shape<D>| v.signed_distance(x) < -self.tolerance;
+            p.voids.iter().any(inside)
+        });
+        !in_void && self.body.locate(&model.mesh, x, self.tolerance).is_some()
+    }
+
+    /// In an element its strain; among points that of the nearest point's family. `None` outside of the body.
+    fn at(&self, x: &Vector<D>) -> Option<Sample<D>> {
+        if !self.is_inside(x) {
+            return None;
+        }
+        let displacement = self.sampler.displacement(x, self.solved.displacement)?;
+        let (gradient, zone) = match self.sampler.carrier(x)? {
+            Carrier::Element(c) => (self.solved.element_gradient(c), self.solved.model.zones[c]),
+            Carrier::Point(site) => (
+                self.solved.point_gradient(site, &self.intact),
+                self.solved.zone_of_site[site],
+            ),
+        };
+        Some(Sample {
+            displacement,
+            gradient,
+            zone,
+        })
+    }
+}
+
+/// Which bonds between points stand.
+struct Intact(FxHashSet<(u32, u32)>);
+
+impl Intact {
+    fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
+        let sites = &solved.model.sites;
+        let point = |site: u32| match sites[site as usize].kind {
+            SiteKind::Point(p) => Some(p),
+            SiteKind::Node(_) => None,
+        };
+        let broken = solved.broken.iter();
+        Self(
+            broken
+                .filter_map(|&(i, j)| point(i).zip(point(j)))
+                .collect(),
+        )
+    }
+
+    fn stands(&self, i: usize, j: usize) -> bool {
+        self.0.is_empty() || !self.0.contains(&(i as u32, j as u32))
+    }
+}
+
+impl<const D: usize> Solved<'_, D> {
+    fn node(&self, n: usize) -> Vector<D> {
+        let transfer = &self.model.node_transfer;
+        transfer.displacement(n, self.displacement)
+    }
+
+    fn site(&self, site: usize) -> Vector<D> {
+        Vector::from_column_slice(&self.displacement[site * D..][..D])
+    }
+
+    fn element_gradient(&self, c: usize) -> Tensor<D> {
+        fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
+    }
+
+    /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.
+    fn point_gradient(&self, site: usize, intact: &Intact) -> Tensor<D> {
+        let Some((body, p)) = self.model.point_of(site) else {
+            return Tensor::zeros();
+        };
+        let here = self.site(site);
+        let bonds: Vec<(Vector<D>, usize)> = body
+            .families
+            .of(p)
+            .iter()
+            .filter(|&&j| intact.stands(p, j as usize))
+            .map(|&j| (body.bond(p, j as usize), j as usize))
+            .collect();
+        let nearest = bonds
+            .iter()
+            .map(|(xi, _)| xi.norm())
+            .fold(f64::INFINITY, f64::min);
+        // the full family where the nearest shells do not span the space
+        for reach in [1.5 * nearest, f64::INFINITY] {
+            let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
+            for (xi, j) in bonds.iter().filter(|(xi, _)| xi.norm() <= reach) {
+                let w = 1.0 / xi.norm_squared();
+                let eta: Vector<D> =
+                    body.cloud.transfer.displacement::<D>(*j, self.displacement) - here;
+                shape += xi * xi.transpose() * w;
+                moment += eta * xi.transpose() * w;
+            }
+            if let Ok(inverse) = crate::peridynamics::invert_shape_tensor(&shape, bonds.len()) {
+                return moment * inverse;
+            }
+        }
+        Tensor::zeros()
+    }
+}
+
+/// Which cells and points a file shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shown {
+    /// All.
+    All,
+    /// Every so many: a sample, to tell how long all take.
+    Every(usize),
+}
+
+impl Shown {
+    fn includes(self, number: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Every(n) => number.is_multiple_of(n.max(1)),
+        }
+    }
+}
+
+/// A field over sites, beside those that every solution has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum OverSites<'a> {
+    /// A vector, like the displacement.
+    Vector(&'static str, &'a [f64]),
+    /// A number, zero at nodes that are no sites.
+    Scalar(&'static str, &'a [f64]),
+}
+
+/// Cells and points with the fields of a solution; without a residual, that field is left out.
+pub(crate) fn snapshot<const D: usize>(
+    solved: &Solved<'_, D>,
+    more: &[OverSites<'_>],
+    shown: Shown,
+) -> Snapshot {
+    let model = solved.model;
+    let mesh = &model.mesh;
+    // nodes that elements use, then points
+    let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
+    let mut snapshot = Snapshot::default();
+    let mut site_of_point: Vec<Option<usize>> = Vec::new();
+    let mut node_of_point: Vec<Option<usize>> = Vec::new();
+    let mut displacement: Vec<Vector<D>> = Vec::new();
+    let mut zones = Vec::new();
+    let (mut strains, mut stresses) = (Vec::new(), Vec::new());
+    let mut site_of_node = vec![None; mesh.nodes.len()];
+    for (site, s) in model.sites.iter().enumerate() {
+        if let SiteKind::Node(n) = s.kind {
+            site_of_node[n as usize] = Some(site);
+        }
+    }
+    for c in (0..mesh.cell_count()).filter(|&c| shown.includes(c) && model.is_element(c)) {
+        let mut nodes = [0u32; 8];
+        for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
+            let entry = &mut point_of_node[n as usize];
+            if *entry == u32::MAX {
+                *entry = snapshot.points.len() as u32;
+                snapshot.points.push(padded(&mesh.nodes[n as usize]));
+                displacement.push(solved.node(n as usize));
+                site_of_point.push(site_of_node[n as usize]);
+                node_of_point.push(Some(n as usize));
+            }
+            *slot = *entry;
+        }
+        snapshot.push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
+        zones.push(label(model.zones[c]));
+        let gradient = solved.element_gradient(c);
+        strains.push(strain(&gradient));
+        stresses.push(
+            solved
+                .operator
+                .cell_stress(c, solved.displacement)
+                .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
+        );
+    }
+    let intact = Intact::of(solved);
+    let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
+        .into_par_iter()
+        .filter(|&site| {
+            shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
+        })
+        .map(|site| {
+            let stress = model.point_of(site).map_or(Tensor::zeros(), |(body, p)| {
+                body.partial_stress_of(p, solved.displacement, |j| intact.stands(p, j))
+            });
+            (site, strain(&solved.point_gradient(site, &intact)), stress)
+        })
+        .collect();
+    for (site, e, stress) in on_points {
+        let number = snapshot.points.len() as u32;
+        snapshot.points.push(padded(&model.sites[site].position));
+        snapshot.push_cell(CellShape::Vertex, &[number]);
+        displacement.push(solved.site(site));
+        site_of_point.push(Some(site));
+        node_of_point.push(None);
+        zones.push(label(solved.zone_of_site[site]));
+        strains.push(e);
+        stresses.push(stress);
+    }
+    let of_site = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        site_of_point.iter().map(|s| s.map_or(0.0, f)).collect()
+    };
+    // a local site has none
+    let horizon = |site: usize| match (&model.peridynamics, solved.zone_of_site[site]) {
+        (None, _) | (_, Zone::Local) => 0.0,
+        (Some(p), _) => (p.horizon)(&model.sites[site].position),
+    };
+    let on_site = |s: usize, values: &[f64]| Vector::<D>::from_column_slice(&values[s * D..][..D]);
+    snapshot.point_fields = vec![
+        Field::vector("displacement", &displacement),
+        Field::scalar("beta", of_site(&|s| solved.operator.beta(s))),
+        Field::scalar("horizon", of_site(&horizon)),
+    ];
+    if !solved.residual.is_empty() {
+        let residual: Vec<Vector<D>> = site_of_point
+            .iter()
+            .map(|s| s.map_or(Vector::zeros(), |s| on_site(s, solved.residual)))
+            .collect();
+        snapshot
+            .point_fields
+            .push(Field::vector("residual", &residual));
+    }
+    for field in more {
+        snapshot.point_fields.push(match field {
+            OverSites::Scalar(name, values) => Field::scalar(name, of_site(&|s| values[s])),
+            OverSites::Vector(name, values) => {
+                let at = |(site, node): (&Option<usize>, &Option<usize>)| match (site, node) {
+                    (_, Some(n)) => model.node_transfer.displacement(*n, values),
+                    (Some(s), None) => on_site(*s, values),
+                    (None, None) => Vector::zeros(),
+                };
+                let vectors: Vec<Vector<D>> =
+                    site_of_point.iter().zip(&node_of_point).map(at).collect();
+                Field::vector(name, &vectors)
+            }
+        });
+    }
+    snapshot.cell_fields = vec![
+        Field::labels("model", zones),
+        Field::tensor("strain", &strains),
+        Field::tensor("stress", &stresses),
+    ];
+    snapshot
+}

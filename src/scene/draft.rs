@@ -1,0 +1,266 @@
+//! From what was typed to a scene: each part read by its own file, the parts beside each other looked at here.
+//!
+//! A scene may leave the nonlocal zone to the program (`zones = "auto"`), which takes solutions to find: what is validated without it is a [`Draft`], and whoever knows the
+//! zone makes the scene.
+
+use std::path::Path;
+
+use super::check;
+use super::conditions::{self, Condition};
+use super::error::{SceneError, SceneErrorKind};
+use super::initial::Initial;
+use super::materials::{self, Material};
+use super::meshing;
+use super::peridynamics::{self, Peridynamics, Points};
+use super::solve::Solve;
+use super::spec::{CouplingSpec, InfluenceSpec, SceneSpec, ZonesNeeded};
+use super::unused::Parts;
+use super::validated::{Scene, Solver};
+use super::zones::Placed;
+use super::{
+    agreement, bodies, breaking, follow, initial, joined, obstacles, output, solve, zones,
+};
+use crate::coupling::Zone;
+use crate::material::Kinematics;
+use crate::mesh::Mesh;
+use crate::observe::checkpoint::Fingerprint;
+use crate::observe::report::number;
+use crate::observe::summary::Choice;
+use crate::peridynamics::Influence;
+
+/// A scene that is validated but for its nonlocal zone, and for what follows from that.
+pub(crate) struct Draft<'a, const D: usize> {
+    pub spec: &'a SceneSpec,
+    pub kinematics: Kinematics,
+    pub mesh: Mesh<D>,
+    pub materials: Vec<Material<D>>,
+    pub cell_material: Vec<u16>,
+    pub solve: Solve,
+    pub conditions: Vec<Condition<D>>,
+    pub initial: Vec<Initial<D>>,
+    pub solver: Solver,
+    /// Beginning of the names of its files.
+    pub name: &'a str,
+    pub fingerprint: Fingerprint,
+}
+
+impl<'a, const D: usize> Draft<'a, D> {
+    /// Validates what does not depend on the zone; relative paths start in `directory`.
+    ///
+    /// # Errors
+    /// A [`SceneError`] with place, value and remedy.
+    pub fn new(
+        spec: &'a SceneSpec,
+        kinematics: Kinematics,
+        directory: &Path,
+        name: &'a str,
+        mut fingerprint: Fingerprint,
+    ) -> Result<Self, SceneError> {
+        let solver = solver(spec)?;
+        let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
+        let influence = match spec
+            .peridynamics
+            .as_ref()
+            .and_then(|p| p.influence.as_ref())
+        {
+            Some(i) => peridynamics::influence("peridynamics.influence", i)?,
+            None => default_influence()?,
+        };
+        let (materials, cell_material) =
+            materials::materials(&spec.materials, influence, kinematics, &mesh)?;
+        let solve = solve::solve(spec.solve.as_ref())?;
+        let clock = solve.clock();
+        let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
+        let initial = initial::initial(&spec.initial, &mesh, clock)?;
+        meshing::add_mesh(&mesh, &mut fingerprint);
+        Ok(Self {
+            spec,
+            kinematics,
+            mesh,
+            materials,
+            cell_material,
+            solve,
+            conditions,
+            initial,
+            solver,
+            name,
+            fingerprint,
+        })
+    }
+
+    /// The scene with the zone that was placed; with the one that it draws where none was.
+    ///
+    /// # Errors
+    /// A [`SceneError`] with place, value and remedy.
+    pub fn scene(&self, placed: Option<&Placed>) -> Result<Scene<D>, SceneError> {
+        let (mut scene, otherwise) = self.with_coupling(placed, None)?;
+        if let Some(coupling) = otherwise.filter(|_| placed.is_none()) {
+            // an alternative that is wrong itself is none
+            let other = self.with_coupling(None, Some(&coupling)).ok();
+            scene.otherwise = other.map(|(other, _)| Box::new(other));
+        }
+        let unused = |scene: &Scene<D>| {
+            let spec = self.spec;
+            Parts { spec, scene }.unused()
+        };
+        scene.unused = unused(&scene);
+        if let Some(other) = &mut scene.otherwise {
+            other.unused = unused(other);
+        }
+        Ok(scene)
+    }
+
+    /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
+    fn with_coupling(
+        &self,
+        placed: Option<&Placed>,
+        instead: Option<&CouplingSpec>,
+    ) -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
+        let (spec, mesh) = (self.spec, &self.mesh);
+        let mut joined = joined::joined(spec, &self.materials, mesh, placed, instead)?;
+        let joining = joined.joining;
+        if spec.peridynamics.is_none()
+            && !matches!(joining.zones, ZonesNeeded::Everywhere(Zone::Local))
+        {
+            return Err(SceneError::new(
+                SceneErrorKind::Missing,
+                format!("coupling `{}` needs [peridynamics]", joining.name),
+            )
+            .label(joined.span.clone(), "has a peridynamic side")
+            .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
+        }
+        let mut zones = zones::zones(spec, &joined, mesh, placed)?;
+        let peridynamics = (spec.peridynamics.as_ref())
+            .map(|p| peridynamics::peridynamics(p, joining.lattice, mesh, &zones))
+            .transpose()?;
+        let choices = peridynamics.as_ref().and_then(points_choice);
+        let peridynamics = peridynamics
+            .map(|p| bodies::bodies(spec, joining, p, mesh, &mut zones))
+            .transpose()?;
+        agreement::one_peridynamic_material(spec, &self.materials, &self.cell_material, &zones)?;
+        if let Some(p) = &peridynamics {
+            agreement::horizon(spec, p, mesh, &zones)?;
+        }
+        let (voids, barriers) = obstacles::obstacles(spec, mesh, &zones)?;
+        if matches!(self.solve, Solve::Explicit(_)) {
+            densities(spec, &self.materials)?;
+        }
+        let peridynamic = self
+            .cell_material
+            .iter()
+            .zip(&zones)
+            .find(|(_, zone)| **zone != Zone::Local)
+            .map_or(0, |(m, _)| *m);
+        let breaking = breaking::breaking(spec, &self.materials[peridynamic as usize], mesh)?;
+        let follow = follow::follow(
+            spec,
+            &mut joined,
+            &self.solve,
+            &breaking,
+            (peridynamics.as_ref()).map(|p| (p, &self.materials[peridynamic as usize].law)),
+            mesh,
+            |c| self.cell_material[c] == peridynamic,
+        )?;
+        let output = output::output(spec, mesh, &voids, self.name)?;
+        let scene = Scene {
+            title: spec.title.clone().unwrap_or_else(|| self.name.to_owned()),
+            kinematics: self.kinematics,
+            mesh: mesh.clone(),
+            zones,
+            materials: self.materials.clone(),
+            cell_material: self.cell_material.clone(),
+            peridynamics,
+            coupling: joined.coupling,
+            coupling_why: joined.why,
+            placement: None,
+            choices: choices.into_iter().collect(),
+            conditions: self.conditions.clone(),
+            voids,
+            barriers,
+            solve: self.solve.clone(),
+            initial: self.initial.clone(),
+            breaking,
+            follow,
+            solver: self.solver,
+            output,
+            otherwise: None,
+            unused: Vec::new(),
+            fingerprint: self.fingerprint,
+        };
+        Ok((scene, joined.otherwise))
+    }
+}
+
+/// Says where points lie that the scene does not place.
+fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Choice> {
+    let Points::Lattice { spacing, .. } = &p.points else {
+        return None;
+    };
+    Some(Choice {
+        choice: format!("points on a lattice of spacing {}", number(*spacing)),
+        why: p.points_why.clone()?,
+    })
+}
+
+/// Refuses a motion without inertia.
+fn densities<const D: usize>(spec: &SceneSpec, found: &[Material<D>]) -> Result<(), SceneError> {
+    let Some(light) = found.iter().find(|m| m.density <= 0.0) else {
+        return Ok(());
+    };
+    let span = spec
+        .materials
+        .get_key_value(light.name.as_str())
+        .map_or(0..0, |(k, _)| k.span.clone());
+    Err(SceneError::new(
+        SceneErrorKind::Missing,
+        format!("the material `{}` has no density, which [solve.explicit] needs", light.name),
+    )
+    .label(span, "has no inertia")
+    .help("add density = ..., in the units of the scene (kg/m³ beside N and m; t/mm³ beside N and mm)"))
+}
+
+fn default_influence() -> Result<Influence, SceneError> {
+    peridynamics::influence(
+        "peridynamics.influence",
+        &InfluenceSpec::Polynomial(super::spec::PolynomialSpec {
+            degree: super::value::Count {
+                value: 3,
+                span: 0..0,
+            },
+            alpha: super::value::Count::default(),
+        }),
+    )
+}
+
+fn solver(spec: &SceneSpec) -> Result<Solver, SceneError> {
+    let s = &spec.solver;
+    let tolerance = match &s.tolerance {
+        Some(t) => check::within(
+            "solver.tolerance",
+            t,
+            t.value > 0.0 && t.value < 1.0,
+            "must lie between 0 and 1",
+            "1e-10 suits most scenes",
+        )?,
+        None => 1e-10,
+    };
+    let max_iterations = match &s.max_iterations {
+        Some(n) if n.value == 0 => {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                "`solver.max-iterations` is 0",
+            )
+            .label(n.span.clone(), "no iteration")
+            .help("allow at least 1; 500 suits most scenes"));
+        }
+        Some(n) => n.value,
+        None => 500,
+    };
+    Ok(Solver {
+        method: s.method,
+        ordering: s.ordering,
+        unproven: s.unproven,
+        tolerance,
+        max_iterations,
+    })
+}

@@ -1,0 +1,150 @@
+//! A validated scene: every name resolved, every number checked.
+
+use std::path::PathBuf;
+
+use super::breaking::Breaking;
+use super::conditions::Condition;
+use super::follow::Follow;
+use super::initial::Initial;
+use super::materials::Material;
+use super::peridynamics::Peridynamics;
+use super::region::Region;
+use super::solve::Solve;
+use super::spec::{CouplingSpec, UnprovenSpec};
+use crate::coupling::Zone;
+use crate::material::Kinematics;
+use crate::mesh::Mesh;
+use crate::observe::checkpoint::Fingerprint;
+use crate::observe::summary::Choice;
+use crate::shape::{Barrier, Shape};
+use crate::solve::ordering::Ordering;
+use crate::tensor::{Vector, padded};
+
+/// A validated scene of dimension `D`.
+#[derive(Clone, Debug)]
+pub struct Scene<const D: usize> {
+    /// What the scene says of itself; its name if it says nothing.
+    pub title: String,
+    /// How the body stands for a solid.
+    pub kinematics: Kinematics,
+    /// The mesh of the whole body.
+    pub mesh: Mesh<D>,
+    /// The model of each cell.
+    pub zones: Vec<Zone>,
+    /// The materials.
+    pub materials: Vec<Material<D>>,
+    /// The material of each cell.
+    pub cell_material: Vec<u16>,
+    /// The peridynamic choices; none if the scene is local throughout.
+    pub peridynamics: Option<Peridynamics<D>>,
+    /// How the models are joined.
+    pub coupling: CouplingSpec,
+    /// Why the coupling was chosen; none if the scene names it.
+    pub coupling_why: Option<String>,
+    /// How the nonlocal zone came about; none if the scene draws it.
+    pub placement: Option<Placement>,
+    /// What was chosen for the accuracy that the scene wants, and for points that it does not place.
+    pub choices: Vec<Choice>,
+    /// Displacements, tractions, body forces.
+    pub conditions: Vec<Condition<D>>,
+    /// Empty regions: no point lies inside.
+    pub voids: Vec<Shape<D>>,
+    /// Voids and cracks that cut bonds.
+    pub barriers: Vec<Barrier<D>>,
+    /// What is computed.
+    pub solve: Solve,
+    /// Displacements and velocities at time zero.
+    pub initial: Vec<Initial<D>>,
+    /// How bonds deform and break.
+    pub breaking: Breaking<D>,
+    /// How the nonlocal zone follows the crack, if it does.
+    pub follow: Option<Follow>,
+    /// The linear solver.
+    pub solver: Solver,
+    /// What is written.
+    pub output: Output<D>,
+    /// The scene with the coupling to go on with, if this one was chosen and turns out not to hold.
+    pub(crate) otherwise: Option<Box<Self>>,
+    /// Warnings of parts that touch nothing.
+    pub unused: Vec<String>,
+    /// A number for the scene's text, by which a checkpoint knows that it belongs to it.
+    pub fingerprint: Fingerprint,
+}
+
+/// How the nonlocal zone of a scene was placed that does not draw it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placement {
+    /// What was chosen, and why.
+    pub choice: Choice,
+    /// Seconds of all but the solution that the run goes on with.
+    pub seconds: f64,
+}
+
+/// The linear solver of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    /// Which solver.
+    pub method: crate::solve::statics::Method,
+    /// Elimination order of a direct one.
+    pub ordering: Ordering,
+    /// Relative residual.
+    pub tolerance: f64,
+    /// What becomes of a model whose proof refuses it.
+    pub unproven: UnprovenSpec,
+    /// Most iterations.
+    pub max_iterations: usize,
+}
+
+/// The outputs of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Output<const D: usize> {
+    /// Folder of all files.
+    pub directory: PathBuf,
+    /// Beginning of all file names.
+    pub name: String,
+    /// Whether a VTU is written.
+    pub vtu: bool,
+    /// Lines of samples: name and positions.
+    pub lines: Vec<(String, Vec<Vector<D>>)>,
+    /// Probes: name and position.
+    pub probes: Vec<(String, Vector<D>)>,
+    /// Tips of cracks to follow.
+    pub tips: Vec<Tip<D>>,
+}
+
+/// The tip of a crack: the farthest damaged point along a direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tip<const D: usize> {
+    /// Its name.
+    pub name: String,
+    /// The direction, of length 1.
+    pub direction: Vector<D>,
+    /// Where to look.
+    pub inside: Region<D>,
+    /// Damage from which a point counts.
+    pub threshold: f64,
+}
+
+impl<const D: usize> Scene<D> {
+    /// Whether the horizon varies in space.
+    pub fn horizon_varies(&self) -> bool {
+        self.peridynamics
+            .as_ref()
+            .is_some_and(|p| p.horizon.as_constant().is_none())
+    }
+
+    /// The horizon at a position; zero without peridynamics.
+    pub fn horizon_at(&self, x: &Vector<D>) -> f64 {
+        self.peridynamics
+            .as_ref()
+            .map_or(0.0, |p| p.horizon.eval(&padded(x)))
+    }
+
+    /// A region that is the whole space.
+    pub fn everywhere() -> Region<D> {
+        Region::Shape {
+            shape: Shape::Everywhere,
+            margin: 0.0,
+        }
+    }
+}
