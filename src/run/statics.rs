@@ -20,7 +20,7 @@ use crate::observe::summary::{
 use crate::progress::Progress;
 use crate::run::definiteness;
 use crate::run::error::RunError;
-use crate::run::warnings::{out_of_balance, warnings};
+use crate::run::warnings::{indefinite, out_of_balance, warnings};
 use crate::scene::solve::Solve;
 use crate::scene::validated::{Output, Scene};
 use crate::system::{BlockCsr, Symmetry};
@@ -199,6 +199,7 @@ fn solve_chosen<const D: usize>(
         .largest(u)
         .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
     let mut told = warnings(model, joining, &proof);
+    told.extend(indefinite(symmetry, info.method));
     told.extend(rotation.as_ref().map(Rotation::warning));
     let out_of_balance_relative = if scale > 0.0 {
         balance.norm() / scale

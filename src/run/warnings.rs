@@ -5,6 +5,8 @@ use crate::observe::proof::{Proof, Severity};
 use crate::observe::report::number;
 use crate::scene::spec::Joining;
 use crate::shape::Barrier;
+use crate::solve::statics::MethodUsed;
+use crate::system::Symmetry;
 
 /// All doubts about a model.
 pub(crate) fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String> {
@@ -40,6 +42,14 @@ pub(crate) fn out_of_balance(force: &[f64], relative: f64, joining: Joining) -> 
             force.join(", "),
             joining.name
         )
+    })
+}
+
+/// A symmetric stiffness that took an LU factorisation, since that of Cholesky met a pivot that is not positive.
+pub(crate) fn indefinite(symmetry: Symmetry, method: MethodUsed) -> Option<String> {
+    (symmetry == Symmetry::Symmetric && method == MethodUsed::Lu).then(|| {
+        "the stiffness is symmetric and not positive definite: the solution is an equilibrium, and not one of least energy, so that a motion would leave it; leave peridynamics.points out, whose lattice follows the mesh, or draw the zone wider than its families"
+            .to_owned()
     })
 }
 
@@ -105,3 +115,37 @@ pub(crate) const STRESS_ELEMENTS: f64 = 1.4;
 
 /// As [`SPLICE`], of meshfree partial stress.
 pub(crate) const MESHFREE: f64 = 1.9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::solve::statics::{StaticParams, StaticProblem, solve};
+    use crate::system::BlockCsr;
+
+    #[test]
+    fn an_equilibrium_without_least_energy_is_warned_of() {
+        // two unknowns with the stiffnesses 1 and `k`
+        let warned = |k: f64| {
+            let stiffness = BlockCsr {
+                block: 1,
+                row_offsets: vec![0, 1, 2],
+                columns: vec![0, 1],
+                values: vec![1.0, k],
+                shared: None,
+            };
+            let problem = StaticProblem {
+                stiffness: &stiffness,
+                symmetry: Symmetry::Symmetric,
+                positions: &[[0.0; 3], [1.0, 0.0, 0.0]],
+                load: &[1.0, 1.0],
+                prescribed: &[None, None],
+            };
+            let solution = solve(&problem, &StaticParams::default(), &Silent).expect("a solution");
+            assert!((solution.displacement[1] - 1.0 / k).abs() < 1e-12);
+            indefinite(Symmetry::Symmetric, solution.info.method).is_some()
+        };
+        assert!(!warned(2.0));
+        assert!(warned(-2.0));
+    }
+}

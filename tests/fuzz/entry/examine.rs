@@ -10,8 +10,10 @@ use super::variant;
 
 /// The most steps in time that are run.
 const MOST_STEPS: u64 = 200;
-/// The most iterations that a load step is given: with more, three steps of a plate take ten seconds in an instrumented build.
-const MOST_ITERATIONS: usize = 1500;
+/// The most iterations that a load step is given.
+const MOST_ITERATIONS: usize = 3000;
+/// The most iterations times bonds: some seconds in an instrumented build.
+const MOST_WORK: usize = 40_000_000;
 /// The relative residual above which a static scene does not count as solved. The solvers promise the scene's tolerance, 1e-10 by default.
 const RESIDUAL: f64 = 1e-8;
 
@@ -114,6 +116,10 @@ fn run<const D: usize>(
         .is_some_and(|m| m.steps > MOST_STEPS)
     {
         return Err(Outcome::Skipped("many steps"));
+    }
+    if let Solve::QuasiStatic(q) = &mut scene.solve {
+        let affordable = MOST_WORK / prediction.sizes.bonds.max(1);
+        q.max_iterations = q.max_iterations.min(affordable);
     }
     let summary = solve(scene, wrap).map_err(|error| failed(&error))?;
     finite(&summary);
