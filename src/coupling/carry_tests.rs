@@ -3,24 +3,19 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::{
-    coupling::{
-        Coupling, Motion, Peridynamics, PointSource, Problem, Splice, Surfaces, Truncated, Zone,
-        motion::BondBehaviour,
-    },
-    mesh::{
-        Mesh,
-        generate::{Axis, rectangle},
-    },
-    peridynamics::{BondBased, BondWeights, Micromodulus, PartialVolume, kernel::Kinematics},
-    progress::Silent,
-    solve::{
-        explicit::{Explicit, ExplicitParams, State, Undriven},
-        stable_step::stable_step,
-    },
-    system::{Dynamic, Symmetry},
-    tensor::Tensor4,
+use crate::coupling::motion::behaviour::BondBehaviour;
+use crate::coupling::{
+    Coupling, Motion, Peridynamics, PointSource, Problem, Splice, Surfaces, Truncated, Zone,
 };
+use crate::mesh::Mesh;
+use crate::mesh::generate::{Axis, rectangle};
+use crate::peridynamics::kernel::Kinematics;
+use crate::peridynamics::{BondBased, BondWeights, Micromodulus, PartialVolume};
+use crate::progress::Silent;
+use crate::solve::explicit::{Explicit, ExplicitParams, State, Undriven};
+use crate::solve::stable_step::stable_step;
+use crate::system::{Dynamic, Symmetry};
+use crate::tensor::Tensor4;
 
 /// Size of an element; points lie four times as dense.
 const H: f64 = 1.0;

@@ -1,16 +1,14 @@
 //! A moving model against the assembled one, closed forms and momentum.
 
-use crate::{
-    coupling::{
-        BlendingFunction, Coupling, SiteKind,
-        motion::{BondBehaviour, Critical, Motion, masses},
-    },
-    fem,
-    peridynamics::{Influence, Micromodulus, kernel::Kinematics},
-    system::{Breakage, Dynamic},
-    tensor::Vector,
-    verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
-};
+use crate::coupling::motion::behaviour::{BondBehaviour, Critical};
+use crate::coupling::motion::{Motion, masses};
+use crate::coupling::{BlendingFunction, Coupling, SiteKind};
+use crate::fem;
+use crate::peridynamics::kernel::Kinematics;
+use crate::peridynamics::{Influence, Micromodulus};
+use crate::system::{Breakage, Dynamic};
+use crate::tensor::Vector;
+use crate::verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
 
 pub(super) const DENSITY: f64 = 2.5;
 

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::MeshError;
 use super::gmsh_kinds::shape;
-use super::read::{Encoding, RawElement, RawMesh, RawNode, Source};
+use crate::mesh::raw::{Encoding, RawElement, RawMesh, RawNode, Source};
 
 /// What a wrong word in a text file calls for.
 const REWRITE: &str = "correct it or write the file again with Gmsh";

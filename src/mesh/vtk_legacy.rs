@@ -7,8 +7,8 @@
 use std::path::Path;
 
 use super::MeshError;
-use super::read::{Encoding, Source};
-use super::vtk::{Grid, Kind, Number};
+use crate::mesh::raw::{Encoding, Source};
+use crate::mesh::vtk_grid::{Grid, Kind, Number};
 
 /// What a wrong word in a file calls for.
 const REWRITE: &str = "write the file again, for instance with VTK, ParaView or meshio";

@@ -10,10 +10,10 @@ use std::io::{Error, ErrorKind, Read as _};
 use std::path::Path;
 
 use super::MeshError;
-use super::read::{Encoding, Source};
-use super::vtk::{Grid, Kind, Number};
 use super::vtu_data::{Blocks, Data, Storage, kind};
 use super::xml::{Event, Tag, Xml};
+use crate::mesh::raw::{Encoding, Source};
+use crate::mesh::vtk_grid::{Grid, Kind, Number};
 
 /// What a wrong file calls for.
 const REWRITE: &str = "write the file again, for instance with VTK, ParaView or meshio";

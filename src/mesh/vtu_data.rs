@@ -6,7 +6,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
 
-use super::vtk::Kind;
+use crate::mesh::vtk_grid::Kind;
 
 /// How numbers are stored in the file.
 #[derive(Clone, Copy)]

@@ -5,8 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::cracks::CrackSummary;
-use super::report::number;
-use super::summary::{components, grouped};
+use super::report::{components, grouped, number};
 use super::switch::{self, Switch};
 
 /// Why a run in time ended.

@@ -489,6 +489,25 @@ pub(crate) fn aligned(grid: &[Vec<String>]) -> String {
     text
 }
 
+/// A whole number in groups of three digits.
+pub fn grouped(value: usize) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(c);
+    }
+    text
+}
+
+/// The components of a force in words.
+pub(super) fn components(force: &[f64]) -> String {
+    let words: Vec<String> = force.iter().map(|&v| number(v)).collect();
+    words.join(", ")
+}
+
 #[cfg(test)]
 #[path = "report_tests.rs"]
 mod tests;

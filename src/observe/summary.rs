@@ -8,7 +8,8 @@ use serde::Serialize;
 
 pub use super::motion_summary::{Ended, EnergyGain, MotionSummary, Rotation};
 use super::proof::Proof;
-use super::report::{aligned, number};
+pub use super::report::grouped;
+use super::report::{aligned, components, number};
 
 /// Seconds of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -241,19 +242,6 @@ pub fn bytes_text(bytes: u64) -> String {
     }
 }
 
-/// A whole number in groups of three digits.
-pub fn grouped(value: usize) -> String {
-    let digits = value.to_string();
-    let mut text = String::new();
-    for (i, c) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(c);
-    }
-    text
-}
-
 impl fmt::Display for RunSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
@@ -342,11 +330,6 @@ impl fmt::Display for RunSummary {
         }
         Ok(())
     }
-}
-
-pub(super) fn components(force: &[f64]) -> String {
-    let words: Vec<String> = force.iter().map(|&v| number(v)).collect();
-    words.join(", ")
 }
 
 #[cfg(test)]

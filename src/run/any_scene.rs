@@ -1,13 +1,13 @@
 //! A scene whose zone is placed, of any dimension: what is run.
 
-use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::budget;
 use super::error::RunError;
 use super::motion::RunOptions;
-use super::placement::{self, Kept};
+use super::placed_scene::PlacedScene;
+use super::placement::{self};
 use super::statics;
 use crate::material::Kinematics;
 use crate::observe::checkpoint::Fingerprint;
@@ -15,35 +15,7 @@ use crate::observe::summary::{Choice, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
 use crate::scene::spec::KinematicsSpec;
-use crate::scene::{Scene, SceneError, SceneSpec, Solve, Source};
-
-/// A validated scene with its nonlocal zone, and with the solution by which that was placed.
-#[derive(Clone, Debug)]
-pub struct PlacedScene<const D: usize> {
-    /// The scene.
-    pub scene: Scene<D>,
-    pub(super) kept: Option<Arc<Kept<D>>>,
-}
-
-impl<const D: usize> From<Scene<D>> for PlacedScene<D> {
-    fn from(scene: Scene<D>) -> Self {
-        Self { scene, kept: None }
-    }
-}
-
-impl<const D: usize> Deref for PlacedScene<D> {
-    type Target = Scene<D>;
-
-    fn deref(&self) -> &Scene<D> {
-        &self.scene
-    }
-}
-
-impl<const D: usize> DerefMut for PlacedScene<D> {
-    fn deref_mut(&mut self) -> &mut Scene<D> {
-        &mut self.scene
-    }
-}
+use crate::scene::{SceneError, SceneSpec, Solve, Source};
 
 /// Validates a scene and places its zone, if it leaves that to the program.
 fn placed<const D: usize>(

@@ -13,7 +13,7 @@ use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
 use crate::peridynamics::{Influence, TIE_TOLERANCE};
 use crate::run::error::RunError;
-use crate::scene::peridynamics::Points;
+use crate::scene::points::Points;
 use crate::scene::solve::Solve;
 use crate::scene::spec::WeightsSpec;
 use crate::scene::validated::Scene;

@@ -1,6 +1,6 @@
 //! Why a scene that is right could not be run.
 
-use crate::coupling::motion::MotionError;
+use crate::coupling::motion::behaviour::MotionError;
 use crate::coupling::{CarryError, ModelError};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointError;

@@ -26,6 +26,7 @@ pub(crate) mod error;
 mod linear;
 pub(crate) mod loads;
 pub(crate) mod motion;
+pub(crate) mod placed_scene;
 mod placement;
 pub(crate) mod proof;
 mod rotation;
@@ -35,7 +36,8 @@ mod statics;
 pub(crate) mod warnings;
 pub(crate) mod write;
 
-pub use any_scene::{AnyScene, PlacedScene};
+pub use crate::run::placed_scene::PlacedScene;
+pub use any_scene::AnyScene;
 pub use budget::{Share, memory_budget, set_memory_budget};
 pub use error::RunError;
 pub use linear::LinearModel;

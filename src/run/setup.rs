@@ -16,7 +16,7 @@ use crate::scene::follow::Follow;
 use crate::scene::initial::Initial;
 use crate::scene::materials::Ratio;
 use crate::scene::materials::{Law, Material};
-use crate::scene::peridynamics::Points;
+use crate::scene::points::Points;
 use crate::scene::spec::{Joining, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
 use crate::tensor::{Vector, padded};

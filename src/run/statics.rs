@@ -1,6 +1,5 @@
 //! From a validated scene to its solution: the only place where scene, core, solver and observers meet.
 
-use super::any_scene::PlacedScene;
 use super::chosen::with_choice;
 use super::equilibrium::{At, Equilibrium, equilibrium};
 use super::motion::{self, RunOptions};
@@ -9,6 +8,7 @@ use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::setup::{problem, volumes_choice};
 use super::solution::{Solved, zone_of_site};
+use crate::run::placed_scene::PlacedScene;
 use std::sync::Arc;
 
 use crate::coupling::{Model, SiteKind};

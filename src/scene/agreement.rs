@@ -2,12 +2,13 @@
 
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
-use super::peridynamics::{Peridynamics, Points};
+use super::peridynamics::Peridynamics;
 use super::source::Span;
 use super::spec::SceneSpec;
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
+use crate::scene::points::Points;
 
 /// The core gives all points one law.
 pub(crate) fn one_peridynamic_material<const D: usize>(

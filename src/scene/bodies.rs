@@ -3,11 +3,12 @@
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
-use super::peridynamics::{Peridynamics, Points};
+use super::peridynamics::Peridynamics;
 use super::region;
 use super::spec::{Joining, LatticeStart, SceneSpec};
 use crate::coupling::{Lattice, Zone};
 use crate::mesh::Mesh;
+use crate::scene::points::Points;
 
 /// Gives the bodies of `zones.bodies` their lattices, and makes elements of the cells that touch a body from the rest of the zone.
 pub(crate) fn bodies<const D: usize>(

@@ -7,11 +7,11 @@
 //! are coarse beside the horizon: seams then interpolate nothing, or end on faces that follow the lattice. On all other meshes it is a third of the horizon,
 //! the ratio that most of the literature uses; a little less where that lets the smallest extent of the body hold a whole number of spacings.
 
-use super::peridynamics::Points;
 use super::spec::LatticeStart;
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
+use crate::scene::points::Points;
 use crate::tensor::Vector;
 
 /// Spacings in a horizon, where nothing else decides.

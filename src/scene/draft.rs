@@ -11,7 +11,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::initial::Initial;
 use super::materials::{self, Material};
 use super::meshing;
-use super::peridynamics::{self, Peridynamics, Points};
+use super::peridynamics::{self, Peridynamics};
 use super::solve::Solve;
 use super::spec::{CouplingSpec, InfluenceSpec, SceneSpec, ZonesNeeded};
 use super::unused::Parts;
@@ -27,6 +27,7 @@ use crate::observe::checkpoint::Fingerprint;
 use crate::observe::report::number;
 use crate::observe::summary::Choice;
 use crate::peridynamics::Influence;
+use crate::scene::points::Points;
 
 /// A scene that is validated but for its nonlocal zone, and for what follows from that.
 pub(crate) struct Draft<'a, const D: usize> {

@@ -3,13 +3,14 @@
 use super::breaking::Breaking;
 use super::check;
 use super::error::{SceneError, SceneErrorKind};
-use super::joined::Joined;
 use super::materials::Law;
-use super::peridynamics::{Peridynamics, Points};
+use super::peridynamics::Peridynamics;
 use super::solve::Solve;
 use super::spec::{CouplingSpec, CutBondsSpec, SceneSpec, SkinSpec, ZonesNeeded};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
+use crate::scene::points::Points;
+use crate::scene::selected_coupling::Joined;
 
 /// Horizons between damage and the edge of the zone: one in which bonds do not break, and one to the points whose bonds reach there.
 const REACH: f64 = 2.0;

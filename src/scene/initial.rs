@@ -7,7 +7,6 @@ use super::error::{SceneError, SceneErrorKind};
 use super::region::Region;
 use super::solve::{Clock, Pacing, still};
 use super::spec::{InitialFieldSpec, InitialSpec};
-use super::validated::Scene;
 use super::value::Text;
 use crate::mesh::Mesh;
 
@@ -68,7 +67,7 @@ pub(crate) fn initial<const D: usize>(
         }
         let region = match shape {
             Some(shape) => inside(&place, name, shape, mesh)?,
-            None => Scene::everywhere(),
+            None => Region::everywhere(),
         };
         let within = mesh.nodes.iter().filter(|x| region.contains(x, 0.0));
         finite(&place, name, &components, clock, within.copied())?;

@@ -6,15 +6,17 @@
 
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::{Law, Material};
-use super::peridynamics::{self, Points};
+use super::peridynamics;
+use super::selected_coupling::Joined;
 use super::source::Span;
 use super::spec::{
-    CouplingSpec, Joining, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, TruncatedSpec,
+    CouplingSpec, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, TruncatedSpec,
     WeightsSpec,
 };
 use super::zones::{self, Placed};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::scene::points::Points;
 use crate::tensor::Vector;
 
 /// How exactly, in spacings, faces have to follow the lattice.
@@ -26,17 +28,6 @@ enum Obstacle {
     Certain(String),
     /// The seam or the proof has to tell.
     Possible(String),
-}
-
-/// A coupling, and why it was chosen if the scene names none.
-pub(crate) struct Joined {
-    /// The coupling to go on with if this one turns out not to hold.
-    pub otherwise: Option<CouplingSpec>,
-    pub coupling: CouplingSpec,
-    pub joining: Joining,
-    /// Where the scene names it, or its kinematics if it does not.
-    pub span: Span,
-    pub why: Option<String>,
 }
 
 /// The coupling that the scene names; without a name `truncated` where it is exact, or else `splice`. One model alone where a zone that was placed holds no cell, or every one.

@@ -3,9 +3,9 @@
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
-use super::region;
+use super::region::{self, Region};
 use super::spec::{SceneSpec, TipSpec};
-use super::validated::{Output, Scene, Tip};
+use super::validated::{Output, Tip};
 use super::value::Text;
 use crate::fem::Locator;
 use crate::mesh::Mesh;
@@ -182,7 +182,7 @@ fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip
         direction: direction.normalize(),
         inside: match &spec.inside {
             Some(shape) => region::region(&format!("{place}.inside"), shape, mesh)?,
-            None => Scene::everywhere(),
+            None => Region::everywhere(),
         },
         threshold,
     })

@@ -4,6 +4,7 @@ use super::check;
 use super::default_points::default_points;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
+use super::points::Points;
 use super::region::position;
 use super::solve;
 use super::spec::{
@@ -11,31 +12,10 @@ use super::spec::{
     WeightsSpec,
 };
 use super::value::Number;
-use crate::coupling::{Lattice, Zone};
+use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::peridynamics::{Influence, PartialVolume};
 use crate::tensor::{Vector, padded};
-
-/// Where the peridynamic points are.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Points<const D: usize> {
-    /// At the centroids of cells.
-    Cells,
-    /// On a lattice of this spacing through this point.
-    Lattice {
-        /// Distance of neighbours.
-        spacing: f64,
-        /// Any point of the lattice.
-        origin: Vector<D>,
-    },
-    /// On several lattices, each with its horizon.
-    Lattices {
-        /// The lattices; the first one is that of the scene's `[peridynamics]`.
-        lattices: Vec<Lattice<D>>,
-        /// The lattice of each cell.
-        of_cell: Vec<u16>,
-    },
-}
 
 /// The peridynamic choices of a scene.
 #[derive(Clone, Debug)]
@@ -176,10 +156,8 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::coupling::{
-        Motion, Sampler,
-        motion::{BondBehaviour, Critical},
-    };
+    use crate::coupling::motion::behaviour::{BondBehaviour, Critical};
+    use crate::coupling::{Motion, Sampler};
     use crate::peridynamics::kernel::Kinematics as BondKinematics;
     use crate::progress::Silent;
     use crate::run::AnyScene;

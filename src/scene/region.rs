@@ -28,6 +28,14 @@ pub enum Region<const D: usize> {
 }
 
 impl<const D: usize> Region<D> {
+    /// A region that is the whole space.
+    pub fn everywhere() -> Self {
+        Self::Shape {
+            shape: Shape::Everywhere,
+            margin: 0.0,
+        }
+    }
+
     /// The cells whose centroid lies in the region; one entry per cell.
     pub fn select(&self, mesh: &Mesh<D>) -> Vec<bool> {
         match self {

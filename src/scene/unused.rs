@@ -3,12 +3,13 @@
 //! A shape beside the body is no mistake of the format, and nothing else tells of it: the run goes on as if it had not been typed. So each is warned of
 //! by its name. Points are taken where the lattice or the cells of the zone have them, and the search ends with the first that is touched.
 
-use super::peridynamics::{Peridynamics, Points};
+use super::peridynamics::Peridynamics;
 use super::region::Region;
 use super::spec::{SceneSpec, ZonesNeeded};
 use super::validated::Scene;
 use crate::coupling::Zone;
 use crate::observe::report::number;
+use crate::scene::points::Points;
 use crate::shape::Barrier;
 use crate::tensor::Vector;
 

@@ -139,12 +139,4 @@ impl<const D: usize> Scene<D> {
             .as_ref()
             .map_or(0.0, |p| p.horizon.eval(&padded(x)))
     }
-
-    /// A region that is the whole space.
-    pub fn everywhere() -> Region<D> {
-        Region::Shape {
-            shape: Shape::Everywhere,
-            margin: 0.0,
-        }
-    }
 }

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 use super::check;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
-use super::joined::Joined;
 use super::region::{self, Region};
 use super::source::Span;
 use super::spec::{SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::scene::selected_coupling::Joined;
 use crate::tensor::{Vector, padded};
 
 /// The nonlocal zone that a scene needs.

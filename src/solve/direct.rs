@@ -7,6 +7,7 @@
 //!
 //! Rejected: faer's sparse LU (column ordering by COLAMD only), measured against this one in `docs/solvers.md`.
 
+pub use super::direct_params::{DirectError, DirectParams};
 use crate::progress::Progress;
 use crate::solve::FreeDofs;
 use crate::solve::krylov::LinearMap;
@@ -15,30 +16,6 @@ use crate::solve::ordering::{Ordering, OrderingError, SiteGraph};
 use crate::solve::symbolic::{FactorCost, Symbolic};
 use crate::system::{BlockCsr, Symmetry};
 use std::time::Instant;
-
-/// What a factorisation may be asked for.
-#[derive(Clone, Copy, Debug)]
-pub struct DirectParams {
-    /// Cholesky for `Symmetric`, LU for `Unsymmetric`.
-    pub symmetry: Symmetry,
-    /// A pivot smaller than this fraction of its original diagonal entry is an error.
-    ///
-    /// Free bodies leave round-off, up to 6e-13 of the diagonal in the tests below; a cantilever fifty times as long
-    /// as it is wide has 1e-6, the blocks and plates there 1e-1 and more. Round-off above the bound shows in the residual.
-    pub smallest_pivot: f64,
-    /// Refuses a factorisation that is predicted to need more bytes.
-    pub memory_limit: Option<u64>,
-}
-
-impl Default for DirectParams {
-    fn default() -> Self {
-        DirectParams {
-            symmetry: Symmetry::Unsymmetric,
-            smallest_pivot: 1e-11,
-            memory_limit: None,
-        }
-    }
-}
 
 /// What a factorisation did.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -55,40 +32,6 @@ pub struct DirectInfo {
     pub ordering_seconds: f64,
     /// Seconds for the numerical factorisation.
     pub factor_seconds: f64,
-}
-
-/// Why a factorisation failed.
-#[derive(Debug, thiserror::Error)]
-pub enum DirectError {
-    /// The factors would not fit.
-    #[error(
-        "the factors need {:.1} GB, {:.1} GB are allowed; use the krylov method, or coarsen the model",
-        *bytes as f64 * 1e-9, *limit as f64 * 1e-9
-    )]
-    TooLarge {
-        /// Predicted peak bytes.
-        bytes: u64,
-        /// Bytes allowed.
-        limit: u64,
-    },
-    /// Cholesky met a pivot that is not positive: the matrix is not positive definite.
-    #[error(
-        "site {site} has a pivot that is not positive; the matrix is not positive definite, factorise it by LU"
-    )]
-    NotPositive {
-        /// Site of the pivot.
-        site: usize,
-    },
-    /// A pivot is zero to round-off: the matrix is singular.
-    #[error(
-        "site {site} has a pivot {ratio:.1e} of its diagonal; the matrix is singular, support the site"
-    )]
-    Singular {
-        /// Site of the pivot.
-        site: usize,
-        /// Pivot over original diagonal.
-        ratio: f64,
-    },
 }
 
 /// The factors of a matrix restricted to its free dofs.

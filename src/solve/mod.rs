@@ -3,6 +3,7 @@
 
 mod aggregate;
 pub mod direct;
+pub(crate) mod direct_params;
 pub mod explicit;
 mod front;
 pub mod growth;

@@ -2,7 +2,7 @@
 
 use crate::progress::Progress;
 use crate::solve::FreeDofs;
-use crate::solve::direct::{DirectError, DirectParams};
+use crate::solve::direct_params::{DirectError, DirectParams};
 use crate::solve::front::{self, BadPivot};
 use crate::solve::ordering::SiteGraph;
 use crate::solve::symbolic::Symbolic;

@@ -8,7 +8,8 @@ use crate::progress::Silent;
 use crate::solve::aggregate::{
     Aggregates, Prolongation, coarse_matrix, rigid_near_null_space, smoothed,
 };
-use crate::solve::direct::{Analysis, DirectError, DirectParams, Factor};
+use crate::solve::direct::{Analysis, Factor};
+use crate::solve::direct_params::{DirectError, DirectParams};
 use crate::solve::krylov::{LinearMap, add_scaled};
 use crate::solve::ordering::{Ordering, OrderingError};
 use crate::solve::smoother::{BlockJacobi, Chebyshev, Residual};

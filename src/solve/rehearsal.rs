@@ -168,7 +168,8 @@ mod tests {
     use super::*;
     use crate::progress::Silent;
     use crate::solve::FreeDofs;
-    use crate::solve::direct::{DirectParams, Factor};
+    use crate::solve::direct::Factor;
+    use crate::solve::direct_params::DirectParams;
     use crate::solve::ordering::Ordering;
     use crate::solve::stencils::Lattice;
 

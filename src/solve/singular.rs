@@ -5,7 +5,8 @@
 
 use crate::progress::Silent;
 use crate::solve::FreeDofs;
-use crate::solve::direct::{Analysis, DirectParams, Factor};
+use crate::solve::direct::{Analysis, Factor};
+use crate::solve::direct_params::DirectParams;
 use crate::solve::ordering::Ordering;
 use crate::system::BlockCsr;
 use nalgebra::{DMatrix, DVector};

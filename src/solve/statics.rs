@@ -2,7 +2,7 @@
 
 use crate::progress::Progress;
 use crate::solve::FreeDofs;
-use crate::solve::direct::DirectError;
+use crate::solve::direct_params::DirectError;
 use crate::solve::multigrid::MultigridError;
 use crate::solve::ordering::{Ordering, OrderingError};
 use crate::solve::singular::{self, FreeMotion};

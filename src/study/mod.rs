@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `resource_estimate.rs`, `motion_estimate.rs`, `counted.rs` | what a run will need, without solving; counted where the model is too large to be laid out |
+//! | `error_prediction.rs` | an error, predicted |
 //! | `output_cost.rs` | what its outputs will cost |
 //! | `variants/` | the scene with another value of a key, and how far outputs are apart |
 //! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
@@ -12,6 +13,7 @@
 pub mod accuracy;
 mod converge;
 mod counted;
+mod error_prediction;
 mod motion_estimate;
 mod output_cost;
 mod resource_estimate;
@@ -28,7 +30,7 @@ use crate::progress::Progress;
 use crate::run::chosen::with_choice;
 use crate::run::{AnyScene, RunError};
 use crate::scene::source::read;
-use crate::scene::{Points, Scene, SceneError, Source};
+use crate::scene::{Points, Scene, SceneError, Solve, Source};
 
 impl AnyScene {
     /// Reads and validates a scene file with overrides `key=value`.
@@ -71,9 +73,9 @@ impl AnyScene {
             return Ok(prediction);
         }
         let mut prediction = match self {
-            Self::Bar(s) => with_choice(s.scene, |s| resource_estimate::predict(s, progress)),
-            Self::Plane(s) => with_choice(s.scene, |s| resource_estimate::predict(s, progress)),
-            Self::Solid(s) => with_choice(s.scene, |s| resource_estimate::predict(s, progress)),
+            Self::Bar(s) => with_choice(s.scene, |s| predicted(s, progress)),
+            Self::Plane(s) => with_choice(s.scene, |s| predicted(s, progress)),
+            Self::Solid(s) => with_choice(s.scene, |s| predicted(s, progress)),
         }?;
         prediction.warnings.extend(unused);
         Ok(prediction)
@@ -92,5 +94,16 @@ impl AnyScene {
             Self::Plane(s) => of(s),
             Self::Solid(s) => of(s),
         }
+    }
+}
+
+/// What a run of a scene will need, once the model is laid out.
+fn predicted<const D: usize>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    match scene.solve {
+        Solve::Static => resource_estimate::predict(scene, progress),
+        Solve::Explicit(_) | Solve::QuasiStatic(_) => motion_estimate::predict(scene, progress),
     }
 }

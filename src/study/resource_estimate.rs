@@ -9,8 +9,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::accuracy::ErrorPrediction;
-use super::motion_estimate;
+use super::error_prediction::ErrorPrediction;
 use crate::assembly::Pattern;
 use crate::coupling::edge::Edge;
 use crate::coupling::{Model, PointSource, SiteKind, Zone};
@@ -33,7 +32,6 @@ use crate::run::proof::{self, Subject};
 use crate::run::setup::{self, Rest};
 use crate::run::solution::{self, Solved};
 use crate::run::warnings::doubts;
-use crate::scene::solve::Solve;
 use crate::scene::spec::{Joining, ZonesNeeded};
 use crate::scene::validated::Scene;
 use crate::solve::FreeDofs;
@@ -191,7 +189,7 @@ impl Planned {
     }
 }
 
-/// Predicts a run.
+/// Predicts a static run.
 ///
 /// # Errors
 /// [`RunError`] if the model cannot be built or a condition meets no site, as a run would.
@@ -199,9 +197,6 @@ pub(crate) fn predict<const D: usize>(
     scene: Scene<D>,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    if scene.solve != Solve::Static {
-        return motion_estimate::predict(scene, progress);
-    }
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
     let title = scene.title.clone();

@@ -4,24 +4,19 @@ pub mod influence;
 
 use rayon::prelude::*;
 
-use crate::{
-    coupling::ModelError,
-    observe::report::{Columns, Row, Table},
-    progress::{Progress, Silent},
-    solve::{
-        FreeDofs,
-        direct::{Analysis, DirectParams, Factor},
-        ordering::Ordering,
-    },
-    tensor::{Tensor, Vector, padded},
-    verify::{
-        Effort,
-        enclosed::{
-            Case, Cells, Enclosed, EnclosedError, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
-        },
-        fields::{Field, affine_modes, monomials, worst},
-    },
+use crate::coupling::ModelError;
+use crate::observe::report::{Columns, Row, Table};
+use crate::progress::{Progress, Silent};
+use crate::solve::FreeDofs;
+use crate::solve::direct::{Analysis, Factor};
+use crate::solve::direct_params::DirectParams;
+use crate::solve::ordering::Ordering;
+use crate::tensor::{Tensor, Vector, padded};
+use crate::verify::Effort;
+use crate::verify::enclosed::{
+    Case, Cells, Enclosed, EnclosedError, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
 };
+use crate::verify::fields::{Field, affine_modes, monomials, worst};
 
 /// Largest affine residual per volume, relative to `E |G|/h`, with elements aligned to the lattice.
 pub const ALIGNED_LIMIT: f64 = 1e-11;

@@ -7,27 +7,24 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::{
-    coupling::SiteKind,
-    fem::{self, Locator},
-    observe::report::{Columns, Row, Table},
-    peridynamics::{BondLaw, LinearPeridynamicSolid, Micromodulus},
-    progress::{Progress, Silent},
-    solve::{
-        FreeDofs,
-        direct::{Analysis, DirectError, DirectParams, Factor},
-        ordering::Ordering,
-        statics::{self, StaticParams, StaticProblem},
-    },
-    system::Symmetry,
-    tensor::{Vector, padded},
-    verify::{
-        Effort,
-        enclosed::{Case, Cells, Enclosed, INFLUENCE, Law, Method, Widths, YOUNGS_MODULUS},
-        patch::affine_residual_where,
-        tangents::momentum,
-    },
+use crate::coupling::SiteKind;
+use crate::fem::{self, Locator};
+use crate::observe::report::{Columns, Row, Table};
+use crate::peridynamics::{BondLaw, LinearPeridynamicSolid, Micromodulus};
+use crate::progress::{Progress, Silent};
+use crate::solve::FreeDofs;
+use crate::solve::direct::{Analysis, Factor};
+use crate::solve::direct_params::{DirectError, DirectParams};
+use crate::solve::ordering::Ordering;
+use crate::solve::statics::{self, StaticParams, StaticProblem};
+use crate::system::Symmetry;
+use crate::tensor::{Vector, padded};
+use crate::verify::Effort;
+use crate::verify::enclosed::{
+    Case, Cells, Enclosed, INFLUENCE, Law, Method, Widths, YOUNGS_MODULUS,
 };
+use crate::verify::patch::affine_residual_where;
+use crate::verify::tangents::momentum;
 
 /// Largest `‖K − Kᵀ‖/‖K‖`.
 pub const SYMMETRY_LIMIT: f64 = 1e-14;

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use super::{BondBehaviour, CHUNK, Critical, MotionError, NONE};
+use crate::coupling::motion::behaviour::{BondBehaviour, CHUNK, Critical, MotionError, NONE};
 use crate::{
     assembly::Transfer,
     coupling::{Model, Operator, SeamBonds, SiteKind},

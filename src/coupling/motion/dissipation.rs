@@ -1,6 +1,7 @@
 //! What breaking bonds costs: energy stored just before less that just after, at the same displacement, and the area of the cracks.
 
-use super::{Motion, NONE};
+use super::Motion;
+use crate::coupling::motion::behaviour::NONE;
 use crate::{
     peridynamics::CrackArea,
     system::{Dissipation, Halfway},

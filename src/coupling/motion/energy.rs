@@ -2,10 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{
-    CHUNK,
-    rows::{SiteRows, row_product},
-};
+use super::rows::{SiteRows, row_product};
+use crate::coupling::motion::behaviour::CHUNK;
 use crate::{
     assembly::{self, Transfer},
     coupling::{CellRole, Model, SiteKind},

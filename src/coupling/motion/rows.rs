@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, NONE};
+use crate::coupling::motion::behaviour::{CHUNK, NONE};
 use crate::{
     assembly::{self, Row},
     system::BlockCsr,

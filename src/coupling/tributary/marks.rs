@@ -1,9 +1,7 @@
 //! The cells of a lattice that the edge of a region cuts, and what cells of the mesh have of them.
 
-use super::{
-    parts::{Detail, Found, FoundCells},
-    simplex::{Cells, Simplex, as_box, box_quadrature, simplices_of},
-};
+use super::simplex::{Cells, Simplex, as_box, box_quadrature, simplices_of};
+use crate::coupling::tributary::found::{Detail, Found, FoundCells};
 use crate::{coupling::Model, shape::Shape, tensor::Vector};
 
 /// Which cells of a lattice the edge of a region cuts.

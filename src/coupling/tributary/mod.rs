@@ -18,12 +18,14 @@
 //! too, stay as they are: there forces between points are equal and opposite.
 
 mod around;
+pub(crate) mod found;
 mod grid;
 mod marks;
 mod parts;
 mod simplex;
 
-pub use parts::{Detail, Moments, Parts};
+pub use crate::coupling::tributary::found::{Detail, Moments};
+pub use parts::Parts;
 
 use crate::{
     coupling::{CellRole, Model, PointSource, SiteKind},

@@ -3,13 +3,13 @@
 use std::cell::OnceCell;
 
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
+use super::found::{Detail, Found, FoundCells};
 use super::{
     around::{Around, centroid_sites},
     grid::{Beyond, Follows, Grid},
     marks::Marks,
-    simplex::{Cells, Simplex, box_quadrature, facet_simplices, moments_of_cells},
+    simplex::{Cells, box_quadrature, facet_simplices, moments_of_cells},
 };
 use crate::{
     coupling::{Model, PointSource, SiteKind},
@@ -18,15 +18,6 @@ use crate::{
     shape::Shape,
     tensor::{Tensor, Vector},
 };
-
-/// What of a part is kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Detail {
-    /// Its size and its centre: enough for a field that is the same everywhere.
-    Centre,
-    /// Quadrature points too, for a field that varies in space.
-    Quadrature,
-}
 
 /// Parts of a region with the sites that they follow.
 ///
@@ -42,69 +33,6 @@ pub struct Parts<const D: usize> {
     quadrature_offsets: Vec<usize>,
     quadrature: Vec<(Vector<D>, f64)>,
 }
-
-/// The force on a region and its first moment, `∫ b` and `∫ b ⊗ x`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moments<const D: usize> {
-    /// `∫ b` \[N\].
-    pub force: Vector<D>,
-    /// `∫ b ⊗ x` \[N m\], about the origin.
-    pub moment: Tensor<D>,
-}
-
-impl<const D: usize> Default for Moments<D> {
-    fn default() -> Self {
-        Self {
-            force: Vector::zeros(),
-            moment: Tensor::zeros(),
-        }
-    }
-}
-
-impl<const D: usize> Moments<D> {
-    /// Adds a force at a position.
-    pub fn add(&mut self, force: &Vector<D>, x: &Vector<D>) {
-        self.force += force;
-        self.moment += force * x.transpose();
-    }
-}
-
-/// What is known of a part while it is put together.
-pub(super) struct Found<const D: usize> {
-    pub size: f64,
-    /// `∫ (x − middle of the cell)`.
-    pub moment: Vector<D>,
-    pub quadrature: Vec<(Vector<D>, f64)>,
-}
-
-impl<const D: usize> Default for Found<D> {
-    fn default() -> Self {
-        Self {
-            size: 0.0,
-            moment: Vector::zeros(),
-            quadrature: Vec::new(),
-        }
-    }
-}
-
-impl<const D: usize> Found<D> {
-    pub fn add(&mut self, simplex: &Simplex<D>, middle: &Vector<D>, detail: Detail) {
-        let size = simplex.size();
-        self.size += size;
-        self.moment += (simplex.centre() - middle) * size;
-        if detail == Detail::Quadrature {
-            simplex.quadrature(|x, w| self.quadrature.push((x, w)));
-        }
-    }
-
-    fn take_in(&mut self, other: Self) {
-        self.size += other.size;
-        self.moment += other.moment;
-        self.quadrature.extend(other.quadrature);
-    }
-}
-
-pub(super) type FoundCells<const D: usize> = FxHashMap<[i32; D], Found<D>>;
 
 impl<const D: usize> Parts<D> {
     /// The parts of some cells that hold points; `counts` has one entry per cell of the mesh.

@@ -8,10 +8,8 @@ use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
 use rayon::prelude::*;
 
-use super::{
-    normal::Dense,
-    sparse_change::{Conditions, norm},
-};
+use super::normal::Dense;
+use crate::coupling::truncated::conditions::{Conditions, norm};
 
 /// Conditions from which on their normal equations are factorised: conjugate gradients alone take as many iterations as a long seam has points.
 const FACTORISED: usize = 300;

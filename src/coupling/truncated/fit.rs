@@ -11,13 +11,11 @@
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::{
-    dilatation::state_of,
-    edges::Strings,
-    segments::{End, Segments},
-    sparse_change::Conditions,
-    squares::fit_factors,
-};
+use super::dilatation::state_of;
+use super::edges::Strings;
+use super::segments::{End, Segments};
+use super::squares::fit_factors;
+use crate::coupling::truncated::conditions::Conditions;
 use crate::{
     coupling::{ModelError, SiteKind},
     fem,

@@ -23,6 +23,7 @@
 //! pulls like the whole bond, so the forces on points cancel as far from the seam, and the forces on a face add up to the traction of the lattice. Pieces of bonds with both ends in elements
 //! (through a corner of the zone, or a zone thinner than a horizon) belong to the sum.
 
+pub(crate) mod conditions;
 mod dilatation;
 mod edges;
 mod factors;

@@ -3,6 +3,7 @@
 use faer::sparse::linalg::solvers::Llt;
 use rayon::prelude::*;
 
+use super::conditions::{Conditions, dot, norm};
 use super::factors::solved;
 
 /// Steps of the dual Newton method.
@@ -71,19 +72,6 @@ struct Found {
     change: Vec<f64>,
     /// Whether changes that meet the conditions are shown to be far too large.
     is_far: bool,
-}
-
-/// Conditions on changes, one column per change.
-#[derive(Clone)]
-pub(super) struct Conditions {
-    pub(super) count: usize,
-    offsets: Vec<usize>,
-    rows: Vec<u32>,
-    values: Vec<f64>,
-    /// From this column on changes have no floor.
-    free: usize,
-    /// Iterations with factors times conditions.
-    most_led: usize,
 }
 
 impl Conditions {
@@ -509,14 +497,6 @@ impl Conditions {
         }
         (best.1, iterations)
     }
-}
-
-pub(super) fn norm(v: &[f64]) -> f64 {
-    dot(v, v).sqrt()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -12,15 +12,13 @@
 
 use rustc_hash::FxHashMap;
 
-use super::{
-    feet::{Shift, shifts},
-    fit::{
-        FLOOR, MET, MOST_TRIPLES, Part, cube, finish, loaded_nodes, pair_tensor, parts,
-        points_at_seam, rounding, third, triples,
-    },
-    segments::{End, Segments},
-    sparse_change::Conditions,
+use super::feet::{Shift, shifts};
+use super::fit::{
+    FLOOR, MET, MOST_TRIPLES, Part, cube, finish, loaded_nodes, pair_tensor, parts, points_at_seam,
+    rounding, third, triples,
 };
+use super::segments::{End, Segments};
+use crate::coupling::truncated::conditions::Conditions;
 use crate::{coupling::ModelError, tensor::Vector};
 
 /// Pieces shorter than this part of the spacing get less stiffness to begin with, or their `k/s` would make the stable step arbitrarily short. Half a spacing is the shortest piece where faces follow the lattice.

@@ -1,10 +1,9 @@
 //! What the bonds that a pass broke have taken: energy stored before less that stored after, at a displacement of choice.
 
-use super::{
-    lanes::LANES,
-    lattice::Lattice,
-    list::{List, extension, stretched},
-};
+use super::lanes::LANES;
+use super::lattice::Lattice;
+use super::list::{extension, stretched};
+use crate::peridynamics::kernel::bond_list::List;
 
 impl<const D: usize> Lattice<D> {
     /// Directed bonds that the last pass broke: group, lane and offset, ascending.

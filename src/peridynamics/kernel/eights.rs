@@ -2,12 +2,10 @@
 
 use std::ops::Range;
 
-use super::{
-    bond::{CHI, PSI, SERIES_RANGE, SHORTEST},
-    lanes::{LANES, Lanes, Work, dispatch},
-    list::{Limit, List},
-    sweep::Bits,
-};
+use super::bond::{CHI, PSI, SERIES_RANGE, SHORTEST};
+use super::lanes::{LANES, Lanes, Work, dispatch};
+use super::sweep::Bits;
+use crate::peridynamics::kernel::bond_list::{Limit, List};
 
 /// What the bonds of a point add up to.
 #[derive(Clone, Copy)]

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::bond_list::{Limit, List, Solid};
 use super::{
     BondForce, BondPass, BondSetup, Kinematics, Storage,
     bond::psi,
@@ -13,45 +14,6 @@ use crate::system::Breakage;
 
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
-
-/// When bonds break, as a limit of `t`.
-pub(super) enum Limit {
-    Never,
-    Uniform(f64),
-    PerBond(Vec<f64>),
-}
-
-/// Coefficients of the state-based law, per point.
-pub(super) struct Solid {
-    /// `D/m`.
-    pub dilatation: Vec<f64>,
-    /// `(D k − (D+2) μ)/m`.
-    pub volumetric: Vec<f64>,
-    /// `D (D+2) μ/m`.
-    pub deviatoric: Vec<f64>,
-    /// Dilatation of the pass at hand.
-    theta: Vec<f64>,
-}
-
-/// A bond pass over lists: two (or four) bytes of neighbour, eight (or four) of weight and one bit per directed bond.
-pub(super) struct List<const D: usize> {
-    pub position: Vec<[f64; D]>,
-    pub volume: Vec<f64>,
-    pub row: Vec<bool>,
-    pub no_fail: Vec<bool>,
-    pub offsets: Vec<usize>,
-    pub neighbours: Neighbours,
-    pub weights: Weights,
-    pub limit: Limit,
-    kinematics: Kinematics,
-    pub solid: Option<Solid>,
-    /// Start of each point's bits, which fill whole bytes.
-    pub bytes: Vec<usize>,
-    intact: Vec<u8>,
-    reference: u64,
-    /// Points and bonds that the last pass broke, ascending.
-    pub(super) last: Vec<(u32, usize)>,
-}
 
 /// What one bond gives.
 pub(crate) struct Stretched<const D: usize> {

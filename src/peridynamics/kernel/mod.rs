@@ -19,6 +19,7 @@
 //! hence break together without telling each other. Every method gives the same bits for any number of threads.
 
 mod bond;
+pub(crate) mod bond_list;
 mod breaks;
 mod eights;
 mod lanes;
@@ -120,7 +121,7 @@ pub fn bond_pass<const D: usize>(
     setup.check_bonds()?;
     match why {
         Some(why) if setup.layout == Layout::Lattice => Err(KernelError::NoLattice { why }),
-        _ => Ok(Box::new(list::List::new(setup))),
+        _ => Ok(Box::new(bond_list::List::new(setup))),
     }
 }
 

@@ -8,9 +8,8 @@
 //!
 //! Energies are those of the rows of the history, and of every hundredth step where rows are farther apart, so that watching costs less than one per cent.
 
-use serde::{Deserialize, Serialize};
-
 use super::record::{Moment, Row};
+use super::seen::{Rotated, Seen};
 use crate::coupling::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::rotation::Rotations;
@@ -24,29 +23,6 @@ const LOOKS: u64 = 1000;
 
 /// A gain of this part is told.
 pub(crate) const TOLD: f64 = 0.01;
-
-/// What was seen so far: part of a checkpoint.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Seen {
-    /// The largest energy or work so far.
-    largest: f64,
-    /// Where the gain went beyond [`TOLD`]: part, step, time.
-    told: Option<(f64, u64, f64)>,
-    /// The largest gain: part, step, time.
-    most: Option<(f64, u64, f64)>,
-    /// The largest rotation: degrees, cell, step, time, and the strain energy that it costs.
-    rotated: Option<Rotated>,
-}
-
-/// An element that has rotated.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Rotated {
-    degrees: f64,
-    place: [f64; 3],
-    step: u64,
-    time: f64,
-    energy: f64,
-}
 
 /// Whether the balance of energy is watched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -23,6 +23,7 @@ pub(crate) mod pace;
 pub(crate) mod quasi_static;
 pub(crate) mod ready;
 pub(crate) mod record;
+pub(crate) mod seen;
 pub(crate) mod switching;
 pub(crate) mod system;
 pub(crate) mod watch;

@@ -1,7 +1,6 @@
 //! What the steps with one layout of the zones begin with: at time zero, at a checkpoint, or where the zones have changed.
 
 use super::drive::SceneDrive;
-use super::guard::Seen;
 use super::laid_out::{breaks, restore};
 use super::pace::{held, paced, repaced};
 use super::record::{EdgeReached, Recorder, Saved, StepChoice, Zone};
@@ -12,6 +11,7 @@ use crate::observe::checkpoint::{CheckpointFile, Pace};
 use crate::observe::proof::Part;
 use crate::observe::summary::{Choice, Stopwatch, Timings, bytes_text};
 use crate::run::error::RunError;
+use crate::run::motion::seen::Seen;
 use crate::run::proof::growth::Asked;
 use crate::run::setup::Rest;
 use crate::scene::solve::Explicit as Spec;

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::guard::Seen;
 use super::switching::{nonlocal, share};
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
@@ -14,6 +13,7 @@ use crate::observe::csv::Entry;
 use crate::observe::history::History;
 use crate::observe::series::Series;
 use crate::observe::switch::Switch;
+use crate::run::motion::seen::Seen;
 use crate::run::solution::Solved;
 use crate::run::write::{OverSites, Shown, snapshot};
 use crate::scene::conditions::Condition;

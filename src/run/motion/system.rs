@@ -1,8 +1,7 @@
 //! The moving system of a scene: what moves, with what mass, from where.
 
-use crate::coupling::motion::{
-    BondBehaviour, ContactBehaviour, Critical, Motion, MotionError, masses,
-};
+use crate::coupling::motion::behaviour::{BondBehaviour, ContactBehaviour, Critical, MotionError};
+use crate::coupling::motion::{Motion, masses};
 use crate::coupling::{BrokenBonds, Coupling, Definiteness, Interface, Model, Operator};
 use crate::observe::summary::Choice;
 use crate::peridynamics::fracture;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::coupling::motion::{BondBehaviour, Critical};
+use crate::coupling::motion::behaviour::{BondBehaviour, Critical};
 use crate::coupling::{Model, Motion, Zone};
 use crate::peridynamics::kernel::Kinematics;
 use crate::progress::Silent;

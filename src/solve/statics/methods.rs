@@ -1,7 +1,8 @@
 //! The ways to solve for the free dofs, and the choice among them.
 
 use crate::progress::Progress;
-use crate::solve::direct::{Analysis, DirectError, DirectInfo, DirectParams, Factor};
+use crate::solve::direct::{Analysis, DirectInfo, Factor};
+use crate::solve::direct_params::{DirectError, DirectParams};
 use crate::solve::krylov::{KrylovError, KrylovParams, conjugate_gradients, gmres};
 use crate::solve::multigrid::{Multigrid, MultigridParams};
 use crate::solve::singular;

@@ -5,47 +5,9 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
-
-use super::TradeError;
 use crate::observe::claim;
+use crate::study::trade::params::{Cost, TradeError};
 use crate::study::variants::Measured;
-
-/// What a case cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Cost {
-    /// Seconds of all stages but output.
-    pub seconds: f64,
-    /// The most memory that its process held, in bytes; 0 where the system does not tell.
-    pub memory: f64,
-    /// Bonds times steps (times one in a scene at rest).
-    pub bond_visits: f64,
-    /// Unknowns.
-    pub unknowns: f64,
-}
-
-/// How a case ended.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Outcome {
-    /// It ran.
-    Ran {
-        /// What it cost.
-        cost: Cost,
-        /// Relative difference from the reference, one per quantity.
-        errors: Vec<f64>,
-    },
-    /// It was refused, or broke off.
-    Refused {
-        /// In the program's own words, a line.
-        why: String,
-    },
-    /// It took several times as long as the reference.
-    OverTime {
-        /// Seconds after which it was ended.
-        seconds: f64,
-    },
-}
 
 /// A case that ran.
 pub(super) struct Ran {

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Case, Cost, TradeError};
+use super::Cost;
 use crate::observe::checkpoint::Fingerprint;
 use crate::regular_file;
 use crate::scene::spec::MeshSpec;
 use crate::scene::{SceneSpec, Source};
+use crate::study::trade::params::{Case, TradeError};
 use crate::study::variants::{Measured, Quantity};
 
 /// The first line of a record: what its errors belong to.

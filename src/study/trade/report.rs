@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::{Case, CostBy, Outcome, Trade, TradeEnd, TradeError, TradeParams, front};
+use super::{Outcome, front};
 use crate::observe::csv::{CsvTable, Entry};
 use crate::observe::figure::{LinePlot, Scale, Series, Stroke};
 use crate::observe::file::write_whole;
 use crate::observe::report::{aligned, number};
 use crate::scene::Source;
+use crate::study::trade::params::{Case, CostBy, Trade, TradeEnd, TradeError, TradeParams};
 
 impl Trade {
     fn points(&self) -> Vec<(usize, (f64, f64))> {

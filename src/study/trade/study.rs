@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::case::{Attempt, Outcome, Runner};
+use super::case::{Attempt, Runner};
 use super::effects::{Effects, most_promising};
+use super::params::Outcome;
 use super::record::{self, write_line};
-use super::{Case, TradeEnd, TradeError, TradeParams};
 use crate::progress::Progress;
 use crate::scene::Source;
+use crate::study::trade::params::{Case, TradeEnd, TradeError, TradeParams};
 use crate::study::variants::{Base, Setting};
 use crate::study::variants::{Measured, Quantity};
 

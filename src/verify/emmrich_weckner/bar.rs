@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use super::{LAMBDA, exact, initial, micromodulus};
+use crate::verify::emmrich_weckner::closed_form::{LAMBDA, exact, initial, micromodulus};
 
 /// Nodes and `σ exp(x²)` of the Gauss–Hermite rule of `n` points.
 ///

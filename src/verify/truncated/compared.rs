@@ -8,24 +8,20 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::Material;
-use crate::{
-    coupling::{
-        BlendingFunction, Coupling, FitDegree, Local, Nonlocal,
-        motion::{BondBehaviour, Critical, Motion, masses},
-    },
-    observe::report::{Columns, Row, Table},
-    peridynamics::{Micromodulus, kernel::Kinematics},
-    progress::{Progress, Silent},
-    shape::{Barrier, Shape},
-    solve::statics::{self, StaticParams, StaticProblem},
-    system::{Breakage, Dynamic, Halfway, Symmetry},
-    tensor::{Vector, padded},
-    verify::{
-        Effort,
-        enclosed::{
-            Case, Cells, Enclosed, INFLUENCE, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
-        },
-    },
+use crate::coupling::motion::behaviour::{BondBehaviour, Critical};
+use crate::coupling::motion::{Motion, masses};
+use crate::coupling::{BlendingFunction, Coupling, FitDegree, Local, Nonlocal};
+use crate::observe::report::{Columns, Row, Table};
+use crate::peridynamics::Micromodulus;
+use crate::peridynamics::kernel::Kinematics;
+use crate::progress::{Progress, Silent};
+use crate::shape::{Barrier, Shape};
+use crate::solve::statics::{self, StaticParams, StaticProblem};
+use crate::system::{Breakage, Dynamic, Halfway, Symmetry};
+use crate::tensor::{Vector, padded};
+use crate::verify::Effort;
+use crate::verify::enclosed::{
+    Case, Cells, Enclosed, INFLUENCE, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
 };
 
 const METHODS: [Method; 7] = [

@@ -6,14 +6,19 @@ use bondline::run::{AnyScene, PlacedScene, RunError, RunOptions, Solved, solve_w
 use bondline::scene::{SceneError, SceneErrorKind, Solve};
 use bondline::{RunSummary, Silent};
 
+use super::size::IS_INSTRUMENTED;
 use super::variant;
 
 /// The most steps in time that are run.
-const MOST_STEPS: u64 = 200;
+const MOST_STEPS: u64 = if IS_INSTRUMENTED { 60 } else { 200 };
 /// The most iterations that a load step is given.
 const MOST_ITERATIONS: usize = 3000;
-/// The most iterations times bonds: some seconds in an instrumented build.
-const MOST_WORK: usize = 40_000_000;
+/// The most iterations times bonds.
+const MOST_WORK: usize = if IS_INSTRUMENTED {
+    5_000_000
+} else {
+    40_000_000
+};
 /// The relative residual above which a static scene does not count as solved. The solvers promise the scene's tolerance, 1e-10 by default.
 const RESIDUAL: f64 = 1e-8;
 

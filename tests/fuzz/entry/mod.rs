@@ -158,6 +158,9 @@ fn variant(error: &impl std::fmt::Debug) -> String {
 pub fn random_scene(data: &[u8]) -> Outcome {
     let text = random_text(data);
     keep(&text, &[]);
+    if size::IS_INSTRUMENTED && text.contains("mesh.file") {
+        return Outcome::Skipped("large");
+    }
     run_text(&text, &fixtures())
 }
 

@@ -1,0 +1,307 @@
+//! What a mesh file holds before it is a mesh: nodes, elements and groups as they are read, and where in the file an error lies.
+
+use super::error::axis_name;
+use super::{CellShape, Facet, Mesh, MeshError, Place};
+use crate::tensor::Vector;
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+
+/// How far out of its plane a node of a 2D mesh may lie, as a fraction of the mesh's extent.
+const OUT_OF_PLANE: f64 = 1e-12;
+
+/// The file behind a mesh, for messages.
+pub(super) struct Source<'a> {
+    pub path: PathBuf,
+    pub bytes: &'a [u8],
+    pub encoding: Encoding,
+}
+
+/// How positions in a file are told to its reader.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Encoding {
+    /// By lines.
+    Text,
+    /// By bytes.
+    Binary,
+}
+
+impl<'a> Source<'a> {
+    /// Where the next word begins: after blanks and line ends from byte `at` on.
+    pub fn next(&self, at: usize) -> usize {
+        let rest = &self.bytes[at..];
+        let blanks = rest.iter().position(|b| !b.is_ascii_whitespace());
+        at + blanks.unwrap_or(rest.len())
+    }
+
+    /// The rest of the line from byte `at` on, trimmed, and where the next one begins; what is not UTF-8 reads as nothing.
+    pub fn line(&self, at: usize) -> (&'a str, usize) {
+        let rest = &self.bytes[at..];
+        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+        let text = std::str::from_utf8(&rest[..length]).unwrap_or("").trim();
+        (text, at + (length + 1).min(rest.len()))
+    }
+
+    /// The file ends at byte `at`, where `wanted` should stand.
+    pub fn truncated(&self, at: usize, section: &str, wanted: &str) -> MeshError {
+        MeshError::Truncated {
+            path: self.path.clone(),
+            place: self.place(at),
+            section: section.to_owned(),
+            wanted: wanted.into(),
+        }
+    }
+
+    /// `found` stands at byte `at` instead of `wanted`.
+    pub fn syntax(&self, at: usize, found: &str, wanted: &str, remedy: &'static str) -> MeshError {
+        let found: String = found.chars().take(60).collect();
+        MeshError::Syntax {
+            path: self.path.clone(),
+            place: self.place(at),
+            found: if found.is_empty() {
+                "nothing legible".into()
+            } else {
+                format!("\"{found}\"")
+            },
+            wanted: wanted.into(),
+            remedy,
+        }
+    }
+
+    /// The place of byte `at`.
+    pub fn place(&self, at: usize) -> Place {
+        match self.encoding {
+            Encoding::Text => {
+                let before = &self.bytes[..at.min(self.bytes.len())];
+                Place::Line(1 + before.iter().filter(|&&b| b == b'\n').count())
+            }
+            Encoding::Binary => Place::Byte(at),
+        }
+    }
+}
+
+/// A node as the file holds it.
+pub(super) struct RawNode {
+    pub tag: u64,
+    pub x: [f64; 3],
+    /// Byte where it stands.
+    pub at: usize,
+}
+
+/// An element as the file holds it.
+pub(super) struct RawElement {
+    pub tag: u64,
+    pub shape: CellShape,
+    /// Where its node tags start in [`RawMesh::element_nodes`].
+    pub start: usize,
+    /// Which of [`RawMesh::groups`] it is in.
+    pub group: u32,
+    /// Byte where it stands.
+    pub at: usize,
+}
+
+/// Nodes and elements as a file holds them, whatever its format.
+pub(super) struct RawMesh {
+    pub nodes: Vec<RawNode>,
+    pub elements: Vec<RawElement>,
+    pub element_nodes: Vec<u64>,
+    /// Lists of set names; the first one is empty.
+    pub groups: Vec<Vec<String>>,
+}
+
+impl Default for RawMesh {
+    fn default() -> Self {
+        Self {
+            nodes: Vec::new(),
+            elements: Vec::new(),
+            element_nodes: Vec::new(),
+            groups: vec![Vec::new()],
+        }
+    }
+}
+
+impl RawMesh {
+    pub(super) fn dimension(&self, source: &Source) -> Result<usize, MeshError> {
+        let found = self.elements.iter().map(|e| e.shape.dimension()).max();
+        match found {
+            Some(found) if !self.nodes.is_empty() && found > 0 => Ok(found),
+            _ => Err(MeshError::Empty {
+                path: source.path.clone(),
+                nodes: self.nodes.len(),
+                elements: self.elements.len(),
+            }),
+        }
+    }
+
+    pub(super) fn assemble<const D: usize>(&self, source: &Source) -> Result<Mesh<D>, MeshError> {
+        let path = || source.path.clone();
+        let found = self.dimension(source)?;
+        if found != D {
+            return Err(MeshError::WrongDimension {
+                path: path(),
+                wanted: D,
+                found,
+                remedy: if found < D {
+                    "mesh the volume too (in Gmsh: gmsh -3, and a physical group for it), or use the dimension found"
+                } else {
+                    "use the dimension found"
+                },
+            });
+        }
+        let numbers = self.number_nodes(source)?;
+        let mut mesh = Mesh::<D> {
+            nodes: self
+                .nodes
+                .iter()
+                .map(|n| Vector::from_fn(|k, _| n.x[k]))
+                .collect(),
+            ..Mesh::default()
+        };
+        // a 2.2 file repeats an element for each of its groups
+        let mut known: HashMap<[u32; 8], (u32, HashSet<u32>)> = HashMap::new();
+        let mut nodes: Vec<u32> = Vec::with_capacity(8);
+        for element in &self.elements {
+            nodes.clear();
+            let tags = &self.element_nodes[element.start..][..element.shape.node_count()];
+            for tag in tags {
+                let Some(&n) = numbers.get(tag) else {
+                    return Err(MeshError::MissingNode {
+                        path: path(),
+                        place: source.place(element.at),
+                        element: element.tag,
+                        node: *tag,
+                    });
+                };
+                nodes.push(n);
+            }
+            let names = &self.groups[element.group as usize];
+            let dimension = element.shape.dimension();
+            if dimension == D {
+                let mut key = [u32::MAX; 8];
+                key[..nodes.len()].copy_from_slice(&nodes);
+                key.sort_unstable();
+                let cell = match known.entry(key) {
+                    Entry::Vacant(slot) => {
+                        let cell = mesh.cell_count() as u32;
+                        slot.insert((cell, HashSet::from([element.group])));
+                        mesh.push_cell(element.shape, &nodes);
+                        cell
+                    }
+                    Entry::Occupied(mut slot) => {
+                        let (cell, groups) = slot.get_mut();
+                        if !groups.insert(element.group) {
+                            let first = self.cell_tag(D, *cell as usize);
+                            return Err(MeshError::DuplicateElement {
+                                path: path(),
+                                place: source.place(element.at),
+                                element: element.tag,
+                                first,
+                            });
+                        }
+                        *cell
+                    }
+                };
+                for name in names {
+                    mesh.cell_sets.entry(name.clone()).or_default().push(cell);
+                }
+            } else if dimension + 1 == D {
+                for name in names {
+                    let set = mesh.facet_sets.entry(name.clone()).or_default();
+                    set.push(nodes.clone());
+                }
+            } else {
+                for name in names {
+                    let set = mesh.node_sets.entry(name.clone()).or_default();
+                    set.extend_from_slice(&nodes);
+                }
+            }
+        }
+        self.check_plane(&mesh, source)?;
+        for set in mesh
+            .cell_sets
+            .values_mut()
+            .chain(mesh.node_sets.values_mut())
+        {
+            set.sort_unstable();
+            set.dedup();
+        }
+        for set in mesh.facet_sets.values_mut() {
+            let mut seen = HashSet::new();
+            set.retain(|facet| {
+                let mut key: Facet = facet.clone();
+                key.sort_unstable();
+                seen.insert(key)
+            });
+        }
+        let all = (0..mesh.cell_count() as u32).collect();
+        mesh.cell_sets.entry("all".into()).or_insert(all);
+        mesh.drop_unused_nodes();
+        Ok(mesh)
+    }
+
+    /// Number of each node tag; refuses a tag that comes twice and coordinates that are no numbers.
+    pub(super) fn number_nodes(&self, source: &Source) -> Result<HashMap<u64, u32>, MeshError> {
+        let mut numbers = HashMap::with_capacity(self.nodes.len());
+        for (i, node) in self.nodes.iter().enumerate() {
+            if let Some(first) = numbers.insert(node.tag, i as u32) {
+                return Err(MeshError::DuplicateTag {
+                    path: source.path.clone(),
+                    place: source.place(node.at),
+                    node: node.tag,
+                    first: source.place(self.nodes[first as usize].at),
+                });
+            }
+            if let Some(k) = node.x.iter().position(|v| !v.is_finite()) {
+                return Err(MeshError::NonFinite {
+                    path: source.path.clone(),
+                    place: source.place(node.at),
+                    node: node.tag,
+                    axis: axis_name(k),
+                    value: node.x[k],
+                });
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// The tag of the first element that became cell number `cell`.
+    pub(super) fn cell_tag(&self, dimension: usize, cell: usize) -> u64 {
+        let mut seen = HashSet::new();
+        self.elements
+            .iter()
+            .filter(|e| e.shape.dimension() == dimension)
+            .filter(|e| {
+                let mut tags = self.element_nodes[e.start..][..e.shape.node_count()].to_vec();
+                tags.sort_unstable();
+                seen.insert(tags)
+            })
+            .nth(cell)
+            .map_or(0, |e| e.tag)
+    }
+
+    /// Refuses nodes of cells with a coordinate beyond the mesh's dimension.
+    pub(super) fn check_plane<const D: usize>(
+        &self,
+        mesh: &Mesh<D>,
+        source: &Source,
+    ) -> Result<(), MeshError> {
+        let (lo, hi) = mesh.bounds();
+        let tolerance = OUT_OF_PLANE * (hi - lo).amax();
+        for &n in &mesh.connectivity {
+            let node = &self.nodes[n as usize];
+            for k in D..3 {
+                if node.x[k].abs() > tolerance {
+                    return Err(MeshError::OutOfPlane {
+                        path: source.path.clone(),
+                        place: source.place(node.at),
+                        node: node.tag,
+                        axis: axis_name(k),
+                        value: node.x[k],
+                        dimension: D,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,26 @@
+//! What a run has seen of its energy and of rotation so far, which a checkpoint keeps.
+
+use serde::{Deserialize, Serialize};
+
+/// What was seen so far: part of a checkpoint.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Seen {
+    /// The largest energy or work so far.
+    pub(super) largest: f64,
+    /// Where the gain went beyond [`TOLD`]: part, step, time.
+    pub(super) told: Option<(f64, u64, f64)>,
+    /// The largest gain: part, step, time.
+    pub(super) most: Option<(f64, u64, f64)>,
+    /// The largest rotation: degrees, cell, step, time, and the strain energy that it costs.
+    pub(super) rotated: Option<Rotated>,
+}
+
+/// An element that has rotated.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Rotated {
+    pub(super) degrees: f64,
+    pub(super) place: [f64; 3],
+    pub(super) step: u64,
+    pub(super) time: f64,
+    pub(super) energy: f64,
+}
