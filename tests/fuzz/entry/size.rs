@@ -7,6 +7,7 @@ use bondline::scene::{Coordinates, Number};
 use toml::Spanned;
 
 /// What is instrumented for a fuzzer takes some twenty times as long, and has ten seconds.
+#[allow(unexpected_cfgs)] // cargo-fuzz sets it
 pub const IS_INSTRUMENTED: bool = cfg!(fuzzing);
 
 /// The most cells of a mesh.
