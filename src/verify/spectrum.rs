@@ -225,30 +225,14 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
             partial.extend(partial_stress().into_iter().map(|k| of(k, law, horizon)));
         }
     }
-    let mut divergences = Vec::new();
-    for divergence in influences() {
-        let kind = Kind::Coupled(Method::Meshfree(divergence));
-        for law in [INFLUENCE, divergence] {
-            for horizon in [Horizon::Constant, Horizon::Tapered] {
-                let (name, cases) = of(kind, StripLaw::Lps(law), horizon);
-                let name = format!("divergence {}, {name}", influence_name(divergence));
-                divergences.push((name, cases));
-            }
-        }
-    }
-    divergences.dedup_by(|a, b| a.0 == b.0);
     vec![
         table::<1>(
             "growth exponent per crossing of the strip, 1D: pure models, splice, blending",
             plain,
         ),
         table::<1>(
-            "growth exponent per crossing of the strip, 1D: partial stress, divergence P1/r",
+            "growth exponent per crossing of the strip, 1D: partial stress, the divergence as a scene takes it",
             partial,
-        ),
-        table::<1>(
-            "growth exponent per crossing of the strip, 1D: partial stress meshfree, by its divergence",
-            divergences,
         ),
         plane(effort),
         steps(effort),
