@@ -3,9 +3,10 @@
 //! | file | what |
 //! |---|---|
 //! | `generate.rs` | line, rectangle and box with cut-outs and grading |
-//! | `read.rs` | one entry for all files, and what all readers share |
-//! | `gmsh.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
-//! | `vtk.rs` | VTK files: cells, and groups of them by integers |
+//! | `read.rs` | one entry for all files |
+//! | `raw.rs` | what a file holds before it is a mesh |
+//! | `gmsh.rs`, `gmsh_kinds.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
+//! | `vtk.rs`, `vtk_grid.rs` | VTK files: cells, and groups of them by integers |
 //! | `vtu.rs`, `vtk_legacy.rs` | their two formats, `.vtu` and `.vtk` |
 //! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |

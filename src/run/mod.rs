@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `any_scene.rs` | a scene of any dimension with its zone placed: what is run |
+//! | `any_scene.rs`, `placed_scene.rs` | a scene of any dimension with its zone placed: what is run |
 //! | `placement/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `setup.rs` | `Scene` to the problem that is coupled, and the settings that a run keeps |
 //! | `budget.rs` | the memory that a run may take, and the refusal of what needs more before anything is laid out |

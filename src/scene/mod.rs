@@ -8,8 +8,9 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `default_points.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `follow.rs`, `output.rs` | its parts |
-//! | `joined.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `default_points.rs`, `points.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `follow.rs`, `output.rs` | its parts |
+//! | `joined.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `check.rs` | numbers within their bounds |
 //! | `agreement.rs` | whether parts that are right alone agree |
 //! | `unused.rs` | parts of a scene that touch nothing |
 //! | `template.rs` | commented scenes to start from |

@@ -6,6 +6,7 @@
 //! | `grid.rs` | places on a lattice, expressed through sites |
 //! | `around.rs` | places beside points at centroids |
 //! | `marks.rs` | the cells of a lattice that the edge of a region cuts |
+//! | `found.rs` | volumes and moments of parts that were found |
 //! | `parts.rs` | a region of the zone, or of its surface, in parts that follow sites |
 //!
 //! The principle of virtual work gives all of it. The displacement of a finite element is `Σ N_a u_a`; a cell of the lattice that lies in the zone as a whole has that of its point; one that the seam, a surface or a void cuts has

@@ -11,6 +11,7 @@
 //! | `factors.rs` | factors of the normal equations of the fit, and what they cost |
 //! | `feet.rs` | other traces at the ends of pieces, where factors alone do not do |
 //! | `squares.rs` | factors of pieces where faces cut the lattice anywhere, and an LPS as a sum of squares |
+//! | `conditions.rs`, `normal.rs` | the conditions of the fit, and their normal equations |
 //! | `fit.rs`, `sparse_change.rs` | the same for an LPS with few bonds, shares of dilatations apart; the smallest change |
 //!
 //! The energy is that of the finite elements, of the bonds within the peridynamic zone, and of the pieces of all other bonds of the lattice, continued behind the faces, that lie within the zone:

@@ -5,6 +5,7 @@
 //! | `setup.rs` | what a pass is made from, and the errors |
 //! | `bond.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
+//! | `bond_list.rs` | neighbour lists with what their pass reads |
 //! | `list.rs`, `eights.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `packed.rs` | neighbours and weights of a list in few bytes |
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |

@@ -9,8 +9,8 @@
 //! | `ready.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
 //! | `quasi_static.rs` | the run under a load that grows |
 //! | `pace.rs` | the time step, with sub-cycling |
-//! | `guard.rs` | what is watched meanwhile: energy, rotation of elements |
-//! | `watch.rs` | where a zone that follows the crack is wanted |
+//! | `guard.rs`, `seen.rs` | what is watched meanwhile: energy, rotation of elements |
+//! | `watch.rs`, `cells.rs` | where a zone that follows the crack is wanted |
 //! | `switching.rs` | what a change of the zone carries over, and what it costs |
 //! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
 

@@ -2,6 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `params.rs` | what a study is asked, what its cases are, how it ends |
 //! | `case.rs` | one case in a process of its own: its cost, its outcome |
 //! | `effects.rs` | guesses of cost and error for cases that were not run; the Pareto front |
 //! | `study.rs` | which case runs next |
