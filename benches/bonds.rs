@@ -11,7 +11,7 @@ use bondline::peridynamics::kernel::{
     Storage, block_pass, bond_pass, instructions,
 };
 use bondline::peridynamics::{Families, TIE_TOLERANCE};
-use bondline::system::Breakage;
+use bondline::system::{Breakage, Interval};
 use bondline::tensor::Vector;
 use std::hint::black_box;
 use std::time::Instant;
@@ -179,11 +179,11 @@ fn time<const D: usize>(pass: &mut dyn BondPass<D>, passes: usize) -> Vec<f64> {
     let mut force = vec![0.0; u.len()];
     let bonds = pass.bonds() as f64;
     pool(1).install(|| {
-        pass.force_into(&u, &mut force, Breakage::Allowed);
+        pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
         (0..passes)
             .map(|_| {
                 let start = cpu();
-                let broken = pass.force_into(&u, &mut force, Breakage::Allowed);
+                let broken = pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
                 assert_eq!(broken, 0);
                 (cpu() - start) / bonds
             })
@@ -213,7 +213,7 @@ fn time_with_contact(pass: &mut dyn BondPass<3>, n: usize, passes: usize) -> Vec
         (0..=passes)
             .map(|_| {
                 let start = cpu();
-                pass.force_into(&u, &mut force, Breakage::Allowed);
+                pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
                 contact.add_force(&u, &|i, j| pass.bonded(i, j), &mut force);
                 (cpu() - start) / bonds
             })
@@ -231,7 +231,7 @@ fn walls<const D: usize>(pass: &mut dyn BondPass<D>, rounds: usize) -> [f64; 2] 
     for _ in 0..rounds {
         for (pool, least) in pools.iter().zip(&mut least) {
             let start = Instant::now();
-            pool.install(|| pass.force_into(&u, &mut force, Breakage::Allowed));
+            pool.install(|| pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed));
             *least = least.min(start.elapsed().as_secs_f64() * 1e9 / pass.bonds() as f64);
         }
     }
@@ -527,7 +527,7 @@ fn memory() {
         let mut pass = make();
         let u = motion(pass.points() * 3);
         let mut force = vec![0.0; u.len()];
-        pass.force_into(&u, &mut force, Breakage::Allowed);
+        pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
         let bytes = (resident() - before) / pass.bonds() as f64;
         println!("| {name} | {:.1e} | {bytes:.2} |", pass.bonds() as f64);
     };

@@ -117,7 +117,7 @@
 //!     cell_material: vec![0; 30],
 //!     peridynamic_material: 0,
 //!     peridynamics: Some(Peridynamics {
-//!         law: Box::new(BondBased::new(Micromodulus::Constant, 1.0)),
+//!         law: Arc::new(BondBased::new(Micromodulus::Constant, 1.0)),
 //!         horizon: Arc::new(|_| 3.0),
 //!         points: PointSource::Cells,
 //!         weights: BondWeights::Isotropic,
@@ -186,7 +186,7 @@ pub use coupling::{
 pub use mesh::{CellShape, Mesh, MeshError};
 pub use observe::summary::RunSummary;
 pub use peridynamics::{
-    BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
+    BondBased, BondWeights, Correspondence, Influence, LinearForceState, LinearPeridynamicSolid,
     Micromodulus, PdBody,
 };
 pub use progress::{Progress, Silent};

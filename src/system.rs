@@ -39,7 +39,24 @@ pub enum Breakage {
     Held,
 }
 
-/// What breaking bonds has cost so far.
+/// The step that a force ends: laws with memory integrate over it, from the state that was committed last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Its end \[s\].
+    pub end: f64,
+    /// Its length Δt \[s\].
+    pub length: f64,
+}
+
+impl Interval {
+    /// No time passes.
+    pub const AT_ONCE: Self = Self {
+        end: 0.0,
+        length: 0.0,
+    };
+}
+
+/// What breaking bonds has cost so far, and what laws with memory have dissipated.
 ///
 /// Units: \[J\] and \[m²\] (per thickness and \[m\] in 2D, per section and a number in 1D).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -48,6 +65,15 @@ pub struct Dissipation {
     pub energy: f64,
     /// Area of the cracks that they left.
     pub area: f64,
+    /// Energy that bonds and points dissipated without breaking: flow, viscosity.
+    pub inelastic: f64,
+}
+
+impl Dissipation {
+    /// All energy that is neither stored nor in motion any more.
+    pub fn total(&self) -> f64 {
+        self.energy + self.inelastic
+    }
 }
 
 /// A displacement `u − back · v`, computed where it is asked for.
@@ -100,8 +126,17 @@ pub trait Dynamic: Send + Sync {
     /// Lumped mass of each site \[kg\].
     fn mass(&self) -> &[f64];
 
-    /// Overwrites `force` with the internal force `F(u)` (`K u` of a linear system); returns how many bonds this pass broke.
-    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64;
+    /// Overwrites `force` with the internal force `F(u, t, Δt)` at the end of an interval that begins where [`Dynamic::commit`] was called last (`K u` of a linear system); returns how many bonds this pass broke.
+    fn internal_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        breakage: Breakage,
+    ) -> u64;
+
+    /// Ends the interval at the displacement of the last call of [`Dynamic::internal_force_into`]: what laws remember is from now on what they remembered there. A trial that is not committed leaves no trace.
+    fn commit(&mut self);
 
     /// `y = K x` with the tangent `K` at rest, broken bonds left out.
     fn tangent_into(&self, x: &[f64], y: &mut [f64]);
@@ -147,9 +182,9 @@ pub trait Dynamic: Send + Sync {
     /// Whoever lets bonds break calls this before anything else.
     fn account_for_breaks(&mut self, _at: &Halfway<'_>) {}
 
-    /// The energy of [`Dynamic::dissipation`] \[J\].
+    /// All energy of [`Dynamic::dissipation`] \[J\].
     fn dissipated_energy(&self) -> Option<f64> {
-        self.dissipation().map(|d| d.energy)
+        self.dissipation().map(|d| d.total())
     }
 
     /// Damage of each site, `1 − Σ V of intact bonds / Σ V of all`; none if nothing can break.
@@ -203,10 +238,18 @@ impl Dynamic for LinearMotion {
         &self.mass
     }
 
-    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], _breakage: Breakage) -> u64 {
+    fn internal_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        _interval: Interval,
+        _breakage: Breakage,
+    ) -> u64 {
         self.stiffness.multiply_into(u, force);
         0
     }
+
+    fn commit(&mut self) {}
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.stiffness.multiply_into(x, y);

@@ -127,13 +127,15 @@ impl<const D: usize> LatticeFactors<D> {
             let horizon = f64::from_bits(bits);
             let (lattice, shares) =
                 lattice_shells::<D>(p.volumes, horizon / cloud.spacing, TIE_TOLERANCE)?;
-            let weights = match p.law.shell_target().filter(|_| isotropic) {
+            let weights = match p.law.linearised().shell_target().filter(|_| isotropic) {
                 Some(target) => {
                     let base: Vec<f64> = lattice
                         .shells
                         .iter()
                         .zip(&shares)
-                        .map(|(s, share)| share * p.law.kernel(s.length(cloud.spacing), horizon))
+                        .map(|(s, share)| {
+                            share * p.law.linearised().kernel(s.length(cloud.spacing), horizon)
+                        })
                         .collect();
                     isotropic_shell_factors(&lattice, cloud.spacing, &base, target)?
                 }
@@ -235,6 +237,7 @@ impl<const D: usize> LatticeFactors<D> {
         let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);
         let state = p
             .law
+            .linearised()
             .coefficients(&family, &mut pair, &mut omega)
             .map_err(|source| ModelError::Family {
                 what: "a point of the full lattice",

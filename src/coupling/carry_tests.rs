@@ -54,7 +54,7 @@ fn problem(mesh: Mesh<2>, within: [f64; 4], coupling: Box<dyn Coupling<2>>) -> P
         mesh,
         peridynamic_material: 0,
         peridynamics: Some(Peridynamics {
-            law: Box::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
+            law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
             horizon: Arc::new(|_| H),
             points: PointSource::Lattice {
                 spacing: 0.25 * H,

@@ -63,7 +63,7 @@ pub use splice::Splice;
 pub use tributary::Tributary;
 pub use truncated::{SeamBonds, Truncated};
 
-use crate::{assembly::Row, mesh::Mesh, peridynamics::BondLaw, system::Symmetry};
+use crate::{assembly::Row, mesh::Mesh, peridynamics::LinearForceState, system::Symmetry};
 
 /// The model that a scene asks for in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
@@ -122,7 +122,7 @@ pub trait Coupling<const D: usize>: Send + Sync {
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole>;
 
     /// How far families have to be complete.
-    fn reach(&self, law: &dyn BondLaw<D>) -> Reach {
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
         if law.is_pairwise() {
             Reach::Own
         } else {

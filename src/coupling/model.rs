@@ -373,7 +373,7 @@ impl<const D: usize> Model<D> {
             horizon: cloud.horizon,
             transfer,
         };
-        let body = PdBody::new(cloud, families, p.law.as_ref(), &weighting, ends)
+        let body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
             .map_err(|e| ModelError::family("the point", e))?;
         self.body = Some(body);
         self.factors = factors.into_iter().zip(horizons).collect();
@@ -437,7 +437,13 @@ impl<const D: usize> Model<D> {
         /// Families looked at: enough for a mean.
         const SAMPLE: usize = 1000;
         let body = self.body.as_ref()?;
-        let typed = self.peridynamics.as_ref()?.law.tensor().get(0, 0, 0, 0);
+        let typed = self
+            .peridynamics
+            .as_ref()?
+            .law
+            .linearised()
+            .tensor()
+            .get(0, 0, 0, 0);
         let weight = |i: usize| -> f64 {
             let family = body.families.of(i).iter();
             family.map(|&j| body.cloud.volume[j as usize]).sum()
@@ -521,6 +527,6 @@ impl<const D: usize> Model<D> {
 fn reach<const D: usize>(coupling: &dyn Coupling<D>, p: &Peridynamics<D>) -> Reach {
     match p.weights {
         BondWeights::Fitted => Reach::Neighbours,
-        BondWeights::Plain | BondWeights::Isotropic => coupling.reach(p.law.as_ref()),
+        BondWeights::Plain | BondWeights::Isotropic => coupling.reach(p.law.linearised()),
     }
 }

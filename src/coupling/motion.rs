@@ -17,7 +17,7 @@ use crate::{
         Families, PdBody,
         kernel::{BondPass, Kinematics},
     },
-    system::{BlockCsr, Breakage, Dissipation, Dynamic, Halfway, Symmetry},
+    system::{BlockCsr, Breakage, Dissipation, Dynamic, Halfway, Interval, Symmetry},
     tensor::Vector,
 };
 pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, MotionError};
@@ -70,9 +70,13 @@ impl<'a, const D: usize> Motion<'a, D> {
         behaviour: &BondBehaviour<'_, D>,
     ) -> Result<Self, MotionError> {
         let sites = model.sites.len();
-        let is_linear =
-            behaviour.critical_stretch.is_none() && behaviour.kinematics == Kinematics::Linear;
-        let mut seam = if is_linear {
+        let law = model.peridynamics.as_ref().map(|p| &p.law);
+        let is_linear = behaviour.critical_stretch.is_none()
+            && behaviour.kinematics == Kinematics::Linear
+            && law.is_none_or(|law| law.is_linear());
+        // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear
+        let follows = law.is_some_and(|law| law.accelerator().is_some());
+        let mut seam = if is_linear || !follows {
             None
         } else {
             operator.seam_bonds()
@@ -159,6 +163,20 @@ impl<'a, const D: usize> Motion<'a, D> {
             .is_some_and(|b| b.critical_stretch.is_some())
     }
 
+    /// Whether the law remembers.
+    fn remembers(&self) -> bool {
+        self.body.as_ref().is_some_and(|b| b.pass.remembers())
+    }
+
+    /// Numbers of the account in a checkpoint.
+    fn spends(&self) -> usize {
+        match (self.remembers(), self.breaks()) {
+            (true, _) => 3,
+            (false, true) => 2,
+            (false, false) => 0,
+        }
+    }
+
     /// Puts the bonds of a state back; false, and nothing changed, if they are those of another model.
     fn restore_bonds(&mut self, state: &[u64]) -> bool {
         let Some(body) = &mut self.body else {
@@ -226,7 +244,13 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         &self.mass
     }
 
-    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+    fn internal_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        breakage: Breakage,
+    ) -> u64 {
         let Some(body) = &mut self.body else {
             self.linear
                 .multiply_into::<D>(u, None, &mut self.products, force);
@@ -234,7 +258,9 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         };
         let mut points = std::mem::take(&mut body.displacement);
         body.spread(u, &mut points);
-        let broken = body.pass.force_into(&points, &mut body.force, breakage);
+        let broken = body
+            .pass
+            .force_into(&points, &mut body.force, interval, breakage);
         if let Some(contact) = &body.contact {
             let pass = &body.pass;
             contact
@@ -256,6 +282,12 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         }
         scale_rows(self.model, force);
         broken + of_seam
+    }
+
+    fn commit(&mut self) {
+        if let Some(body) = &mut self.body {
+            self.spent.inelastic += body.pass.commit();
+        }
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
@@ -416,7 +448,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     }
 
     fn dissipation(&self) -> Option<Dissipation> {
-        self.breaks().then_some(self.spent)
+        (self.breaks() || self.remembers()).then_some(self.spent)
     }
 
     fn set_dissipation(&mut self, dissipation: Dissipation) {
@@ -426,6 +458,7 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     fn account_for_breaks(&mut self, at: &Halfway<'_>) {
         let spent = self.of_last_breaks(at);
         self.spent.energy += spent.energy;
+        // inelastic energy is counted where it is committed
         self.spent.area += spent.area;
     }
 
@@ -498,23 +531,24 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         if let Some(seam) = &self.seam {
             state.extend(seam.damage_state());
         }
-        if self.breaks() {
-            state.extend([self.spent.energy, self.spent.area].map(f64::to_bits));
+        if self.spends() > 0 {
+            let spent = [self.spent.energy, self.spent.area, self.spent.inelastic];
+            state.extend(&spent.map(f64::to_bits)[..self.spends()]);
         }
         state
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
-        let of_spent = if self.breaks() { 2 } else { 0 };
-        let Some(bonds) = state.len().checked_sub(of_spent) else {
+        let Some(bonds) = state.len().checked_sub(self.spends()) else {
             return false;
         };
         let (bonds, spent) = state.split_at(bonds);
         let fits = self.restore_bonds(bonds);
-        if let (true, &[energy, area]) = (fits, spent) {
+        if let (true, &[energy, area, ref rest @ ..]) = (fits, spent) {
             self.spent = Dissipation {
                 energy: f64::from_bits(energy),
                 area: f64::from_bits(area),
+                inelastic: rest.first().map_or(0.0, |bits| f64::from_bits(*bits)),
             };
         }
         fits

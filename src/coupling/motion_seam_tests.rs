@@ -7,7 +7,7 @@ use super::{
 use crate::{
     coupling::{SiteKind, Truncated, truncated::CutBonds},
     peridynamics::{Influence, Micromodulus, kernel::Kinematics},
-    system::{Breakage, Dynamic, Halfway, Symmetry},
+    system::{Breakage, Dynamic, Halfway, Interval, Symmetry},
     tensor::Vector,
     verify::{
         enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths},
@@ -53,7 +53,8 @@ fn the_force_of_a_seam_that_stretches_is_the_gradient_of_its_energy_and_adds_up_
             let u = wave(enclosed, amplitude);
             let mut force = vec![0.0; u.len()];
             // some bonds break, the seam's among them
-            let broken = motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+            let broken =
+                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
             assert!(broken > 0);
             let scale = largest(force.iter().copied());
             for k in 0..D {
@@ -102,7 +103,10 @@ fn moments_of_a_seam_that_moves_add_up_to_zero() {
         with_motion::<D, _>(case, &linear, |enclosed, motion| {
             let u = random(enclosed, 0.4 * SPACING);
             let mut force = vec![0.0; u.len()];
-            assert!(motion.internal_force_into(&u, &mut force, Breakage::Allowed) > 0);
+            assert!(
+                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
+                    > 0
+            );
             let (forces, moments) = out_of_balance(&places(enclosed, &vec![0.0; u.len()]), &force);
             assert!(forces.max(moments) < 1e-13, "{D} {forces:e} {moments:e}");
         });
@@ -116,7 +120,10 @@ fn moments_of_a_seam_that_moves_add_up_to_zero() {
                 }
             }
             let mut force = vec![0.0; u.len()];
-            assert!(motion.internal_force_into(&u, &mut force, Breakage::Allowed) > 0);
+            assert!(
+                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
+                    > 0
+            );
             let (forces, moments) = out_of_balance(&places(enclosed, &u), &force);
             assert!(forces.max(moments) < 1e-13, "{D} {forces:e} {moments:e}");
         });
@@ -140,7 +147,10 @@ fn forces_are_gradients_and_add_up_to_zero_where_cut_bonds_are_linear_and_others
         with_motion_by(&enclosed, &coupling, &exact, |enclosed, motion| {
             let u = random(enclosed, 0.4 * SPACING);
             let mut force = vec![0.0; u.len()];
-            assert!(motion.internal_force_into(&u, &mut force, Breakage::Allowed) > 0);
+            assert!(
+                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
+                    > 0
+            );
             let places: Vec<Vector<D>> = enclosed.positions().copied().collect();
             let (forces, _) = out_of_balance(&places, &force);
             assert!(forces < 1e-13, "{D} {forces:e}");
@@ -168,7 +178,10 @@ fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
             let before = motion.stored_energy(&u);
             assert!(motion.damage_at_edge().is_none());
             // of all bonds those along x, whole ones and pieces, are over the limit
-            assert!(motion.internal_force_into(&u, &mut force, Breakage::Allowed) > 0);
+            assert!(
+                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
+                    > 0
+            );
             motion.account_for_breaks(&Halfway::at(&u));
             let after = motion.stored_energy(&u);
             let taken = motion.dissipated_energy().unwrap();
@@ -183,7 +196,12 @@ fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
             assert!(motion.damage_at_edge().is_some());
             // for good, and kept
             let state = motion.damage_state();
-            motion.internal_force_into(&vec![0.0; u.len()], &mut force, Breakage::Allowed);
+            motion.internal_force_into(
+                &vec![0.0; u.len()],
+                &mut force,
+                Interval::AT_ONCE,
+                Breakage::Allowed,
+            );
             assert_eq!(motion.damage_state(), state);
             assert!(!motion.restore_damage(&state[1..]));
             assert!(motion.restore_damage(&state));
@@ -209,7 +227,7 @@ fn linear_bonds_that_may_break_are_the_assembled_stiffness_until_they_do() {
             let u = wave(enclosed, 1.0);
             let wanted = enclosed.stiffness.multiply(&u);
             let (mut force, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
-            motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
             motion.tangent_into(&u, &mut tangent);
             let sites: Vec<u32> = (0..(u.len() / D) as u32).collect();
             let rows = motion.tangent_rows(&sites).multiply(&u);
@@ -258,7 +276,7 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
             let u = stretched(strain);
             let taken = motion.dissipated_energy().unwrap();
             let before = motion.stored_energy(&u);
-            motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
             motion.account_for_breaks(&Halfway::at(&u));
             let released = before - motion.stored_energy(&u);
             let taken = motion.dissipated_energy().unwrap() - taken;
@@ -343,7 +361,9 @@ fn crack_beside_the_seam(coupling: Box<dyn crate::coupling::Coupling<2>>) -> Run
         })
         .collect();
     let mut force = vec![0.0; jump.len()];
-    assert!(motion.internal_force_into(&jump, &mut force, Breakage::Allowed) > 0);
+    assert!(
+        motion.internal_force_into(&jump, &mut force, Interval::AT_ONCE, Breakage::Allowed) > 0
+    );
     motion.account_for_breaks(&Halfway::at(&jump));
     let tip = |motion: &Motion<'_, 2>| {
         let damage = motion.damage().unwrap();
@@ -368,11 +388,11 @@ fn crack_beside_the_seam(coupling: Box<dyn crate::coupling::Coupling<2>>) -> Run
             }
         }
     };
-    motion.internal_force_into(&u, &mut force, Breakage::Held);
+    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
     for _ in 0..300 {
         kick(&mut v, &force);
         u.iter_mut().zip(&v).for_each(|(u, v)| *u += step * v);
-        motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+        motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
         let back = 0.5 * step;
         motion.account_for_breaks(&Halfway { u: &u, v: &v, back });
         kick(&mut v, &force);

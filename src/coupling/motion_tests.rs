@@ -6,7 +6,7 @@ use crate::coupling::{BlendingFunction, Coupling, SiteKind};
 use crate::fem;
 use crate::peridynamics::kernel::Kinematics;
 use crate::peridynamics::{Influence, Micromodulus};
-use crate::system::{Breakage, Dynamic};
+use crate::system::{Breakage, Dynamic, Interval};
 use crate::tensor::Vector;
 use crate::verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
 
@@ -125,7 +125,7 @@ fn linear_bonds_are_the_assembled_stiffness() {
                 let wanted = scaled(enclosed, enclosed.stiffness.multiply(&u));
                 let (mut force, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
                 assert_eq!(
-                    motion.internal_force_into(&u, &mut force, Breakage::Held),
+                    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held),
                     0
                 );
                 motion.tangent_into(&u, &mut tangent);
@@ -166,7 +166,7 @@ fn exact_bonds_are_the_stiffness_to_first_order() {
                     let u = wave(enclosed, amplitude);
                     let wanted = scaled(enclosed, enclosed.stiffness.multiply(&u));
                     let mut force = vec![0.0; u.len()];
-                    motion.internal_force_into(&u, &mut force, Breakage::Held);
+                    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
                     *off = largest(force.iter().zip(&wanted).map(|(a, b)| a - b))
                         / largest(wanted.iter().copied());
                 }
@@ -265,7 +265,12 @@ fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
                     .collect();
                 let mut force = vec![0.0; u.len()];
                 assert!(motion.damage_at_edge().is_none());
-                let broken = motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+                let broken = motion.internal_force_into(
+                    &u,
+                    &mut force,
+                    Interval::AT_ONCE,
+                    Breakage::Allowed,
+                );
                 assert!(broken > 0);
                 let damage = motion.damage().unwrap();
                 let edge = motion.damage_at_edge().unwrap();
@@ -280,7 +285,12 @@ fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
                 // for good: nothing heals, and held passes break nothing
                 let state = motion.damage_state();
                 assert_eq!(
-                    motion.internal_force_into(&vec![0.0; u.len()], &mut force, Breakage::Allowed),
+                    motion.internal_force_into(
+                        &vec![0.0; u.len()],
+                        &mut force,
+                        Interval::AT_ONCE,
+                        Breakage::Allowed
+                    ),
                     0
                 );
                 assert_eq!(motion.damage_state(), state);
@@ -303,7 +313,7 @@ fn an_exact_body_turns_without_force() {
             let turned = |x: &Vector<2>| [c * x[0] - s * x[1] - x[0], s * x[0] + c * x[1] - x[1]];
             let u: Vec<f64> = enclosed.positions().flat_map(turned).collect();
             let mut force = vec![0.0; u.len()];
-            motion.internal_force_into(&u, &mut force, Breakage::Held);
+            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
             let linear = enclosed.stiffness.multiply(&wave(enclosed, 1e-3));
             let scale = largest(linear);
             for (site, s) in enclosed.model.sites.iter().enumerate() {

@@ -10,8 +10,8 @@ use crate::{
     fem::{self, QuadraturePoint},
     mesh::Mesh,
     peridynamics::{
-        BondLaw, Bound, Cloud, Conditions, Ends, Factors, Families, Influence, PdBody, PdError,
-        TIE_TOLERANCE,
+        Bound, Cloud, Conditions, Ends, Factors, Families, Influence, LinearForceState, PdBody,
+        PdError, TIE_TOLERANCE,
         alike::{self, Shape},
         weights,
     },
@@ -44,7 +44,7 @@ impl<const D: usize> Coupling<D> for PartialStressMeshfree {
             .collect()
     }
 
-    fn reach(&self, _law: &dyn BondLaw<D>) -> Reach {
+    fn reach(&self, _law: &dyn LinearForceState<D>) -> Reach {
         Reach::Neighbours
     }
 
@@ -198,7 +198,7 @@ impl<'a, const D: usize> Elements<'a, D> {
                     .push(model.place_row(c as u32, shape, &g.position));
             }
         }
-        let fit = FamilyFit::new(model, peridynamics.law.as_ref());
+        let fit = FamilyFit::new(model, peridynamics.law.linearised());
         let families = Self::families(model, &mut cloud, points, &fit)?;
         let centres: Vec<usize> = (points..cloud.position.len()).collect();
         let shapes = shapes(&cloud, &families, &centres);
@@ -215,7 +215,7 @@ impl<'a, const D: usize> Elements<'a, D> {
         let body = PdBody::new(
             cloud,
             families,
-            peridynamics.law.as_ref(),
+            peridynamics.law.linearised(),
             &Factors::OfFamily(&factors),
             Ends::Alike,
         )
@@ -296,7 +296,7 @@ type LatticeMoments<const D: usize> = (Vec<(Vector<D>, f64)>, Vec<f64>);
 
 /// How the weights of a Gauss point's family are fitted, so that its partial stress is that of the elements around under affine fields.
 struct FamilyFit<'a, const D: usize> {
-    law: &'a dyn BondLaw<D>,
+    law: &'a dyn LinearForceState<D>,
     /// Bonds and coefficients of the lattice whose tensor the elements have, where that is not the typed one.
     lattice: Option<LatticeMoments<D>>,
     /// Whether places in elements lie between the nodes, so that fifth moments should vanish too. Where every one is a node, what the points of one element err under quadratic fields cancels around each node.
@@ -304,7 +304,7 @@ struct FamilyFit<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> FamilyFit<'a, D> {
-    fn new(model: &Model<D>, law: &'a dyn BondLaw<D>) -> Self {
+    fn new(model: &Model<D>, law: &'a dyn LinearForceState<D>) -> Self {
         let lattice = model.plain_lattice().map(|whole| {
             // Σ λ ξ⊗ξ⊗ξ⊗ξ V of a pairwise law, whose p is λ/2; Σ ω ξ⊗ξ⊗ξ⊗ξ/|ξ|² V of another
             let of = |(p, omega): (f64, f64)| if law.is_pairwise() { 2.0 * p } else { omega };

@@ -433,7 +433,7 @@ mod tests {
             cell_material: vec![0; cells],
             peridynamic_material: 0,
             peridynamics: Some(Peridynamics {
-                law: Box::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
+                law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
                 horizon: Arc::new(move |_| horizon),
                 points,
                 weights: BondWeights::Plain,

@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::{
     coupling::{Coupling, Zone},
     mesh::Mesh,
-    peridynamics::{BondLaw, BondWeights, BoxCell, PartialVolume, PointError},
+    peridynamics::{BondWeights, BoxCell, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
     tensor::{Tensor4, Vector},
 };
@@ -50,7 +50,7 @@ pub struct Lattice<const D: usize> {
 /// The peridynamic part of a problem.
 pub struct Peridynamics<const D: usize> {
     /// The law.
-    pub law: Box<dyn BondLaw<D>>,
+    pub law: Arc<dyn Law<D>>,
     /// Horizon δ as a field \[m\].
     pub horizon: ScalarField<D>,
     /// Where the points come from; a lattice of several has its own horizon instead.

@@ -122,6 +122,8 @@ pub struct MotionSummary {
     /// What breaking bonds cost; none where none can break.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cracks: Option<CrackSummary>,
+    /// Energy that a law with memory dissipated \[J\].
+    pub inelastic_energy: Option<f64>,
     /// Bonds broken, each once for each direction.
     pub broken_bonds: u64,
     /// When damage reached the edge of the nonlocal zone, and where.
@@ -162,12 +164,16 @@ impl MotionSummary {
         if let Some(cracks) = &self.cracks {
             cracks.write(dimension, f)?;
         }
+        if let Some(energy) = self.inelastic_energy {
+            writeln!(f, "dissipated by the law  {}", number(energy))?;
+        }
         // load steps leave out the motion of what breaks
         let rest = match self.stable_step {
             None if self.cracks.is_some() => "set free by breaking",
             _ => "energy not accounted",
         };
-        let dissipated = self.cracks.map_or(0.0, |c| c.dissipated_energy);
+        let dissipated =
+            self.cracks.map_or(0.0, |c| c.dissipated_energy) + self.inelastic_energy.unwrap_or(0.0);
         writeln!(f, "{rest:<22} {}", number(self.missing_energy - dissipated))?;
         if self.broken_bonds > 0 {
             writeln!(

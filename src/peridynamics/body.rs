@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::{
     assembly::{Row, Transfer},
     peridynamics::{
-        BondLaw, Bound, Families, Family, PdError, PointError, Reversed, StatePart,
+        Bound, Families, Family, LinearForceState, PdError, PointError, Reversed, StatePart,
         collapsed_tensor, weights,
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -89,7 +89,7 @@ impl<const D: usize> PdBody<D> {
     pub fn new(
         cloud: Cloud<D>,
         families: Families,
-        law: &dyn BondLaw<D>,
+        law: &dyn LinearForceState<D>,
         factors: &Factors<'_, D>,
         ends: Ends,
     ) -> Result<Self, PointError<D>> {
@@ -420,7 +420,7 @@ fn along<const D: usize>(modulus: &Tensor4<D>, x: &Vector<D>, s: f64) -> [Tensor
 
 /// The factors of one irregular family: not negative where the moments allow it, else of any sign.
 fn fitted<const D: usize>(
-    law: &dyn BondLaw<D>,
+    law: &dyn LinearForceState<D>,
     bonds: &[(Vector<D>, f64)],
     horizon: f64,
 ) -> Result<Vec<f64>, PdError> {
@@ -437,7 +437,8 @@ fn fitted<const D: usize>(
         .collect())
 }
 
-fn split_rows<'a>(mut values: &'a mut [f64], offsets: &[usize]) -> Vec<&'a mut [f64]> {
+/// One list as rows.
+pub(super) fn split_rows<'a, T>(mut values: &'a mut [T], offsets: &[usize]) -> Vec<&'a mut [T]> {
     let mut rows = Vec::with_capacity(offsets.len().saturating_sub(1));
     for pair in offsets.windows(2) {
         let (head, tail) = values.split_at_mut(pair[1] - pair[0]);

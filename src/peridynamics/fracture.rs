@@ -39,6 +39,14 @@ pub enum FractureError {
         /// What was given \[J/m²\].
         energy: f64,
     },
+    /// A bond that softens never stores enough.
+    #[error(
+        "no stretch of a bond stores the fracture energy: linear bonds would at {linear:.3e}; give critical-stretch instead, or let bonds soften less"
+    )]
+    Unreached {
+        /// The stretch at which bonds that are linear in their extension would.
+        linear: f64,
+    },
     /// The state part gives back more than the bonds take.
     #[error(
         "opening a plane in this material would release energy ({per_square} J/m² at unit stretch): its Poisson ratio is too far below that of bonds that act alone; give critical-stretch instead, or raise the ratio"
@@ -54,7 +62,7 @@ pub enum FractureError {
 /// Opened by Δ, a bond ξ across the plane is stretched by `Δ ξ_n/r²` and breaks at `Δ = s_c r²/ξ_n`. What that costs is what is stored just before less what is stored just after. With bonds that act alone that is `p r⁴ s_c²` each. Of an LPS the dilatations
 /// `Σ ω Δ ξ_n V` of the layers that the bond joins change as well, and as bonds break one after another that is not what it would be if all were stretched alike.
 ///
-/// `bonds`: the whole family of a point by integer offsets with `p` and ω of [`crate::peridynamics::law`]; `state`: the modulus `𝓜_1111` of `½ 𝓜 (Σ ω ξ·η V)²`, zero without a state. Units: spacing \[m\] → \[J/m²\] (J/m in 2D, J in 1D).
+/// `bonds`: the whole family of a point by integer offsets with `p` and ω of [`crate::peridynamics::linear_force_state`]; `state`: the modulus `𝓜_1111` of `½ 𝓜 (Σ ω ξ·η V)²`, zero without a state. Units: spacing \[m\] → \[J/m²\] (J/m in 2D, J in 1D).
 pub fn plane_energy<const D: usize>(
     spacing: f64,
     bonds: &[([i32; D], (f64, f64))],
@@ -123,6 +131,41 @@ pub fn critical_stretch(energy: f64, per_square: f64) -> Result<f64, FractureErr
         return Err(FractureError::Releases { per_square });
     }
     Ok((energy / per_square).sqrt())
+}
+
+/// The stretch at which a bond holds what one that is linear in its extension holds at the stretch `linear`; `ratio` is [`crate::peridynamics::ForceState::energy_ratio`].
+///
+/// # Errors
+/// [`FractureError::Unreached`] if a bond that softens never holds as much.
+pub fn stretch_of_equal_energy(
+    linear: f64,
+    ratio: impl Fn(f64) -> f64,
+) -> Result<f64, FractureError> {
+    /// Halvings of the interval: to the last bit.
+    const HALVINGS: usize = 200;
+    /// Stretches looked at.
+    const LARGEST: f64 = 1e3;
+    let held = |s: f64| s * s * ratio(s) - linear * linear;
+    if held(linear) == 0.0 {
+        return Ok(linear);
+    }
+    // upwards from below any root, so that the first one is met
+    let (mut low, mut high) = (0.0, linear * 1e-3);
+    while held(high) < 0.0 {
+        low = high;
+        high *= 1.05;
+        if high > LARGEST.max(linear * 10.0) {
+            return Err(FractureError::Unreached { linear });
+        }
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        match held(middle) < 0.0 {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    Ok(high)
 }
 
 impl BondEnergy {

@@ -9,7 +9,10 @@
 //! | `shells.rs` | isotropic weights of a lattice, shell by shell | eq. (3.6) as a sum |
 //! | `weights.rs` | moment-fitted weights of one irregular family | |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
-//! | `law.rs` | what a law is; `bond_based.rs`, `lps.rs`, `correspondence.rs` | eq. (3.1), (5.16), section 7.2 |
+//! | `law.rs` | what a law is | |
+//! | `linear_force_state.rs` | its linearisation at rest | eq. (2.19), (5.16) |
+//! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.3) |
+//! | `laws/` | the laws, one file each | eq. (3.1), (5.16), section 7.2 |
 //! | `fracture.rs` | critical stretch from the fracture energy | \[Silling2005\] |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
@@ -19,19 +22,19 @@
 
 pub(crate) mod alike;
 pub mod body;
-pub mod bond_based;
 pub mod contact;
-pub mod correspondence;
 mod crack_area;
 pub mod families;
+pub mod force_state;
 pub mod fracture;
 mod grid;
 pub mod influence;
 pub mod kernel;
 mod lattice_families;
 pub mod law;
+pub mod laws;
 pub(crate) mod least_change;
-pub mod lps;
+pub mod linear_force_state;
 pub(crate) mod offsets;
 pub mod partial_volume;
 pub mod shape_tensor;
@@ -39,14 +42,14 @@ pub mod shells;
 pub mod weights;
 
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
-pub use bond_based::BondBased;
-pub use correspondence::Correspondence;
 pub use crack_area::CrackArea;
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
+pub use force_state::{DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, Present};
 pub use fracture::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use influence::{Influence, Micromodulus};
-pub use law::{BondLaw, Family, StatePart, collapsed_tensor};
-pub use lps::LinearPeridynamicSolid;
+pub use law::{Accelerator, Law};
+pub use laws::{BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell};
+pub use linear_force_state::{Family, LinearForceState, StatePart, collapsed_tensor};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shells::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};

@@ -6,7 +6,6 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::setup;
 use crate::coupling::{CellRole, Interface, Reach, Zone};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
@@ -123,14 +122,14 @@ impl Counts {
         let material = (scene.zones.iter().zip(&scene.cell_material))
             .find(|(zone, _)| **zone != Zone::Local)
             .map_or(0, |(_, m)| usize::from(*m));
-        let law = setup::law(&scene.materials[material]);
+        let law = scene.materials[material].law.linearised();
         let coupling = scene.coupling.build::<D>(Influence::Gaussian);
         let horizon: Vec<f64> = (0..mesh.cell_count())
             .map(|c| p.horizon_at(&mesh.centroid(c)))
             .collect();
         let largest = horizon.iter().copied().fold(0.0, f64::max);
         let roles = coupling.roles(mesh, &scene.zones, largest);
-        let reach = coupling.reach(law.as_ref());
+        let reach = coupling.reach(law);
         counts.is_state_based = !law.is_pairwise();
         counts.is_lattice = !matches!(p.points, Points::Cells)
             && p.weights != WeightsSpec::Fitted

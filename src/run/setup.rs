@@ -5,17 +5,12 @@ use std::sync::Arc;
 use crate::coupling::{self, Model, PointSource, Problem, Surfaces, Zone};
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Choice;
-use crate::peridynamics::influence::{Alpha, Degree};
-use crate::peridynamics::{
-    BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
-    Micromodulus, PartialVolume,
-};
+use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::scene::breaking::Breaking;
 use crate::scene::conditions::Condition;
 use crate::scene::follow::Follow;
 use crate::scene::initial::Initial;
 use crate::scene::materials::Ratio;
-use crate::scene::materials::{Law, Material};
 use crate::scene::points::Points;
 use crate::scene::spec::{Joining, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
@@ -57,24 +52,6 @@ impl<const D: usize> Rest<D> {
     }
 }
 
-/// The law of the bonds of a material.
-pub(crate) fn law<const D: usize>(material: &Material<D>) -> Box<dyn BondLaw<D>> {
-    let (lambda, mu) = material.lame;
-    match material.law {
-        Law::BondBased(micromodulus) => Box::new(BondBased::new(micromodulus, mu)),
-        Law::Lps(influence) => Box::new(LinearPeridynamicSolid::new(influence, lambda, mu)),
-        Law::Correspondence(influence, stabilisation) => {
-            Box::new(Correspondence::new(influence, lambda, mu, stabilisation))
-        }
-    }
-}
-
-/// `P_1/|ξ|`, ω of the divergence of the partial stress beside a triangular micromodulus, which is `P_1/|ξ|` too: stable in motion, where a Gaussian grows. Beside the inverse distance it is the other way round.
-const DIVERGENCE: Influence = Influence::Polynomial {
-    degree: Degree::P1,
-    alpha: Alpha::One,
-};
-
 /// The problem of a scene, and what remains of the scene.
 pub(crate) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
     let material = scene
@@ -84,14 +61,9 @@ pub(crate) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
         .find(|(zone, _)| **zone != Zone::Local)
         .map_or(0, |(_, m)| *m);
     let stuff = &scene.materials[material as usize];
-    let influence = match stuff.law {
-        Law::Lps(i) | Law::Correspondence(i, _) => i,
-        Law::BondBased(Micromodulus::Triangular) => DIVERGENCE,
-        Law::BondBased(_) => Influence::Gaussian,
-    };
-    let law = law(stuff);
+    let law = Arc::clone(&stuff.law);
     let ratio = Ratio::new(stuff.lame, scene.kinematics);
-    let method = scene.coupling.build(influence);
+    let method = scene.coupling.build(law.linearised().divergence());
     let chosen = scene.coupling_why.map(|why| Choice {
         choice: format!("coupling {}", scene.coupling.joining().name),
         why,

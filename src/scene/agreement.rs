@@ -4,7 +4,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::source::Span;
-use super::spec::SceneSpec;
+use super::spec::{CouplingSpec, SceneSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
@@ -41,6 +41,32 @@ pub(crate) fn one_peridynamic_material<const D: usize>(
     .label(span(a), "one")
     .label(span(b), "another")
     .help("keep the nonlocal and transition zones within one material; bonds between materials come later"))
+}
+
+/// Refuses a law that is not linear where rows at the seam would not balance it: those of splice, blending, balanced and partial stress hold a uniform strain whatever stress the two sides have.
+pub(crate) fn balanced_seam<const D: usize>(
+    spec: &SceneSpec,
+    coupling: &CouplingSpec,
+    material: &Material<D>,
+) -> Result<(), SceneError> {
+    let joining = coupling.joining();
+    let balances = matches!(coupling, CouplingSpec::Truncated(_))
+        || matches!(joining.zones, ZonesNeeded::Everywhere(_));
+    if balances || material.law.is_linear() {
+        return Ok(());
+    }
+    let name = spec.materials.get_key_value(material.name.as_str());
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!(
+            "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
+            material.name,
+            material.law.name(),
+            joining.name
+        ),
+    )
+    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
+    .help("use coupling = \"truncated\", whose seam is in equilibrium at any stretch, or \"nonlocal\""))
 }
 
 /// Refuses a horizon below the spacing of the points.

@@ -2,7 +2,7 @@
 
 use super::check;
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::{Fracture, Law, Material};
+use super::materials::{Fracture, Material};
 use super::region::{Region, region};
 use super::spec::{
     BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec,
@@ -41,6 +41,7 @@ pub struct Contact {
 pub(crate) fn breaking<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
+    has_points: bool,
     mesh: &Mesh<D>,
 ) -> Result<Breaking<D>, SceneError> {
     let fracture = material.fracture;
@@ -94,13 +95,20 @@ pub(crate) fn breaking<const D: usize>(
     let bonds = match typed {
         Some(bonds) => {
             if *bonds.get_ref() == BondsSpec::Exact
-                && matches!(material.law, Law::Correspondence(..))
+                && !(material.law.force_state()).is_some_and(|f| f.is_objective())
             {
                 return Err(SceneError::new(
                     SceneErrorKind::Conflict,
-                    format!("`peridynamics.bonds` is \"exact\", and the material `{}` is a correspondence law", material.name),
+                    format!(
+                        "`peridynamics.bonds` is \"exact\", and the material `{}` is a {} law",
+                        material.name,
+                        material.law.name()
+                    ),
                 )
-                .label(bonds.span(), "its force does not follow the stretch of a bond")
+                .label(
+                    bonds.span(),
+                    "its force does not follow the stretch of a bond",
+                )
                 .help("use bonds = \"linear\", or a bond-based or lps material"));
             }
             *bonds.get_ref()
@@ -108,6 +116,35 @@ pub(crate) fn breaking<const D: usize>(
         None if fracture.is_some() || spec.contact.is_some() => BondsSpec::Exact,
         None => BondsSpec::Linear,
     };
+    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
+    if let (Some(bonds), true) = (typed, is_static)
+        && *bonds.get_ref() == BondsSpec::Exact
+    {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            "`peridynamics.bonds` is \"exact\", and a static scene is solved to first order",
+        )
+        .label(bonds.span(), "of bonds that rotate and stretch")
+        .help("add [solve.quasi-static] with steps = ..., or remove it"));
+    }
+    if let (true, true, Some((name, _))) = (
+        is_static,
+        has_points && !material.law.is_linear(),
+        spec.materials
+            .iter()
+            .find(|(name, _)| name.value == material.name),
+    ) {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!(
+                "the law of the material `{name}`, {}, is not linear, and a static scene is solved to first order",
+                material.law.name()
+            ),
+        )
+        .label(name.span.clone(), "its bonds follow the load step by step")
+        .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]"));
+    }
     let mut no_fail = Vec::with_capacity(spec.no_fail.len());
     for (name, shape) in &spec.no_fail {
         no_fail.push(region(&format!("no-fail.{name}"), shape, mesh)?);
@@ -116,8 +153,7 @@ pub(crate) fn breaking<const D: usize>(
         .peridynamics
         .as_ref()
         .and_then(|p| p.precision.as_ref());
-    let solve = spec.solve.as_ref().map(|s| s.get_ref());
-    if let (Some(precision), None | Some(SolveSpec::Static(_))) = (precision, solve) {
+    if let (Some(precision), true) = (precision, is_static) {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
             "`peridynamics.precision` is set, and nothing moves".to_owned(),

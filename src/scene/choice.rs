@@ -7,7 +7,10 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, SceneErrorKind};
+use std::sync::LazyLock;
+
 use super::spec::CouplingSpec;
+use crate::peridynamics::laws::Named;
 
 /// Keys of the top of a scene that often end up below the header of a table.
 const TOP: &[&str] = &[
@@ -56,9 +59,13 @@ const TRANSITIONS: &[&str] = &[
     "set",
     "without",
 ];
+/// Keys of materials: those with keys of their own kind, and the laws that are known by name.
+static MATERIALS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
+    let typed = ["bond-based", "correspondence", "lps"];
+    typed.iter().chain(Named::KEYS).copied().collect()
+});
 const AXES: &[&str] = &["cells", "graded", "spacing"];
 const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
-const MATERIALS: &[&str] = &["bond-based", "correspondence", "lps"];
 const CONDITIONS: &[&str] = &["body-force", "displacement", "traction", "velocity"];
 const SOLVES: &[&str] = &["explicit", "quasi-static", "static"];
 const INITIAL: &[&str] = &["displacement", "velocity"];
@@ -79,7 +86,7 @@ pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
         ["initial", _] => Some(INITIAL),
         ["mesh"] => Some(MESHES),
         ["mesh", _, "x" | "y" | "z"] => Some(AXES),
-        ["materials", _] => Some(MATERIALS),
+        ["materials", _] => Some(&MATERIALS),
         ["materials", _, _, "micromodulus"] => Some(MICROMODULI),
         ["peridynamics", "points"] => Some(POINTS),
         ["conditions", _] => Some(CONDITIONS),

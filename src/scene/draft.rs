@@ -152,13 +152,26 @@ impl<'a, const D: usize> Draft<'a, D> {
             .zip(&zones)
             .find(|(_, zone)| **zone != Zone::Local)
             .map_or(0, |(m, _)| *m);
-        let breaking = breaking::breaking(spec, &self.materials[peridynamic as usize], mesh)?;
+        agreement::balanced_seam(
+            spec,
+            &joined.coupling,
+            &self.materials[peridynamic as usize],
+        )?;
+        let breaking = {
+            let has_points = zones.iter().any(|zone| *zone != Zone::Local);
+            breaking::breaking(
+                spec,
+                &self.materials[peridynamic as usize],
+                has_points,
+                mesh,
+            )?
+        };
         let follow = follow::follow(
             spec,
             &mut joined,
             &self.solve,
             &breaking,
-            (peridynamics.as_ref()).map(|p| (p, &self.materials[peridynamic as usize].law)),
+            (peridynamics.as_ref()).map(|p| (p, self.materials[peridynamic as usize].law.as_ref())),
             mesh,
             |c| self.cell_material[c] == peridynamic,
         )?;

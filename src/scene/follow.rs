@@ -3,12 +3,12 @@
 use super::breaking::Breaking;
 use super::check;
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::Law;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
 use super::spec::{CouplingSpec, CutBondsSpec, SceneSpec, SkinSpec, ZonesNeeded};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
+use crate::peridynamics::Law;
 use crate::scene::points::Points;
 use crate::scene::selected_coupling::Joined;
 
@@ -48,7 +48,7 @@ pub(crate) fn follow<const D: usize>(
     joined: &mut Joined,
     solve: &Solve,
     breaking: &Breaking<D>,
-    bonds: Option<(&Peridynamics<D>, &Law)>,
+    bonds: Option<(&Peridynamics<D>, &dyn Law<D>)>,
     mesh: &Mesh<D>,
     is_peridynamic: impl Fn(usize) -> bool,
 ) -> Result<Option<Follow>, SceneError> {
@@ -108,6 +108,18 @@ pub(crate) fn follow<const D: usize>(
         }
         truncated.cut_bonds = Some(CutBondsSpec::Linear);
     }
+    if let Some(states) = law.force_state()
+        && !states.history().is_empty()
+    {
+        return Err(refused(
+            format!(
+                "`zones.follow` is set, and the law of the points, {}, remembers",
+                law.name()
+            ),
+            "lays points out anew, and their history would be lost",
+            "draw a zone that is wide enough, or remove it",
+        ));
+    }
     if matches!(p.points, Points::Lattices { .. }) {
         return Err(refused(
             "`zones.follow` and `zones.bodies` are set".to_owned(),
@@ -130,9 +142,9 @@ pub(crate) fn follow<const D: usize>(
         None => STRETCH,
     };
     let reach = horizon
-        * match law {
-            Law::Lps(_) => REACH + DILATATION,
-            _ => REACH,
+        * match law.linearised().is_pairwise() {
+            false => REACH + DILATATION,
+            true => REACH,
         };
     let padding = match &follow.padding {
         Some(w) => check::within(

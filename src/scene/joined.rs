@@ -5,7 +5,7 @@
 //! Poisson's ratio, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
 
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::{Law, Material};
+use super::materials::Material;
 use super::peridynamics;
 use super::selected_coupling::Joined;
 use super::source::Span;
@@ -135,12 +135,12 @@ fn obstacle<const D: usize>(
     let mut negative = None;
     for m in found {
         let (lambda, mu) = m.lame;
-        match m.law {
-            Law::Correspondence(..) => {
-                return certain(&format!("the correspondence material `{}`", m.name));
-            }
-            Law::Lps(_) if lambda < mu * (1.0 - 1e-9) => negative = Some(&m.name),
-            _ => {}
+        let law = m.law.linearised();
+        if !law.is_ordinary() {
+            return certain(&format!("the {} material `{}`", m.law.name(), m.name));
+        }
+        if !law.is_pairwise() && lambda < mu * (1.0 - 1e-9) {
+            negative = Some(&m.name);
         }
     }
     if matches!(p.points, Some(PointsSpec::Cells)) {

@@ -1,6 +1,7 @@
 //! Materials of a validated scene.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::check;
 use super::error::{SceneError, SceneErrorKind};
@@ -10,7 +11,10 @@ use super::spec::{MaterialSpec, MicromodulusSpec};
 use super::value::Text;
 use crate::material::{Elastic, Kinematics};
 use crate::mesh::Mesh;
-use crate::peridynamics::{Influence, Micromodulus};
+use crate::peridynamics::laws::Constants;
+use crate::peridynamics::{
+    BondBased, Correspondence, Influence, Law, LinearPeridynamicSolid, Micromodulus,
+};
 use crate::tensor::Tensor4;
 
 /// The Poisson ratio of a material, and that at which its bonds would act alone.
@@ -36,24 +40,13 @@ impl Ratio {
     }
 }
 
-/// The law that bonds of a material follow.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Law {
-    /// Bonds that act alone.
-    BondBased(Micromodulus),
-    /// Linear peridynamic solid.
-    Lps(Influence),
-    /// Elastic correspondence with its stabilising force, relative to an LPS.
-    Correspondence(Influence, f64),
-}
-
 /// A material of a scene: elastic constants in the scene's dimension, and the law of its bonds.
 #[derive(Clone, Debug)]
 pub struct Material<const D: usize> {
     /// Its name.
     pub name: String,
-    /// Law of bonds.
-    pub law: Law,
+    /// The law of its bonds.
+    pub law: Arc<dyn Law<D>>,
     /// Lamé's parameters (λ_D, μ) of the scene's dimension \[Pa\].
     pub lame: (f64, f64),
     /// Density [kg/m³]; zero if not given.
@@ -95,8 +88,8 @@ pub(crate) fn materials<const D: usize>(
     let mut rest: Option<(&Text, u16)> = None;
     for (number, (name, material)) in spec.iter().enumerate() {
         let number = number as u16;
-        let (law, cells) = law_and_cells(name, material, influence)?;
         let (lame, density) = constants::<D>(name, material, kinematics)?;
+        let (law, cells) = law_and_cells(name, material, influence, lame)?;
         found.push(Material {
             name: name.value.clone(),
             law,
@@ -148,11 +141,12 @@ pub(crate) fn materials<const D: usize>(
     Ok((found, material))
 }
 
-fn law_and_cells<'a>(
+fn law_and_cells<'a, const D: usize>(
     name: &Text,
     spec: &'a MaterialSpec,
     influence: Influence,
-) -> Result<(Law, Option<&'a Text>), SceneError> {
+    (lambda, mu): (f64, f64),
+) -> Result<(Arc<dyn Law<D>>, Option<&'a Text>), SceneError> {
     Ok(match spec {
         MaterialSpec::BondBased(m) => {
             let micromodulus = match &m.micromodulus {
@@ -165,9 +159,12 @@ fn law_and_cells<'a>(
                     Micromodulus::Influence(peridynamics::influence(&place, i)?)
                 }
             };
-            (Law::BondBased(micromodulus), m.cells.as_ref())
+            (Arc::new(BondBased::new(micromodulus, mu)), m.cells.as_ref())
         }
-        MaterialSpec::Lps(m) => (Law::Lps(influence), m.cells.as_ref()),
+        MaterialSpec::Lps(m) => (
+            Arc::new(LinearPeridynamicSolid::new(influence, lambda, mu)),
+            m.cells.as_ref(),
+        ),
         MaterialSpec::Correspondence(m) => {
             let place = format!("materials.{name}.correspondence.stabilisation");
             let stabilisation = match &m.stabilisation {
@@ -175,9 +172,29 @@ fn law_and_cells<'a>(
                 None => 1.0,
             };
             (
-                Law::Correspondence(influence, stabilisation),
+                Arc::new(Correspondence::new(influence, lambda, mu, stabilisation)),
                 m.cells.as_ref(),
             )
+        }
+        MaterialSpec::Named(m) => {
+            let mut values = Vec::with_capacity(m.parameters.len());
+            for (parameter, typed) in m.law.parameters().iter().zip(&m.parameters) {
+                values.push(match typed {
+                    Some(typed) => check::within(
+                        &format!("materials.{name}.{}.{}", m.law.key(), parameter.key),
+                        typed,
+                        typed.value >= parameter.least && typed.value <= parameter.most,
+                        &format!(
+                            "must lie between {:e} and {:e}",
+                            parameter.least, parameter.most
+                        ),
+                        parameter.about,
+                    )?,
+                    None => parameter.default.unwrap_or_default(),
+                });
+            }
+            let constants = Constants { lambda, shear: mu };
+            (m.law.build(constants, &values), m.cells.as_ref())
         }
     })
 }
@@ -224,6 +241,12 @@ fn constants<const D: usize>(
             "correspondence",
             &m.youngs_modulus,
             Some(&m.poisson_ratio),
+            &m.density,
+        ),
+        MaterialSpec::Named(m) => (
+            m.law.key(),
+            &m.youngs_modulus,
+            m.poisson_ratio.as_ref(),
             &m.density,
         ),
     };

@@ -54,7 +54,7 @@ pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use follow::Follow;
 pub use initial::{Initial, InitialKind};
-pub use materials::{Fracture, Law, Material};
+pub use materials::{Fracture, Material};
 pub use peridynamics::Peridynamics;
 pub use region::Region;
 pub use solve::{Explicit, QuasiStatic, Solve};

@@ -163,7 +163,7 @@ mod tests {
     use crate::run::AnyScene;
     use crate::run::{Solved, solve_with};
     use crate::scene::Source;
-    use crate::system::{Breakage, Dynamic, Symmetry};
+    use crate::system::{Breakage, Dynamic, Interval, Symmetry};
     use crate::tensor::Tensor4;
 
     /// A plate whose edge moves as `u = G x`; a lattice with δ/h = 3.3 in its middle.
@@ -417,7 +417,7 @@ y = 0.01
                 };
                 let u: Vec<f64> = model.sites.iter().flat_map(wave).collect();
                 let mut force = vec![0.0; u.len()];
-                motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
                 let wanted = model.assemble(operator, &Silent).multiply(&u);
                 let largest =
                     |v: &mut dyn Iterator<Item = f64>| v.fold(0.0, |m: f64, v| m.max(v.abs()));

@@ -23,7 +23,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::system::{Breakage, Dynamic, Halfway};
+use crate::system::{Breakage, Dynamic, Halfway, Interval};
 
 mod state;
 
@@ -106,10 +106,15 @@ impl<'a> Explicit<'a> {
         } else {
             Breakage::Held
         };
-        let broken = system.internal_force_into(&state.u, &mut force, breakage);
+        let at_start = Interval {
+            end: state.time,
+            length: 0.0,
+        };
+        let broken = system.internal_force_into(&state.u, &mut force, at_start, breakage);
         if broken > 0 {
             system.account_for_breaks(&Halfway::at(&state.u));
         }
+        system.commit();
         state.broken += broken;
         let inverse_mass: Vec<f64> = system.mass().iter().map(|m| 1.0 / m).collect();
         let mut motion = Explicit {
@@ -237,9 +242,16 @@ impl<'a> Explicit<'a> {
             self.drive.load_into(self.state.time, &mut self.load);
             Reading::Fresh
         };
-        let broken =
-            self.system
-                .internal_force_into(&self.state.u, &mut self.force, Breakage::Allowed);
+        let interval = Interval {
+            end: self.state.time,
+            length: dt,
+        };
+        let broken = self.system.internal_force_into(
+            &self.state.u,
+            &mut self.force,
+            interval,
+            Breakage::Allowed,
+        );
         if broken > 0 {
             self.system.account_for_breaks(&Halfway {
                 u: &self.state.u,
@@ -247,6 +259,7 @@ impl<'a> Explicit<'a> {
                 back: 0.5 * dt,
             });
         }
+        self.system.commit();
         self.state.broken += broken;
         self.look_ahead();
         for (p, &k) in self.prescribed.iter().enumerate() {

@@ -161,10 +161,12 @@ impl Dynamic for Fed {
         &mut self,
         u: &[f64],
         force: &mut [f64],
+        interval: crate::system::Interval,
         b: crate::system::Breakage,
     ) -> u64 {
-        self.system.internal_force_into(u, force, b)
+        self.system.internal_force_into(u, force, interval, b)
     }
+    fn commit(&mut self) {}
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.system.tangent_into(x, y);
     }

@@ -21,7 +21,7 @@ use crate::{
         explicit::Drive,
         krylov::{KrylovParams, LinearMap, add_scaled, conjugate_gradients, dot, gmres, norm},
     },
-    system::{Breakage, Dynamic, Halfway, Symmetry},
+    system::{Breakage, Dynamic, Halfway, Interval, Symmetry},
 };
 
 mod error;
@@ -175,6 +175,8 @@ struct Run<'a> {
     balanced: f64,
     step: u64,
     time: f64,
+    /// From the load step before to this one; of no length at the first.
+    interval: Interval,
 }
 
 /// The work of a load step.
@@ -277,6 +279,7 @@ pub fn run(
         balanced: 0.0,
         step: state.step,
         time: 0.0,
+        interval: Interval::AT_ONCE,
     };
     let mut values = vec![0.0; prescribed.len()];
     let mut info = QuasiStaticInfo::default();
@@ -284,11 +287,21 @@ pub fn run(
         (work.step, work.time) = (state.step, time);
         work.balanced = 0.0;
         let mut account = None;
-        if let Some(before) = state.step.checked_sub(1).and_then(times) {
+        let before = state.step.checked_sub(1).and_then(times);
+        work.interval = Interval {
+            end: before.unwrap_or(time),
+            length: 0.0,
+        };
+        if let Some(before) = before {
             drive.load_into(before, &mut work.load);
             work.balanced = work.evaluate(&state.u)?.scale;
             account = Some(Account::of(&work, &state.u));
         }
+        let interval = Interval {
+            end: time,
+            length: before.map_or(0.0, |before| time - before),
+        };
+        work.interval = interval;
         drive.load_into(time, &mut work.load);
         drive.displacement_into(time, &mut values);
         work.find_row_sums();
@@ -306,9 +319,12 @@ pub fn run(
             if let Some(account) = &mut account {
                 account.advance(&work, &state.u);
             }
-            let now = work
-                .system
-                .internal_force_into(&state.u, &mut work.force, Breakage::Allowed);
+            let now = work.system.internal_force_into(
+                &state.u,
+                &mut work.force,
+                interval,
+                Breakage::Allowed,
+            );
             if now == 0 {
                 break residual;
             }
@@ -324,6 +340,7 @@ pub fn run(
                 });
             }
         };
+        work.system.commit();
         state.step += 1;
         state.broken += broken;
         info.steps += 1;
@@ -412,7 +429,7 @@ impl Run<'_> {
     /// `f − F` on free dofs, and its norm.
     fn evaluate(&mut self, u: &[f64]) -> Result<Residual, QuasiStaticError> {
         self.system
-            .internal_force_into(u, &mut self.force, Breakage::Held);
+            .internal_force_into(u, &mut self.force, self.interval, Breakage::Held);
         for ((r, f), k) in self.residual.iter_mut().zip(&self.load).zip(&self.force) {
             *r = f - k;
         }

@@ -183,7 +183,15 @@ impl Dynamic for Bundle {
         &self.mass
     }
 
-    fn internal_force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+    fn commit(&mut self) {}
+
+    fn internal_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        _interval: Interval,
+        breakage: Breakage,
+    ) -> u64 {
         let mut broken = 0;
         if breakage == Breakage::Allowed {
             for (intact, limit) in self.intact.iter_mut().zip(&self.limits) {

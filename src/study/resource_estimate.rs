@@ -417,7 +417,7 @@ pub(crate) fn warnings<const D: usize>(
 
 /// Smallest and largest factor of a shell of the lattice; none where the points are no lattice or no factors exist.
 fn shell_factors<const D: usize>(model: &Model<D>, horizon: f64) -> Option<(f64, f64)> {
-    let law = &model.peridynamics.as_ref()?.law;
+    let law = model.peridynamics.as_ref()?.law.linearised();
     let h = model.spacing();
     let target = law.shell_target()?;
     let lattice = LatticeFamily::<D>::new(horizon / h, TIE_TOLERANCE).ok()?;

@@ -13,8 +13,8 @@ use crate::{
         generate::{Axis, Grid},
     },
     peridynamics::{
-        BondBased, BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
-        Micromodulus, PartialVolume,
+        BondBased, BondWeights, Correspondence, Influence, LinearPeridynamicSolid, Micromodulus,
+        PartialVolume,
         influence::{Alpha, Degree},
     },
     progress::Silent,
@@ -153,12 +153,12 @@ impl Law {
     }
 
     /// The law itself.
-    pub fn law<const D: usize>(self) -> Box<dyn BondLaw<D>> {
+    pub fn law<const D: usize>(self) -> Arc<dyn crate::peridynamics::Law<D>> {
         let (lambda, mu) = self.lame::<D>();
         match self {
-            Self::BondBased(kernel) => Box::new(BondBased::<D>::new(kernel, mu)),
-            Self::StateBased(w) => Box::new(LinearPeridynamicSolid::<D>::new(w, lambda, mu)),
-            Self::Correspondence(w) => Box::new(Correspondence::<D>::new(w, lambda, mu, 1.0)),
+            Self::BondBased(kernel) => Arc::new(BondBased::<D>::new(kernel, mu)),
+            Self::StateBased(w) => Arc::new(LinearPeridynamicSolid::<D>::new(w, lambda, mu)),
+            Self::Correspondence(w) => Arc::new(Correspondence::<D>::new(w, lambda, mu, 1.0)),
         }
     }
 }
@@ -297,7 +297,7 @@ impl<const D: usize> Enclosed<D> {
     pub fn with(
         case: &Case,
         coupling: Box<dyn Coupling<D>>,
-        law: Box<dyn BondLaw<D>>,
+        law: Arc<dyn crate::peridynamics::Law<D>>,
     ) -> Result<Self, EnclosedError> {
         Self::with_barriers(case, coupling, law, Vec::new())
     }
@@ -309,11 +309,11 @@ impl<const D: usize> Enclosed<D> {
     pub fn with_barriers(
         case: &Case,
         coupling: Box<dyn Coupling<D>>,
-        law: Box<dyn BondLaw<D>>,
+        law: Arc<dyn crate::peridynamics::Law<D>>,
         barriers: Vec<Barrier<D>>,
     ) -> Result<Self, EnclosedError> {
         let (mesh, zones) = blocks::<D>(case.cells, case.widths)?;
-        let tensor = *law.tensor();
+        let tensor = *law.linearised().tensor();
         let horizon = f64::from(case.ratio) * SPACING;
         // truncated bonds want the seam halfway between points
         let origin = match case.method {

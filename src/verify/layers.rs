@@ -65,7 +65,7 @@ pub(crate) fn bodies<const D: usize>(law: Law, ratio: u32) -> Result<Enclosed<D>
     };
     let lattices = vec![lattice(SPACING), lattice(SPACING / f64::from(HORIZONS))];
     let law = law.law::<D>();
-    let tensor = *law.tensor();
+    let tensor = *law.linearised().tensor();
     let horizon = lattices[0].horizon;
     let problem = Problem {
         cell_material: vec![0; mesh.cell_count()],
@@ -243,10 +243,10 @@ fn bar(meeting: Meeting, half: u32, ratio: u32) -> Result<(LinearMotion, Vec<f64
         cell_material: vec![0; mesh.cell_count()],
         mesh,
         zones,
-        tensors: vec![*crate::peridynamics::BondLaw::tensor(&law)],
+        tensors: vec![*crate::peridynamics::LinearForceState::tensor(&law)],
         peridynamic_material: 0,
         peridynamics: Some(Peridynamics {
-            law: Box::new(law),
+            law: Arc::new(law),
             horizon: Arc::new(move |x| match meeting {
                 Meeting::Smaller => small,
                 Meeting::Jump | Meeting::Bridge if x[0] > 0.0 => small,

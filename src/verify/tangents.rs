@@ -97,7 +97,7 @@ impl<const D: usize> RandomCloud<D> {
         PdBody::new(
             cloud,
             self.families.clone(),
-            law.law::<D>().as_ref(),
+            law.law::<D>().linearised(),
             &Factors::Plain,
             Ends::Differ,
         )

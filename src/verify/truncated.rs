@@ -1,5 +1,7 @@
 //! Truncated bonds, measured: symmetry, definiteness, affine fields, equilibrium, order in the horizon, and what a symmetric matrix saves.
 
+use std::sync::Arc;
+
 mod compared;
 mod zones;
 
@@ -10,7 +12,7 @@ use rayon::prelude::*;
 use crate::coupling::SiteKind;
 use crate::fem::{self, Locator};
 use crate::observe::report::{Columns, Row, Table};
-use crate::peridynamics::{BondLaw, LinearPeridynamicSolid, Micromodulus};
+use crate::peridynamics::{LinearPeridynamicSolid, Micromodulus};
 use crate::progress::{Progress, Silent};
 use crate::solve::FreeDofs;
 use crate::solve::direct::{Analysis, Factor};
@@ -60,14 +62,14 @@ impl Material {
         }
     }
 
-    fn law<const D: usize>(self) -> Box<dyn BondLaw<D>> {
+    fn law<const D: usize>(self) -> Arc<dyn crate::peridynamics::Law<D>> {
         match self {
             Self::Pairwise(kernel) => Law::BondBased(kernel).law(),
             Self::Lps(nu) => {
                 let e = YOUNGS_MODULUS;
                 let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
                 let mu = e / (2.0 * (1.0 + nu));
-                Box::new(LinearPeridynamicSolid::new(INFLUENCE, lambda, mu))
+                Arc::new(LinearPeridynamicSolid::new(INFLUENCE, lambda, mu))
             }
         }
     }

@@ -24,7 +24,7 @@ use crate::{
         report::{Columns, Row, Table},
     },
     peridynamics::{
-        BondLaw, BondWeights, Correspondence, Influence, LinearPeridynamicSolid, PartialVolume,
+        BondWeights, Correspondence, Influence, Law, LinearPeridynamicSolid, PartialVolume,
         influence::{Alpha, Degree},
     },
     progress::Progress,
@@ -76,18 +76,18 @@ impl BarLaw {
         }
     }
 
-    fn law<const D: usize>(self) -> Result<(Box<dyn BondLaw<D>>, Tensor4<D>), MaterialError> {
+    fn law<const D: usize>(self) -> Result<(Arc<dyn Law<D>>, Tensor4<D>), MaterialError> {
         let kinematics = if D == 1 {
             Kinematics::Bar
         } else {
             Kinematics::Solid
         };
         let (lambda, mu) = Elastic::new(YOUNGS_MODULUS, 0.0, DENSITY)?.lame::<D>(kinematics)?;
-        let law: Box<dyn BondLaw<D>> = match self {
+        let law: Arc<dyn Law<D>> = match self {
             Self::Correspondence => {
-                Box::new(Correspondence::new(Influence::Gaussian, lambda, mu, 0.0))
+                Arc::new(Correspondence::new(Influence::Gaussian, lambda, mu, 0.0))
             }
-            Self::Lps => Box::new(LinearPeridynamicSolid::new(OMEGA, lambda, mu)),
+            Self::Lps => Arc::new(LinearPeridynamicSolid::new(OMEGA, lambda, mu)),
         };
         Ok((law, Tensor4::isotropic(lambda, mu)))
     }

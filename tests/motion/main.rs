@@ -11,6 +11,7 @@ mod follow;
 mod growth;
 mod indefinite;
 mod keys;
+mod laws;
 mod load_steps;
 mod neighbours;
 mod restarts;

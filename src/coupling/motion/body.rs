@@ -9,7 +9,7 @@ use crate::{
     assembly::Transfer,
     coupling::{Model, Operator, SeamBonds, SiteKind},
     peridynamics::{
-        BondEnergy, Families, PdBody,
+        Accelerator, Families, PdBody,
         contact::{Contact, ContactSetup, contact_stiffness},
         kernel::{
             BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, Storage, bond_pass,
@@ -107,14 +107,15 @@ impl<const D: usize> MovingBody<D> {
             true => body.kernel(i).1[k],
             false => omega_of(body, i, families.of(i)[k]),
         };
-        let force = match p.law.bond_energy(body.cloud.horizon[0]) {
-            Some(BondEnergy::Pairwise { .. }) => BondForce::Pairwise { coefficient: &pair },
-            Some(BondEnergy::Lps { bulk, shear, .. }) => BondForce::Solid {
+        let force = match (p.law.accelerator(), p.law.force_state()) {
+            (Some(Accelerator::Pairwise), _) => BondForce::Pairwise { coefficient: &pair },
+            (Some(Accelerator::Solid { bulk, shear }), _) => BondForce::Solid {
                 omega: &omega,
                 bulk,
                 shear,
             },
-            None => return Err(MotionError::Law { law: p.law.name() }),
+            (None, Some(_)) => BondForce::Law { law: &p.law, body },
+            (None, None) => return Err(MotionError::Law { law: p.law.name() }),
         };
         let by_bond = |i: usize, _: usize, _: &Vector<D>| {
             let critical = behaviour.critical_stretch.as_ref();

@@ -37,6 +37,7 @@ impl<const D: usize> Motion<'_, D> {
         let mut spent = Dissipation {
             energy: moving.pass.lost_energy(&displaced),
             area: 0.0,
+            inelastic: 0.0,
         };
         for (i, j) in moving.pass.last_broken() {
             spent.area += 0.5 * area_of([i, j]);

@@ -54,7 +54,7 @@ use crate::{
         CellRole, Coupling, Definiteness, Interface, Model, ModelError, Operator, Reach, Zone,
     },
     mesh::Mesh,
-    peridynamics::BondLaw,
+    peridynamics::LinearForceState,
     system::Symmetry,
 };
 
@@ -96,7 +96,7 @@ impl<const D: usize> Coupling<D> for Truncated {
             .collect()
     }
 
-    fn reach(&self, _law: &dyn BondLaw<D>) -> Reach {
+    fn reach(&self, _law: &dyn LinearForceState<D>) -> Reach {
         Reach::Own
     }
 

@@ -8,7 +8,7 @@ use super::{
     stencil::{NONE, Stencil},
     sweep::{Bits, Broken, CARE, FULL, Field, Task, job},
 };
-use crate::system::Breakage;
+use crate::system::{Breakage, Interval};
 
 /// Groups of eight points per task; a constant, so that no result depends on the number of threads.
 pub(super) const TASK: usize = 64;
@@ -312,7 +312,13 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         self.reference
     }
 
-    fn force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+    fn force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        _interval: Interval,
+        breakage: Breakage,
+    ) -> u64 {
         match self.kinematics {
             Kinematics::Exact => self.pass::<true>(u, force, breakage),
             Kinematics::Linear => self.pass::<false>(u, force, breakage),
@@ -529,6 +535,14 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         let whole = super::unpack(state, self.reference, &mut self.stencil.intact);
         self.mark_full();
         whole
+    }
+
+    fn commit(&mut self) -> f64 {
+        0.0
+    }
+
+    fn remembers(&self) -> bool {
+        false
     }
 
     fn memory_bytes(&self) -> usize {

@@ -92,6 +92,7 @@ impl<const D: usize> Lattice<D> {
                         2.0 * coefficient(0, 0, xi) * xi.norm_squared()
                     }
                     BondForce::Solid { omega, .. } => omega(0, 0, xi),
+                    BondForce::Law { .. } => 0.0,
                 };
                 (weight, limit)
             },
@@ -140,6 +141,7 @@ impl<const D: usize> Lattice<D> {
         let offsets = &stencil.offsets;
         let bits = |g: usize| &stencil.reference[g * offsets.len()..(g + 1) * offsets.len()];
         let solid = match *force {
+            BondForce::Law { .. } => return Err("the law has no lattice pass".into()),
             BondForce::Pairwise { .. } => None,
             BondForce::Solid { bulk, shear, .. } => {
                 let d = D as f64;

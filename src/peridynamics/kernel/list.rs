@@ -10,7 +10,7 @@ use super::{
     packed::{Neighbours, Weights},
     sweep::Bits,
 };
-use crate::system::Breakage;
+use crate::system::{Breakage, Interval};
 
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
@@ -125,7 +125,8 @@ impl<const D: usize> List<D> {
             }
         };
         let solid = match setup.force {
-            BondForce::Pairwise { .. } => None,
+            // any other law is passed over by its force states
+            BondForce::Pairwise { .. } | BondForce::Law { .. } => None,
             BondForce::Solid { bulk, shear, .. } => {
                 let d = D as f64;
                 let inverse: Vec<f64> = (0..points)
@@ -347,7 +348,13 @@ impl<const D: usize> BondPass<D> for List<D> {
         self.reference
     }
 
-    fn force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64 {
+    fn force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        _interval: Interval,
+        breakage: Breakage,
+    ) -> u64 {
         match self.kinematics {
             Kinematics::Exact => self.pass::<true>(u, force, breakage),
             Kinematics::Linear => self.pass::<false>(u, force, breakage),
@@ -503,6 +510,14 @@ impl<const D: usize> BondPass<D> for List<D> {
             return state.is_empty();
         }
         super::unpack(state, self.reference, &mut self.intact)
+    }
+
+    fn commit(&mut self) -> f64 {
+        0.0
+    }
+
+    fn remembers(&self) -> bool {
+        false
     }
 
     fn memory_bytes(&self) -> usize {

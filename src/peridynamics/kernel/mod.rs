@@ -5,6 +5,7 @@
 //! | `setup.rs` | what a pass is made from, and the errors |
 //! | `bond.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
+//! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
 //! | `list.rs`, `eights.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `packed.rs` | neighbours and weights of a list in few bytes |
@@ -23,6 +24,10 @@ mod bond;
 pub(crate) mod bond_list;
 mod breaks;
 mod eights;
+mod generic;
+mod generic_tangent;
+#[cfg(test)]
+mod generic_tests;
 mod lanes;
 mod lattice;
 mod lattice_build;
@@ -45,7 +50,7 @@ pub use stencil::BlockSetup;
 
 pub(crate) use list::{extension, ratio, stretched};
 
-use crate::system::Breakage;
+use crate::system::{Breakage, Interval};
 
 /// One sweep over the bonds of a cloud.
 ///
@@ -61,9 +66,21 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Directed bonds of the reference families.
     fn bonds(&self) -> u64;
 
-    /// Overwrites `force` with the internal force `F(u)` (`K u` of a linear body, so minus the force that acts on the point), volume included; zero for points without a row.
+    /// Overwrites `force` with the internal force `F(u, t, Δt)` (`K u` of a linear body, so minus the force that acts on the point), volume included; zero for points without a row.
     /// Returns how many directed bonds this pass broke.
-    fn force_into(&mut self, u: &[f64], force: &mut [f64], breakage: Breakage) -> u64;
+    fn force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        breakage: Breakage,
+    ) -> u64;
+
+    /// Ends the interval of the last call of [`BondPass::force_into`]: its history is the past of the next. Returns the energy that points with rows dissipated in it \[J\].
+    fn commit(&mut self) -> f64;
+
+    /// Whether there is a history.
+    fn remembers(&self) -> bool;
 
     /// `y = K x` with the tangent `K` at rest and bonds as they stand; zero for points without a row.
     fn tangent_into(&self, x: &[f64], y: &mut [f64]);
@@ -111,6 +128,13 @@ pub fn bond_pass<const D: usize>(
     setup: &BondSetup<'_, D>,
 ) -> Result<Box<dyn BondPass<D>>, KernelError> {
     setup.check_lists()?;
+    if let BondForce::Law { law, body } = setup.force {
+        setup.check_bonds()?;
+        let states = law
+            .force_state()
+            .ok_or(KernelError::FirstOrder { law: law.name() })?;
+        return Ok(Box::new(generic::Generic::new(setup, law, states, body)));
+    }
     let mut why = None;
     if setup.layout != Layout::List {
         match lattice::Lattice::new(setup) {

@@ -1,8 +1,13 @@
 //! What a bond pass is made from.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
-use crate::{peridynamics::Families, tensor::Vector};
+use crate::{
+    peridynamics::{Families, Law, PdBody},
+    tensor::Vector,
+};
 
 /// Largest difference of a number of a bond between its ends, in parts of it.
 pub(super) const ENDS: f64 = 1e-12;
@@ -55,7 +60,7 @@ pub enum BondForce<'a, const D: usize> {
     /// Prototype microelastic brittle (PMB), [SAND2015-7998] eq. (3.1) linearised: both ends together pull with `2 p ξ (ξ·η) V_i V_j`; exact bonds with `2 p r² (1 − r/|ξ+η|) (ξ+η) V_i V_j`,
     /// whose energy `p r² (|ξ+η| − r)² V_i V_j` is quadratic in the extension.
     Pairwise {
-        /// `p`, the pairwise coefficient of [`crate::peridynamics::law`] \[N/m^(2D+2)\].
+        /// `p`, the pairwise coefficient of [`crate::peridynamics::linear_force_state`] \[N/m^(2D+2)\].
         coefficient: &'a BondFunction<'a, D>,
     },
     /// Linear peridynamic solid, [SAND2015-7998] eq. (5.16)–(5.18), `T = [(D k − (D+2) μ)/m θ ω r + D(D+2) μ/m ω e] M`; the weighted volume `m` is that of the reference family and stays.
@@ -66,6 +71,13 @@ pub enum BondForce<'a, const D: usize> {
         bulk: f64,
         /// Shear modulus \[Pa\].
         shear: f64,
+    },
+    /// Any law, by its force states.
+    Law {
+        /// The law.
+        law: &'a Arc<dyn Law<D>>,
+        /// The coefficients of its linearisation, of all bonds of the families and maybe more.
+        body: &'a PdBody<D>,
     },
 }
 
@@ -163,6 +175,14 @@ pub enum KernelError {
         /// Its weighted volume.
         weighted_volume: f64,
     },
+    /// A law without force states.
+    #[error(
+        "bond pass: {law} is known to first order only, so that its bonds neither rotate nor break"
+    )]
+    FirstOrder {
+        /// Its name.
+        law: &'static str,
+    },
     /// The lattice pass was asked for where there is none.
     #[error("bond pass: no lattice pass, {why}; choose the automatic layout")]
     NoLattice {
@@ -187,6 +207,8 @@ impl<const D: usize> BondSetup<'_, D> {
         match self.force {
             BondForce::Pairwise { coefficient } => 2.0 * coefficient(i, k, xi) * xi.norm_squared(),
             BondForce::Solid { omega, .. } => omega(i, k, xi),
+            // ends may differ: each end has a force state of its own
+            BondForce::Law { .. } => 0.0,
         }
     }
 

@@ -28,7 +28,10 @@ fn against_naive<const D: usize>(counts: [usize; D], jitter: f64, ghosts: bool) 
                 let (expected, energy) = naive(&case, law, kinematics, &u, &|_, _| true);
                 with(&case, law, kinematics, None, layout, |mut pass| {
                     let mut force = vec![f64::NAN; n];
-                    assert_eq!(pass.force_into(&u, &mut force, Breakage::Allowed), 0);
+                    assert_eq!(
+                        pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed),
+                        0
+                    );
                     // the textbook's difference of lengths loses what the amplitude has less than the length
                     let error = difference(&force, &expected) / largest(&expected);
                     let tolerance = if amplitude < 1e-3 && kinematics == Kinematics::Exact {
@@ -74,8 +77,13 @@ fn derivatives<const D: usize>(counts: [usize; D], jitter: f64) {
                 let direction = noise(n, H, 5);
                 let (mut plus, mut minus, mut tangent) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
                 let scaled = |s: f64| -> Vec<f64> { direction.iter().map(|x| s * x).collect() };
-                pass.force_into(&scaled(1e-5), &mut plus, Breakage::Held);
-                pass.force_into(&scaled(-1e-5), &mut minus, Breakage::Held);
+                pass.force_into(&scaled(1e-5), &mut plus, Interval::AT_ONCE, Breakage::Held);
+                pass.force_into(
+                    &scaled(-1e-5),
+                    &mut minus,
+                    Interval::AT_ONCE,
+                    Breakage::Held,
+                );
                 pass.tangent_into(&direction, &mut tangent);
                 let numeric: Vec<f64> = plus
                     .iter()
@@ -91,7 +99,7 @@ fn derivatives<const D: usize>(counts: [usize; D], jitter: f64) {
                     u.iter().zip(&direction).map(|(u, d)| u + s * d).collect()
                 };
                 let slope = (pass.stored_energy(&at(1e-5)) - pass.stored_energy(&at(-1e-5))) / 2e-5;
-                pass.force_into(&u, &mut plus, Breakage::Held);
+                pass.force_into(&u, &mut plus, Interval::AT_ONCE, Breakage::Held);
                 let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
                 assert!(
                     (slope - work).abs() < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
@@ -161,8 +169,8 @@ fn a_large_rotation_turns_the_forces() {
         for &layout in layouts(0.0) {
             with(&case, law, Kinematics::Exact, None, layout, |mut pass| {
                 let (mut force, mut other) = (vec![0.0; n], vec![0.0; n]);
-                pass.force_into(&u, &mut force, Breakage::Held);
-                pass.force_into(&turned, &mut other, Breakage::Held);
+                pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
+                pass.force_into(&turned, &mut other, Interval::AT_ONCE, Breakage::Held);
                 let expected: Vec<f64> = force
                     .chunks(3)
                     .flat_map(|f| {
@@ -211,9 +219,13 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
                     let name = format!("{D}D {law:?} {}", pass.name());
                     let mut force = vec![0.0; n];
                     let fresh = pass.damage_state();
-                    assert_eq!(pass.force_into(&first, &mut force, Breakage::Held), 0);
+                    assert_eq!(
+                        pass.force_into(&first, &mut force, Interval::AT_ONCE, Breakage::Held),
+                        0
+                    );
                     let whole = force.clone();
-                    let mut lost = pass.force_into(&first, &mut force, Breakage::Allowed);
+                    let mut lost =
+                        pass.force_into(&first, &mut force, Interval::AT_ONCE, Breakage::Allowed);
                     let (expected, energy) =
                         naive(&case, law, Kinematics::Exact, &first, &|i, j| {
                             !breaks(&first, i, j)
@@ -244,7 +256,8 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
                     }
                     // once broken, a bond stays so
                     let state = pass.damage_state();
-                    lost += pass.force_into(&second, &mut force, Breakage::Allowed);
+                    lost +=
+                        pass.force_into(&second, &mut force, Interval::AT_ONCE, Breakage::Allowed);
                     let stands =
                         |i: usize, j: usize| !breaks(&first, i, j) && !breaks(&second, i, j);
                     let (expected, _) = naive(&case, law, Kinematics::Exact, &second, &stands);
@@ -284,7 +297,7 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
                     assert!(pass.restore_damage(&state) && !pass.restore_damage(&state[1..]));
                     assert_eq!(pass.damage_state(), state);
                     assert!(pass.restore_damage(&fresh) && pass.broken() == 0);
-                    pass.force_into(&first, &mut force, Breakage::Held);
+                    pass.force_into(&first, &mut force, Interval::AT_ONCE, Breakage::Held);
                     assert_eq!(force, whole);
                 },
             );
@@ -326,7 +339,12 @@ fn threads_do_not_change_a_bit() {
                         layout,
                         |mut pass| {
                             let (mut force, mut y) = (vec![0.0; n], vec![0.0; n]);
-                            let broken = pass.force_into(&u, &mut force, Breakage::Allowed);
+                            let broken = pass.force_into(
+                                &u,
+                                &mut force,
+                                Interval::AT_ONCE,
+                                Breakage::Allowed,
+                            );
                             pass.tangent_into(&u, &mut y);
                             let energy = pass.stored_energy(&u);
                             (
@@ -373,7 +391,7 @@ fn precracks_count_as_damage_and_single_weights_err_by_little() {
     };
     let (mut force, mut single) = (vec![0.0; n], vec![0.0; n]);
     let mut pass = bond_pass(&setup).unwrap();
-    pass.force_into(&u, &mut force, Breakage::Held);
+    pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
     let (expected, _) = naive(&case, Law::Solid, Kinematics::Exact, &u, &|i, j| !cut(i, j));
     assert!(difference(&force, &expected) < 1e-13 * largest(&expected));
     assert!(pass.broken() > 0);
@@ -383,7 +401,7 @@ fn precracks_count_as_damage_and_single_weights_err_by_little() {
         ..setup
     })
     .unwrap();
-    pass.force_into(&u, &mut single, Breakage::Held);
+    pass.force_into(&u, &mut single, Interval::AT_ONCE, Breakage::Held);
     let error = difference(&force, &single) / largest(&force);
     assert!(error > 1e-10 && error < 1e-7, "{error:e}");
 }

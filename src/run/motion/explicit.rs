@@ -366,7 +366,7 @@ fn leg<'r, const D: usize>(
             let energy = recorder.last.kinetic + recorder.last.stored;
             let broken = match breaks {
                 Breaks::Possibly => format!(", {} bonds broken", state.broken),
-                Breaks::Never => String::new(),
+                Breaks::Never | Breaks::Dissipating => String::new(),
             };
             progress.tell(&format!(
                 "step {}, t = {:.3e}, energy {energy:.3e}{broken}, {speed:.0} steps/s",
@@ -471,7 +471,8 @@ fn leg<'r, const D: usize>(
             external_work: state.work,
             missing_energy: recorder.energy_at_start + state.work - moment.kinetic - stored,
             energy_gain,
-            cracks: cracks(moment.system, plane),
+            cracks: cracks(moment.system, breaks, plane),
+            inelastic_energy: inelastic_energy(moment.system),
             broken_bonds: state.broken,
             edge_reached: edge.map(|e| {
                 let x = place(e.site as usize);
@@ -491,13 +492,25 @@ fn leg<'r, const D: usize>(
 }
 
 /// What breaking bonds cost so far; none where none can break.
-pub(crate) fn cracks(system: &dyn Dynamic, plane: Option<PlaneEnergy>) -> Option<CrackSummary> {
-    let spent = system.dissipation()?;
+pub(crate) fn cracks(
+    system: &dyn Dynamic,
+    breaks: Breaks,
+    plane: Option<PlaneEnergy>,
+) -> Option<CrackSummary> {
+    let spent = system
+        .dissipation()
+        .filter(|_| breaks == Breaks::Possibly)?;
     Some(CrackSummary {
         plane_energy: plane.map(|p| p.of_plane),
         fracture_energy: plane.and_then(|p| p.typed),
         ..CrackSummary::new(spent.energy, spent.area)
     })
+}
+
+/// What a law with memory dissipated; none of any other.
+pub(crate) fn inelastic_energy(system: &dyn Dynamic) -> Option<f64> {
+    let inelastic = system.dissipation().map(|d| d.inelastic);
+    inelastic.filter(|energy| *energy != 0.0)
 }
 
 pub(crate) fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {

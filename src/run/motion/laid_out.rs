@@ -189,6 +189,7 @@ pub(crate) fn restore(
 pub(crate) fn breaks<const D: usize>(system: &dyn Dynamic, rest: &Rest<D>) -> Breaks {
     match system.damage() {
         Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
+        _ if system.dissipation().is_some() => Breaks::Dissipating,
         _ => Breaks::Never,
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::RunOptions;
 use super::drive::SceneDrive;
-use super::explicit::{cracks, sizes};
+use super::explicit::{cracks, inelastic_energy, sizes};
 use super::laid_out::{LaidOut, breaks, laid_out, opened, restore};
 use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
 use super::system::{plane_energy, start};
@@ -282,7 +282,8 @@ fn load_steps<const D: usize>(
             external_work: state.work,
             missing_energy: recorder.energy_at_start + state.work - stored,
             energy_gain: None,
-            cracks: cracks(moving.system.as_ref(), plane),
+            cracks: cracks(moving.system.as_ref(), breaks, plane),
+            inelastic_energy: inelastic_energy(moving.system.as_ref()),
             broken_bonds: state.broken,
             edge_reached: edge.map(|e| (e.time, place(e.site as usize).iter().copied().collect())),
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),

@@ -145,6 +145,8 @@ pub(crate) enum Breaks {
     Possibly,
     /// None does.
     Never,
+    /// None does, but the law dissipates energy.
+    Dissipating,
 }
 
 /// A state to tell of.
@@ -323,7 +325,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             stored,
             work: state.work,
             dissipated: match self.breaks {
-                Breaks::Possibly => system.dissipated_energy().unwrap_or(0.0),
+                Breaks::Possibly | Breaks::Dissipating => system.dissipated_energy().unwrap_or(0.0),
                 Breaks::Never => 0.0,
             },
             missing: self.energy_at_start + state.work - moment.kinetic - stored,
@@ -351,9 +353,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
             state.work.into(),
         ];
         row.extend(moment.discrete.map(Entry::from));
-        if self.breaks == Breaks::Possibly {
+        if self.breaks != Breaks::Never {
             row.push(energies.dissipated.into());
             row.push(energies.missing.into());
+        }
+        if self.breaks == Breaks::Possibly {
             row.push((state.broken as i64).into());
             row.push(system.dissipation().map_or(0.0, |d| d.area).into());
         }
@@ -417,7 +421,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let mut more = vec![OverSites::Vector("velocity", &moment.state.v)];
         let damage = match self.breaks {
             Breaks::Possibly => moment.system.damage(),
-            Breaks::Never => None,
+            Breaks::Never | Breaks::Dissipating => None,
         };
         if let Some(damage) = &damage {
             more.push(OverSites::Scalar("damage", damage));
@@ -529,9 +533,11 @@ fn history_header<const D: usize>(
     if is_linear {
         header.push("discrete_energy");
     }
+    if breaks != Breaks::Never {
+        header.extend(["dissipated_energy", "missing_energy"]);
+    }
     if breaks == Breaks::Possibly {
-        header.extend(["dissipated_energy", "missing_energy", "broken_bonds"]);
-        header.push("crack_area");
+        header.extend(["broken_bonds", "crack_area"]);
     }
     let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();
     header.extend(AXES[..D].iter().map(|a| format!("momentum_{a}")));

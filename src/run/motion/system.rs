@@ -73,7 +73,8 @@ pub(crate) fn dynamic<'a, const D: usize>(
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
     let is_linear = critical_stretch.is_none()
         && breaking.contact.is_none()
-        && breaking.bonds == BondsSpec::Linear;
+        && breaking.bonds == BondsSpec::Linear
+        && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear());
     definiteness::check(model, operator, rest.ratio, choices, progress)?;
     let moving = Motion::new(
         model,
@@ -187,12 +188,15 @@ pub(crate) fn critical_stretch<const D: usize>(
         let Some(bonds) = p.law.bond_energy(horizon) else {
             return Err(MotionError::Law { law: p.law.name() }.into());
         };
+        let linear = match rest.breaking.calibration {
+            CalibrationSpec::Lattice => fracture::critical_stretch(energy, per_square)?,
+            CalibrationSpec::Continuum => bonds.critical_stretch::<D>(energy, horizon)?,
+        };
         list.push((
             horizon,
-            match rest.breaking.calibration {
-                CalibrationSpec::Lattice => fracture::critical_stretch(energy, per_square)?,
-                CalibrationSpec::Continuum => bonds.critical_stretch::<D>(energy, horizon)?,
-            },
+            fracture::stretch_of_equal_energy(linear, |s| {
+                p.law.force_state().map_or(1.0, |law| law.energy_ratio(s))
+            })?,
         ));
     }
     Ok(Some(match list[..] {
@@ -213,8 +217,13 @@ pub(crate) fn plane_energy<const D: usize>(
     let [(horizon, per_square)] = planes[..] else {
         return Ok(None);
     };
+    let stretch = critical.at(horizon);
+    let law = model
+        .peridynamics
+        .as_ref()
+        .and_then(|p| p.law.force_state());
     Ok(Some(PlaneEnergy {
-        of_plane: critical.at(horizon).powi(2) * per_square,
+        of_plane: stretch.powi(2) * per_square * law.map_or(1.0, |law| law.energy_ratio(stretch)),
         typed: match rest.breaking.fracture {
             Some(Fracture::Energy(energy)) => Some(energy),
             _ => None,

@@ -2,11 +2,11 @@
 
 use super::shapes::touching;
 use crate::coupling::need::{Criteria, Need, gradient_ratio};
-use crate::run::setup;
+use crate::peridynamics::fracture::stretch_of_equal_energy;
 use crate::scene::conditions::Support;
 use crate::scene::draft::Draft;
 use crate::scene::error::SceneError;
-use crate::scene::materials::{Fracture, Law, Material};
+use crate::scene::materials::{Fracture, Material};
 use crate::scene::region;
 use crate::tensor::{Tensor4, Vector};
 
@@ -73,15 +73,9 @@ fn held<const D: usize>(scene: &Draft<'_, D>, horizon: &[f64]) -> Vec<bool> {
     mesh.grown(&touching(mesh, nodes), |c| horizon[c])
 }
 
-/// The micromodulus of the bonds of a material, up to a factor; of a law that is not named here, that of ω = 1.
+/// The micromodulus of the bonds of a material, up to a factor.
 fn micromodulus<const D: usize>(material: &Material<D>, r: f64, horizon: f64) -> f64 {
-    let mut influence = 1.0;
-    if let Law::BondBased(m) = material.law {
-        return m.shape(r, horizon);
-    } else if let Law::Lps(omega) | Law::Correspondence(omega, _) = material.law {
-        influence = omega.value(r, horizon);
-    }
-    influence / (r * r)
+    material.law.linearised().kernel(r, horizon)
 }
 
 /// The stretch at which bonds of a material break. A fracture energy that gives none is the run's to complain of.
@@ -89,8 +83,10 @@ fn critical_stretch<const D: usize>(material: &Material<D>, horizon: f64) -> Opt
     match material.fracture? {
         Fracture::Stretch(s) => Some(s),
         Fracture::Energy(energy) => {
-            let bonds = setup::law(material).bond_energy(horizon)?;
-            bonds.critical_stretch::<D>(energy, horizon).ok()
+            let bonds = material.law.bond_energy(horizon)?;
+            let linear = bonds.critical_stretch::<D>(energy, horizon).ok()?;
+            let law = material.law.force_state();
+            stretch_of_equal_energy(linear, |s| law.map_or(1.0, |law| law.energy_ratio(s))).ok()
         }
     }
 }

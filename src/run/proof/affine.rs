@@ -189,7 +189,7 @@ fn reach<const D: usize>(model: &Model<D>) -> f64 {
     let alone = model
         .peridynamics
         .as_ref()
-        .is_some_and(|p| p.law.is_pairwise())
+        .is_some_and(|p| p.law.linearised().is_pairwise())
         && !model.zones.contains(&Zone::Transition);
     // points on the boundary itself have half a cell, so that a family lacks as much that only touches it
     (if alone { 1.0 } else { 2.0 }) * largest * (1.0 + 1e-6)

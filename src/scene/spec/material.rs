@@ -2,17 +2,22 @@
 
 use std::borrow::Cow;
 use std::fmt;
+use std::sync::LazyLock;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
-use serde::de::{self, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
+use serde::de::{
+    self, DeserializeSeed, Deserializer, EnumAccess, MapAccess, VariantAccess, Visitor,
+    value::MapAccessDeserializer,
+};
 
+use super::named_law::{self, NamedSpec};
+use crate::peridynamics::laws::Named;
 use crate::scene::expression::Expression;
 use crate::scene::value::{Coordinates, Count, Number, Text};
 
 /// A material: its peridynamic law, beside which the local law is linear elasticity with the same constants.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Debug)]
 pub enum MaterialSpec {
     /// Bonds that act alone; Poisson's ratio follows (1/3 in plane stress, 1/4 in plane strain and solids).
     BondBased(BondBasedSpec),
@@ -20,6 +25,111 @@ pub enum MaterialSpec {
     Lps(StateBasedSpec),
     /// Elastic correspondence: the local law applied to a deformation gradient averaged over the family.
     Correspondence(CorrespondenceSpec),
+    /// A law of [`Named`].
+    Named(NamedSpec),
+}
+
+/// Keys of materials.
+static KEYS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
+    let typed = ["bond-based", "lps", "correspondence"];
+    typed.iter().chain(Named::KEYS).copied().collect()
+});
+
+impl<'de> Deserialize<'de> for MaterialSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Materials;
+        impl<'de> Visitor<'de> for Materials {
+            type Value = MaterialSpec;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "one of {}", KEYS.join(", "))
+            }
+
+            fn visit_enum<A: EnumAccess<'de>>(self, data: A) -> Result<MaterialSpec, A::Error> {
+                let (key, content) = data.variant_seed(MaterialKey)?;
+                Ok(match key {
+                    Key::BondBased => MaterialSpec::BondBased(content.newtype_variant()?),
+                    Key::Lps => MaterialSpec::Lps(content.newtype_variant()?),
+                    Key::Correspondence => MaterialSpec::Correspondence(content.newtype_variant()?),
+                    Key::Named(law) => {
+                        MaterialSpec::Named(content.newtype_variant_seed(named_law::Seed(law))?)
+                    }
+                })
+            }
+        }
+        deserializer.deserialize_enum("MaterialSpec", &KEYS, Materials)
+    }
+}
+
+/// The law that a key of a material names.
+enum Key {
+    BondBased,
+    Lps,
+    Correspondence,
+    Named(Named),
+}
+
+/// Reads such a key.
+struct MaterialKey;
+
+impl<'de> DeserializeSeed<'de> for MaterialKey {
+    type Value = Key;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Key, D::Error> {
+        let key = String::deserialize(deserializer)?;
+        Ok(match key.as_str() {
+            "bond-based" => Key::BondBased,
+            "lps" => Key::Lps,
+            "correspondence" => Key::Correspondence,
+            other => match Named::ALL.iter().find(|law| law.key() == other) {
+                Some(law) => Key::Named(*law),
+                None => return Err(de::Error::unknown_variant(other, &KEYS)),
+            },
+        })
+    }
+}
+
+impl JsonSchema for MaterialSpec {
+    fn schema_name() -> Cow<'static, str> {
+        "MaterialSpec".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let of = |key: &str, about: &str, content: Schema| {
+            json_schema!({
+                "description": about,
+                "type": "object",
+                "properties": { key: content },
+                "required": [key],
+                "additionalProperties": false
+            })
+        };
+        let mut variants = vec![
+            of(
+                "bond-based",
+                "Bonds that act alone; Poisson's ratio follows (1/3 in plane stress, 1/4 in plane strain and solids).",
+                generator.subschema_for::<BondBasedSpec>(),
+            ),
+            of(
+                "lps",
+                "Ordinary state-based law (linear peridynamic solid), any Poisson ratio.",
+                generator.subschema_for::<StateBasedSpec>(),
+            ),
+            of(
+                "correspondence",
+                "Elastic correspondence: the local law applied to a deformation gradient averaged over the family.",
+                generator.subschema_for::<CorrespondenceSpec>(),
+            ),
+        ];
+        for law in Named::ALL {
+            let content = named_law::schema(*law, generator);
+            variants.push(of(law.key(), law.about(), content));
+        }
+        json_schema!({
+            "description": "A material: its peridynamic law, beside which the local law is linear elasticity with the same constants.",
+            "oneOf": variants
+        })
+    }
 }
 
 impl MaterialSpec {
@@ -28,7 +138,8 @@ impl MaterialSpec {
         match self {
             Self::BondBased(m) => Some(("bond-based", &m.fracture_energy, &m.critical_stretch)),
             Self::Lps(m) => Some(("lps", &m.fracture_energy, &m.critical_stretch)),
-            _ => None,
+            Self::Named(m) => Some((m.law.key(), &m.fracture_energy, &m.critical_stretch)),
+            Self::Correspondence(_) => None,
         }
     }
 }

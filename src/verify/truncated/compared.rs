@@ -17,7 +17,7 @@ use crate::peridynamics::kernel::Kinematics;
 use crate::progress::{Progress, Silent};
 use crate::shape::{Barrier, Shape};
 use crate::solve::statics::{self, StaticParams, StaticProblem};
-use crate::system::{Breakage, Dynamic, Halfway, Symmetry};
+use crate::system::{Breakage, Dynamic, Halfway, Interval, Symmetry};
 use crate::tensor::{Vector, padded};
 use crate::verify::Effort;
 use crate::verify::enclosed::{
@@ -238,7 +238,7 @@ fn run_crack(
             }
         }
     };
-    motion.internal_force_into(&u, &mut force, Breakage::Held);
+    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
     let row = |damage: &[f64], side: f64| -> Vec<(f64, f64)> {
         let beside = x.iter().zip(damage);
         let beside = beside.filter(|(x, _)| (x[1] - y - side * SPACING).abs() < 0.1 * SPACING);
@@ -254,7 +254,7 @@ fn run_crack(
         done += 1;
         kick(&mut v, &force);
         u.iter_mut().zip(&v).for_each(|(u, v)| *u += step * v);
-        motion.internal_force_into(&u, &mut force, Breakage::Allowed);
+        motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
         let back = 0.5 * step;
         motion.account_for_breaks(&Halfway { u: &u, v: &v, back });
         kick(&mut v, &force);

@@ -151,7 +151,7 @@ fn model<const D: usize>(case: &Case) -> Result<Placed<D>, EnclosedError> {
         _ => grid.jitter(0.2, 7).mesh()?,
     };
     let law = case.material.law::<D>();
-    let tensor = *law.tensor();
+    let tensor = *law.linearised().tensor();
     let horizon = f64::from(case.ratio) * SPACING;
     let end = (f64::from(zone) + 0.4) * cell;
     let barriers = if case.form == Form::Cracked {

@@ -8,7 +8,7 @@ use crate::{
         Truncated, Zone,
     },
     mesh::generate::{Axis, Grid},
-    peridynamics::{BondBased, BondLaw, BondWeights, Micromodulus, PartialVolume},
+    peridynamics::{BondBased, BondWeights, LinearForceState, Micromodulus, PartialVolume},
     progress::Silent,
     shape::{Barrier, Shape},
     system::LinearMotion,
@@ -172,7 +172,7 @@ impl Plate {
             tensors: vec![*law.tensor()],
             peridynamic_material: 0,
             peridynamics: Some(Peridynamics {
-                law: Box::new(law),
+                law: Arc::new(law),
                 horizon: Arc::new(move |_| horizon),
                 points,
                 weights: BondWeights::Isotropic,

@@ -1,10 +1,19 @@
-//! The linearised bond-based material, `T⟨ξ⟩ = ½ λ(|ξ|) ξ (ξ · η)`.
+//! The bond-based material: `T⟨ξ⟩ = ½ λ(|ξ|) ξ (ξ · η)` to first order, `½ λ |ξ|² e M` with geometrically exact bonds (prototype microelastic brittle).
 
 use crate::{
     peridynamics::{
-        BondEnergy, BondLaw, Conditions, Family, Micromodulus, PdError, ShellTarget, StatePart,
+        Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
+        HistoryLayout, Influence, Law, LinearForceState, Micromodulus, Past, PdError, Present,
+        ShellTarget, StatePart,
+        influence::{Alpha, Degree},
     },
     tensor::{Tensor4, Vector},
+};
+
+/// `P_1/|ξ|`, ω of the divergence of the partial stress beside a triangular micromodulus, which is `P_1/|ξ|` too: stable in motion, where a Gaussian grows. Beside the inverse distance it is the other way round.
+const DIVERGENCE: Influence = Influence::Polynomial {
+    degree: Degree::P1,
+    alpha: Alpha::One,
 };
 
 /// Linearised bond-based material with a general micromodulus.
@@ -28,17 +37,25 @@ impl<const D: usize> BondBased<D> {
     }
 }
 
-impl<const D: usize> BondLaw<D> for BondBased<D> {
+impl<const D: usize> Law<D> for BondBased<D> {
     fn name(&self) -> &'static str {
         "bond-based"
     }
 
-    fn is_pairwise(&self) -> bool {
-        true
+    fn linearised(&self) -> &dyn LinearForceState<D> {
+        self
     }
 
-    fn tensor(&self) -> &Tensor4<D> {
-        &self.tensor
+    fn force_state(&self) -> Option<&dyn ForceState<D>> {
+        Some(self)
+    }
+
+    fn accelerator(&self) -> Option<Accelerator> {
+        Some(Accelerator::Pairwise)
+    }
+
+    fn is_linear(&self) -> bool {
+        true
     }
 
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
@@ -47,6 +64,27 @@ impl<const D: usize> BondLaw<D> for BondBased<D> {
             micromodulus: self.micromodulus,
             constant: self.micromodulus.constant::<D>(horizon, c1111),
         })
+    }
+}
+
+impl<const D: usize> LinearForceState<D> for BondBased<D> {
+    fn is_pairwise(&self) -> bool {
+        true
+    }
+
+    fn is_ordinary(&self) -> bool {
+        true
+    }
+
+    fn divergence(&self) -> Influence {
+        match self.micromodulus {
+            Micromodulus::Triangular => DIVERGENCE,
+            _ => Influence::Gaussian,
+        }
+    }
+
+    fn tensor(&self) -> &Tensor4<D> {
+        &self.tensor
     }
 
     fn kernel(&self, r: f64, horizon: f64) -> f64 {
@@ -85,5 +123,40 @@ impl<const D: usize> BondLaw<D> for BondBased<D> {
                 0.5 * c * family.factors[k] * self.micromodulus.shape(xi.norm(), family.horizon);
         }
         Ok(None)
+    }
+}
+
+impl<const D: usize> ForceState<D> for BondBased<D> {
+    fn history(&self) -> HistoryLayout {
+        HistoryLayout::NONE
+    }
+
+    fn respond(
+        &self,
+        family: &DeformedFamily<'_, D>,
+        _step: f64,
+        _past: Past<'_>,
+        _present: Present<'_>,
+        force: &mut [Vector<D>],
+    ) -> EnergyDensity {
+        let mut stored = 0.0;
+        for (k, force) in force.iter_mut().enumerate() {
+            let e = family.extension[k];
+            let t = family.pair[k] * family.bonds[k].norm_squared() * e;
+            *force = family.direction[k] * t;
+            stored += 0.5 * t * e * family.volumes[k];
+        }
+        EnergyDensity {
+            stored,
+            dissipated: 0.0,
+        }
+    }
+
+    fn is_objective(&self) -> bool {
+        true
+    }
+
+    fn energy_ratio(&self, _s: f64) -> f64 {
+        1.0
     }
 }

@@ -1,9 +1,10 @@
-//! The linearised linear peridynamic solid (LPS), any Poisson ratio.
+//! The linear peridynamic solid (LPS), any Poisson ratio.
 
 use crate::{
     peridynamics::{
-        BondEnergy, BondLaw, Conditions, Family, Influence, PdError, ShellTarget, StatePart,
-        weights,
+        Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
+        HistoryLayout, Influence, Law, LinearForceState, Past, PdError, Present, ShellTarget,
+        StatePart, weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -38,17 +39,28 @@ impl<const D: usize> LinearPeridynamicSolid<D> {
     }
 }
 
-impl<const D: usize> BondLaw<D> for LinearPeridynamicSolid<D> {
+impl<const D: usize> Law<D> for LinearPeridynamicSolid<D> {
     fn name(&self) -> &'static str {
         "linear peridynamic solid"
     }
 
-    fn is_pairwise(&self) -> bool {
-        false
+    fn linearised(&self) -> &dyn LinearForceState<D> {
+        self
     }
 
-    fn tensor(&self) -> &Tensor4<D> {
-        &self.tensor
+    fn force_state(&self) -> Option<&dyn ForceState<D>> {
+        Some(self)
+    }
+
+    fn accelerator(&self) -> Option<Accelerator> {
+        Some(Accelerator::Solid {
+            bulk: self.bulk,
+            shear: self.shear,
+        })
+    }
+
+    fn is_linear(&self) -> bool {
+        true
     }
 
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
@@ -57,6 +69,24 @@ impl<const D: usize> BondLaw<D> for LinearPeridynamicSolid<D> {
             bulk: self.bulk,
             shear: self.shear,
         })
+    }
+}
+
+impl<const D: usize> LinearForceState<D> for LinearPeridynamicSolid<D> {
+    fn is_pairwise(&self) -> bool {
+        false
+    }
+
+    fn is_ordinary(&self) -> bool {
+        true
+    }
+
+    fn divergence(&self) -> Influence {
+        self.influence
+    }
+
+    fn tensor(&self) -> &Tensor4<D> {
+        &self.tensor
     }
 
     fn kernel(&self, r: f64, horizon: f64) -> f64 {
@@ -109,5 +139,45 @@ impl<const D: usize> BondLaw<D> for LinearPeridynamicSolid<D> {
             stabilisation: 0.0,
             shape,
         }))
+    }
+}
+
+impl<const D: usize> ForceState<D> for LinearPeridynamicSolid<D> {
+    fn history(&self) -> HistoryLayout {
+        HistoryLayout::NONE
+    }
+
+    fn respond(
+        &self,
+        family: &DeformedFamily<'_, D>,
+        _step: f64,
+        _past: Past<'_>,
+        _present: Present<'_>,
+        force: &mut [Vector<D>],
+    ) -> EnergyDensity {
+        // θ m/D over intact bonds, and the modulus (D k − (D+2) μ)/m · D/m that multiplies it
+        let (mut theta, mut stored) = (0.0, 0.0);
+        for (k, e) in family.extension.iter().enumerate() {
+            theta += family.omega[k] * family.bonds[k].norm() * e * family.volumes[k];
+        }
+        let modulus = family.state.map_or(0.0, |s| s.modulus.get(0, 0, 0, 0));
+        for (k, force) in force.iter_mut().enumerate() {
+            let (e, r) = (family.extension[k], family.bonds[k].norm());
+            let deviatoric = family.pair[k] * r * r * e;
+            *force = family.direction[k] * (deviatoric + modulus * theta * family.omega[k] * r);
+            stored += 0.5 * deviatoric * e * family.volumes[k];
+        }
+        EnergyDensity {
+            stored: stored + 0.5 * modulus * theta * theta,
+            dissipated: 0.0,
+        }
+    }
+
+    fn is_objective(&self) -> bool {
+        true
+    }
+
+    fn energy_ratio(&self, _s: f64) -> f64 {
+        1.0
     }
 }

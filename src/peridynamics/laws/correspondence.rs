@@ -2,8 +2,8 @@
 
 use crate::{
     peridynamics::{
-        BondLaw, Conditions, Family, Influence, PdError, ShellTarget, StatePart,
-        invert_shape_tensor,
+        Accelerator, BondEnergy, Conditions, Family, ForceState, Influence, Law, LinearForceState,
+        PdError, ShellTarget, StatePart, invert_shape_tensor,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -34,13 +34,43 @@ impl<const D: usize> Correspondence<D> {
     }
 }
 
-impl<const D: usize> BondLaw<D> for Correspondence<D> {
+impl<const D: usize> Law<D> for Correspondence<D> {
     fn name(&self) -> &'static str {
         "correspondence"
     }
 
+    fn linearised(&self) -> &dyn LinearForceState<D> {
+        self
+    }
+
+    fn force_state(&self) -> Option<&dyn ForceState<D>> {
+        None
+    }
+
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
+        None
+    }
+}
+
+impl<const D: usize> LinearForceState<D> for Correspondence<D> {
     fn is_pairwise(&self) -> bool {
         false
+    }
+
+    fn is_ordinary(&self) -> bool {
+        false
+    }
+
+    fn divergence(&self) -> Influence {
+        self.influence
     }
 
     fn tensor(&self) -> &Tensor4<D> {

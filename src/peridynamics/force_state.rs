@@ -1,0 +1,114 @@
+//! The nonlinear response of a law: force states of deformed families, and what points and bonds remember.
+//!
+//! A law gives the force state `T⟨ξ⟩` of one family at a time, [SAND2015-7998] eq. (2.3). [`crate::peridynamics::kernel`] passes over all families, adds `T_i⟨ξ⟩ − T_j⟨−ξ⟩` up,
+//! breaks bonds, and keeps the history. So a law that is written here runs in load steps and in explicit motion, beside every seam, with damage, energies and checkpoints.
+
+use crate::{peridynamics::StatePart, tensor::Vector};
+
+/// The numbers that a law keeps from step to step, by their names.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HistoryLayout {
+    /// Of each point.
+    pub point: &'static [&'static str],
+    /// Of each bond, seen from either end.
+    pub bond: &'static [&'static str],
+}
+
+impl HistoryLayout {
+    /// A law without memory.
+    pub const NONE: Self = Self {
+        point: &[],
+        bond: &[],
+    };
+
+    /// Whether nothing is kept.
+    pub fn is_empty(&self) -> bool {
+        self.point.is_empty() && self.bond.is_empty()
+    }
+}
+
+/// One deformed family, of its intact bonds only.
+///
+/// Shapes: one entry per intact bond; `omega` is empty for a pairwise law. Units: ξ and e \[m\], V \[m^D\].
+#[derive(Clone, Copy, Debug)]
+pub struct DeformedFamily<'a, const D: usize> {
+    /// Bond vectors ξ of the reference configuration.
+    pub bonds: &'a [Vector<D>],
+    /// Volumes V of the bonds' far points.
+    pub volumes: &'a [f64],
+    /// `p` of the linearised law, [`crate::peridynamics::LinearForceState::coefficients`], of the whole family: broken bonds change nothing of it.
+    pub pair: &'a [f64],
+    /// `ω` of the linearised law.
+    pub omega: &'a [f64],
+    /// Its state part, of the whole family.
+    pub state: Option<&'a StatePart<D>>,
+    /// Difference of displacement η \[m\].
+    pub difference: &'a [Vector<D>],
+    /// Extension `e = |ξ + η| − |ξ|`; with linear kinematics `ξ·η/|ξ|`.
+    pub extension: &'a [f64],
+    /// Direction `M = (ξ + η)/|ξ + η|`; with linear kinematics `ξ/|ξ|`.
+    pub direction: &'a [Vector<D>],
+}
+
+impl<const D: usize> DeformedFamily<'_, D> {
+    /// Number of intact bonds.
+    pub fn len(&self) -> usize {
+        self.bonds.len()
+    }
+
+    /// Whether no bond is intact.
+    pub fn is_empty(&self) -> bool {
+        self.bonds.is_empty()
+    }
+}
+
+/// What a point and its intact bonds remember, by [`HistoryLayout`]: the numbers of a bond follow one another, bond after bond.
+#[derive(Clone, Copy, Debug)]
+pub struct Past<'a> {
+    /// Of the point.
+    pub point: &'a [f64],
+    /// Of its bonds.
+    pub bonds: &'a [f64],
+}
+
+/// The same at the end of the step, to be overwritten.
+#[derive(Debug)]
+pub struct Present<'a> {
+    /// Of the point.
+    pub point: &'a mut [f64],
+    /// Of its bonds.
+    pub bonds: &'a mut [f64],
+}
+
+/// Energies per volume of a point \[J/m^D\].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnergyDensity {
+    /// Stored at the end of the step.
+    pub stored: f64,
+    /// Dissipated within the step, without what breaking bonds costs.
+    pub dissipated: f64,
+}
+
+/// A law's nonlinear response.
+pub trait ForceState<const D: usize>: Send + Sync {
+    /// What it keeps. History starts at zero.
+    fn history(&self) -> HistoryLayout;
+
+    /// Overwrites `force` with `T⟨ξ⟩` of the intact bonds at the end of a step of the length `step` \[s\], and `present` with what is remembered then; returns the energies.
+    ///
+    /// A step of length zero is the response at once: nothing that takes time happens.
+    fn respond(
+        &self,
+        family: &DeformedFamily<'_, D>,
+        step: f64,
+        past: Past<'_>,
+        present: Present<'_>,
+        force: &mut [Vector<D>],
+    ) -> EnergyDensity;
+
+    /// Whether a rotation of the family rotates its force state: only such a law takes geometrically exact bonds.
+    fn is_objective(&self) -> bool;
+
+    /// Energy stored in a bond at the stretch `s` over that of the linearised law, `½ c s²`: 1 for a law that is linear in the extension. By this the critical stretch follows from a fracture energy.
+    fn energy_ratio(&self, s: f64) -> f64;
+}

@@ -1,0 +1,124 @@
+//! The tangent at rest of the generic pass, [SAND2015-7998] eq. (2.5) with the linear force state of [`crate::peridynamics::linear_force_state`].
+
+use rayon::prelude::*;
+
+use super::generic::{Generic, NONE, at};
+use crate::{
+    peridynamics::body::split_rows,
+    tensor::{Tensor, Vector},
+};
+
+impl<const D: usize> Generic<D> {
+    /// `y = K x` with the tangent at rest, broken bonds left out.
+    pub(super) fn tangent_product(&self, x: &[f64], y: &mut [f64]) {
+        let mut states = vec![Vector::<D>::zeros(); self.families.neighbours.len()];
+        split_rows(&mut states, &self.families.offsets)
+            .into_par_iter()
+            .with_min_len(64)
+            .enumerate()
+            .for_each(|(i, states)| {
+                let start = self.range(i).start;
+                let here: Vector<D> = at(x, i);
+                let intact = || self.range(i).filter(|&bond| self.intact[bond]);
+                let state = self.state[i].as_ref();
+                let mut gradient = Tensor::<D>::zeros();
+                if state.is_some() {
+                    for bond in intact() {
+                        let j = self.neighbour(bond);
+                        let w = self.omega[bond] * self.volume[j];
+                        gradient += (at::<D>(x, j) - here) * self.xi(i, j).transpose() * w;
+                    }
+                }
+                let stress = state.map(|s| s.modulus.contract(&gradient));
+                for bond in intact() {
+                    let j = self.neighbour(bond);
+                    let (xi, eta) = (self.xi(i, j), at::<D>(x, j) - here);
+                    let mut t = xi * (self.pair[bond] * xi.dot(&eta));
+                    if let (Some(state), Some(stress)) = (state, stress) {
+                        t += (eta * state.stabilisation + stress * xi) * self.omega[bond];
+                    }
+                    states[bond - start] = t;
+                }
+            });
+        self.gather(&states, y);
+    }
+
+    /// Per unknown an upper bound of `Σ |K_ab|` of that tangent.
+    pub(super) fn tangent_row_sums(&self) -> Vec<f64> {
+        let points = self.position.len();
+        let sums: Vec<[f64; D]> = match self.omega.is_empty() {
+            true => Vec::new(),
+            false => (0..points)
+                .into_par_iter()
+                .map(|i| self.gradient_sums(i))
+                .collect(),
+        };
+        let mut result = vec![0.0; points * D];
+        let rows = result.par_chunks_exact_mut(D).with_min_len(64).enumerate();
+        rows.filter(|(i, _)| self.row[*i]).for_each(|(i, row)| {
+            let mut own = Tensor::<D>::zeros();
+            let mut first = Vector::<D>::zeros();
+            for bond in self.range(i).filter(|&bond| self.intact[bond]) {
+                let j = self.neighbour(bond);
+                let xi = self.xi(i, j);
+                let vv = self.volume[i] * self.volume[j];
+                let both = |of: &[f64], part: &dyn Fn(usize) -> f64| {
+                    let back = match self.reverse[bond] {
+                        NONE if self.law.linearised().is_pairwise() => of[bond] * part(i),
+                        NONE => 0.0,
+                        back => of[back as usize] * part(j),
+                    };
+                    of[bond] * part(i) + back
+                };
+                let mut block = xi * xi.transpose() * (both(&self.pair, &|_| 1.0) * vv);
+                if !sums.is_empty() {
+                    let q = |p: usize| self.state[p].as_ref().map_or(0.0, |s| s.stabilisation);
+                    block += Tensor::identity() * (both(&self.omega, &q) * vv);
+                    first += xi * (self.omega[bond] * vv);
+                    if self.reverse[bond] != NONE {
+                        let omega = self.omega[self.reverse[bond] as usize];
+                        self.add_state_sums(j, &(xi * (omega * vv)), &sums[j], row);
+                    }
+                }
+                own += block;
+                for (a, row) in row.iter_mut().enumerate() {
+                    *row += block.row(a).iter().map(|k| k.abs()).sum::<f64>();
+                }
+            }
+            for (a, row) in row.iter_mut().enumerate() {
+                *row += own.row(a).iter().map(|k| k.abs()).sum::<f64>();
+            }
+            if !sums.is_empty() {
+                self.add_state_sums(i, &first, &sums[i], row);
+            }
+        });
+        result
+    }
+
+    /// `Ḡ`-derivatives of a family, summed by column of `Ḡ`: `Σ_l |∂Ḡ_kb/∂u_k(l)|`.
+    fn gradient_sums(&self, i: usize) -> [f64; D] {
+        let (mut own, mut others) = (Vector::<D>::zeros(), [0.0; D]);
+        for bond in self.range(i).filter(|&bond| self.intact[bond]) {
+            let j = self.neighbour(bond);
+            let x = self.xi(i, j) * (self.omega[bond] * self.volume[j]);
+            own += x;
+            for b in 0..D {
+                others[b] += x[b].abs();
+            }
+        }
+        std::array::from_fn(|b| others[b] + own[b].abs())
+    }
+
+    /// Adds to the row sums of one point what the state part of point `j` gives along `v`.
+    fn add_state_sums(&self, j: usize, v: &Vector<D>, sums: &[f64; D], row: &mut [f64]) {
+        let Some(state) = &self.state[j] else { return };
+        for (i, row) in row.iter_mut().enumerate() {
+            for k in 0..D {
+                for b in 0..D {
+                    let of: f64 = (0..D).map(|a| state.modulus.get(i, a, k, b) * v[a]).sum();
+                    *row += of.abs() * sums[b];
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Peridynamic laws, one file each; [`crate::peridynamics::law`] says what a law is.
+//!
+//! | file | law | source |
+//! |---|---|---|
+//! | `bond_based.rs` | bonds that act alone | [SAND2015-7998] eq. (3.1) |
+//! | `lps.rs` | linear peridynamic solid | eq. (5.16) |
+//! | `correspondence.rs` | elastic correspondence, to first order | section 7.2 |
+//! | `hardening.rs` | bonds that stiffen with their stretch | |
+//! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
+//!
+//! A law that implements [`NamedLaw`] and has its line in the list at the end of this file is a material of scenes, by its key.
+
+mod bond_based;
+mod correspondence;
+mod hardening;
+mod lps;
+mod maxwell;
+
+use std::sync::Arc;
+
+use crate::peridynamics::Law;
+
+pub use bond_based::BondBased;
+pub use correspondence::Correspondence;
+pub use hardening::Hardening;
+pub use lps::LinearPeridynamicSolid;
+pub use maxwell::Maxwell;
+
+/// A number that a law takes beside the elastic constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its key in a scene.
+    pub key: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Its value if left out; none if it has to be given.
+    pub default: Option<f64>,
+    /// Its least value.
+    pub least: f64,
+    /// Its largest value.
+    pub most: f64,
+    /// A usual value, by which every law is tested.
+    pub usual: f64,
+}
+
+/// Which Poisson ratios a law has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ratio {
+    /// That of bonds that act alone.
+    Pairwise,
+    /// Any: a scene gives it.
+    Any,
+}
+
+/// Elastic constants of a scene's material, of its dimension \[Pa\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constants {
+    /// Lamé's λ.
+    pub lambda: f64,
+    /// Shear modulus μ.
+    pub shear: f64,
+}
+
+/// A law as scenes name it: its key, its numbers, and how it is made of them.
+pub trait NamedLaw<const D: usize>: Law<D> {
+    /// The key of the material.
+    const KEY: &'static str;
+    /// What it is, in a sentence.
+    const ABOUT: &'static str;
+    /// Which Poisson ratios it has.
+    const RATIO: Ratio;
+    /// What it takes beside the elastic constants.
+    const PARAMETERS: &'static [Parameter];
+
+    /// The law; `values` are those of [`NamedLaw::PARAMETERS`], each within its limits.
+    fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>>;
+}
+
+/// Every law of this folder with usual numbers, for tests that hold for all of them.
+#[cfg(test)]
+pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
+    use crate::peridynamics::{Influence, Micromodulus};
+    let constants = Constants {
+        lambda: 1.7,
+        shear: 1.3,
+    };
+    let Constants { lambda, shear } = constants;
+    let typed: [Arc<dyn Law<D>>; 3] = [
+        Arc::new(BondBased::new(Micromodulus::InverseDistance, shear)),
+        Arc::new(LinearPeridynamicSolid::new(
+            Influence::Gaussian,
+            lambda,
+            shear,
+        )),
+        Arc::new(Correspondence::new(Influence::Gaussian, lambda, shear, 1.0)),
+    ];
+    let named = Named::ALL.iter().map(|law| {
+        let values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
+        law.build(constants, &values)
+    });
+    typed.into_iter().chain(named).collect()
+}
+
+/// Declares [`Named`], the laws that scenes know by key.
+macro_rules! named_laws {
+    ($($law:ident),* $(,)?) => {
+        /// A law that scenes know by its key.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Named {
+            $(#[doc = concat!("[`", stringify!($law), "`]")] $law,)*
+        }
+
+        impl Named {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$law),*];
+            /// Their keys.
+            pub const KEYS: &'static [&'static str] = &[$(<$law<1> as NamedLaw<1>>::KEY),*];
+
+            /// The key of the material.
+            pub fn key(self) -> &'static str {
+                match self { $(Self::$law => <$law<1> as NamedLaw<1>>::KEY,)* }
+            }
+
+            /// What it is.
+            pub fn about(self) -> &'static str {
+                match self { $(Self::$law => <$law<1> as NamedLaw<1>>::ABOUT,)* }
+            }
+
+            /// Which Poisson ratios it has.
+            pub fn ratio(self) -> Ratio {
+                match self { $(Self::$law => <$law<1> as NamedLaw<1>>::RATIO,)* }
+            }
+
+            /// What it takes beside the elastic constants.
+            pub fn parameters(self) -> &'static [Parameter] {
+                match self { $(Self::$law => <$law<1> as NamedLaw<1>>::PARAMETERS,)* }
+            }
+
+            /// The law; `values` are those of [`Named::parameters`].
+            pub fn build<const D: usize>(self, constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
+                match self { $(Self::$law => <$law<D> as NamedLaw<D>>::build(constants, values),)* }
+            }
+        }
+    };
+}
+
+named_laws! {
+    Hardening,
+    Maxwell,
+}

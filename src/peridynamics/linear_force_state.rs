@@ -1,0 +1,113 @@
+//! The linearisation of a law at rest: what seams, linear statics and preconditioners know of it.
+//!
+//! The linearisation of every law at rest is linear in the bond elongations `η = u(x + ξ) − u(x)`:
+//!
+//! ```text
+//! T⟨ξ⟩ = p(ξ) ξ (ξ · η)  +  q ω(ξ) η  +  ω(ξ) (𝓜 : Ḡ) ξ ,      Ḡ = Σ ω η ⊗ ξ V
+//! ```
+//!
+//! a pairwise part, an optional stabilising part, and a part through the weighted gradient `Ḡ` of the family. The bond-based material has only the first,
+//! the linear peridynamic solid (LPS) has `𝓜 ∝ I ⊗ I` (its dilatation), correspondence has its stress. One kernel
+//! (`body.rs`) turns these coefficients into rows of the stiffness and into the partial stress for all of them. `T` is the derivative of the energy
+//! density `W = ½ Σ [p (ξ · η)² + q ω η²] V + ½ Ḡ : 𝓜 : Ḡ`, so a body of such points alone has a symmetric stiffness.
+
+use crate::{
+    peridynamics::{Conditions, Influence, PdError, ShellTarget},
+    tensor::{Tensor, Tensor4, Vector},
+};
+
+/// One family as a law sees it.
+///
+/// Shapes: `bonds`, `volumes` and `factors` have one entry per intact bond. Units: ξ \[m\], V \[m^D\], factors \[1\].
+#[derive(Clone, Copy, Debug)]
+pub struct Family<'a, const D: usize> {
+    /// Bond vectors ξ.
+    pub bonds: &'a [Vector<D>],
+    /// Volumes V of the bonds' far points.
+    pub volumes: &'a [f64],
+    /// Weight of each bond relative to the plain kernel (1 with plain weights).
+    pub factors: &'a [f64],
+    /// Horizon δ of the family's centre.
+    pub horizon: f64,
+}
+
+/// The state part of a law at one point.
+#[derive(Clone, Debug)]
+pub struct StatePart<const D: usize> {
+    /// `𝓜_iakb`, from `Ḡ_kb` to the `(i, a)` component of the tensor that multiplies `ω ξ_a`.
+    pub modulus: Tensor4<D>,
+    /// `q`, the weight of the stabilising part.
+    pub stabilisation: f64,
+    /// `K = Σ ω ξ ⊗ ξ V`, the shape tensor of the family.
+    pub shape: Tensor<D>,
+}
+
+/// A law linearised at rest: seams, linear statics and preconditioners are made from it.
+pub trait LinearForceState<const D: usize>: Send + Sync {
+    /// Whether bonds do not know of each other (no state part).
+    fn is_pairwise(&self) -> bool;
+
+    /// Whether the force of a bond points along it.
+    fn is_ordinary(&self) -> bool;
+
+    /// ω of the divergence of a meshfree partial stress beside this law.
+    fn divergence(&self) -> Influence;
+
+    /// The classical elastic tensor that the law is calibrated to \[Pa\].
+    fn tensor(&self) -> &Tensor4<D>;
+
+    /// The kernel whose fourth moment the weights of a lattice's shells are to make isotropic, at bond length `r`.
+    fn kernel(&self, r: f64, horizon: f64) -> f64;
+
+    /// What the fourth moment of [`LinearForceState::kernel`] should be on a lattice; `None` if the law needs no correction.
+    fn shell_target(&self) -> Option<ShellTarget>;
+
+    /// Coefficients and moment conditions that make the partial stress exact for affine fields on any one family, whose bonds are `(ξ, V)`;
+    /// `None` if it is exact without.
+    fn moment_conditions(
+        &self,
+        bonds: &[(Vector<D>, f64)],
+        horizon: f64,
+    ) -> Option<(Vec<f64>, Conditions<D>)>;
+
+    /// Overwrites `pair` (`p` per bond) and `omega` (`ω` per bond; untouched by a pairwise law) and returns the state part, if the law has one.
+    ///
+    /// # Errors
+    /// [`PdError`] if the family is too small or degenerate for the law.
+    fn coefficients(
+        &self,
+        family: &Family<'_, D>,
+        pair: &mut [f64],
+        omega: &mut [f64],
+    ) -> Result<Option<StatePart<D>>, PdError>;
+}
+
+/// The classical tensor that a family really carries: `ν⁰ = C : G` under `u = G x`.
+///
+/// Source: [SAND2015-7998] eq. (2.10), for the linear force state above:
+/// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl`.
+pub fn collapsed_tensor<const D: usize>(
+    family: &Family<'_, D>,
+    pair: &[f64],
+    state: Option<&StatePart<D>>,
+) -> Tensor4<D> {
+    let mut c = Tensor4::zeros();
+    for (k, xi) in family.bonds.iter().enumerate() {
+        c.add_fourth_power(pair[k] * family.volumes[k], xi);
+    }
+    if let Some(state) = state {
+        for i in 0..D {
+            for j in 0..D {
+                let mut t = Tensor::<D>::zeros();
+                for a in 0..D {
+                    t += state.modulus.0[i][a] * state.shape * state.shape[(a, j)];
+                }
+                for l in 0..D {
+                    t[(i, l)] += state.stabilisation * state.shape[(j, l)];
+                }
+                c.0[i][j] += t;
+            }
+        }
+    }
+    c
+}

@@ -1,0 +1,186 @@
+//! Materials of the laws that [`Named`] lists: the constants that all have, and the numbers of each.
+
+use std::fmt;
+use std::sync::LazyLock;
+
+use schemars::{Schema, SchemaGenerator, json_schema};
+use serde::de::{self, Deserialize, DeserializeSeed, Deserializer, MapAccess, Visitor};
+
+use crate::peridynamics::laws::{Named, Ratio};
+use crate::scene::value::{Number, Text};
+
+/// A material of a law that is known by its key.
+#[derive(Clone, Debug)]
+pub struct NamedSpec {
+    /// The law.
+    pub law: Named,
+    /// Young's modulus E.
+    pub youngs_modulus: Number,
+    /// Poisson's ratio, of a law that has any.
+    pub poisson_ratio: Option<Number>,
+    /// Density.
+    pub density: Option<Number>,
+    /// Energy per area of a new crack.
+    pub fracture_energy: Option<Number>,
+    /// Stretch at which a bond breaks.
+    pub critical_stretch: Option<Number>,
+    /// The set of cells that this material fills.
+    pub cells: Option<Text>,
+    /// The law's own numbers, in the order of [`Named::parameters`]; none where one is left out that has a default.
+    pub parameters: Vec<Option<Number>>,
+}
+
+/// Keys that materials of all laws have, with what they are.
+const COMMON: [(&str, &str); 6] = [
+    ("youngs-modulus", "Young's modulus E."),
+    ("poisson-ratio", "Poisson's ratio."),
+    ("density", "Density."),
+    (
+        "fracture-energy",
+        "Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.",
+    ),
+    (
+        "critical-stretch",
+        "Stretch at which a bond breaks, instead of `fracture-energy`.",
+    ),
+    ("cells", "The set of cells that this material fills."),
+];
+
+/// Keys of each law, as errors list them.
+static FIELDS: LazyLock<Vec<Vec<&'static str>>> = LazyLock::new(|| {
+    let of = |law: &Named| {
+        let common = COMMON.iter().map(|c| c.0);
+        let own = law.parameters().iter().map(|p| p.key);
+        common.filter(|key| takes(*law, key)).chain(own).collect()
+    };
+    Named::ALL.iter().map(of).collect()
+});
+
+/// Whether materials of a law have a common key.
+fn takes(law: Named, key: &str) -> bool {
+    key != "poisson-ratio" || law.ratio() == Ratio::Any
+}
+
+fn fields(law: Named) -> &'static [&'static str] {
+    let place = Named::ALL.iter().position(|l| *l == law);
+    place.map_or(&[], |place| &FIELDS[place])
+}
+
+impl<'de> DeserializeSeed<'de> for Seed {
+    type Value = NamedSpec;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<NamedSpec, D::Error> {
+        deserializer.deserialize_struct("material", fields(self.0), self)
+    }
+}
+
+/// Reads the material of a law.
+pub(super) struct Seed(pub Named);
+
+impl<'de> Visitor<'de> for Seed {
+    type Value = NamedSpec;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a table of the keys {}", fields(self.0).join(", "))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<NamedSpec, A::Error> {
+        let law = self.0;
+        let parameters = law.parameters();
+        let mut common: [Option<Number>; 5] = Default::default();
+        let mut own: Vec<Option<Number>> = vec![None; parameters.len()];
+        let mut cells: Option<Text> = None;
+        while let Some(key) = map.next_key_seed(Key(law))? {
+            match key {
+                Field::Common(5) => cells = Some(map.next_value()?),
+                Field::Common(k) => common[k] = Some(map.next_value()?),
+                Field::Own(k) => own[k] = Some(map.next_value()?),
+            }
+        }
+        let [
+            modulus,
+            poisson_ratio,
+            density,
+            fracture_energy,
+            critical_stretch,
+        ] = common;
+        let missing = |key| <A::Error as de::Error>::missing_field(key);
+        if law.ratio() == Ratio::Any && poisson_ratio.is_none() {
+            return Err(missing("poisson-ratio"));
+        }
+        for (parameter, typed) in parameters.iter().zip(&own) {
+            if typed.is_none() && parameter.default.is_none() {
+                return Err(missing(parameter.key));
+            }
+        }
+        Ok(NamedSpec {
+            law,
+            youngs_modulus: modulus.ok_or_else(|| missing("youngs-modulus"))?,
+            poisson_ratio,
+            density,
+            fracture_energy,
+            critical_stretch,
+            cells,
+            parameters: own,
+        })
+    }
+}
+
+/// A key of a law's material, by its place.
+enum Field {
+    Common(usize),
+    Own(usize),
+}
+
+/// Reads such a key.
+struct Key(Named);
+
+impl<'de> DeserializeSeed<'de> for Key {
+    type Value = Field;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Field, D::Error> {
+        let key = String::deserialize(deserializer)?;
+        let own = self.0.parameters().iter().position(|p| p.key == key);
+        let common = COMMON.iter().position(|c| c.0 == key);
+        let common = common.filter(|_| takes(self.0, &key));
+        match (own, common) {
+            (Some(k), _) => Ok(Field::Own(k)),
+            (None, Some(k)) => Ok(Field::Common(k)),
+            _ => Err(de::Error::unknown_field(&key, fields(self.0))),
+        }
+    }
+}
+
+/// The schema of a law's material.
+pub(super) fn schema(law: Named, generator: &mut SchemaGenerator) -> Schema {
+    let (number, text) = (
+        generator.subschema_for::<Number>(),
+        generator.subschema_for::<Text>(),
+    );
+    let mut properties = serde_json::Map::new();
+    let mut required = vec!["youngs-modulus"];
+    if law.ratio() == Ratio::Any {
+        required.push("poisson-ratio");
+    }
+    let mut add = |key: &str, about: &str, of: &Schema| {
+        let of = of.as_value();
+        let entry = serde_json::json!({ "description": about, "allOf": [of] });
+        properties.insert(key.to_owned(), entry);
+    };
+    for (key, about) in COMMON.iter().filter(|c| takes(law, c.0)) {
+        add(key, about, if *key == "cells" { &text } else { &number });
+    }
+    for parameter in law.parameters() {
+        add(parameter.key, parameter.about, &number);
+        if parameter.default.is_none() {
+            required.push(parameter.key);
+        }
+    }
+    json_schema!({
+        "description": law.about(),
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": false
+    })
+}

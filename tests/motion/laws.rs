@@ -1,0 +1,177 @@
+//! Laws that are known by their force states alone: nonlinear bonds, bonds that remember.
+
+use crate::{column, run, same, table, write};
+
+/// A bar that is pulled at one end, all of its bonds peridynamic where `{coupling}` has points.
+const BAR: &str = r#"
+kinematics = "bar"
+coupling = "{coupling}"
+[mesh.line]
+min = 0
+max = 10
+x = { cells = 100 }
+[zones.nonlocal]
+box = { min = 3, max = 7 }
+[materials.m.{law}
+density = 1
+youngs-modulus = 1000
+[peridynamics]
+horizon = 0.3
+points.lattice = { spacing = 0.1 }
+[conditions.left.displacement]
+on = "left"
+x = 0
+[conditions.right.displacement]
+on = "right"
+x = "0.1*t"
+[output]
+probes.a = { at = 4.55 }
+probes.b = { at = 5.45 }
+"#;
+
+const STEPS: &str = "[solve.quasi-static]\nduration = 1\nsteps = 5\ntolerance = 1e-11\n";
+
+fn scene(coupling: &str, law: &str, rest: &str) -> String {
+    let scene = BAR.replace("{coupling}", coupling).replace("{law}", law);
+    scene + rest
+}
+
+/// The history of a scene: a column.
+fn history(folder: &std::path::Path, scene: &str, columns: &[&str]) -> Vec<Vec<f64>> {
+    write(folder, "bar.toml", scene);
+    run(folder, &["bar.toml"]);
+    let path = folder.join("out/bar_history.csv");
+    columns.iter().map(|c| column(&path, c)).collect()
+}
+
+#[test]
+fn bonds_that_harden_carry_the_force_of_their_strain() {
+    const BETA: f64 = 400.0;
+    let law = format!("hardening]\nhardening = {BETA}");
+    let folder = tempfile::tempdir().unwrap();
+    let typed = scene("truncated", &law, STEPS);
+    let found = history(folder.path(), &typed, &["a_ux", "b_ux", "right_reaction_x"]);
+    for k in 1..6 {
+        // all bonds between the probes have one stretch: their strain
+        let strain = (found[1][k] - found[0][k]) / 0.9;
+        let force = 1000.0 * strain * (1.0 + BETA * strain * strain);
+        let reaction = found[2][k];
+        assert!(
+            (force - reaction).abs() < 1e-6 * reaction,
+            "{k}: {force} {reaction}"
+        );
+    }
+}
+
+#[test]
+fn a_relaxing_bond_follows_its_hereditary_integral_whatever_the_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let elastic = scene("nonlocal", "bond-based]", STEPS);
+    let rigid = history(folder.path(), &elastic, &["right_reaction_x"])[0][5];
+    let (share, time) = (0.4, 0.3);
+    let law = format!("viscoelastic-bond]\nrelaxing-share = {share}\nrelaxation-time = {time}");
+    for steps in [5, 7, 20] {
+        let rest = STEPS.replace("steps = 5", &format!("steps = {steps}"));
+        let typed = scene("nonlocal", &law, &rest);
+        let columns = ["right_reaction_x", "stored_energy", "external_work"];
+        let found = history(folder.path(), &typed, &columns);
+        for k in 0..=steps {
+            let t = k as f64 / steps as f64;
+            let relaxing = time * (1.0 - (-t / time).exp());
+            let expected = rigid * ((1.0 - share) * t + share * relaxing);
+            let force = found[0][k];
+            assert!(
+                (force - expected).abs() < 1e-7 * rigid,
+                "{steps} {k}: {force} {expected}"
+            );
+        }
+        // what was not stored was dissipated
+        let said = run(folder.path(), &["bar.toml", "--json"]);
+        let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+        let number = |key: &str| summary["motion"][key].as_f64().unwrap_or(f64::NAN);
+        let (work, stored) = (number("external_work"), number("stored_energy"));
+        let lost = number("inelastic_energy");
+        assert!(lost > 0.02 * work, "{summary}");
+        // the trapezoidal rule for the work of the support
+        let allowed = 0.5 / (steps * steps) as f64;
+        assert!(
+            ((stored + lost) / work - 1.0).abs() < allowed,
+            "{stored} {lost} {work}"
+        );
+    }
+}
+
+#[test]
+fn a_motion_goes_on_from_its_checkpoint_with_what_bonds_remember() {
+    let law = "viscoelastic-bond]\nrelaxing-share = 0.5\nrelaxation-time = 0.05";
+    let rest = "[initial.u.velocity]\nx = \"sin(pi*x/10)\"\n[solve.explicit]\nduration = 1\noutputs = 4\ncheckpoint-every = 50\n";
+    let typed = scene("truncated", law, rest).replace("x = \"0.1*t\"", "x = 0");
+    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for folder in [whole.path(), parts.path()] {
+        write(folder, "bar.toml", &typed);
+    }
+    run(whole.path(), &["bar.toml"]);
+    // from the last checkpoint but one of a run that came to its end
+    run(parts.path(), &["bar.toml"]);
+    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
+    let mut files = files.map(|e| e.unwrap().path());
+    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
+    let previous = previous.expect("two checkpoints");
+    std::fs::rename(&previous, previous.with_extension("")).unwrap();
+    let said = run(parts.path(), &["bar.toml", "--resume"]);
+    assert!(said.contains("resumed after step"), "{said}");
+    same(&whole.path().join("out"), &parts.path().join("out"));
+    // damped: energy falls, and is accounted for
+    let path = whole.path().join("out/bar_history.csv");
+    let (kinetic, stored) = (
+        column(&path, "kinetic_energy"),
+        column(&path, "stored_energy"),
+    );
+    let lost = column(&path, "dissipated_energy");
+    let last = kinetic.len() - 1;
+    assert!(kinetic[last] + stored[last] < 0.9 * kinetic[0]);
+    let balance = kinetic[last] + stored[last] + lost[last] - kinetic[0];
+    assert!(
+        balance.abs() < 2e-3 * kinetic[0],
+        "{balance} {}",
+        kinetic[0]
+    );
+    assert!(table(&path).1.len() > 4);
+}
+
+#[test]
+fn scenes_that_would_forget_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let typed = scene("truncated", "hardening]\nhardening = 1", "").replace("\"0.1*t\"", "0.1");
+    let refused = |typed: &str, part: &str| {
+        write(folder.path(), "bar.toml", typed);
+        let output = crate::bondline(folder.path())
+            .args(["run", "bar.toml"])
+            .output()
+            .unwrap();
+        // messages are broken into lines
+        let said = String::from_utf8_lossy(&output.stderr).replace('│', " ");
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(!output.status.success() && said.contains(part), "{said}");
+        assert!(!said.contains("panicked"), "{said}");
+    };
+    refused(&typed, "a static scene is solved to first order");
+    for coupling in ["splice", "balanced"] {
+        refused(
+            &scene(coupling, "hardening]\nhardening = 1", STEPS),
+            "finite elements are linear",
+        );
+    }
+    refused(
+        &typed.replace("hardening = 1", "hardening = 1e300"),
+        "must lie between",
+    );
+    refused(&typed.replace("hardening = 1", "hardenin = 1"), "hardenin");
+    refused(&typed.replace("hardening = 1", ""), "lacks `hardening`");
+    refused(
+        &scene("truncated", "bond-based]", "")
+            .replace("\"0.1*t\"", "0.1")
+            .replace("horizon = 0.3", "horizon = 0.3\nbonds = \"exact\""),
+        "solved to first order",
+    );
+}
