@@ -345,6 +345,27 @@ impl BlockCsr {
         product::multiply_into(self, x, y);
     }
 
+    /// `y = K x` of a matrix whose [rows add up to zero](Self::rows_add_up_to_zero), with differences of `x` within each row.
+    ///
+    /// What `x` has in common along a row drops out of it before it is multiplied, so that the rounding does not grow with it. Rows that share their blocks with those before them are multiplied as by
+    /// [`BlockCsr::multiply_into`]. Threaded over rows; the same bits for any number of threads.
+    pub fn multiply_differences_into(&self, x: &[f64], y: &mut [f64]) {
+        product::multiply_differences_into(self, x, y);
+    }
+
+    /// Whether every row gives nothing for an `x` that is the same at all sites, to 1e-12 of the sizes of its entries.
+    pub fn rows_add_up_to_zero(&self) -> bool {
+        let d = self.block;
+        (0..self.rows()).into_par_iter().all(|i| {
+            let blocks = self.row(i).1;
+            let size: f64 = blocks.iter().fold(0.0, |m, k| m.max(k.abs()));
+            (0..d * d).all(|e| {
+                let entries = || blocks.iter().skip(e).step_by(d * d);
+                entries().sum::<f64>().abs() <= 1e-12 * size * entries().count() as f64
+            })
+        })
+    }
+
     /// `K x`.
     pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; self.dofs()];
@@ -449,6 +470,44 @@ impl BlockCsr {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn products_with_differences_do_not_feel_how_far_a_body_has_drifted() {
+        // a chain of unequal springs; displacements that stay exact beside a drift of 2^20
+        let springs: Vec<f64> = (0..9).map(|k| 0.5 + 1.0 / f64::from(k + 3)).collect();
+        let (mut row_offsets, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+        for i in 0..10_usize {
+            let left = if i > 0 { springs[i - 1] } else { 0.0 };
+            let right = springs.get(i).copied().unwrap_or(0.0);
+            let row = [
+                (i.wrapping_sub(1), -left),
+                (i, left + right),
+                (i + 1, -right),
+            ];
+            for (column, value) in row.into_iter().filter(|&(c, _)| c < 10) {
+                columns.push(column as u32);
+                values.push(value);
+            }
+            row_offsets.push(columns.len());
+        }
+        let mut matrix = BlockCsr {
+            block: 1,
+            row_offsets,
+            columns,
+            values,
+            shared: None,
+        };
+        assert!(matrix.rows_add_up_to_zero());
+        let u: Vec<f64> = (0..10).map(|k| f64::from(k * k % 7) / 1024.0).collect();
+        let far: Vec<f64> = u.iter().map(|u| u + 1_048_576.0).collect();
+        let (exact, mut force) = (matrix.multiply(&u), vec![0.0; 10]);
+        matrix.multiply_differences_into(&far, &mut force);
+        for (f, exact) in force.iter().zip(&exact) {
+            assert!((f - exact).abs() < 1e-17, "{f:e} {exact:e}");
+        }
+        matrix.values[0] += 1e-9;
+        assert!(!matrix.rows_add_up_to_zero());
+    }
 
     #[test]
     fn products_and_asymmetry_are_those_of_the_scalar_matrix() {

@@ -201,4 +201,15 @@ pub trait Operator<const D: usize>: Sync {
     fn cell_stress(&self, _cell: usize, _u: &[f64]) -> Option<crate::tensor::Tensor<D>> {
         None
     }
+
+    /// The sum of [`Operator::cell_stress`] over cells, for displacements that have one component: entry `[f][c]` is that of `u_c` = field `f`, the others zero.
+    ///
+    /// Shapes: each field has one number per site; empty where no cell has such a stress. One pass over the families does for all fields.
+    fn sums_of_cell_stress(
+        &self,
+        _cells: &[usize],
+        _fields: &[Vec<f64>],
+    ) -> Vec<[crate::tensor::Tensor<D>; D]> {
+        Vec::new()
+    }
 }

@@ -438,4 +438,150 @@ impl<const D: usize> Operator<D> for Elements<'_, D> {
                 .sum(),
         )
     }
+
+    fn sums_of_cell_stress(&self, cells: &[usize], fields: &[Vec<f64>]) -> Vec<[Tensor<D>; D]> {
+        let transfer = &self.body.cloud.transfer;
+        let at_places: Vec<Vec<f64>> = (fields.iter())
+            .map(|field| {
+                let at = |(site, weight): (u32, f64)| weight * field[site as usize];
+                (0..transfer.len())
+                    .map(|place| transfer.row(place).map(at).sum())
+                    .collect()
+            })
+            .collect();
+        let mut sums = vec![[Tensor::zeros(); D]; fields.len()];
+        let mut quadrature = Vec::new();
+        for &cell in cells.iter().filter(|&&c| self.first[c] != u32::MAX) {
+            fem::quadrature(&self.model.mesh, cell, &mut quadrature);
+            let volume: f64 = quadrature.iter().map(|g| g.weight).sum();
+            for (q, g) in quadrature.iter().enumerate() {
+                let point = self.first[cell] as usize + q;
+                self.add_stresses(point, &at_places, g.weight / volume, &mut sums);
+            }
+        }
+        sums
+    }
+}
+
+/// Components `a ≤ b ≤ c` of a symmetric tensor of third order in space.
+const THIRD: usize = 10;
+
+/// Number of a component of such a tensor, whatever the order of its indices.
+fn third(a: usize, b: usize, c: usize) -> usize {
+    let mut index = [a, b, c];
+    index.sort_unstable();
+    let [a, b, c] = index;
+    // those whose last index is less come first: 1, 4, then 10 of them
+    c * (c + 1) * (c + 2) / 6 + b * (b + 1) / 2 + a
+}
+
+impl<const D: usize> Elements<'_, D> {
+    /// Adds the partial stress of a Gauss point under each component of each field, which have one number per place, times `share`.
+    ///
+    /// The bonds enter by `Σ p ξ⊗ξ⊗ξ V Δf` and `Σ ω ξ V Δf` of each field, which serve all components of displacement.
+    fn add_stresses(
+        &self,
+        point: usize,
+        fields: &[Vec<f64>],
+        share: f64,
+        sums: &mut [[Tensor<D>; D]],
+    ) {
+        let body = &self.body;
+        let (pair, omega) = body.kernel(point);
+        let mut moments = vec![([0.0; THIRD], Vector::<D>::zeros()); fields.len()];
+        for (k, &l) in body.families.of(point).iter().enumerate() {
+            let l = l as usize;
+            let (xi, volume) = (body.bond(point, l), body.cloud.volume[l]);
+            let mut cubes = [0.0; THIRD];
+            for c in 0..D {
+                for b in 0..=c {
+                    for a in 0..=b {
+                        cubes[third(a, b, c)] = pair[k] * volume * xi[a] * xi[b] * xi[c];
+                    }
+                }
+            }
+            let weighted = xi * omega.get(k).map_or(0.0, |omega| omega * volume);
+            for ((moment, gradient), field) in moments.iter_mut().zip(fields) {
+                let difference = field[l] - field[point];
+                for (moment, cube) in moment.iter_mut().zip(&cubes) {
+                    *moment += cube * difference;
+                }
+                *gradient += weighted * difference;
+            }
+        }
+        for ((moment, along), sums) in moments.iter().zip(sums) {
+            for (c, sum) in sums.iter_mut().enumerate() {
+                let mut stress = Tensor::from_fn(|a, b| moment[third(a, b, c)]);
+                if let Some(state) = body.state(point) {
+                    let mut gradient = Tensor::<D>::zeros();
+                    gradient.set_row(c, &along.transpose());
+                    stress += gradient * state.stabilisation
+                        + state.modulus.contract(&gradient) * state.shape;
+                }
+                *sum += stress * share;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peridynamics::Micromodulus;
+    use crate::verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
+
+    /// Sums of all components of some fields at once against the stress under each displacement.
+    fn sums_are_those_of_single_cells<const D: usize>(law: Law) {
+        let method = Method::Elements(FitDegree::Quadratic);
+        let case = Case {
+            method,
+            law,
+            cells: Cells::Coarse,
+            widths: Widths {
+                nonlocal: 6,
+                transition: 6,
+                local: 12,
+            },
+            ratio: 2,
+        };
+        let enclosed = Enclosed::<D>::new(&case).unwrap();
+        let model = &enclosed.model;
+        let operator = method.coupling::<D>();
+        let operator = operator.operator(model).unwrap();
+        let is_stressed = |c: &usize| model.roles[*c] == CellRole::StressElement;
+        let cells: Vec<usize> = (0..model.mesh.cell_count()).filter(is_stressed).collect();
+        let fields = [1.7, 0.3].map(|k| -> Vec<f64> {
+            let at = |x: Vector<D>| (k * x.sum()).sin() + k * x[0] * x[D - 1];
+            model.sites.iter().map(|site| at(site.position)).collect()
+        });
+        let sums = operator.sums_of_cell_stress(&cells, &fields);
+        assert!(!cells.is_empty() && sums.len() == fields.len());
+        for (field, sums) in fields.iter().zip(&sums) {
+            for (c, sum) in sums.iter().enumerate() {
+                let mut u = vec![0.0; field.len() * D];
+                for (u, value) in u.chunks_mut(D).zip(field) {
+                    u[c] = *value;
+                }
+                let stress = |&cell: &usize| operator.cell_stress(cell, &u).unwrap();
+                let (mut expected, mut size) = (Tensor::<D>::zeros(), 0.0);
+                for stress in cells.iter().map(stress) {
+                    expected += stress;
+                    size += stress.amax();
+                }
+                let error = (sum - expected).amax() / size;
+                assert!(error < 1e-13, "component {c}: {error:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_pass_over_the_families_gives_the_stress_of_all_fields() {
+        let pairwise = Law::BondBased(Micromodulus::InverseDistance);
+        let state_based = Law::StateBased(Influence::Gaussian);
+        sums_are_those_of_single_cells::<1>(state_based);
+        sums_are_those_of_single_cells::<2>(pairwise);
+        sums_are_those_of_single_cells::<2>(state_based);
+        sums_are_those_of_single_cells::<3>(pairwise);
+        sums_are_those_of_single_cells::<3>(state_based);
+    }
 }

@@ -14,6 +14,55 @@ const ROWS: usize = 256;
 /// single row 3 (measured on the stencils alone).
 const TILE: usize = 16;
 
+/// `y_i = Σ_j K_ij (x_j − x_r)`, r a column in the middle of row i; the same bits for any number of threads.
+///
+/// Rows that mostly share their blocks are multiplied as by [`multiply_into`]: differences make their stencils two to three times slower (measured; rows with blocks of their own wait for these, and differences cost nothing).
+pub(super) fn multiply_differences_into(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
+    match (k.block, runs(k)) {
+        (1, None) => of_differences::<1>(k, x, y),
+        (2, None) => of_differences::<2>(k, x, y),
+        (3, None) => of_differences::<3>(k, x, y),
+        _ => multiply_into(k, x, y),
+    }
+}
+
+fn of_differences<const D: usize>(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
+    y.par_chunks_mut(ROWS * D)
+        .enumerate()
+        .for_each(|(chunk, y)| {
+            for (i, y) in y.chunks_exact_mut(D).enumerate() {
+                y.copy_from_slice(&of_row_differences::<D>(k, chunk * ROWS + i, x));
+            }
+        });
+}
+
+/// Row `i` times the differences of `x` from that of its middle column.
+#[inline(always)]
+fn of_row_differences<const D: usize>(k: &BlockCsr, i: usize, x: &[f64]) -> [f64; D] {
+    let (columns, blocks) = k.row(i);
+    let mut sum = [0.0; D];
+    let Some(&middle) = columns.get(columns.len() / 2) else {
+        return sum;
+    };
+    let reference: [f64; D] = std::array::from_fn(|b| x[middle as usize * D + b]);
+    for (&c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+        let xj = &x[c as usize * D..][..D];
+        for b in 0..D {
+            let difference = xj[b] - reference[b];
+            for a in 0..D {
+                sum[a] += block[a * D + b] * difference;
+            }
+        }
+    }
+    sum
+}
+
+/// Which rows follow those before them, if most do.
+fn runs(k: &BlockCsr) -> Option<&[bool]> {
+    let follows = k.shared.as_ref().map(|s| s.follows.as_slice());
+    follows.filter(|f| 2 * f.iter().filter(|f| **f).count() > f.len())
+}
+
 /// `y = K x`; the same bits for any number of threads.
 pub(super) fn multiply_into(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
     match k.block {
@@ -38,9 +87,7 @@ pub(super) fn multiply_into(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
 
 /// The product with blocks of a size known to the compiler, which unrolls them.
 fn of_block<const D: usize>(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
-    let follows = k.shared.as_ref().map(|s| s.follows.as_slice());
-    let follows = follows.filter(|f| 2 * f.iter().filter(|f| **f).count() > f.len());
-    let Some(follows) = follows else {
+    let Some(follows) = runs(k) else {
         y.par_chunks_mut(ROWS * D)
             .enumerate()
             .for_each(|(chunk, y)| {

@@ -14,6 +14,8 @@ pub(super) struct SiteRows {
     /// The row of each site; `NONE` for a site without one.
     row_of_site: Vec<u32>,
     matrix: BlockCsr,
+    /// Whether no row feels a translation, so that a body that drifts far need not lose digits to its drift.
+    is_translation_free: bool,
 }
 
 impl SiteRows {
@@ -36,6 +38,7 @@ impl SiteRows {
         );
         Self {
             row_of_site,
+            is_translation_free: matrix.rows_add_up_to_zero(),
             matrix,
         }
     }
@@ -55,7 +58,9 @@ impl SiteRows {
         force: &mut [f64],
     ) {
         products.resize(self.matrix.rows() * D, 0.0);
-        if self.matrix.rows() > 0 {
+        if self.is_translation_free {
+            self.matrix.multiply_differences_into(u, products);
+        } else {
             self.matrix.multiply_into(u, products);
         }
         let entry = |from: &[f64], of: u32| -> Vector<D> {
