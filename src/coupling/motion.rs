@@ -458,7 +458,6 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
     fn account_for_breaks(&mut self, at: &Halfway<'_>) {
         let spent = self.of_last_breaks(at);
         self.spent.energy += spent.energy;
-        // inelastic energy is counted where it is committed
         self.spent.area += spent.area;
     }
 
