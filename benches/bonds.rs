@@ -4,7 +4,6 @@
 //!
 //! Times of one thread are CPU times, so that other programs on the machine do not count; times of two threads are wall-clock times, the least of many. Markdown comes out.
 
-use bondline::observe::figure::{LinePlot, Scale, Series, Stroke};
 use bondline::peridynamics::contact::{Contact, ContactSetup};
 use bondline::peridynamics::kernel::{
     BlockSetup, BondForce, BondPass, BondSetup, CriticalStretch, Failure, Kinematics, Layout,
@@ -13,6 +12,7 @@ use bondline::peridynamics::kernel::{
 use bondline::peridynamics::{Families, TIE_TOLERANCE};
 use bondline::system::{Breakage, Interval};
 use bondline::tensor::Vector;
+use bondline_study::figure::{LinePlot, Scale, Series, Stroke};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -577,8 +577,8 @@ fn scaling() {
         let name = format!("{}, linear", law.name());
         series.push(Series::new(name, Stroke::Dashed, straight.to_vec()));
     }
-    let path =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/figures/bond_scaling.svg");
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+        .join("docs/figures/bond_scaling.svg");
     let plot = LinePlot {
         title: "One force pass, 3D, m = 3, damage on, one thread".into(),
         x_label: "directed bonds".into(),

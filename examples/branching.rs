@@ -7,13 +7,13 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use bondline::{
-    observe::{
-        figure::{LinePlot, Series, Stroke},
-        report::{self, Row, Table},
-        summary::{Ended, MotionSummary},
-    },
-    study::trade::distance_from_path,
+use bondline::observe::{
+    report::{self, Row, Table},
+    summary::{Ended, MotionSummary},
+};
+use bondline_study::{
+    figure::{LinePlot, Series, Stroke},
+    trade::distance_from_path,
 };
 use shared::{Columns, Failure, argument, run};
 

@@ -13,11 +13,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use bondline::coupling::Zone;
-use bondline::observe::progress::TerminalProgress;
 use bondline::observe::report::{Columns, Format, Row, Table, exit_code, render};
-use bondline::run::AnyScene;
-use bondline::verify::bar::{self, Bar, ENCLOSED, EXACT, METHODS, PLANE_MEANS, Write};
-use bondline::verify::variable_horizon;
+use bondline_terminal::progress::TerminalProgress;
+use bondline_verify::bar::{self, Bar, ENCLOSED, EXACT, METHODS, PLANE_MEANS, Write};
+use bondline_verify::variable_horizon;
 use clap::Parser;
 
 const ABOUT: &str = "A bar of finite elements with a peridynamic middle, pulled at its two ends; the answer is the straight line u = 1e-3 x.";
@@ -100,14 +99,15 @@ fn run(arguments: &Arguments) -> miette::Result<Vec<Table>> {
 }
 
 fn solve(arguments: &Arguments, scene: &str, name: &str, choice: &[&str]) -> miette::Result<Bar> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/{scene}.toml"));
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+        .join(format!("examples/{scene}.toml"));
     let mut overrides: Vec<String> = choice.iter().map(|&o| o.to_owned()).collect();
     if scene == "coupled_bar" {
         overrides.extend(arguments.overrides.iter().cloned());
     }
     let name = name.replace([' ', ','], "_").replace("__", "_");
     overrides.push(format!("output.name=\"{scene}_{name}\""));
-    let mut scene = AnyScene::load(&path, &overrides).map_err(|e| e.report())?;
+    let mut scene = bondline_study::load(&path, &overrides).map_err(bondline_terminal::report)?;
     let write = match &arguments.output {
         Some(folder) => {
             scene.set_output_directory(folder.clone());

@@ -18,8 +18,6 @@ use bondline::{
     coupling::{CellRole, Sampler, SiteKind},
     fem,
     observe::{
-        map::FieldMap,
-        progress::TerminalProgress,
         report::{Columns, Format, Row, Table, exit_code, render},
         summary::RunSummary,
     },
@@ -28,6 +26,8 @@ use bondline::{
     scene::{Condition, Field},
     tensor::{Vector, strain},
 };
+use bondline_study::map::FieldMap;
+use bondline_terminal::progress::TerminalProgress;
 
 type Failure = Box<dyn std::error::Error>;
 type Point = Vector<2>;
@@ -119,10 +119,10 @@ impl Case {
 }
 
 fn load(scene: &str, overrides: &[String]) -> Result<Box<PlacedScene<2>>, Failure> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
         .join("examples")
         .join(scene);
-    match AnyScene::load(&path, overrides).map_err(|e| e.to_string())? {
+    match bondline_study::load(&path, overrides).map_err(|e| e.to_string())? {
         AnyScene::Plane(scene) => Ok(scene),
         _ => Err("the slit plate is a plane problem".into()),
     }

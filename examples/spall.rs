@@ -6,10 +6,8 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use bondline::observe::{
-    figure::{LinePlot, Series, Stroke},
-    report::{self, Row, Table},
-};
+use bondline::observe::report::{self, Row, Table};
+use bondline_study::figure::{LinePlot, Series, Stroke};
 use shared::{Columns, Failure, argument, at, between, run, running_mean};
 
 mod shared;

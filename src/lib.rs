@@ -75,11 +75,12 @@
 //! | [`system`] | the seam to solvers: a block-sparse stiffness and its symmetry |
 //! | [`solve`] | orderings, multifrontal factorisation, Krylov methods with multigrid, the static problem |
 //! | [`progress`] | what a long computation tells |
-//! | [`observe`] | the only writers: VTU, CSV, JSON, pictures, progress bars |
-//! | [`verify`] | the suites that `bondline verify` prints |
+//! | [`observe`] | the only writers: VTU, CSV, JSON |
 //! | [`scene`] | TOML to a validated scene; the only module that knows TOML |
 //! | [`run`] | one run of a scene: laid out, proved, solved, written |
-//! | [`study`] | many runs: what one needs, its error, convergence, speed against accuracy |
+//!
+//! Other crates of the workspace stand on this one: `bondline-study` (many runs, `accuracy`, plots), `bondline-cli` (the program), `bondline-verify` (the suites that
+//! `bondline verify` prints) and `bondline-terminal` (what programs share).
 //!
 //! # From a scene
 //!
@@ -160,6 +161,15 @@
 //!
 //! Keys in brackets, such as [SAND2015-7998], are resolved in `docs/references.md`.
 
+#[cfg(test)]
+extern crate self as bondline;
+
+/// Models of the suites, for unit tests; the file says `bondline` for this crate.
+#[cfg(test)]
+#[allow(dead_code)]
+#[path = "../crates/bondline-verify/src/enclosed.rs"]
+mod enclosed;
+
 pub mod assembly;
 pub mod coupling;
 pub mod fem;
@@ -168,15 +178,13 @@ pub mod mesh;
 pub mod observe;
 pub mod peridynamics;
 pub mod progress;
-mod regular_file;
+pub mod regular_file;
 pub mod run;
 pub mod scene;
 pub mod shape;
 pub mod solve;
-pub mod study;
 pub mod system;
 pub mod tensor;
-pub mod verify;
 
 pub use coupling::{
     Blending, BlendingFunction, CellRole, Coupling, FitDegree, Local, Model, ModelError, Nonlocal,

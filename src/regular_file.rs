@@ -9,7 +9,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// Those of the system, and [`ErrorKind::InvalidInput`] with the kind of thing that lies there instead.
-pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<File> {
+pub fn open(path: &Path, options: &OpenOptions) -> Result<File> {
     let found = std::fs::metadata(path)?;
     if !found.is_file() {
         return Err(Error::new(
@@ -24,7 +24,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<File> {
 ///
 /// # Errors
 /// As [`open`], and those of reading.
-pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
+pub fn read(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path, OpenOptions::new().read(true))?.read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -34,7 +34,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`open`], and [`ErrorKind::InvalidData`] for what is no text.
-pub(crate) fn read_to_string(path: &Path) -> Result<String> {
+pub fn read_to_string(path: &Path) -> Result<String> {
     String::from_utf8(read(path)?).map_err(|e| Error::new(ErrorKind::InvalidData, e.utf8_error()))
 }
 
@@ -45,7 +45,7 @@ const LONGEST_SCENE: u64 = 64 << 20;
 ///
 /// # Errors
 /// Those of the system, and [`ErrorKind::InvalidData`] for what is no text or does not end.
-pub(crate) fn read_scene(path: &Path) -> Result<String> {
+pub fn read_scene(path: &Path) -> Result<String> {
     let mut text = String::new();
     File::open(path)?
         .take(LONGEST_SCENE + 1)
@@ -61,7 +61,7 @@ pub(crate) fn read_scene(path: &Path) -> Result<String> {
 ///
 /// # Errors
 /// As [`open`].
-pub(crate) fn may_be_written(path: &Path) -> Result<()> {
+pub fn may_be_written(path: &Path) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if !found.is_file() => Err(Error::new(
             ErrorKind::InvalidInput,

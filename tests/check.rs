@@ -7,7 +7,7 @@ use serde_json::Value;
 fn json(command: &str, scene: &str, overrides: &[&str], folder: &std::path::Path) -> Value {
     let mut binary = Command::cargo_bin("bondline").unwrap();
     binary
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
         .args([command, scene, "--json"]);
     for set in overrides {
         binary.args(["--set", set]);
@@ -262,7 +262,7 @@ fn pilots_take_a_time_above_zero() {
 fn refused(command: &str, overrides: &[&str], folder: &std::path::Path) -> (String, f64) {
     let mut binary = Command::cargo_bin("bondline").unwrap();
     binary
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
         .args([command, SLIT_PLATE]);
     for set in overrides {
         binary.args(["--set", set]);

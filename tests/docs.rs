@@ -68,7 +68,7 @@ fn every_key_of_the_literature_resolves() {
         .filter_map(|l| l.strip_prefix('[')?.split_once("]: ").map(|(key, _)| key))
         .collect();
     let mut sources = pages();
-    for folder in ["src", "tests", "examples", "benches"] {
+    for folder in ["src", "crates", "tests", "examples", "benches"] {
         sources.extend(files(&root().join(folder), &["rs", "toml"]));
     }
     let mut used = BTreeSet::new();

@@ -4,11 +4,11 @@ use bondline::{
     observe::report::{Table, Verdict, exit_code},
     peridynamics::Micromodulus,
     progress::Silent,
-    verify::{
-        Effort,
-        enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
-        patch,
-    },
+};
+use bondline_verify::{
+    Effort,
+    enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
+    patch,
 };
 
 fn shorts(tables: &[Table]) -> String {

@@ -52,9 +52,9 @@ fn build(text: &str, overrides: &[&str]) -> Result<AnyScene, SceneError> {
     for o in overrides {
         source.push_override(o)?;
     }
-    AnyScene::from_source(
+    bondline_study::from_source(
         &source,
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")),
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")),
         "plate",
     )
 }
@@ -78,7 +78,7 @@ fn check(error: &SceneError, kind: SceneErrorKind, underlined: &str, message: &s
     let remedy = error.remedy().unwrap_or_default();
     assert!(remedy.contains(help), "{error}");
     // a person at a terminal sees the same words
-    let shown = format!("{:?}", error.clone().report());
+    let shown = format!("{:?}", bondline_terminal::report(error.clone()));
     assert!(
         shown.contains(underlined.lines().next().unwrap()),
         "{shown}"
@@ -425,7 +425,7 @@ fn templates_are_right_and_never_overwritten() {
         assert!(e.to_string().contains("nothing is overwritten"), "{e}");
         std::fs::remove_file(&path).unwrap();
     }
-    let e = AnyScene::load(&path, &[]).unwrap_err();
+    let e = bondline_study::load(&path, &[]).unwrap_err();
     assert_eq!(e.kind(), SceneErrorKind::File);
     assert!(e.to_string().contains("bondline new"), "{e}");
 }

@@ -3,7 +3,9 @@
 use bondline::{
     observe::report::{Table, Verdict},
     progress::Silent,
-    verify::{Effort, balance, extremes, layers, partial_volumes, skin, tangents, weights},
+};
+use bondline_verify::{
+    Effort, balance, extremes, layers, partial_volumes, skin, tangents, weights,
 };
 
 fn assert_no_short(tables: &[Table]) {

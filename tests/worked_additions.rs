@@ -4,8 +4,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The name of the copy.
+/// The name of the program that is built.
 const NAME: &str = "bondline-extended";
+
+/// The packages of which the program is built, the library first.
+const PACKAGES: [&str; 4] = [
+    "bondline",
+    "bondline-study",
+    "bondline-terminal",
+    "bondline-cli",
+];
 
 /// A fenced block of the page: language, file, text.
 struct Block<'a> {
@@ -86,27 +94,33 @@ fn rows(path: &Path) -> Vec<Vec<f64>> {
 
 #[test]
 fn the_additions_of_the_page_build_and_run() {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let page = fs::read_to_string(root.join("docs/extending.md")).unwrap();
     let copied = Path::new(env!("CARGO_TARGET_TMPDIR")).join("worked_additions");
     let _ = fs::remove_dir_all(&copied);
-    // the suites read scenes of the examples, and meshes
-    for folder in ["src", "examples", "meshes"] {
+    for folder in ["src", "crates"] {
         copy(&root.join(folder), &copied.join(folder));
     }
-    // under another name, so that nothing of the crate itself is overwritten
+    // what the program needs, without tests and suites
     let manifest = fs::read_to_string(root.join("Cargo.toml")).unwrap();
-    let manifest = manifest
-        .split("[[bench]]")
-        .next()
-        .unwrap()
-        .replace("\nname = \"bondline\"", "\nname = \"bondline-extended\"")
-        .replace("default-run = \"bondline\"\n", "")
-        .replace("[lib]\n", "[lib]\nname = \"bondline\"\n");
-    fs::write(copied.join("Cargo.toml"), manifest + "\n[workspace]\n").unwrap();
-    let lock = fs::read_to_string(root.join("Cargo.lock")).unwrap();
-    let lock = lock.replace("name = \"bondline\"", "name = \"bondline-extended\"");
-    fs::write(copied.join("Cargo.lock"), lock).unwrap();
+    let packages = manifest.find("[workspace.package]").unwrap();
+    let (needed, tests) = manifest[packages..]
+        .split_once("[dev-dependencies]")
+        .unwrap();
+    let profiles = &tests[tests.find("[profile.release]").unwrap()..];
+    let members = PACKAGES.map(|p| format!("\"crates/{p}\""));
+    let members = members[1..].join(", ");
+    let manifest = format!("[workspace]\nmembers = [\".\", {members}]\n\n{needed}{profiles}");
+    fs::write(copied.join("Cargo.toml"), manifest).unwrap();
+    for package in &PACKAGES[1..] {
+        let path = copied.join("crates").join(package).join("Cargo.toml");
+        let manifest = fs::read_to_string(&path).unwrap();
+        let needed = manifest.split("[dev-dependencies]").next().unwrap();
+        // under another name, so that the program itself is not overwritten
+        let renamed = needed.replace("= \"bondline\"", &format!("= \"{NAME}\""));
+        fs::write(&path, renamed).unwrap();
+    }
+    fs::copy(root.join("Cargo.lock"), copied.join("Cargo.lock")).unwrap();
 
     for block in blocks(&page) {
         let path = copied.join(block.file);
@@ -127,8 +141,7 @@ fn the_additions_of_the_page_build_and_run() {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
     let output = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
         .args(["build", "--release", "--offline", "--bin", NAME])
-        .args(["--config"])
-        .arg(format!("profile.release.package.{NAME}.opt-level=0"))
+        .args(PACKAGES.map(|p| format!("--config=profile.release.package.{p}.opt-level=0")))
         .arg("--target-dir")
         .arg(target)
         .current_dir(&copied)

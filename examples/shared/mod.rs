@@ -5,14 +5,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use bondline::{
-    observe::{
-        progress::TerminalProgress,
-        report::{Format, Row, Table, exit_code, render},
-        summary::RunSummary,
-    },
-    run::AnyScene,
+use bondline::observe::{
+    report::{Format, Row, Table, exit_code, render},
+    summary::RunSummary,
 };
+use bondline_terminal::progress::TerminalProgress;
 
 pub type Failure = Box<dyn std::error::Error>;
 
@@ -83,10 +80,11 @@ pub fn run(
     output: &Path,
     name: &str,
 ) -> Result<RunSummary, Failure> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
         .join("examples")
         .join(scene);
-    let mut scene = AnyScene::load(&path, overrides).map_err(|e| format!("{:?}", e.report()))?;
+    let mut scene = bondline_study::load(&path, overrides)
+        .map_err(|e| format!("{:?}", bondline_terminal::report(e)))?;
     scene.set_output_directory(output.join(name));
     Ok(scene.run(&TerminalProgress::on_stderr())?)
 }

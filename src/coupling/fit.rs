@@ -28,12 +28,13 @@ pub(super) struct Sites<'a, const D: usize> {
 }
 
 /// Positions sorted into bins, to find those near a node without looking at all of them.
-pub(crate) struct Bins<const D: usize> {
+pub struct Bins<const D: usize> {
     size: f64,
     bins: FxHashMap<[i64; D], Vec<u32>>,
 }
 
 impl<const D: usize> Bins<D> {
+    /// Sorts positions \[m\] into cubes of that edge \[m\].
     pub fn new(positions: &[Vector<D>], size: f64) -> Self {
         let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
         for (k, x) in positions.iter().enumerate() {

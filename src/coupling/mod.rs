@@ -52,7 +52,7 @@ pub use balanced::Balanced;
 pub use blending::{Blending, BlendingFunction};
 pub use carry::{BrokenBonds, Carried, CarryError, Carrying};
 pub use derivative::FitDegree;
-pub(crate) use fit::Bins;
+pub use fit::Bins;
 pub use model::{Model, Site, SiteKind};
 pub use motion::Motion;
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};

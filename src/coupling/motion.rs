@@ -29,14 +29,6 @@ mod dissipation;
 mod energy;
 mod rows;
 
-#[cfg(test)]
-#[path = "motion_tests.rs"]
-mod tests;
-
-#[cfg(test)]
-#[path = "motion_seam_tests.rs"]
-mod seam_tests;
-
 /// A coupled model as a system that moves.
 pub struct Motion<'a, const D: usize> {
     model: &'a Model<D>,
@@ -224,7 +216,7 @@ pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) ->
 }
 
 /// Scales what each row gives, where the rows of a model are scaled.
-fn scale_rows<const D: usize>(model: &Model<D>, values: &mut [f64]) {
+pub fn scale_rows<const D: usize>(model: &Model<D>, values: &mut [f64]) {
     let Some(scale) = model.row_scale() else {
         return;
     };

@@ -528,7 +528,7 @@ impl<const D: usize> Elements<'_, D> {
 mod tests {
     use super::*;
     use crate::peridynamics::Micromodulus;
-    use crate::verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
+    use crate::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
 
     /// Sums of all components of some fields at once against the stress under each displacement.
     fn sums_are_those_of_single_cells<const D: usize>(law: Law) {

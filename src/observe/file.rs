@@ -27,7 +27,7 @@ pub(super) fn create_parent(path: &Path) -> Result<(), ObserveError> {
 ///
 /// # Errors
 /// [`ObserveError::Folder`] or [`ObserveError::Write`]; the file that lay at `path` before is then still there.
-pub(crate) fn write_whole(
+pub fn write_whole(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
 ) -> Result<(), ObserveError> {

@@ -1,4 +1,4 @@
-//! What leaves a computation: fields for ParaView, tables, summaries, pictures and progress. The only writers.
+//! What leaves a computation: fields for ParaView, tables and summaries. Pictures are drawn by `bondline-study`, progress by `bondline-terminal`.
 //!
 //! | file | what |
 //! |---|---|
@@ -13,8 +13,6 @@
 //! | `summary.rs`, `motion_summary.rs` | what one run did: sizes, choices, timings, balance; energies over time |
 //! | `proof.rs` | what was shown about a model before it was solved |
 //! | `switch.rs` | changes of the nonlocal zone during a run |
-//! | `progress.rs` | a bar on standard error, if that is a terminal |
-//! | `figure.rs`, `map.rs` | line plots and coloured fields as SVG |
 //! | `file.rs` | whole files or none: written beside, then renamed |
 
 pub mod checkpoint;
@@ -22,12 +20,9 @@ pub mod claim;
 pub mod cracks;
 pub mod csv;
 mod data_array;
-pub mod figure;
 pub mod file;
 pub mod history;
-pub mod map;
 mod motion_summary;
-pub mod progress;
 pub mod proof;
 pub mod report;
 pub mod series;

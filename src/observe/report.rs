@@ -454,7 +454,7 @@ pub fn number(value: f64) -> String {
 }
 
 /// Lines of words in columns; all but the first column to the right, unless they hold words.
-pub(crate) fn aligned(grid: &[Vec<String>]) -> String {
+pub fn aligned(grid: &[Vec<String>]) -> String {
     let columns = grid.first().map_or(0, Vec::len);
     let width = |j: usize| grid.iter().map(|l| l[j].chars().count()).max().unwrap_or(0);
     let numeric = |j: usize| {

@@ -377,7 +377,7 @@ pub fn write_pvd(path: &Path, steps: &[(f64, PathBuf)]) -> Result<(), ObserveErr
 }
 
 /// Text for an XML attribute or element.
-pub(super) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -23,7 +23,7 @@ pub enum Bound {
 
 /// What stopped [`least_change`].
 #[derive(Debug)]
-pub(crate) struct NotMet {
+pub struct NotMet {
     /// Independent conditions.
     pub(crate) rank: usize,
     /// Whether they can be met without the bound.
@@ -34,7 +34,7 @@ pub(crate) struct NotMet {
 ///
 /// The dual is smooth: `Δ_k = max(l, Σ_c b_ck μ_c)`. Newton's method with the normal equations of the bonds off the bound and a step
 /// halved until the dual falls; without a bound its first step solves, the second is the refinement that restores lost digits.
-pub(crate) fn least_change(
+pub fn least_change(
     rows: &DMatrix<f64>,
     shares: &[f64],
     missing: &DVector<f64>,

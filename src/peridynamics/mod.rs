@@ -33,7 +33,7 @@ pub mod kernel;
 mod lattice_families;
 pub mod law;
 pub mod laws;
-pub(crate) mod least_change;
+pub mod least_change;
 pub mod linear_force_state;
 pub(crate) mod offsets;
 pub mod partial_volume;

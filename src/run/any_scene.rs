@@ -14,8 +14,9 @@ use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::{Choice, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
+use crate::scene::source::read;
 use crate::scene::spec::KinematicsSpec;
-use crate::scene::{SceneError, SceneSpec, Solve, Source};
+use crate::scene::{SceneError, SceneErrorKind, SceneSpec, Solve, Source};
 
 /// Validates a scene and places its zone, if it leaves that to the program.
 fn placed<const D: usize>(
@@ -47,8 +48,33 @@ pub enum AnyScene {
 }
 
 impl AnyScene {
+    /// Reads and validates a scene file with overrides `key=value`.
+    ///
+    /// # Errors
+    /// A [`SceneError`] with place, value and remedy; for a scene with an `accuracy`, which `bondline_study::load` takes.
+    pub fn load(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let (source, directory, name) = read(path, overrides)?;
+        Self::from_source(&source, directory, &name)
+    }
+
+    /// Validates a scene whose relative paths start in `directory` and whose files are named `name` by default.
+    ///
+    /// # Errors
+    /// A [`SceneError`] with place, value and remedy; for a scene with an `accuracy`, which `bondline_study::from_source` takes.
+    pub fn from_source(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
+        if source.table()?.contains_key("accuracy") {
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                "`accuracy` leaves open what only trial runs of the scene can choose",
+            )
+            .help("load it by `bondline_study::load`, which makes them; or type mesh, horizon and points, and leave `accuracy` out")
+            .shown_in(source));
+        }
+        Self::complete(source, directory, name)
+    }
+
     /// Keeps what was chosen for an accuracy, to be told with the results.
-    pub(crate) fn chose(&mut self, choices: Vec<Choice>) {
+    pub fn chose(&mut self, choices: Vec<Choice>) {
         let known = match self {
             Self::Bar(s) => &mut s.choices,
             Self::Plane(s) => &mut s.choices,
@@ -57,12 +83,11 @@ impl AnyScene {
         known.splice(0..0, choices);
     }
 
-    /// Validates a scene that leaves nothing open.
-    pub(crate) fn complete(
-        source: &Source,
-        directory: &Path,
-        name: &str,
-    ) -> Result<Self, SceneError> {
+    /// Validates a scene that leaves nothing open, whether or not it has an `accuracy`.
+    ///
+    /// # Errors
+    /// A [`SceneError`] with place, value and remedy.
+    pub fn complete(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
         let spec = SceneSpec::parse(source)?;
         let print = source.fingerprint()?;
         let found = match spec.kinematics.get_ref() {
@@ -139,7 +164,7 @@ impl AnyScene {
     }
 
     /// Refuses what needs more memory than there is, before anything of it is laid out.
-    pub(crate) fn fits(&self) -> Result<(), RunError> {
+    pub fn fits(&self) -> Result<(), RunError> {
         match self {
             Self::Bar(s) => budget::fits(s),
             Self::Plane(s) => budget::fits(s),

@@ -77,8 +77,10 @@ fn control_group() -> Option<u64> {
 ///
 /// Points within a hundredth where cells are larger than the spacing; bonds are those of whole families, so that near surfaces fewer exist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Counts {
+pub struct Counts {
+    /// Nodes of the mesh.
     pub nodes: usize,
+    /// Cells of the mesh.
     pub cells: usize,
     /// Peridynamic points that are sites.
     pub points: f64,
@@ -370,7 +372,7 @@ pub(crate) fn fits<const D: usize>(scene: &Scene<D>) -> Result<(), RunError> {
 }
 
 /// The three largest items, the largest first.
-pub(crate) fn largest(memory: &[Share]) -> String {
+pub fn largest(memory: &[Share]) -> String {
     let mut list: Vec<&Share> = memory.iter().collect();
     list.sort_by_key(|s| std::cmp::Reverse(s.bytes));
     let named = |s: &&Share| format!("{} {}", s.name, bytes_text(s.bytes));

@@ -8,7 +8,7 @@ use crate::scene::validated::Scene;
 ///
 /// # Errors
 /// Those of `then`; [`RunError::NoCoupling`] if neither choice holds.
-pub(crate) fn with_choice<const D: usize, T>(
+pub fn with_choice<const D: usize, T>(
     mut scene: Scene<D>,
     mut then: impl FnMut(Scene<D>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {

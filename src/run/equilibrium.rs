@@ -87,7 +87,7 @@ pub(crate) fn equilibrium<const D: usize>(
 }
 
 /// What the solver is asked for, with the memory that is left to it.
-pub(crate) fn params(solver: &Solver) -> StaticParams {
+pub fn params(solver: &Solver) -> StaticParams {
     StaticParams {
         method: solver.method,
         ordering: solver.ordering,
@@ -98,7 +98,7 @@ pub(crate) fn params(solver: &Solver) -> StaticParams {
 }
 
 /// The symmetry that the coupling promises, if the matrix keeps it: a horizon that varies breaks it.
-pub(crate) fn symmetry<const D: usize>(
+pub fn symmetry<const D: usize>(
     coupling: &dyn Coupling<D>,
     asymmetry: impl FnOnce() -> f64,
     choices: &mut Vec<Choice>,

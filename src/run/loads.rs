@@ -170,7 +170,7 @@ type Held = (Vec<Option<f64>>, Vec<Option<usize>>);
 ///
 /// # Errors
 /// As [`holders`].
-pub(crate) fn supports<const D: usize>(
+pub fn supports<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
     t: f64,
@@ -349,7 +349,7 @@ pub(crate) fn split_facets<const D: usize>(
 ///
 /// # Errors
 /// As [`Loads::new`].
-pub(crate) fn loads<const D: usize>(
+pub fn loads<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
     t: f64,

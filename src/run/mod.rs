@@ -18,23 +18,23 @@
 //! | `error.rs` | what cannot be run, with place and remedy |
 
 mod any_scene;
-pub(crate) mod budget;
-pub(crate) mod chosen;
+pub mod budget;
+pub mod chosen;
 mod definiteness;
-pub(crate) mod equilibrium;
+pub mod equilibrium;
 pub(crate) mod error;
 mod linear;
-pub(crate) mod loads;
-pub(crate) mod motion;
+pub mod loads;
+pub mod motion;
 pub(crate) mod placed_scene;
 mod placement;
-pub(crate) mod proof;
+pub mod proof;
 mod rotation;
-pub(crate) mod setup;
-pub(crate) mod solution;
+pub mod setup;
+pub mod solution;
 mod statics;
-pub(crate) mod warnings;
-pub(crate) mod write;
+pub mod warnings;
+pub mod write;
 
 pub use crate::run::placed_scene::PlacedScene;
 pub use any_scene::AnyScene;

@@ -17,15 +17,22 @@ use crate::scene::validated::{Output, Scene, Solver};
 use crate::tensor::{Vector, padded};
 
 /// What of a scene remains once its problem is built.
-pub(crate) struct Rest<const D: usize> {
+pub struct Rest<const D: usize> {
+    /// Supports and loads.
     pub conditions: Vec<Condition<D>>,
+    /// How systems of equations are solved.
     pub solver: Solver,
+    /// What is written, and where.
     pub output: Output<D>,
+    /// Displacements and velocities at the start.
     pub initial: Vec<Initial<D>>,
+    /// What breaks bonds.
     pub breaking: Breaking<D>,
     /// Poisson's ratio of the points.
     pub ratio: Ratio,
+    /// How the nonlocal zone follows damage, where it does.
     pub follow: Option<Follow>,
+    /// A number for all that determines the results.
     pub fingerprint: Fingerprint,
     /// Density of each material.
     pub density: Vec<f64>,
@@ -53,7 +60,7 @@ impl<const D: usize> Rest<D> {
 }
 
 /// The problem of a scene, and what remains of the scene.
-pub(crate) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
+pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
     let material = scene
         .zones
         .iter()
@@ -125,7 +132,7 @@ pub(crate) fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) 
 }
 
 /// Says which partial volumes are in use, if not full ones.
-pub(crate) fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Choice> {
+pub fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Choice> {
     let volumes = model.peridynamics.as_ref()?.volumes;
     let why = match volumes {
         PartialVolume::Full => return None,

@@ -19,7 +19,7 @@ pub struct Solved<'a, const D: usize> {
 }
 
 /// The zone that each site lies in; of a node the most nonlocal one of the elements around it.
-pub(crate) fn zone_of_site<const D: usize>(model: &Model<D>) -> Vec<Zone> {
+pub fn zone_of_site<const D: usize>(model: &Model<D>) -> Vec<Zone> {
     let node_zone = |site: usize| {
         model
             .cells_of_site(site)

@@ -9,7 +9,7 @@ use crate::solve::statics::MethodUsed;
 use crate::system::Symmetry;
 
 /// All doubts about a model.
-pub(crate) fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String> {
+pub fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String> {
     let all = [one_sided(model), crack_beside_seam(model, joining)];
     all.into_iter().flatten().collect()
 }
@@ -108,13 +108,13 @@ fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: Joining) -> Opti
 }
 
 /// Horizons from crack to seam up to which a splice errs.
-pub(crate) const SPLICE: f64 = 1.0;
+pub const SPLICE: f64 = 1.0;
 
 /// As [`SPLICE`], of partial stress in elements.
-pub(crate) const STRESS_ELEMENTS: f64 = 1.4;
+pub const STRESS_ELEMENTS: f64 = 1.4;
 
 /// As [`SPLICE`], of meshfree partial stress.
-pub(crate) const MESHFREE: f64 = 1.9;
+pub const MESHFREE: f64 = 1.9;
 
 #[cfg(test)]
 mod tests {

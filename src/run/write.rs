@@ -223,7 +223,7 @@ impl<const D: usize> Solved<'_, D> {
 
 /// Which cells and points a file shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shown {
+pub enum Shown {
     /// All.
     All,
     /// Every so many: a sample, to tell how long all take.
@@ -241,7 +241,7 @@ impl Shown {
 
 /// A field over sites, beside those that every solution has.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum OverSites<'a> {
+pub enum OverSites<'a> {
     /// A vector, like the displacement.
     Vector(&'static str, &'a [f64]),
     /// A number, zero at nodes that are no sites.
@@ -249,7 +249,7 @@ pub(crate) enum OverSites<'a> {
 }
 
 /// Cells and points with the fields of a solution; without a residual, that field is left out.
-pub(crate) fn snapshot<const D: usize>(
+pub fn snapshot<const D: usize>(
     solved: &Solved<'_, D>,
     more: &[OverSites<'_>],
     shown: Shown,

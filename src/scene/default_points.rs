@@ -15,13 +15,13 @@ use crate::scene::points::Points;
 use crate::tensor::Vector;
 
 /// Spacings in a horizon, where nothing else decides.
-pub(crate) const RATIO: f64 = 3.0;
+pub const RATIO: f64 = 3.0;
 
 /// How far, in cells, nodes may be from a lattice of cells.
 const ALIKE: f64 = 1e-6;
 
 /// A lattice for cells of the edge `cell` under a horizon: the cells themselves, or a whole fraction of them.
-pub(crate) fn fraction_of_cells(cell: f64, horizon: f64) -> f64 {
+pub fn fraction_of_cells(cell: f64, horizon: f64) -> f64 {
     cell / (RATIO * cell / horizon).round().max(1.0)
 }
 

@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
-
 use super::source::{Source, Span};
 
 /// What sort of mistake a [`SceneError`] reports.
@@ -39,22 +37,27 @@ pub enum SceneErrorKind {
 
 /// A mistake in a scene, with where it stands and what to write instead.
 ///
-/// `Display` gives all on one line, `file:line: message; help`. miette, which knows the labels, shows the text
-/// underlined: [`SceneError::report`].
+/// `Display` gives all on one line, `file:line: message; help`. [`SceneError::excerpt`] has what a terminal underlines.
 #[derive(Clone, Debug)]
 pub struct SceneError {
     kind: SceneErrorKind,
     message: String,
     help: Option<String>,
     labels: Vec<(Span, String)>,
-    shown: Option<Box<Shown>>,
+    shown: Option<Box<Excerpt>>,
 }
 
+/// A piece of a scene's text, with what is wrong in it.
 #[derive(Clone, Debug)]
-struct Shown {
-    source: NamedSource<String>,
-    labels: Vec<LabeledSpan>,
-    line: usize,
+pub struct Excerpt {
+    /// The path of the scene, or `--set`.
+    pub name: String,
+    /// The whole text.
+    pub text: String,
+    /// Bytes of `text` to underline, and a few words to write under each.
+    pub labels: Vec<(Span, String)>,
+    /// The line of the first label, from 1; 0 if there is none.
+    pub line: usize,
 }
 
 impl SceneError {
@@ -84,14 +87,15 @@ impl SceneError {
     /// Attaches the text that the labels point into.
     pub fn shown_in(mut self, source: &Source) -> Self {
         let spans: Vec<Span> = self.labels.iter().map(|(s, _)| s.clone()).collect();
-        let (named, local, line) = source.locate(&spans);
+        let (name, text, local, line) = source.locate(&spans);
         let labels = local
             .into_iter()
             .zip(&self.labels)
-            .filter_map(|(span, (_, text))| span.map(|s| LabeledSpan::at(s, text.clone())))
+            .filter_map(|(span, (_, words))| span.map(|s| (s, words.clone())))
             .collect();
-        self.shown = Some(Box::new(Shown {
-            source: named,
+        self.shown = Some(Box::new(Excerpt {
+            name,
+            text,
             labels,
             line: if spans.is_empty() { 0 } else { line },
         }));
@@ -118,16 +122,15 @@ impl SceneError {
         let Some(shown) = &self.shown else {
             return Vec::new();
         };
-        shown
-            .labels
-            .iter()
-            .filter_map(|l| shown.source.inner().get(l.offset()..l.offset() + l.len()))
+        let labels = shown.labels.iter();
+        labels
+            .filter_map(|(span, _)| shown.text.get(span.clone()))
             .collect()
     }
 
-    /// The same mistake for a person at a terminal: message, underlined text and remedy.
-    pub fn report(self) -> miette::Report {
-        miette::Report::new(Headline(self))
+    /// The text that the mistake stands in; none where it stands in no text.
+    pub fn excerpt(&self) -> Option<&Excerpt> {
+        self.shown.as_deref()
     }
 }
 
@@ -135,8 +138,8 @@ impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(shown) = &self.shown {
             match shown.line {
-                0 => write!(f, "{}: ", shown.source.name())?,
-                line => write!(f, "{}:{line}: ", shown.source.name())?,
+                0 => write!(f, "{}: ", shown.name)?,
+                line => write!(f, "{}:{line}: ", shown.name)?,
             }
         }
         f.write_str(&self.message)?;
@@ -148,48 +151,6 @@ impl fmt::Display for SceneError {
 }
 
 impl std::error::Error for SceneError {}
-
-impl Diagnostic for SceneError {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.help.as_ref().map(|h| Box::new(h) as _)
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        let shown = self.shown.as_ref()?;
-        (!shown.labels.is_empty()).then_some(&shown.source as _)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let shown = self.shown.as_ref()?;
-        Some(Box::new(shown.labels.iter().cloned()))
-    }
-}
-
-/// A [`SceneError`] whose `Display` leaves place and remedy to miette.
-#[derive(Debug)]
-struct Headline(SceneError);
-
-impl fmt::Display for Headline {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0.message)
-    }
-}
-
-impl std::error::Error for Headline {}
-
-impl Diagnostic for Headline {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        Diagnostic::help(&self.0)
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.0.source_code()
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        self.0.labels()
-    }
-}
 
 /// The member of `known` that `word` was probably meant to be.
 pub(crate) fn closest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

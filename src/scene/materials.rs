@@ -19,7 +19,7 @@ use crate::tensor::Tensor4;
 
 /// The Poisson ratio of a material, and that at which its bonds would act alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Ratio {
+pub struct Ratio {
     pub typed: f64,
     pub pairwise: f64,
 }

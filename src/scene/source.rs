@@ -5,7 +5,6 @@
 
 use std::path::Path;
 
-use miette::NamedSource;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -83,8 +82,8 @@ impl Source {
         &self.pieces[0].name
     }
 
-    /// What miette shows, and `spans` relative to it; labels of other pieces than the first label's are left out.
-    pub(crate) fn locate(&self, spans: &[Span]) -> (NamedSource<String>, Vec<Option<Span>>, usize) {
+    /// Name and text of the piece in which the first of `spans` lies, all spans relative to it (none for those in other pieces), and the line of the first.
+    pub(crate) fn locate(&self, spans: &[Span]) -> (String, String, Vec<Option<Span>>, usize) {
         let first = spans.first().map_or(0, |s| s.start);
         let piece = self
             .pieces
@@ -105,11 +104,7 @@ impl Source {
             .filter(|b| *b == b'\n')
             .count()
             + 1;
-        (
-            NamedSource::new(&piece.name, piece.text.clone()),
-            local,
-            line,
-        )
+        (piece.name.clone(), piece.text.clone(), local, line)
     }
 
     /// The tables of the scene with all overrides applied, every key and value with its span.
@@ -147,7 +142,7 @@ impl Source {
     ///
     /// # Errors
     /// As [`Source::merged`].
-    pub(crate) fn table(&self) -> Result<toml::Table, SceneError> {
+    pub fn table(&self) -> Result<toml::Table, SceneError> {
         Ok(plain_table(self.merged()?.get_ref()))
     }
 
@@ -273,7 +268,7 @@ fn add_value(value: &DeValue<'_>, path: &mut Vec<String>, print: &mut Fingerprin
 ///
 /// # Errors
 /// A [`SceneError`] for a file that cannot be read or an override without `=`.
-pub(crate) fn read<'p>(
+pub fn read<'p>(
     path: &'p Path,
     overrides: &[String],
 ) -> Result<(Source, &'p Path, String), SceneError> {

@@ -78,7 +78,7 @@ pub enum KrylovError {
 const CHUNK: usize = 8192;
 
 /// `a·b`, summed by fixed chunks.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let partial: Vec<f64> = a
         .par_chunks(CHUNK)
         .zip(b.par_chunks(CHUNK))
@@ -88,7 +88,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// `‖a‖₂`, also of numbers whose squares are too large or too small for a number.
-pub(crate) fn norm(a: &[f64]) -> f64 {
+pub fn norm(a: &[f64]) -> f64 {
     let squares = dot(a, a);
     if squares > 1e-200 && squares < 1e300 {
         return squares.sqrt();

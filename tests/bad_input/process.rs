@@ -120,7 +120,8 @@ fn memory_that_is_exhausted_ends_with_a_status_of_its_own() {
 fn blocks_that_end_nowhere_are_refused_without_a_panic() {
     let scene = edit(scene_of_mesh(), &[("m.msh", "m.vtu")]);
     let folder = folder_with(&scene);
-    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/wrong_blocks.vtu");
+    let fixture = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+        .join("tests/fixtures/wrong_blocks.vtu");
     std::fs::copy(fixture, folder.path().join("m.vtu")).unwrap();
     let (status, said) = by_shell(folder.path(), "", "");
     assert_eq!(status, Some(1), "{said}");
@@ -191,7 +192,7 @@ fn tables_of_a_scene_at_rest_are_replaced_whole() {
 /// Where the first coupling does not hold, `--output` and the warnings of parts that touch nothing are those of the scene all the same.
 #[test]
 fn the_coupling_that_is_taken_in_the_end_writes_where_it_is_told() {
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let fixtures = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/fixtures");
     let scene = format!(
         "kinematics = 'plane-strain'
 mesh.file.path = '{}'

@@ -42,7 +42,7 @@ impl Case {
 
     /// Copies a file of `tests/faults/` beside the scene.
     pub fn with_file(self, name: &str) -> Self {
-        let from = Path::new(env!("CARGO_MANIFEST_DIR"))
+        let from = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
             .join("tests/faults")
             .join(name);
         std::fs::copy(from, self.folder.path().join(name)).expect("the file is copied");

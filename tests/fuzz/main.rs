@@ -21,7 +21,7 @@ const MOST_MEMORY: u64 = 2 << 30;
 
 /// Every file that is kept for a target ends as it should.
 fn replay(target: &str, entry: fn(&[u8]) -> Outcome) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
         .join("tests/fuzz/corpus")
         .join(target);
     let mut cases = 0;

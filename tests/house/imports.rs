@@ -1,4 +1,4 @@
-//! What each file of the crate takes from which other, re-exports followed to the file that defines what is taken.
+//! What each file of the crates takes from which other, re-exports followed to the file that defines what is taken.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,13 +13,18 @@ pub struct Imports {
     code: BTreeMap<ItemPath, String>,
     /// Where what a module exports again comes from.
     exports: BTreeMap<ItemPath, ItemPath>,
+    /// Crates beside the library, by what stands before their modules.
+    crates: BTreeSet<String>,
 }
 
 impl Imports {
-    /// Reads the files of a crate.
-    pub fn read(src: &Path, files: &[PathBuf]) -> Self {
+    /// Reads the files of crates: folder of the sources, what stands before their modules (nothing for the library), files.
+    pub fn read(crates: &[(&Path, &str, Vec<PathBuf>)]) -> Self {
         let mut code = BTreeMap::new();
-        for file in files {
+        let all = crates
+            .iter()
+            .flat_map(|c| c.2.iter().map(move |f| (c.0, c.1, f)));
+        for (src, name, file) in all {
             let inside = file
                 .strip_prefix(src)
                 .expect("below src")
@@ -29,12 +34,19 @@ impl Imports {
                 .map(|part| part.to_string_lossy().into_owned())
                 .collect();
             module.pop_if(|last| last == "mod");
+            if !name.is_empty() {
+                module
+                    .pop_if(|last| last == "lib" || last == "main" && !src.join("lib.rs").exists());
+                module.insert(0, name.to_owned());
+            }
             let text = fs::read_to_string(file).expect("a source file");
             code.insert(module, without_comments(&text));
         }
+        let names = crates.iter().filter(|c| !c.1.is_empty());
         let mut imports = Self {
             code,
             exports: BTreeMap::new(),
+            crates: names.map(|c| c.1.to_owned()).collect(),
         };
         let mut exports = BTreeMap::new();
         for (module, code) in &imports.code {
@@ -61,7 +73,16 @@ impl Imports {
     fn absolute(&self, path: &[String], module: &[String]) -> Option<ItemPath> {
         let (first, rest) = path.split_first()?;
         match first.as_str() {
-            "crate" => Some(rest.to_vec()),
+            "crate" => {
+                let own = module.first().filter(|m| self.crates.contains(*m));
+                let root: ItemPath = own.into_iter().cloned().collect();
+                Some([&root, rest].concat())
+            }
+            "bondline" => Some(rest.to_vec()),
+            other if other.starts_with("bondline_") => {
+                let name = other["bondline_".len()..].to_owned();
+                Some([&[name], rest].concat())
+            }
             "self" => Some([module, rest].concat()),
             "super" => {
                 let up = path.iter().take_while(|part| *part == "super").count();
@@ -247,10 +268,18 @@ fn without_uses(code: &str) -> String {
     kept.collect()
 }
 
-/// Paths that begin with `crate` or `super` outside of `use` statements.
+/// Paths that begin with `crate`, `super` or one of the crates outside of `use` statements.
 fn inline(code: &str) -> Vec<ItemPath> {
     let mut list = Vec::new();
-    for start in ["crate::", "super::"] {
+    let starts = [
+        "crate::",
+        "super::",
+        "bondline::",
+        "bondline_study::",
+        "bondline_terminal::",
+        "bondline_verify::",
+    ];
+    for start in starts {
         for (at, _) in code.match_indices(start) {
             let before = code[..at].chars().next_back();
             if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':' || c == '$') {

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use imports::{Imports, ItemPath};
 
-/// Modules of `src`, the lowest first.
-const FLOORS: [&str; 18] = [
+/// Modules of the library and, above them, the other crates, the lowest first.
+const FLOORS: [&str; 19] = [
     "tensor",
     "progress",
     "regular_file",
@@ -24,10 +24,17 @@ const FLOORS: [&str; 18] = [
     "coupling",
     "scene",
     "run",
+    "terminal",
     "study",
     "verify",
-    "command",
+    "cli",
 ];
+
+/// Crates that stand on the library.
+const CRATES: [&str; 4] = ["terminal", "study", "verify", "cli"];
+
+/// Crates of one floor that may not take from each other.
+const APART: [&str; 2] = ["verify", "cli"];
 
 /// The most lines that a file has.
 const MOST_LINES: usize = 600;
@@ -68,11 +75,47 @@ const CIRCLES: [&[&str]; 3] = [
     &["scene/choice", "scene/error", "scene/source"],
 ];
 
+/// Where the sources of a crate lie; of the library without a name.
+fn folder(name: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    match name {
+        "" => root.join("src"),
+        name => root.join(format!("crates/bondline-{name}/src")),
+    }
+}
+
 fn imports() -> Imports {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&src, &mut files);
-    Imports::read(&src, &files)
+    let names = [""].into_iter().chain(CRATES);
+    let crates = names.map(|name| {
+        let src = folder(name);
+        let mut files = Vec::new();
+        sources(&src, &mut files);
+        (src, name, files)
+    });
+    let crates: Vec<_> = crates.collect();
+    let crates: Vec<_> = crates
+        .iter()
+        .map(|(src, name, files)| (src.as_path(), *name, files.clone()))
+        .collect();
+    Imports::read(&crates)
+}
+
+#[test]
+fn every_crate_is_looked_at() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    let there = fs::read_dir(root).expect("the crates");
+    let mut there: Vec<String> = there
+        .map(|e| {
+            e.expect("an entry")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    there.sort();
+    let mut known = CRATES.map(|name| format!("bondline-{name}"));
+    known.sort();
+    assert_eq!(there, known);
 }
 
 #[test]
@@ -85,11 +128,17 @@ fn no_module_imports_from_a_floor_above() {
     };
     let mut climbing = Vec::new();
     for module in imports.modules() {
-        if module == &["main"] || module == &["lib"] {
+        if module == &["lib"] {
             continue;
         }
         let own = floor(module).unwrap_or_else(|| panic!("{module:?} has no floor"));
-        let above = |m: &ItemPath| floor(m).is_some_and(|other| other > own);
+        let above = |m: &ItemPath| {
+            let apart = m[0] != module[0]
+                && [&m[0], &module[0]]
+                    .iter()
+                    .all(|n| APART.contains(&n.as_str()));
+            apart || floor(m).is_some_and(|other| other > own)
+        };
         for other in imports.of(module).into_iter().filter(above) {
             climbing.push(format!(
                 "{} takes from {}",
@@ -136,7 +185,7 @@ fn a_circle_is_found_through_names_that_are_exported_again() {
         "mod b;\nmod c;\npub use b::B;\npub use self::c::C;\n",
     )
     .expect("a file");
-    let imports = Imports::read(src, &files);
+    let imports = Imports::read(&[(src, "", files.to_vec())]);
     assert_eq!(imports.circles(), [["a/b", "a/c"]]);
     let of = |module: &[&str]| {
         let module: ItemPath = module.iter().map(|m| (*m).to_owned()).collect();
@@ -148,10 +197,58 @@ fn a_circle_is_found_through_names_that_are_exported_again() {
 }
 
 #[test]
+fn paths_lead_from_crate_to_crate() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        fs::write(&path, text).expect("a file");
+        path
+    };
+    let library = vec![
+        write("src/lib.rs", "pub mod a;\n"),
+        write(
+            "src/a.rs",
+            "pub struct A;\nfn f() { bondline_study::b::g(); }\n",
+        ),
+    ];
+    let study = vec![
+        write("study/lib.rs", "pub mod b;\nmod c;\npub use c::C;\n"),
+        write(
+            "study/b.rs",
+            "use bondline::a::A;\npub fn g() -> crate::c::C { todo!() }\n",
+        ),
+        write("study/c.rs", "pub struct C;\n"),
+    ];
+    let cli = vec![write(
+        "cli/main.rs",
+        "use bondline_study::C;\nfn main() { bondline::a::f(); }\n",
+    )];
+    let (src, of_study, of_cli) = (
+        folder.path().join("src"),
+        folder.path().join("study"),
+        folder.path().join("cli"),
+    );
+    let imports = Imports::read(&[
+        (&src, "", library),
+        (&of_study, "study", study),
+        (&of_cli, "cli", cli),
+    ]);
+    let of = |module: &[&str]| {
+        let module: ItemPath = module.iter().map(|m| (*m).to_owned()).collect();
+        let found = imports.of(&module).into_iter();
+        found.map(|m| m.join("/")).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&["a"]), ["study/b"]);
+    assert_eq!(of(&["study", "b"]), ["a", "study/c"]);
+    assert_eq!(of(&["cli"]), ["a", "study/c"]);
+}
+
+#[test]
 fn no_file_is_longer_than_it_should_be() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
-    for folder in ["src", "examples"] {
+    for folder in ["src", "crates", "examples"] {
         sources(&root.join(folder), &mut files);
     }
     let long: Vec<String> = files

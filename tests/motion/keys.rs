@@ -13,7 +13,7 @@ fn wrong(scene: &str, from: &str, to: &str) -> SceneError {
     if let Err(error) = SceneSpec::parse(&source) {
         return error;
     }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     AnyScene::from_source(&source, folder, "bar").expect_err("this scene is wrong")
 }
 

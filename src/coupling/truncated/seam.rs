@@ -519,8 +519,8 @@ fn for_box<const D: usize>(first: &[i64; D], last: &[i64; D], mut visit: impl Fn
 mod tests {
     use super::*;
     use crate::{
+        enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
         peridynamics::Micromodulus,
-        verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
     };
 
     /// Bonds of all kinds at a seam, of a lattice moved by some parts of its spacing: how they run against their pieces, which are found by looking where the middle of each part lies.

@@ -13,7 +13,7 @@ use crate::tensor::Vector;
 ///
 /// What does not change with time is evaluated once; what depends on time alone, once per step and condition; the rest
 /// at every place and every step.
-pub(crate) struct SceneDrive<'a, const D: usize> {
+pub struct SceneDrive<'a, const D: usize> {
     model: &'a Model<D>,
     conditions: &'a [Condition<D>],
     loads: Loads<'a, D>,

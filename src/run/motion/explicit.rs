@@ -43,7 +43,7 @@ fn is_due(before: f64, after: f64, interval: f64) -> bool {
 }
 
 /// The sizes of a model that moves.
-pub(crate) fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Sizes {
+pub fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Sizes {
     Sizes {
         nodes: model.mesh.nodes.len(),
         cells: model.mesh.cell_count(),
@@ -508,12 +508,13 @@ pub(crate) fn cracks(
 }
 
 /// What a law with memory dissipated; none of any other.
-pub(crate) fn inelastic_energy(system: &dyn Dynamic) -> Option<f64> {
+pub fn inelastic_energy(system: &dyn Dynamic) -> Option<f64> {
     let inelastic = system.dissipation().map(|d| d.inelastic);
     inelastic.filter(|energy| *energy != 0.0)
 }
 
-pub(crate) fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
+/// The present moment of a run, as tables write it.
+pub fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
     let energies = motion.energies();
     Moment {
         state: motion.state(),

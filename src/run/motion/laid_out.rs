@@ -16,22 +16,32 @@ use crate::scene::validated::Scene;
 use crate::system::Dynamic;
 
 /// A scene with all that it computes before its first step.
-pub(crate) struct LaidOut<'a, const D: usize> {
+pub struct LaidOut<'a, const D: usize> {
+    /// The title of the scene.
     pub title: String,
+    /// How its bodies are coupled.
     pub joining: Joining,
+    /// What to change in the scene where a mode may grow.
     pub remedy: &'static str,
     /// What shows that no mode grows, if anything does.
     pub proved: Option<&'static str>,
+    /// Sites, families and zones.
     pub model: &'a Model<D>,
+    /// Rows of the stiffness.
     pub operator: &'a dyn Operator<D>,
+    /// What the run keeps of the scene.
     pub rest: &'a Rest<D>,
+    /// The system that solvers see.
     pub moving: Moving<'a>,
+    /// What the program chose where the scene leaves it open.
     pub choices: Vec<Choice>,
     /// What was shown about the model.
     pub proof: Proof,
     /// Memory that the program held when sites and bonds were there.
     pub bytes: u64,
+    /// Seconds of each stage so far.
     pub timings: Timings,
+    /// The clock of the stages.
     pub watch: Stopwatch,
 }
 
@@ -134,7 +144,7 @@ pub(crate) fn lay_out<const D: usize, T>(
 }
 
 /// Lays a scene out and hands it on; `first` has a say before anything is computed.
-pub(crate) fn laid_out<const D: usize, S, T>(
+pub fn laid_out<const D: usize, S, T>(
     scene: Scene<D>,
     progress: &dyn Progress,
     first: impl FnOnce(&Rest<D>, &mut Vec<Choice>) -> Result<S, RunError>,
@@ -186,7 +196,7 @@ pub(crate) fn restore(
 }
 
 /// Whether bonds may break.
-pub(crate) fn breaks<const D: usize>(system: &dyn Dynamic, rest: &Rest<D>) -> Breaks {
+pub fn breaks<const D: usize>(system: &dyn Dynamic, rest: &Rest<D>) -> Breaks {
     match system.damage() {
         Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
         _ if system.dissipation().is_some() => Breaks::Dissipating,

@@ -15,17 +15,17 @@
 //! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
 
 pub(crate) mod cells;
-pub(crate) mod drive;
-pub(crate) mod explicit;
+pub mod drive;
+pub mod explicit;
 pub(crate) mod guard;
-pub(crate) mod laid_out;
-pub(crate) mod pace;
-pub(crate) mod quasi_static;
+pub mod laid_out;
+pub mod pace;
+pub mod quasi_static;
 pub(crate) mod ready;
-pub(crate) mod record;
+pub mod record;
 pub(crate) mod seen;
 pub(crate) mod switching;
-pub(crate) mod system;
+pub mod system;
 pub(crate) mod watch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,7 +69,8 @@ impl RunOptions<'_> {
     }
 }
 
-pub(crate) const STILL: RunError = RunError::Later {
+/// The refusal of a static scene where one that moves is needed.
+pub const STILL: RunError = RunError::Later {
     what: "a static scene does not move",
     remedy: "use AnyScene::run, which solves it",
 };

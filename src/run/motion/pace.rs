@@ -19,7 +19,7 @@ use crate::system::Dynamic;
 ///
 /// # Errors
 /// [`RunError::Step`] for a step beyond the stable one or a motion that grows, [`RunError::SubCycling`].
-pub(crate) fn paced<'a>(
+pub fn paced<'a>(
     spec: &Spec,
     asked: &Asked<'_>,
     moving: Moving<'a>,
@@ -184,7 +184,7 @@ fn choose_step(
 ///
 /// # Errors
 /// [`RunError::Idle`] for a condition that meets no site.
-pub(crate) fn held<const D: usize>(
+pub fn held<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
 ) -> Result<Vec<u32>, RunError> {

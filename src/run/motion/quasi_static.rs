@@ -301,11 +301,7 @@ const RAISED: f64 = 1e-10;
 
 /// Whether factors may lead the secant: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone, whose condition is that
 /// of L/δ and not of L/h, so that conjugate gradients without a matrix take less time and an eighth of the memory.
-pub(crate) fn may_factorise<const D: usize>(
-    model: &Model<D>,
-    method: Method,
-    symmetry: Symmetry,
-) -> bool {
+pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
     let is_point = |site: usize| model.point_of(site).is_some();
     let only_points = || symmetry == Symmetry::Symmetric && (0..model.sites.len()).all(is_point);
     match method {

@@ -45,7 +45,7 @@ pub(crate) struct Saved {
 
 /// Where a zone that follows the crack stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Zone {
+pub struct Zone {
     /// Whether each cell is nonlocal.
     pub nonlocal: Vec<bool>,
     /// When each was wanted last \[s\], or became nonlocal; minus infinity if never.
@@ -94,7 +94,7 @@ impl Zone {
 
 /// A time step, and the limits that it keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct StepChoice {
+pub struct StepChoice {
     /// The step.
     pub step: f64,
     /// Steps to the end.
@@ -118,7 +118,7 @@ impl StepChoice {
 
 /// Damage at the edge of the nonlocal zone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct EdgeReached {
+pub struct EdgeReached {
     /// After this step.
     pub step: u64,
     /// At this time.
@@ -129,7 +129,7 @@ pub(crate) struct EdgeReached {
 
 /// What of a run's files belongs to a state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Written {
+pub struct Written {
     /// Lengths of the history and of the tables of tips.
     pub bytes: Vec<u64>,
     /// Times of the VTU files.
@@ -140,7 +140,7 @@ pub(crate) struct Written {
 
 /// Whether bonds may break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Breaks {
+pub enum Breaks {
     /// They may.
     Possibly,
     /// None does.
@@ -150,7 +150,7 @@ pub(crate) enum Breaks {
 }
 
 /// A state to tell of.
-pub(crate) struct Moment<'a> {
+pub struct Moment<'a> {
     /// Fields, time, step, work, broken bonds.
     pub state: &'a State,
     /// What moves.
@@ -192,7 +192,7 @@ impl Moment<'_> {
 
 /// The energies of a row of the history.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Row {
+pub struct Row {
     /// `½ vᵀ M v`.
     pub kinetic: f64,
     /// Of all bodies.
@@ -206,7 +206,7 @@ pub(crate) struct Row {
 }
 
 /// What a run writes.
-pub(crate) struct Recorder<'a, const D: usize> {
+pub struct Recorder<'a, const D: usize> {
     output: &'a Output<D>,
     /// Sites and weights of each probe.
     probes: Vec<Vec<(u32, f64)>>,

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// What was seen so far: part of a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Seen {
+pub struct Seen {
     /// The largest energy or work so far.
     pub(super) largest: f64,
     /// Where the gain went beyond [`TOLD`]: part, step, time.

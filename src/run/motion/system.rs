@@ -18,7 +18,7 @@ use crate::solve::explicit::State;
 use crate::system::{Dynamic, LinearMotion};
 
 /// What moves, and what it holds.
-pub(crate) struct Moving<'a> {
+pub struct Moving<'a> {
     /// The system.
     pub system: Box<dyn Dynamic + 'a>,
     /// Bytes of rows and bonds.
@@ -241,7 +241,7 @@ pub(crate) struct PlaneEnergy {
 }
 
 /// Displacement and velocity at time zero.
-pub(crate) fn start<const D: usize>(model: &Model<D>, initial: &[Initial<D>]) -> State {
+pub fn start<const D: usize>(model: &Model<D>, initial: &[Initial<D>]) -> State {
     let mut state = State::at_rest(model.sites.len() * D);
     for field in initial {
         let values = match field.kind {

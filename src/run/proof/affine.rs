@@ -36,7 +36,7 @@ struct Subject<'a, const D: usize> {
 }
 
 /// The displacement of all sites under each affine field.
-pub(crate) fn displacements<const D: usize>(model: &Model<D>) -> Vec<Vec<f64>> {
+pub fn displacements<const D: usize>(model: &Model<D>) -> Vec<Vec<f64>> {
     let (tensor, centre) = (reference(model), centre(model));
     let fields = gradients(&tensor).into_iter();
     fields.map(|g| affine(model, &g, &centre)).collect()

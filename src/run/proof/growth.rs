@@ -21,7 +21,7 @@ const TOLD: f64 = 0.005;
 
 /// What is known before a run of a motion that may grow.
 #[derive(Clone, Copy)]
-pub(crate) struct Asked<'a> {
+pub struct Asked<'a> {
     /// What to do about it.
     pub remedy: &'static str,
     /// What shows that no mode grows, if anything does.

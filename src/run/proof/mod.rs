@@ -15,7 +15,7 @@
 mod affine;
 mod classes;
 mod fields;
-pub(crate) mod growth;
+pub mod growth;
 mod loads;
 mod patch;
 mod quadratic;
@@ -30,13 +30,17 @@ use crate::run::error::RunError;
 use crate::scene::spec::UnprovenSpec;
 use crate::system::{BlockCsr, Dynamic};
 
-pub(crate) use self::affine::displacements as affine_displacements;
+pub use self::affine::displacements as affine_displacements;
 
 /// What is to be proved: a model laid out, with its conditions.
-pub(crate) struct Subject<'a, const D: usize> {
+pub struct Subject<'a, const D: usize> {
+    /// Sites, families and zones.
     pub model: &'a Model<D>,
+    /// The method that couples them.
     pub coupling: &'a dyn Coupling<D>,
+    /// Rows of the stiffness.
     pub operator: &'a dyn Operator<D>,
+    /// What the run keeps of the scene.
     pub rest: &'a Rest<D>,
     /// The assembled stiffness, where the run has one; else rows come from the operator.
     pub stiffness: Option<&'a BlockCsr>,
@@ -50,7 +54,7 @@ pub(crate) struct Subject<'a, const D: usize> {
 ///
 /// # Errors
 /// [`RunError`] of a check that cannot be made.
-pub(crate) fn prove<const D: usize>(
+pub fn prove<const D: usize>(
     subject: &Subject<'_, D>,
     progress: &dyn Progress,
 ) -> Result<Proof, RunError> {
@@ -74,7 +78,7 @@ pub(crate) fn prove<const D: usize>(
 ///
 /// # Errors
 /// [`RunError::Unproven`] with the first refusal.
-pub(crate) fn hold(proof: &Proof) -> Result<(), RunError> {
+pub fn hold(proof: &Proof) -> Result<(), RunError> {
     match proof.messages(Severity::Refusal).next() {
         Some(message) => Err(RunError::Unproven(message.to_owned())),
         None => Ok(()),

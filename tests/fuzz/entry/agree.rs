@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use arbitrary::Unstructured;
-use bondline::run::AnyScene;
 use bondline::scene::Source;
 use bondline::{RunSummary, Silent};
 
@@ -83,7 +82,7 @@ pub fn typed_scene(data: &[u8]) -> Told {
 
 fn solved(text: &str, folder: &Path) -> Result<RunSummary, Outcome> {
     let source = Source::new("typed.toml", text);
-    match AnyScene::from_source(&source, folder, "fuzz") {
+    match bondline_study::from_source(&source, folder, "fuzz") {
         Ok(scene) => ended(scene, folder),
         Err(error) => Err(refused(&error)),
     }
@@ -92,7 +91,7 @@ fn solved(text: &str, folder: &Path) -> Result<RunSummary, Outcome> {
 /// Elements alone, of which any number is cheap.
 fn elements_alone(text: &str, folder: &Path) -> Option<RunSummary> {
     let source = Source::new("alone.toml", text);
-    let mut scene = AnyScene::from_source(&source, folder, "fuzz").ok()?;
+    let mut scene = bondline_study::from_source(&source, folder, "fuzz").ok()?;
     scene.set_output_directory(folder.to_path_buf());
     scene.run(&Silent).ok()
 }

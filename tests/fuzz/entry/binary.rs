@@ -97,7 +97,8 @@ const PLATE: &str = "
 
 fn scene(folder: &Path) -> (AnyScene, u64) {
     let source = Source::new("fuzz.toml", PLATE);
-    let mut scene = AnyScene::from_source(&source, folder, "fuzz").expect("the plate is right");
+    let mut scene =
+        bondline_study::from_source(&source, folder, "fuzz").expect("the plate is right");
     scene.set_output_directory(folder.to_path_buf());
     let AnyScene::Plane(plane) = &scene else {
         panic!("the plate is plane")

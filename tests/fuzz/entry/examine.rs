@@ -50,7 +50,7 @@ pub fn refused(error: &SceneError) -> Outcome {
         "no place: {text}"
     );
     // a terminal shows it without trouble
-    let _ = format!("{:?}", error.clone().report());
+    let _ = format!("{:?}", bondline_terminal::report(error.clone()));
     Outcome::Refused(format!("scene: {:?}", error.kind()))
 }
 
@@ -103,7 +103,7 @@ fn run<const D: usize>(
         Solve::Explicit(e) => e.checkpoint_every = None,
         Solve::Static => {}
     }
-    let prediction = match wrap(Box::new(scene.clone())).predict(&Silent) {
+    let prediction = match bondline_study::predict(wrap(Box::new(scene.clone())), &Silent) {
         Ok(prediction) => prediction,
         // what `check` refuses a run refuses too, or else the check is wrong
         Err(error) => {

@@ -22,7 +22,6 @@ use std::path::{Path, PathBuf};
 
 use arbitrary::Unstructured;
 use bondline::mesh::{MeshError, quality, read};
-use bondline::run::AnyScene;
 use bondline::scene::{SceneSpec, Source};
 
 #[allow(unused_imports)] // each target calls its own
@@ -72,7 +71,7 @@ fn run_text(text: &str, meshes: &Path) -> Outcome {
     if !size::is_small(&spec) {
         return Outcome::Skipped("large");
     }
-    match AnyScene::from_source(&source, meshes, "fuzz") {
+    match bondline_study::from_source(&source, meshes, "fuzz") {
         Ok(scene) => examine(scene, folder().path()),
         Err(error) => refused(&error),
     }

@@ -1,0 +1,11 @@
+//! What only the program has, and not the library: the process around a run.
+//!
+//! | file | what |
+//! |---|---|
+//! | `interrupt.rs` | signals |
+//! | `threads.rs` | how many threads compute |
+//! | `verify.rs` | the program of the suites, which is built apart |
+
+pub mod interrupt;
+pub mod threads;
+pub mod verify;

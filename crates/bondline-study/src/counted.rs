@@ -1,0 +1,66 @@
+//! What a run will need, counted from volumes: the answer where laying the model out would take longer than a check may.
+
+use super::resource_estimate::Prediction;
+use bondline::observe::proof::Proof;
+use bondline::observe::summary::{Choice, Sizes, Timings};
+use bondline::peridynamics::Influence;
+use bondline::run::budget::Counts;
+use bondline::scene::Scene;
+
+/// Seconds that `check` may take, or a [`TENTH`] of the run if that is more.
+pub(crate) const ANSWERS: f64 = 5.0;
+
+/// See [`ANSWERS`].
+pub(crate) const TENTH: f64 = 0.1;
+
+/// The counts of a scene as a prediction, where laying it out would take longer than `check` may; `None` where it would not.
+pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
+    let counts = Counts::of(scene);
+    let (lay_out, run) = counts.seconds(scene);
+    if lay_out <= ANSWERS.max(TENTH * (lay_out + run)) {
+        return None;
+    }
+    let joining = scene.coupling.joining();
+    let whole = |x: f64| x.round() as usize;
+    let mut timings = Timings::default();
+    timings.add("sites and bonds", lay_out);
+    timings.add("solve", run);
+    let mut choices = scene.choices.clone();
+    choices.push(Choice {
+        choice: format!("coupling {}", joining.name),
+        why: scene
+            .coupling_why
+            .clone()
+            .unwrap_or_else(|| joining.about.to_owned()),
+    });
+    Some(Prediction {
+        scene: scene.title.clone(),
+        counted: Some(format!("laying it out would take about {lay_out:.0} s")),
+        dimension: D,
+        coupling: joining.name.to_owned(),
+        sizes: Sizes {
+            nodes: counts.nodes,
+            cells: counts.cells,
+            sites: whole(counts.dofs / D as f64),
+            points: whole(counts.points),
+            bonds: whole(counts.bonds),
+            dofs: whole(counts.dofs),
+            nonzeros: whole(counts.nonzeros),
+        },
+        method: None,
+        symmetry: scene.coupling.build::<D>(Influence::Gaussian).symmetry(),
+        unknowns: whole(counts.dofs),
+        factor_nonzeros: 0,
+        operations: 0.0,
+        peak_memory_bytes: counts.peak(),
+        memory: counts.memory(),
+        total_seconds: timings.total(),
+        timings,
+        choices,
+        proof: Proof::default(),
+        warnings: Vec::new(),
+        error: None,
+        no_error: None,
+        motion: None,
+    })
+}

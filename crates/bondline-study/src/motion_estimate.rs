@@ -1,0 +1,326 @@
+//! What a run in time will need: its stable step, number of steps, memory and time, from a few steps taken.
+
+use std::time::Instant;
+
+use crate::output_cost::{TrialFolder, file_seconds, made_up};
+use crate::resource_estimate::{
+    MotionPrediction, OUTPUT_BYTES, Planned, Prediction, holds, warnings,
+};
+use bondline::coupling::Sampler;
+use bondline::observe::checkpoint::CheckpointFile;
+use bondline::observe::series::Series;
+use bondline::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
+use bondline::progress::Progress;
+use bondline::run::RunError;
+use bondline::run::budget::Share;
+use bondline::run::motion::STILL;
+use bondline::run::motion::drive::SceneDrive;
+use bondline::run::motion::explicit::{moment, sizes};
+use bondline::run::motion::laid_out::{LaidOut, breaks, laid_out};
+use bondline::run::motion::pace::{held, paced};
+use bondline::run::motion::quasi_static::may_factorise;
+use bondline::run::motion::record::Recorder;
+use bondline::run::motion::system::start;
+use bondline::run::proof::growth::Asked;
+use bondline::run::solution::{self, Solved};
+use bondline::run::write::OverSites;
+use bondline::scene::spec::LoadStepSpec;
+use bondline::scene::{Explicit as Spec, QuasiStatic, Solve};
+use bondline::scene::{Output, Scene};
+use bondline::solve::FreeDofs;
+use bondline::solve::explicit::{Explicit, ExplicitParams};
+use bondline::solve::statics::MethodUsed;
+
+/// Steps are taken for a tenth of the run to tell what one costs, for this long at most \[s\].
+const TRIED_FOR: f64 = 0.5;
+
+/// And for this long at least \[s\].
+const LEAST_TRIED: f64 = 0.01;
+
+/// Steps before the clock starts.
+const WARM: u64 = 3;
+
+/// Rows of the history that are timed.
+const ROWS: u32 = 5;
+
+/// Predicts a run in time or under a load that grows.
+///
+/// # Errors
+/// [`RunError`] as a run would.
+pub(crate) fn predict<const D: usize>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    match scene.solve.clone() {
+        Solve::Explicit(solve) => explicit(scene, &solve, progress),
+        Solve::QuasiStatic(solve) => load_steps(scene, &solve, progress),
+        Solve::Static => Err(STILL),
+    }
+}
+
+/// Predicts a run in time.
+///
+/// # Errors
+/// [`RunError`] as a run would, the refusal of its time step included.
+fn explicit<const D: usize>(
+    scene: Scene<D>,
+    spec: &Spec,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    let nothing = |_: &_, _: &mut Vec<Choice>| Ok(());
+    laid_out(scene, progress, nothing, |laid_out, ()| {
+        steps(laid_out, spec, progress)
+    })
+}
+
+/// Sizes, memory and the choices so far, as they stand with what moves.
+fn prediction<const D: usize>(
+    laid_out: &LaidOut<'_, D>,
+    held: usize,
+    files: Files,
+    state: Option<u64>,
+) -> Prediction {
+    let sizes = sizes(laid_out.model, laid_out.operator);
+    let output = match files {
+        Files::Some => OUTPUT_BYTES * (sizes.cells + sizes.points) as u64,
+        Files::None => 0,
+    };
+    let share = |name, bytes| Share { name, bytes };
+    let mut memory = vec![
+        share("model", laid_out.bytes),
+        share("rows, bonds", laid_out.moving.bytes as u64),
+    ];
+    memory.extend(state.map(|bytes| share("state", bytes)));
+    memory.push(share("output", output));
+    let mut choices = vec![laid_out.rest.coupling(laid_out.joining)];
+    // a coupling that was chosen is told already
+    let told = choices[0].clone();
+    choices.extend(laid_out.choices.iter().filter(|c| **c != told).cloned());
+    Prediction {
+        scene: laid_out.title.clone(),
+        counted: None,
+        dimension: D,
+        coupling: laid_out.joining.name.to_owned(),
+        sizes,
+        method: None,
+        symmetry: laid_out.moving.system.symmetry(),
+        unknowns: sizes.dofs - held,
+        factor_nonzeros: 0,
+        operations: 0.0,
+        peak_memory_bytes: (resident_memory_bytes().unwrap_or(0) + output)
+            .max(peak_memory_bytes().unwrap_or(0)),
+        memory,
+        total_seconds: laid_out.timings.total(),
+        timings: laid_out.timings.clone(),
+        choices,
+        proof: laid_out.proof.clone(),
+        warnings: Vec::new(),
+        error: None,
+        no_error: None,
+        motion: None,
+    }
+}
+
+/// Whether a run writes VTU files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Files {
+    Some,
+    None,
+}
+
+fn steps<const D: usize>(
+    mut laid_out: LaidOut<'_, D>,
+    spec: &Spec,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    let (model, rest) = (laid_out.model, laid_out.rest);
+    let held = held(model, &rest.conditions)?;
+    let asked = Asked {
+        remedy: laid_out.remedy,
+        proved: laid_out.proved,
+        policy: spec.growing_modes,
+        place: &|site| model.sites[site].position.iter().copied().collect(),
+    };
+    let (moving, pace, growth) = paced(
+        spec,
+        &asked,
+        laid_out.moving,
+        &held,
+        None,
+        &mut laid_out.choices,
+    )?;
+    laid_out.proof.parts.extend(growth);
+    laid_out.moving = moving;
+    laid_out.watch.lap(&mut laid_out.timings, "stable step");
+
+    let is_linear = laid_out.moving.is_linear;
+    let breaks = breaks(laid_out.moving.system.as_ref(), rest);
+    let begin = start(model, &rest.initial);
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
+    let state_bytes = 12 * 8 * begin.u.len() as u64;
+    let mut motion = Explicit::new(
+        laid_out.moving.system.as_mut(),
+        &drive,
+        ExplicitParams::with_step(pace.step),
+        begin,
+    )?;
+    // the first touch memory, and wake threads
+    let mut taken = 0u64;
+    let mut clock = Instant::now();
+    let mut tried = TRIED_FOR;
+    while taken < pace.steps && (taken < 2 * WARM || clock.elapsed().as_secs_f64() < tried) {
+        motion.step()?;
+        moment(&motion, is_linear);
+        taken += 1;
+        if taken == WARM {
+            let run = clock.elapsed().as_secs_f64() / WARM as f64 * pace.steps as f64;
+            tried = (0.1 * run).clamp(LEAST_TRIED, TRIED_FOR);
+            clock = Instant::now();
+        }
+    }
+    let timed = if taken > WARM { taken - WARM } else { taken };
+    let seconds_per_step = clock.elapsed().as_secs_f64() / timed as f64;
+
+    // rows and files as the run writes them, elsewhere
+    let folder = TrialFolder::new(&rest.output.directory);
+    let output = Output {
+        directory: folder.path().to_path_buf(),
+        ..rest.output.clone()
+    };
+    let begun = Instant::now();
+    let mut recorder = Recorder::new(
+        &output,
+        &rest.conditions,
+        &Sampler::new(model),
+        breaks,
+        is_linear,
+        CheckpointFile::new(folder.path().join("trial.checkpoint"), 0),
+        None,
+        None,
+    )?;
+    let shown = moment(&motion, is_linear);
+    recorder.begin(&shown);
+    let place = |site: usize| model.sites[site].position;
+    let energies = recorder.energies(&shown);
+    recorder.row(&shown, energies, place)?;
+    let opened = begun.elapsed().as_secs_f64();
+    let begun = Instant::now();
+    for _ in 0..ROWS {
+        let energies = recorder.energies(&shown);
+        recorder.row(&shown, energies, place)?;
+    }
+    let per_row = begun.elapsed().as_secs_f64() / f64::from(ROWS);
+    let per_file = if rest.output.vtu {
+        let count = (spec.duration / spec.output_interval).ceil() + 1.0;
+        let u = made_up(shown.state.u.len());
+        let solved = Solved {
+            model,
+            operator: laid_out.operator,
+            displacement: &u,
+            residual: &[],
+            zone_of_site: &solution::zone_of_site(model),
+            broken: &[],
+        };
+        let mut series = Series::new(folder.path(), "trial");
+        let more = [OverSites::Vector("velocity", &u)];
+        file_seconds(&solved, &more, count, |s| series.push(0.0, s))?
+    } else {
+        0.0
+    };
+    drop(motion);
+    progress.finish();
+
+    let (files, written) = if rest.output.vtu {
+        let count = (spec.duration / spec.output_interval).ceil() + 1.0;
+        (Files::Some, count)
+    } else {
+        (Files::None, 0.0)
+    };
+    let rows = (spec.duration / spec.history_interval)
+        .ceil()
+        .min(pace.steps as f64)
+        + 1.0;
+    let timings = &mut laid_out.timings;
+    timings.add("start", opened + per_file);
+    timings.add("steps", pace.steps as f64 * seconds_per_step);
+    timings.add(
+        "output",
+        (written - 1.0).max(0.0) * per_file + rows * per_row,
+    );
+    let mut prediction = Prediction {
+        motion: Some(MotionPrediction {
+            step: pace.step,
+            steps: pace.steps,
+            stable_step: pace.stable,
+            certified_step: pace.certified,
+            certified_at: model.sites[pace.site as usize]
+                .position
+                .iter()
+                .copied()
+                .collect(),
+            seconds_per_step,
+        }),
+        ..prediction(&laid_out, held.len(), files, Some(state_bytes))
+    };
+    prediction.warnings = warnings(model, laid_out.joining, &prediction);
+    holds(&prediction)?;
+    Ok(prediction)
+}
+
+/// Predicts a run under a load that grows: sizes and memory, for what a load step takes shows only when bonds break.
+///
+/// # Errors
+/// [`RunError`] as a run would.
+pub(crate) fn load_steps<const D: usize>(
+    scene: Scene<D>,
+    spec: &QuasiStatic,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    let nothing = |_: &_, _: &mut Vec<Choice>| Ok(());
+    laid_out(scene, progress, nothing, |laid_out, ()| {
+        let held = held(laid_out.model, &laid_out.rest.conditions)?;
+        progress.finish();
+        let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);
+        factors(&laid_out, spec, &held, &mut prediction, progress)?;
+        prediction.warnings = warnings(laid_out.model, laid_out.joining, &prediction);
+        prediction.warnings.push(format!(
+            "the time of {} load steps is not in the estimate: it depends on the bonds that break",
+            spec.steps
+        ));
+        holds(&prediction)?;
+        Ok(prediction)
+    })
+}
+
+/// Memory and operations of the factors that lead the iteration, if there are any.
+fn factors<const D: usize>(
+    laid_out: &LaidOut<'_, D>,
+    spec: &QuasiStatic,
+    held: &[u32],
+    prediction: &mut Prediction,
+    progress: &dyn Progress,
+) -> Result<(), RunError> {
+    let symmetry = prediction.symmetry;
+    if spec.method == LoadStepSpec::Relaxation
+        || !may_factorise(laid_out.model, laid_out.rest.solver.method, symmetry)
+    {
+        return Ok(());
+    }
+    let mut prescribed = vec![None; prediction.sizes.dofs];
+    held.iter()
+        .for_each(|&dof| prescribed[dof as usize] = Some(0.0));
+    let free = FreeDofs::from_prescribed(&prescribed, D);
+    let pattern = laid_out.model.pattern(laid_out.operator, &[], progress);
+    let plan = Planned::of(laid_out.model, &pattern, &free, laid_out.rest, symmetry)?;
+    if !matches!(plan.method, MethodUsed::Cholesky | MethodUsed::Lu) {
+        return Ok(());
+    }
+    prediction.method = Some(plan.method);
+    prediction.factor_nonzeros = plan.cost.factor_nnz;
+    prediction.operations = plan.cost.flops;
+    for (name, bytes) in [("stiffness", plan.stiffness), ("solver", plan.solver)] {
+        prediction.memory.push(Share { name, bytes });
+        prediction.peak_memory_bytes += bytes;
+    }
+    Ok(())
+}

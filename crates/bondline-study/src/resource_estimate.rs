@@ -1,0 +1,595 @@
+//! What a run of a scene will need: sites, bonds, non-zeros, memory and time, without solving it.
+//!
+//! The model is laid out as a run does it, so sites and bonds are exact, and what it occupies is read from the system.
+//! Each row of the stiffness is computed and dropped at once; only its pattern stays, from which ordering and symbolic
+//! factorisation follow. That costs the time of an assembly and a tenth of its memory, and no factorisation.
+
+use std::fmt;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::error_prediction::ErrorPrediction;
+use crate::output_cost::{made_up, output_seconds};
+use bondline::assembly::Pattern;
+use bondline::coupling::edge::Edge;
+use bondline::coupling::{Model, PointSource, SiteKind, Zone};
+use bondline::mesh::Mesh;
+use bondline::observe::proof::{Proof, Severity};
+use bondline::observe::report::{aligned, number};
+use bondline::observe::summary::{
+    Choice, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
+    resident_memory_bytes,
+};
+use bondline::peridynamics::{
+    BondWeights, LatticeFamily, PartialVolume, TIE_TOLERANCE, isotropic_shell_factors,
+};
+use bondline::progress::Progress;
+use bondline::run::RunError;
+use bondline::run::budget::{Share, largest, memory_budget};
+use bondline::run::equilibrium;
+use bondline::run::loads;
+use bondline::run::proof::{self, Subject};
+use bondline::run::setup::{self, Rest};
+use bondline::run::solution::{self, Solved};
+use bondline::run::warnings::doubts;
+use bondline::scene::Scene;
+use bondline::scene::spec::{Joining, ZonesNeeded};
+use bondline::solve::FreeDofs;
+use bondline::solve::direct::Analysis;
+use bondline::solve::ordering::SiteGraph;
+use bondline::solve::rehearsal::{rehearse, seconds_per_scalar};
+use bondline::solve::statics::{MethodUsed, StaticError, expected_method};
+use bondline::solve::symbolic::FactorCost;
+use bondline::system::Symmetry;
+use bondline::tensor::padded;
+
+/// What a run will need.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Prediction {
+    /// The scene's name or title.
+    pub scene: String,
+    /// Why the model was not laid out: sizes and memory are then counted from volumes, and nothing is proven; `run` proves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counted: Option<String>,
+    /// Space dimension.
+    pub dimension: usize,
+    /// Coupling method, as the scene names it.
+    pub coupling: String,
+    /// How large the model is; exact.
+    pub sizes: Sizes,
+    /// How it will be solved; none of a scene in time.
+    pub method: Option<MethodUsed>,
+    /// Whether the stiffness is symmetric.
+    pub symmetry: Symmetry,
+    /// Unknowns that no condition prescribes.
+    pub unknowns: usize,
+    /// Scalars in the factors; zero for an iterative method.
+    pub factor_nonzeros: u64,
+    /// Operations of the factorisation; zero for an iterative method.
+    pub operations: f64,
+    /// Most memory that a run will hold \[bytes\].
+    pub peak_memory_bytes: u64,
+    /// What holds memory; not all of it at the same time.
+    pub memory: Vec<Share>,
+    /// Seconds per stage: up to the ordering measured here, of the others from parts of them that were tried here.
+    pub timings: Timings,
+    /// Seconds of all stages.
+    pub total_seconds: f64,
+    /// What the scene asks for or leaves open.
+    pub choices: Vec<Choice>,
+    /// What was shown about the model before it was solved.
+    #[serde(skip_serializing_if = "Proof::is_empty")]
+    pub proof: Proof,
+    /// What will be costly or inaccurate.
+    pub warnings: Vec<String>,
+    /// How far results will be from those of a finer model, where runs with other spacings tell; see [`check`](fn@crate::check).
+    pub error: Option<ErrorPrediction>,
+    /// Why there is none, if it was looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_error: Option<String>,
+    /// The steps of a scene in time; none of a static one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionPrediction>,
+}
+
+/// The steps of a scene in time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionPrediction {
+    /// The time step.
+    pub step: f64,
+    /// Steps to the end.
+    pub steps: u64,
+    /// The largest step that is taken to be stable.
+    pub stable_step: f64,
+    /// The step that row sums guarantee.
+    pub certified_step: f64,
+    /// Where the row with the largest sum is.
+    pub certified_at: Vec<f64>,
+    /// Seconds of a step, measured here.
+    pub seconds_per_step: f64,
+}
+
+/// A factorisation is rehearsed for so long at most, and for no longer than a tenth of what it takes at [`OPERATIONS`].
+const REHEARSED: f64 = 0.5;
+
+/// Operations per second of one thread, to tell how long to rehearse; the prediction does not use it.
+const OPERATIONS: f64 = 1e10;
+
+/// Solves with the factors, each with a product and a residual: one or two refinements, and one that finds nothing to gain.
+const SUBSTITUTIONS: f64 = 3.0;
+
+/// Times that a whole iterative solve reads the stiffness, set-up and cycles included: `benches/solvers.rs` takes 0.8e-7 to
+/// 2.5e-7 s of CPU per stored scalar, and [`seconds_per_scalar`] gives 1e-10 s there.
+const PASSES: f64 = 1500.0;
+
+/// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
+pub(crate) const OUTPUT_BYTES: u64 = 900;
+
+/// Bytes of a factorisation on two threads over those on one: two subtrees hold contribution blocks. Measured on the scenes
+/// of `tests/check.rs`: 1.23 to 1.36 for Cholesky, whose factors are the smaller part, 1.0 to 1.15 for LU.
+const CHOLESKY: f64 = 1.26;
+
+/// As [`CHOLESKY`].
+const LU: f64 = 1.1;
+
+/// Bytes of a multigrid hierarchy and of the vectors of an iteration over those of the stiffness; measured 2.1 to 2.2.
+const HIERARCHY: f64 = 2.1;
+
+/// Bytes of program and buffers that a run touches after its model is laid out; measured.
+const PROGRAM: u64 = 3_700_000;
+
+/// How a stiffness that is not assembled yet will be solved with.
+pub(crate) struct Planned {
+    pub analysis: Analysis,
+    pub cost: FactorCost,
+    pub method: MethodUsed,
+    /// Bytes of the stiffness.
+    pub stiffness: u64,
+    /// Bytes of the factors, or of the multigrid hierarchy.
+    pub solver: u64,
+}
+
+impl Planned {
+    pub fn of<const D: usize>(
+        model: &Model<D>,
+        pattern: &Pattern,
+        free: &FreeDofs,
+        rest: &Rest<D>,
+        symmetry: Symmetry,
+    ) -> Result<Self, RunError> {
+        let nonzeros = pattern.stored * D * D;
+        let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+        let mut params = equilibrium::params(&rest.solver);
+        let stored = pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8;
+        // a run holds the stiffness by then
+        params.memory_limit = params
+            .memory_limit
+            .map(|left| left.saturating_sub(stored as u64));
+        let graph = SiteGraph::from_pattern(&pattern.row_offsets, &pattern.columns, free);
+        let analysis =
+            Analysis::of_graph(graph, &positions, params.ordering).map_err(StaticError::from)?;
+        let cost = analysis.cost(symmetry);
+        let method = expected_method(&params, symmetry, &cost, nonzeros);
+        let solver = match method {
+            MethodUsed::Cholesky => analysis.bytes() + (cost.bytes as f64 * CHOLESKY) as u64,
+            MethodUsed::Lu => analysis.bytes() + (cost.bytes as f64 * LU) as u64,
+            // coarse levels share no rows
+            _ => analysis
+                .bytes()
+                .max((HIERARCHY * (nonzeros * 8 + pattern.stored * 4) as f64) as u64),
+        };
+        Ok(Self {
+            analysis,
+            cost,
+            method,
+            stiffness: stored as u64,
+            solver,
+        })
+    }
+}
+
+/// Predicts a static run.
+///
+/// # Errors
+/// [`RunError`] if the model cannot be built or a condition meets no site, as a run would.
+pub(crate) fn predict<const D: usize>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+) -> Result<Prediction, RunError> {
+    let mut timings = Timings::default();
+    let mut watch = Stopwatch::start();
+    let title = scene.title.clone();
+    let joining = scene.coupling.joining();
+    let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
+    let (problem, rest) = setup::problem(scene);
+    let (model, coupling) = Model::new(problem, progress)?;
+    let operator = coupling.operator(&model)?;
+    watch.lap(&mut timings, "sites and bonds");
+    let laid_out = resident_memory_bytes().unwrap_or(0);
+    let layout_peak = peak_memory_bytes().unwrap_or(0);
+    let fields = proof::affine_displacements(&model);
+    let pattern = model.pattern(operator.as_ref(), &fields, progress);
+    drop(fields);
+    watch.lap(&mut timings, "assembly");
+
+    loads::loads(&model, &rest.conditions, 0.0)?;
+    let (prescribed, _) = loads::supports(&model, &rest.conditions, 0.0)?;
+    let free = FreeDofs::from_prescribed(&prescribed, D);
+    let proof = proof::prove(
+        &Subject {
+            model: &model,
+            coupling: coupling.as_ref(),
+            operator: operator.as_ref(),
+            rest: &rest,
+            stiffness: None,
+            system: None,
+            affine_forces: &pattern.products,
+        },
+        progress,
+    )?;
+    proof::hold(&proof)?;
+    watch.lap(&mut timings, "proof");
+    let mut choices = rest.choices.clone();
+    choices.extend(rest.placed.iter().cloned());
+    choices.push(rest.coupling(joining));
+    let symmetry = equilibrium::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
+    let nonzeros = pattern.stored * D * D;
+    let Planned {
+        analysis,
+        cost,
+        method,
+        stiffness,
+        solver,
+    } = Planned::of(&model, &pattern, &free, &rest, symmetry)?;
+    watch.lap(&mut timings, "conditions and ordering");
+    let factorised = matches!(method, MethodUsed::Cholesky | MethodUsed::Lu);
+    progress.finish();
+
+    let points = model
+        .sites
+        .iter()
+        .filter(|s| matches!(s.kind, SiteKind::Point(_)))
+        .count();
+    let sizes = Sizes {
+        nodes,
+        cells,
+        sites: model.sites.len(),
+        points,
+        bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
+        dofs: model.sites.len() * D,
+        nonzeros,
+    };
+    choices.push(Choice {
+        choice: method.name().to_owned(),
+        why: format!("{} system of {} unknowns", symmetry.name(), free.count()),
+    });
+    if let Some(p) = &model.peridynamics {
+        choices.push(Choice {
+            choice: format!("{:?} bond weights", p.weights),
+            why: match p.weights {
+                BondWeights::Plain => {
+                    "the papers' quadrature; its elastic tensor is not isotropic".to_owned()
+                }
+                BondWeights::Isotropic if model.is_lattice() => {
+                    "the lattice carries the typed elastic constants".to_owned()
+                }
+                BondWeights::Isotropic => scattered(&model),
+                BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
+            },
+        });
+        choices.extend(setup::volumes_choice(&model));
+    }
+
+    let output_bytes = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
+    let memory = vec![
+        Share {
+            name: "model",
+            bytes: laid_out,
+        },
+        Share {
+            name: "program",
+            bytes: PROGRAM,
+        },
+        Share {
+            name: "stiffness",
+            bytes: stiffness,
+        },
+        Share {
+            name: "solver",
+            bytes: solver,
+        },
+        Share {
+            name: "output",
+            bytes: output_bytes,
+        },
+    ];
+    let peak = laid_out + PROGRAM + stiffness + solver.max(output_bytes);
+    let threads = rayon::current_num_threads() as f64;
+    if factorised {
+        let most = (0.1 * cost.flops / OPERATIONS / threads).clamp(0.01, REHEARSED);
+        let told = rehearse(&analysis, symmetry, Duration::from_secs_f64(most));
+        let product = nonzeros as f64 * seconds_per_scalar() / threads;
+        timings.add("factorisation", told.factorisation);
+        timings.add("solve", SUBSTITUTIONS * (told.substitution + product));
+    } else {
+        let pass = nonzeros as f64 * seconds_per_scalar() / threads;
+        timings.add("iteration", PASSES * pass);
+    }
+    let zones = solution::zone_of_site(&model);
+    let displacement = made_up(model.sites.len() * D);
+    let made_up = Solved {
+        model: &model,
+        operator: operator.as_ref(),
+        displacement: &displacement,
+        residual: &displacement,
+        zone_of_site: &zones,
+        broken: &[],
+    };
+    timings.add("output", output_seconds(&rest.output, &made_up)?);
+    let mut prediction = Prediction {
+        scene: title,
+        counted: None,
+        dimension: D,
+        coupling: joining.name.to_owned(),
+        sizes,
+        method: Some(method),
+        symmetry,
+        unknowns: free.count(),
+        factor_nonzeros: if factorised { cost.factor_nnz } else { 0 },
+        operations: if factorised { cost.flops } else { 0.0 },
+        peak_memory_bytes: peak.max(layout_peak),
+        memory,
+        total_seconds: timings.total(),
+        timings,
+        choices,
+        proof,
+        warnings: Vec::new(),
+        error: None,
+        no_error: None,
+        motion: None,
+    };
+    prediction.warnings = warnings(&model, joining, &prediction);
+    holds(&prediction)?;
+    Ok(prediction)
+}
+
+/// Bonds beyond which a scene deserves a second thought.
+const MANY_BONDS: usize = 100_000_000;
+
+pub(crate) fn warnings<const D: usize>(
+    model: &Model<D>,
+    joining: Joining,
+    prediction: &Prediction,
+) -> Vec<String> {
+    let mut list = Vec::new();
+    // families are judged by the one spacing of a model
+    let alone = |p: &&bondline::coupling::Peridynamics<D>| {
+        !matches!(p.points, PointSource::Lattices { .. })
+    };
+    if let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref().filter(alone)) {
+        let h = model.spacing();
+        let smallest = body
+            .cloud
+            .horizon
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        if smallest < 2.0 * h * (1.0 - 1e-9) {
+            list.push(format!(
+                "the horizon {smallest} is {:.2} spacings: families are sparse and directions distorted; 3 to 6 are usual",
+                smallest / h
+            ));
+        }
+        if p.weights == BondWeights::Isotropic
+            && p.volumes == PartialVolume::Full
+            && let Some((low, high)) = shell_factors(model, smallest)
+            && (low < 0.5 || high > 2.0)
+        {
+            list.push(format!(
+                "isotropic weights change shells of bonds by factors from {low:.2} to {high:.2}: choose another horizon over spacing, or weights = \"plain\""
+            ));
+        }
+        if let Some(width) = transition_width(&model.mesh, &model.zones) {
+            let largest = body.cloud.horizon.iter().copied().fold(0.0, f64::max);
+            let (wanted, why) = match joining.zones {
+                ZonesNeeded::Transition { width, why } => (width, why),
+                _ => (0.0, ""),
+            };
+            if width < (wanted - 0.01) * largest {
+                list.push(format!(
+                    "the transition zone is {width:.3e} wide, {:.2} horizons, less than {wanted}: {why}",
+                    width / largest
+                ));
+            }
+        }
+    }
+    list.extend(doubts(model, joining));
+    let proof = &prediction.proof;
+    list.extend(proof.messages(Severity::Warning).map(str::to_owned));
+    if prediction.sizes.bonds > MANY_BONDS {
+        list.push(format!(
+            "{} bonds: shrink the nonlocal zone or the horizon over spacing",
+            grouped(prediction.sizes.bonds)
+        ));
+    }
+    list
+}
+
+/// Smallest and largest factor of a shell of the lattice; none where the points are no lattice or no factors exist.
+fn shell_factors<const D: usize>(model: &Model<D>, horizon: f64) -> Option<(f64, f64)> {
+    let law = model.peridynamics.as_ref()?.law.linearised();
+    let h = model.spacing();
+    let target = law.shell_target()?;
+    let lattice = LatticeFamily::<D>::new(horizon / h, TIE_TOLERANCE).ok()?;
+    let base: Vec<f64> = lattice
+        .shells
+        .iter()
+        .map(|s| law.kernel(s.length(h), horizon))
+        .collect();
+    let factors = isotropic_shell_factors(&lattice, h, &base, target).ok()?;
+    let least = factors.iter().copied().fold(f64::INFINITY, f64::min);
+    Some((least, factors.iter().copied().fold(0.0, f64::max)))
+}
+
+/// What isotropic weights do for points that are no lattice: nothing, and by how much families then miss the typed constants.
+fn scattered<const D: usize>(model: &Model<D>) -> String {
+    let missed = model
+        .tensor_deviation()
+        .map_or(String::new(), |[mean, worst]| {
+            format!(
+                ": C_1111 of their full families is {:+.1} % off in the mean and {:.0} % at most",
+                100.0 * mean,
+                100.0 * worst
+            )
+        });
+    format!("the points are no lattice, so bonds keep plain weights{missed}")
+}
+
+/// Greatest distance of a node of the transition zone from the nonlocal zone; none without either.
+fn transition_width<const D: usize>(mesh: &Mesh<D>, zones: &[Zone]) -> Option<f64> {
+    if !(zones.contains(&Zone::Transition) && zones.contains(&Zone::Nonlocal)) {
+        return None;
+    }
+    let edge = Edge::of(mesh, |c| zones[c] == Zone::Nonlocal);
+    // to the local zone, from the nonlocal one: the narrowest place
+    let mut narrowest = f64::INFINITY;
+    for c in (0..mesh.cell_count()).filter(|&c| zones[c] == Zone::Local) {
+        for &n in mesh.cell(c) {
+            if edge.within(&mesh.nodes[n as usize], narrowest) {
+                narrowest = edge.distance(&mesh.nodes[n as usize]);
+            }
+        }
+    }
+    narrowest.is_finite().then_some(narrowest)
+}
+
+impl fmt::Display for Prediction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = match &self.counted {
+            None => "the scene is right".to_owned(),
+            Some(why) => {
+                format!("counted from volumes, not proven: {why}; `run` proves it before it solves")
+            }
+        };
+        writeln!(
+            f,
+            "{} ({}D, coupling: {}): {found}\n",
+            self.scene, self.dimension, self.coupling
+        )?;
+        let s = &self.sizes;
+        let mut grid = vec![vec!["size".to_owned(), "number".to_owned()]];
+        for (name, value) in [
+            ("FE nodes", s.nodes),
+            ("FE cells", s.cells),
+            ("PD points", s.points),
+            ("bonds", s.bonds),
+            ("sites", s.sites),
+            ("unknowns", self.unknowns),
+            ("non-zeros", s.nonzeros),
+            ("factor non-zeros", self.factor_nonzeros as usize),
+        ] {
+            if self.motion.is_some() && name.ends_with("non-zeros") {
+                // bonds are passed over, not assembled
+                continue;
+            }
+            grid.push(vec![name.to_owned(), grouped(value)]);
+        }
+        writeln!(f, "{}", aligned(&grid))?;
+        for c in &self.choices {
+            writeln!(f, "chosen: {} ({})", c.choice, c.why)?;
+        }
+        writeln!(f, "{}", self.proof)?;
+        for share in &self.memory {
+            writeln!(
+                f,
+                "memory of {:<12} {}",
+                share.name,
+                bytes_text(share.bytes)
+            )?;
+        }
+        writeln!(
+            f,
+            "peak memory            {}",
+            bytes_text(self.peak_memory_bytes)
+        )?;
+        if self.operations > 0.0 {
+            writeln!(
+                f,
+                "factorisation          {:.1e} operations",
+                self.operations
+            )?;
+        }
+        if let Some(m) = &self.motion {
+            writeln!(
+                f,
+                "stable step            {} (row sums guarantee {}; their largest is at {:?})",
+                number(m.stable_step),
+                number(m.certified_step),
+                m.certified_at
+            )?;
+            writeln!(
+                f,
+                "steps                  {} of {}, {:.3e} s each",
+                grouped(m.steps as usize),
+                number(m.step),
+                m.seconds_per_step
+            )?;
+        }
+        writeln!(
+            f,
+            "time                   about {:.1} s on {} threads",
+            self.total_seconds,
+            rayon::current_num_threads()
+        )?;
+        if let Some(e) = &self.error {
+            writeln!(
+                f,
+                "error                  about {} of {} against {}, within a factor of {} in {} that were measured (order {:.1}, from {} runs with other spacings, {:.2} s)",
+                number(e.error),
+                e.quantities.join(", "),
+                e.against,
+                e.spread,
+                e.share,
+                e.order,
+                e.pilots,
+                e.seconds
+            )?;
+        } else if let Some(why) = &self.no_error {
+            writeln!(f, "error                  not predicted: {why}")?;
+        }
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a run whose model, laid out, shows that it needs more memory than there is.
+///
+/// # Errors
+/// [`RunError::Memory`], as [`fits`].
+pub(crate) fn holds(prediction: &Prediction) -> Result<(), RunError> {
+    let Some(there) = memory_budget().filter(|b| prediction.peak_memory_bytes > *b) else {
+        return Ok(());
+    };
+    let s = &prediction.sizes;
+    Err(RunError::Memory {
+        needed: bytes_text(prediction.peak_memory_bytes),
+        there: bytes_text(there),
+        largest: largest(&prediction.memory),
+        sizes: format!(
+            "{} cells, {} points, {} bonds",
+            grouped(s.cells),
+            grouped(s.points),
+            grouped(s.bonds)
+        ),
+        remedy: match prediction.method {
+            Some(MethodUsed::Cholesky | MethodUsed::Lu) => {
+                "use solver.method = \"krylov\", coarsen the model, or give more by --memory"
+            }
+            _ => "coarsen the model, make the nonlocal zone smaller, or give more by --memory",
+        }
+        .to_owned(),
+    })
+}

@@ -1,0 +1,17 @@
+//! What the programs of bondline share, and the library does without: the process around a computation, and the person who waits for it.
+//!
+//! | file | what |
+//! |---|---|
+//! | `progress.rs` | a bar on standard error, if that is a terminal |
+//! | `report.rs` | a mistake in a scene, with the text underlined |
+//! | `streams.rs` | standard output and standard error, which may be full or closed |
+//! | `memory.rs` | the limit of memory, and the end of a run that exceeds it |
+
+pub mod memory;
+pub mod progress;
+mod report;
+mod streams;
+
+pub use progress::TerminalProgress;
+pub use report::report;
+pub use streams::{print, tell};

@@ -1,0 +1,357 @@
+//! Affine fields through scenes: displacements prescribed on the whole boundary, on families of meshes, with every coupling and law.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::scene;
+use crate::Effort;
+use bondline::{
+    observe::report::{Columns, Row, Table},
+    progress::Progress,
+};
+
+/// Largest error of a displacement over the largest one.
+pub const LIMIT: f64 = 1e-9;
+
+/// Displacement gradient of the field.
+const GRADIENT: [[f64; 3]; 3] = [
+    [1e-3, 2e-4, -3e-4],
+    [1e-4, -3e-4, 4e-4],
+    [-2e-4, 5e-4, 7e-4],
+];
+
+/// A mesh as a file, and a box in its middle that elements enclose.
+struct Family {
+    name: &'static str,
+    kinematics: &'static str,
+    mesh: String,
+    /// Side of the typical element.
+    size: f64,
+    /// The zone: lowest and highest corner.
+    zone: [[f64; 3]; 2],
+    /// Where displacements are prescribed.
+    boundary: &'static str,
+    /// Width of the transition zone.
+    around: f64,
+}
+
+/// Twelve by twelve cells, moved by `place`.
+fn plane(name: &'static str, cells: usize, place: impl Fn(f64, f64) -> [f64; 2]) -> Family {
+    let n = cells + 1;
+    let nodes = (0..n * n)
+        .map(|k| place((k % n) as f64, (k / n) as f64))
+        .map(|[x, y]| [x, y, 0.0]);
+    let cell = |c: usize| {
+        let a = c / cells * n + c % cells;
+        vec![a, a + 1, a + 1 + n, a + n]
+    };
+    Family {
+        name,
+        kinematics: "plane-stress",
+        mesh: gmsh(
+            nodes.collect(),
+            &(0..cells * cells).map(cell).collect::<Vec<_>>(),
+        ),
+        size: 1.0,
+        zone: [[4.5, 4.5, 0.0], [7.5, 7.5, 0.0]],
+        boundary: "on = \"outer\"",
+        around: 1.0,
+    }
+}
+
+/// A number in [−1, 1) for a node.
+fn noise(x: f64, y: f64) -> f64 {
+    let s = (12.9898 * x + 78.233 * y).sin() * 43758.5453;
+    2.0 * (s - s.floor()) - 1.0
+}
+
+/// The families of meshes.
+fn families() -> Vec<Family> {
+    let inner = |x: f64| x > 0.5 && x < 11.5;
+    let bent = |x: f64, y: f64, z: f64| {
+        let (r, a) = (12.0 + y, 0.06 * (x - 5.0));
+        [r * a.sin() + 5.0, r * a.cos() - 12.0, z]
+    };
+    vec![
+        plane("matching", 12, |x, y| [x, y]),
+        plane("coarser", 12, |x, y| [1.3 * x - 1.8, 1.3 * y - 1.8]),
+        plane("graded", 12, |x, y| {
+            let grade = |t: f64| t + 0.02 * t * (t - 12.0);
+            [grade(x), grade(y)]
+        }),
+        plane("jittered", 12, |x, y| {
+            let by = |a: f64, b: f64| {
+                if inner(a) && inner(b) {
+                    0.2 * noise(a, b)
+                } else {
+                    0.0
+                }
+            };
+            [
+                x + by(x, y),
+                y + if inner(x) && inner(y) {
+                    0.2 * noise(y + 3.0, x)
+                } else {
+                    0.0
+                },
+            ]
+        }),
+        Family {
+            name: "Delaunay triangles",
+            kinematics: "plane-stress",
+            mesh: include_str!("../../../../meshes/graded_triangles.msh").to_owned(),
+            size: 1.0,
+            zone: [[8.0, 8.0, 0.0], [12.0, 12.0, 0.0]],
+            boundary: "inside = { without = { from = { everywhere = true }, removed = { box = { min = [0.01, 0.01], max = [19.99, 19.99] } } } }",
+            around: 3.0,
+        },
+        plane("polar", 12, |x, y| {
+            let (r, a) = (6.0 + x, 0.09 * (y - 6.0));
+            [r * a.cos() - 6.0, r * a.sin() + 6.0]
+        }),
+        solid("tets of a lug", Split::Tets, |x, y, z| {
+            let a = 0.05 * (x - 5.0);
+            [x + 0.3 * (0.5 * y).sin(), y + 5.0 * a * a, z]
+        }),
+        solid("hexes of a bent bar", Split::Hexes, bent),
+    ]
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Split {
+    Hexes,
+    Tets,
+}
+
+/// Eight by eight by eight cells of a block with sides of 10, moved by `place`.
+fn solid(name: &'static str, split: Split, place: impl Fn(f64, f64, f64) -> [f64; 3]) -> Family {
+    const CELLS: usize = 8;
+    let n = CELLS + 1;
+    let step = 10.0 / CELLS as f64;
+    let nodes = (0..n * n * n).map(|k| {
+        let at = |i: usize| step * i as f64;
+        place(at(k % n), at(k / n % n), at(k / n / n))
+    });
+    let cells = (0..CELLS * CELLS * CELLS).flat_map(|c| {
+        let (i, j, k) = (c % CELLS, c / CELLS % CELLS, c / CELLS / CELLS);
+        let at = |a: usize, b: usize, d: usize| i + a + (j + b) * n + (k + d) * n * n;
+        let hex = vec![
+            at(0, 0, 0),
+            at(1, 0, 0),
+            at(1, 1, 0),
+            at(0, 1, 0),
+            at(0, 0, 1),
+            at(1, 0, 1),
+            at(1, 1, 1),
+            at(0, 1, 1),
+        ];
+        match split {
+            Split::Hexes => vec![hex],
+            // six around the diagonal from corner 0 to corner 6
+            Split::Tets => [[1, 2], [2, 3], [3, 7], [7, 4], [4, 5], [5, 1]]
+                .map(|[a, b]| vec![hex[0], hex[a], hex[b], hex[6]])
+                .to_vec(),
+        }
+    });
+    Family {
+        name,
+        kinematics: "solid",
+        mesh: gmsh(nodes.collect(), &cells.collect::<Vec<_>>()),
+        size: step,
+        zone: [[3.5, 3.5, 3.5], [6.5, 6.5, 6.5]],
+        boundary: "on = \"outer\"",
+        around: step,
+    }
+}
+
+/// The text of a Gmsh file, format 2.2, of cells of one shape, with its boundary as the set `outer`.
+fn gmsh(nodes: Vec<[f64; 3]>, cells: &[Vec<usize>]) -> String {
+    use std::fmt::Write as _;
+    // four nodes make a quadrilateral or a tetrahedron
+    let is_plane = nodes.iter().all(|x| x[2] == 0.0);
+    let (kind, facet_kind, facets): (_, _, &[&[usize]]) = match (cells[0].len(), is_plane) {
+        (4, true) => (3, 1, &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]]),
+        (4, false) => (4, 2, &[&[0, 1, 2], &[0, 1, 3], &[0, 2, 3], &[1, 2, 3]]),
+        _ => (
+            5,
+            3,
+            &[
+                &[0, 1, 2, 3],
+                &[4, 5, 6, 7],
+                &[0, 1, 5, 4],
+                &[1, 2, 6, 5],
+                &[2, 3, 7, 6],
+                &[3, 0, 4, 7],
+            ],
+        ),
+    };
+    let mut seen: BTreeMap<Vec<usize>, (Vec<usize>, usize)> = BTreeMap::new();
+    for cell in cells {
+        for facet in facets {
+            let list: Vec<usize> = facet.iter().map(|&a| cell[a]).collect();
+            let mut key = list.clone();
+            key.sort_unstable();
+            seen.entry(key).or_insert((list, 0)).1 += 1;
+        }
+    }
+    let outer = seen.into_values().filter(|(_, times)| *times == 1);
+    let outer = outer.map(|(list, _)| (facet_kind, 2, list));
+    let inner = cells.iter().map(|cell| (kind, 1, cell.clone()));
+    let elements: Vec<(i32, i32, Vec<usize>)> = outer.chain(inner).collect();
+    let dimension = if is_plane { 2 } else { 3 };
+    let mut text = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n{} 2 \"outer\"\n{dimension} 1 \"body\"\n$EndPhysicalNames\n$Nodes\n{}\n",
+        dimension - 1,
+        nodes.len()
+    );
+    for (k, [x, y, z]) in nodes.iter().enumerate() {
+        let _ = writeln!(text, "{} {x:.17} {y:.17} {z:.17}", k + 1);
+    }
+    let _ = writeln!(text, "$EndNodes\n$Elements\n{}", elements.len());
+    for (k, (kind, tag, list)) in elements.iter().enumerate() {
+        let _ = write!(text, "{} {kind} 2 {tag} {tag}", k + 1);
+        list.iter().for_each(|n| {
+            let _ = write!(text, " {}", n + 1);
+        });
+        text.push('\n');
+    }
+    text.push_str("$EndElements\n");
+    text
+}
+
+/// Couplings by what a scene types, and whether they have a transition zone.
+const COUPLINGS: [(&str, &str, bool); 6] = [
+    ("truncated", "[coupling.truncated]", false),
+    ("splice", "[coupling.splice]", false),
+    ("balanced", "[coupling.balanced]", false),
+    ("blending", "[coupling.blending]", true),
+    (
+        "partial stress, points",
+        "[coupling.partial-stress]\nform = \"meshfree\"",
+        true,
+    ),
+    (
+        "partial stress, elements",
+        "[coupling.partial-stress]",
+        true,
+    ),
+];
+
+/// Laws: at the pairwise Poisson ratio, above and below it.
+const LAWS: [(&str, &str); 3] = [
+    ("bond-based", "bond-based]\nyoungs-modulus = 7"),
+    ("LPS, 0.4", "lps]\nyoungs-modulus = 7\npoisson-ratio = 0.4"),
+    ("LPS, 0.2", "lps]\nyoungs-modulus = 7\npoisson-ratio = 0.2"),
+];
+
+/// The scene of one case.
+fn text(
+    family: &Family,
+    law: &str,
+    coupling: &str,
+    has_transition: bool,
+    per_element: f64,
+) -> String {
+    let dimensions = if family.kinematics == "solid" { 3 } else { 2 };
+    let list = |x: &[f64; 3]| format!("{:?}", &x[..dimensions]);
+    let h = family.size / per_element;
+    let [low, high] = &family.zone;
+    let transition = if has_transition {
+        format!("[zones.transition]\naround = {}\n", family.around)
+    } else {
+        String::new()
+    };
+    let axes = ["x", "y", "z"];
+    let mut field = String::new();
+    for i in 0..dimensions {
+        let terms: Vec<String> = (0..dimensions)
+            .map(|j| format!("({:e})*{}", GRADIENT[i][j], axes[j]))
+            .collect();
+        field += &format!("{} = \"{}\"\n", axes[i], terms.join(" + "));
+    }
+    let held = format!(
+        "[conditions.all.displacement]\n{}\n{field}",
+        family.boundary
+    );
+    format!(
+        "kinematics = \"{}\"\n[mesh.file]\npath = \"m.msh\"\n[materials.m.{law}\n[peridynamics]\nhorizon = {}\npoints.lattice = {{ spacing = {h} }}\n[zones.nonlocal]\nbox = {{ min = {}, max = {} }}\n{transition}{coupling}\n{held}[solver]\ntolerance = 1e-12\n",
+        family.kinematics,
+        3.0 * h,
+        list(low),
+        list(high),
+    )
+}
+
+/// One case: its error, or why it is refused.
+fn row(family: &Family, law: (&str, &str), coupling: (&str, &str, bool), per_element: f64) -> Row {
+    let name = format!(
+        "{}, {}, {}, {per_element} h",
+        family.name, coupling.0, law.0
+    );
+    let text = text(family, law.1, coupling.1, coupling.2, per_element);
+    match scene::solve(&text, &[], &[("m.msh", &family.mesh)]) {
+        Ok((summary, sites)) => {
+            let (mut error, mut largest) = (0.0f64, 0.0f64);
+            for site in &sites {
+                let d = site.position.len();
+                for i in 0..d {
+                    let exact: f64 = (0..d).map(|j| GRADIENT[i][j] * site.position[j]).sum();
+                    error = error.max((site.displacement[i] - exact).abs());
+                    largest = largest.max(exact.abs());
+                }
+            }
+            let error = error / largest;
+            let warned = summary
+                .warnings
+                .iter()
+                .find(|w| w.contains("uniform stress"));
+            match warned {
+                Some(why) if error > LIMIT => Row::warned(&name, "error", error, why),
+                _ => Row::at_most(&name, "error", error, LIMIT),
+            }
+        }
+        Err(why) => Row::refused(&name, "error", why),
+    }
+}
+
+/// The table of affine fields.
+pub fn tables(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    let families = families();
+    let mut cases = Vec::new();
+    for family in &families {
+        for (k, coupling) in COUPLINGS.iter().enumerate() {
+            for (l, law) in LAWS.iter().enumerate() {
+                for per_element in [2.0, 2.5, 4.0] {
+                    let is_solid = family.kinematics == "solid";
+                    let wanted = match effort {
+                        Effort::Quick => {
+                            per_element == 2.0
+                                && (k < 2 || l == 0)
+                                && (!is_solid || (k < 2 && l == 0))
+                        }
+                        Effort::Full => !is_solid || per_element == 2.0,
+                    };
+                    if wanted {
+                        cases.push((family, *law, *coupling, per_element));
+                    }
+                }
+            }
+        }
+    }
+    progress.stage("affine fields", Some(cases.len() as u64));
+    let rows: Vec<Row> = cases
+        .into_par_iter()
+        .map(|(family, law, coupling, per_element)| {
+            let row = row(family, law, coupling, per_element);
+            progress.advance(1);
+            row
+        })
+        .collect();
+    let mut table = Table::new(
+        "Affine displacements on the whole boundary of scenes, m = 3: largest error over the largest displacement, or the reason of the refusal",
+        Columns::ByQuantity,
+    );
+    rows.into_iter().for_each(|row| table.push(row));
+    vec![table]
+}

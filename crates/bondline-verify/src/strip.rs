@@ -1,0 +1,247 @@
+//! A strip of finite elements, transition, peridynamics, transition and finite elements that moves, as a scene: that of the suites `spectrum`, `wave` and `reflection`.
+//!
+//! Units are those of the lattice: spacing h = 1, modulus `C_1111` = 1 and density 1, so that long waves run one spacing in a unit of time.
+
+use std::fmt::Write as _;
+
+use crate::enclosed::Method;
+use crate::meshes::scene;
+use bondline::coupling::{BlendingFunction, FitDegree};
+use bondline::peridynamics::influence::{Alpha, Degree};
+use bondline::peridynamics::{Influence, Micromodulus};
+use bondline::run::LinearModel;
+use bondline::system::LinearMotion;
+
+/// The law of the points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StripLaw {
+    /// Bond-based.
+    BondBased(Micromodulus),
+    /// Linear peridynamic solid, Poisson ratio 1/4.
+    Lps(Influence),
+    /// Correspondence, stabilised with 1, Poisson ratio 1/4.
+    Correspondence(Influence),
+}
+
+impl StripLaw {
+    /// The material's table, and the influence function where the law has one.
+    fn text(self, dimension: usize) -> (String, String) {
+        // λ = μ and C_1111 = 1: ν = 1/4 in the plane; in a bar 1/2, which no solid quite has
+        let (modulus, ratio) = match dimension {
+            1 => (1.0, 0.4999999),
+            _ => (5.0 / 6.0, 0.25),
+        };
+        let ratio = format!("poisson-ratio = {ratio}");
+        let table = |name: &str, rest: &str| {
+            format!("[materials.m.{name}]\nyoungs-modulus = {modulus}\ndensity = 1\n{rest}\n")
+        };
+        let influence = |w| format!("influence = {}\n", influence(w));
+        match self {
+            Self::BondBased(kernel) => {
+                let kernel = match kernel {
+                    Micromodulus::InverseDistance => "\"inverse-distance\"".to_owned(),
+                    Micromodulus::Uniform => "\"uniform\"".to_owned(),
+                    Micromodulus::Constant => "\"constant\"".to_owned(),
+                    Micromodulus::Triangular => "\"triangular\"".to_owned(),
+                    Micromodulus::Influence(w) => {
+                        format!("{{ influence = {} }}", self::influence(w))
+                    }
+                };
+                (
+                    table("bond-based", &format!("micromodulus = {kernel}")),
+                    String::new(),
+                )
+            }
+            Self::Lps(w) => (table("lps", &ratio), influence(w)),
+            Self::Correspondence(w) => (table("correspondence", &ratio), influence(w)),
+        }
+    }
+}
+
+/// An influence function as a scene has it.
+fn influence(w: Influence) -> String {
+    match w {
+        Influence::Gaussian => "\"gaussian\"".to_owned(),
+        Influence::Polynomial { degree, alpha } => {
+            let alpha = u8::from(alpha == Alpha::One);
+            format!("{{ degree = {}, alpha = {alpha} }}", Degree::order(degree))
+        }
+    }
+}
+
+/// What holds along the strip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// Finite elements everywhere.
+    Local,
+    /// Peridynamics everywhere.
+    Nonlocal,
+    /// Both, by a method.
+    Coupled(Method),
+}
+
+impl Kind {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Local => "finite elements",
+            Self::Nonlocal => "peridynamics",
+            Self::Coupled(method) => method.name(),
+        }
+    }
+
+    /// The coupling as a scene has it.
+    fn text(self) -> String {
+        let beta = |function| match function {
+            BlendingFunction::Constant => "constant",
+            BlendingFunction::Linear => "linear",
+            BlendingFunction::Smooth => "smooth",
+        };
+        let method = match self {
+            Self::Local => return "\"local\"".to_owned(),
+            Self::Nonlocal => return "\"nonlocal\"".to_owned(),
+            Self::Coupled(method) => method,
+        };
+        match method {
+            Method::Splice => "\"splice\"".to_owned(),
+            Method::Truncated => "\"truncated\"".to_owned(),
+            Method::Balanced => "\"balanced\"".to_owned(),
+            Method::Blending(f) => format!("{{ blending = {{ beta = \"{}\" }} }}", beta(f)),
+            Method::BalancedOver(f) => format!("{{ balanced = {{ beta = \"{}\" }} }}", beta(f)),
+            Method::Meshfree(_) => "{ partial-stress = { form = \"meshfree\" } }".to_owned(),
+            Method::Elements(fit) => {
+                let fit = match fit {
+                    FitDegree::Affine => "affine",
+                    FitDegree::Quadratic => "quadratic",
+                };
+                format!("{{ partial-stress = {{ interface = \"{fit}\" }} }}")
+            }
+        }
+    }
+}
+
+/// A strip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StripCase {
+    /// What holds along it.
+    pub kind: Kind,
+    /// The law of the points.
+    pub law: StripLaw,
+    /// m = δ/h in the peridynamic zone.
+    pub ratio: f64,
+    /// δ/h where the transition meets the finite elements; the horizon runs straight between. Equal to `ratio` for a constant horizon.
+    pub edge_ratio: f64,
+    /// Lengths of local, transition, nonlocal, transition and local zones, in spacings.
+    pub lengths: [u32; 5],
+    /// Size of the finite elements in spacings; it divides the lengths.
+    pub cell: u32,
+    /// Cells across the strip, of which in 2D the sides are free.
+    pub across: u32,
+}
+
+/// A strip that can move.
+pub struct Strip {
+    /// Stiffness and masses.
+    pub motion: LinearMotion,
+    /// Position of each site along the strip, in spacings.
+    pub x: Vec<f64>,
+    /// Position of each site across it; 0 in 1D.
+    pub y: Vec<f64>,
+    /// Blending function of each site: 1 where it is peridynamic, 0 where it is local.
+    pub beta: Vec<f64>,
+    /// Where zones meet: local to transition, transition to nonlocal, and so on.
+    pub borders: [f64; 4],
+}
+
+impl Strip {
+    /// Builds and assembles a strip.
+    ///
+    /// # Errors
+    /// The message of the refusal of its scene.
+    pub fn new<const D: usize>(case: &StripCase) -> Result<Strip, String> {
+        let borders = case.borders();
+        let LinearModel {
+            motion,
+            position,
+            beta,
+        } = scene::linear_model(&case.text::<D>())?;
+        Ok(Strip {
+            beta,
+            x: position.iter().map(|x| x[0]).collect(),
+            y: position.iter().map(|x| x[1]).collect(),
+            motion,
+            borders: [borders[1], borders[2], borders[3], borders[4]],
+        })
+    }
+}
+
+impl StripCase {
+    /// Both ends, and where zones meet.
+    fn borders(&self) -> [f64; 6] {
+        let mut borders = [0.0; 6];
+        for (k, length) in self.lengths.iter().enumerate() {
+            borders[k + 1] = borders[k] + f64::from(*length);
+        }
+        borders
+    }
+
+    /// The strip as a scene.
+    fn text<const D: usize>(&self) -> String {
+        let borders = self.borders();
+        let cell = self.cell.max(1);
+        let width = self.across * cell;
+        let (material, influence) = self.law.text(D);
+        let along = self.lengths.iter().sum::<u32>() / cell;
+        let (kinematics, mesh) = match D {
+            1 => (
+                "bar",
+                format!("line]\nmin = 0\nmax = {}\nx.cells = {along}\n", borders[5]),
+            ),
+            _ => (
+                "plane-strain",
+                format!(
+                    "rectangle]\nmin = [0, 0]\nmax = [{}, {width}]\nx.cells = {along}\ny.cells = {}\n",
+                    borders[5], self.across
+                ),
+            ),
+        };
+        let mut text = format!(
+            "kinematics = \"{kinematics}\"\ncoupling = {}\n[mesh.{mesh}{material}[solve.explicit]\nduration = 1\n[output]\nvtu = false\n",
+            self.kind.text()
+        );
+        if self.kind != Kind::Local {
+            let horizon = match self.ratio == self.edge_ratio {
+                true => self.ratio.to_string(),
+                // straight from the edge ratio at the finite elements to the ratio of the points
+                false => format!(
+                    "\"{} + {} * max(0, min(1, min((x - {}) / {}, ({} - x) / {})))\"",
+                    self.edge_ratio,
+                    self.ratio - self.edge_ratio,
+                    borders[1],
+                    (borders[2] - borders[1]).max(1.0),
+                    borders[4],
+                    (borders[4] - borders[3]).max(1.0)
+                ),
+            };
+            let origin = if D == 1 { "0" } else { "[0, 0]" };
+            let _ = write!(
+                text,
+                "[peridynamics]\nhorizon = {horizon}\npoints.lattice = {{ spacing = 1, origin = {origin} }}\n{influence}"
+            );
+        }
+        if let Kind::Coupled(method) = self.kind {
+            let part = |from: f64, to: f64| match D {
+                1 => format!("{{ box = {{ min = {from}, max = {to} }} }}"),
+                _ => format!(
+                    "{{ box = {{ min = [{from}, -1], max = [{to}, {}] }} }}",
+                    width + 1
+                ),
+            };
+            let _ = writeln!(text, "[zones]\nnonlocal = {}", part(borders[2], borders[3]));
+            if method.has_transition() {
+                let _ = writeln!(text, "transition = {}", part(borders[1], borders[4]));
+            }
+        }
+        text
+    }
+}
