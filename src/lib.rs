@@ -161,15 +161,6 @@
 //!
 //! Keys in brackets, such as [SAND2015-7998], are resolved in `docs/references.md`.
 
-#[cfg(test)]
-extern crate self as bondline;
-
-/// Models of the suites, for unit tests; the file says `bondline` for this crate.
-#[cfg(test)]
-#[allow(dead_code)]
-#[path = "../crates/bondline-verify/src/enclosed.rs"]
-mod enclosed;
-
 pub mod assembly;
 pub mod coupling;
 pub mod fem;

@@ -527,27 +527,25 @@ impl<const D: usize> Elements<'_, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::peridynamics::Micromodulus;
-    use crate::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
+    use crate::run::SceneModel;
+    use crate::run::block::Block;
 
     /// Sums of all components of some fields at once against the stress under each displacement.
-    fn sums_are_those_of_single_cells<const D: usize>(law: Law) {
-        let method = Method::Elements(FitDegree::Quadratic);
-        let case = Case {
-            method,
-            law,
-            cells: Cells::Coarse,
-            widths: Widths {
-                nonlocal: 6,
-                transition: 6,
-                local: 12,
-            },
+    fn sums_are_those_of_single_cells<const D: usize>(material: [&str; 2]) {
+        let block = Block {
+            coupling: "\"partial-stress\"",
+            material,
+            influence: "influence = \"gaussian\"\n",
+            size: 3,
+            has_triangles: false,
+            widths: [6, 6, 12],
             ratio: 2,
+            origin: 0.0,
         };
-        let enclosed = Enclosed::<D>::new(&case).unwrap();
-        let model = &enclosed.model;
-        let operator = method.coupling::<D>();
-        let operator = operator.operator(model).unwrap();
+        let SceneModel {
+            model, coupling, ..
+        } = block.model::<D>();
+        let operator = coupling.operator(&model).unwrap();
         let is_stressed = |c: &usize| model.roles[*c] == CellRole::StressElement;
         let cells: Vec<usize> = (0..model.mesh.cell_count()).filter(is_stressed).collect();
         let fields = [1.7, 0.3].map(|k| -> Vec<f64> {
@@ -576,8 +574,8 @@ mod tests {
 
     #[test]
     fn one_pass_over_the_families_gives_the_stress_of_all_fields() {
-        let pairwise = Law::BondBased(Micromodulus::InverseDistance);
-        let state_based = Law::StateBased(Influence::Gaussian);
+        let pairwise = ["bond-based", ""];
+        let state_based = ["lps", "poisson-ratio = 0.3\n"];
         sums_are_those_of_single_cells::<1>(state_based);
         sums_are_those_of_single_cells::<2>(pairwise);
         sums_are_those_of_single_cells::<2>(state_based);

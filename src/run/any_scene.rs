@@ -1,5 +1,6 @@
 //! A scene whose zone is placed, of any dimension: what is run.
 
+use std::any::Any;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ use crate::progress::Progress;
 use crate::scene::draft::Draft;
 use crate::scene::source::read;
 use crate::scene::spec::KinematicsSpec;
-use crate::scene::{SceneError, SceneErrorKind, SceneSpec, Solve, Source};
+use crate::scene::{Scene, SceneError, SceneErrorKind, SceneSpec, Solve, Source};
 
 /// Validates a scene and places its zone, if it leaves that to the program.
 fn placed<const D: usize>(
@@ -105,6 +106,17 @@ impl AnyScene {
             }
         };
         found.map_err(|error| error.shown_in(source))
+    }
+
+    /// The scene, if it is of `D` dimensions.
+    pub fn of_dimension<const D: usize>(self) -> Option<Scene<D>> {
+        let found: Box<dyn Any> = match self {
+            Self::Bar(scene) => scene,
+            Self::Plane(scene) => scene,
+            Self::Solid(scene) => scene,
+        };
+        let scene = found.downcast::<PlacedScene<D>>().ok()?;
+        Some(scene.scene)
     }
 
     /// Writes all files into another folder than the scene's.

@@ -1,14 +1,66 @@
-//! The motion of a scene about rest, as matrices: what studies of eigenvalues and waves look at.
+//! The model of a scene about rest: what studies of stiffness, eigenvalues and waves look at.
 
 use super::setup::problem;
-use crate::coupling::Model;
 use crate::coupling::motion::masses;
+use crate::coupling::{Coupling, Model, Operator};
 use crate::progress::Silent;
 use crate::run::AnyScene;
 use crate::run::error::RunError;
 use crate::scene::validated::Scene;
-use crate::system::LinearMotion;
+use crate::system::{BlockCsr, LinearMotion};
 use crate::tensor::padded;
+
+/// The sites and bonds of a scene as its run lays them out: bonds intact, nothing loaded or held, nothing proved.
+pub struct SceneModel<const D: usize> {
+    /// Sites and families.
+    pub model: Model<D>,
+    /// How the models are joined; its operator belongs to `model`.
+    pub coupling: Box<dyn Coupling<D>>,
+    /// Density of each material [kg/m³]; zero where the scene types none.
+    pub density: Vec<f64>,
+}
+
+impl<const D: usize> SceneModel<D> {
+    /// Lays out a scene; its conditions and what it computes are left out.
+    ///
+    /// # Errors
+    /// [`RunError::Model`] of the sites or their families.
+    pub fn new(scene: Scene<D>) -> Result<Self, RunError> {
+        let (problem, rest) = problem(scene);
+        let (model, coupling) = Model::new(problem, &Silent)?;
+        Ok(Self {
+            model,
+            coupling,
+            density: rest.density,
+        })
+    }
+
+    /// The stiffness as a run has it, a `D × D` block per pair of sites: minus the derivative of internal forces \[N\] by displacements \[m\].
+    ///
+    /// # Errors
+    /// [`RunError::Model`] of the coupling.
+    pub fn stiffness(&self) -> Result<BlockCsr, RunError> {
+        let operator = self.coupling.operator(&self.model)?;
+        Ok(self.model.assemble(operator.as_ref(), &Silent))
+    }
+
+    /// Stiffness, and lumped mass of each site \[kg\].
+    ///
+    /// # Errors
+    /// As [`SceneModel::stiffness`].
+    pub fn motion(&self) -> Result<LinearMotion, RunError> {
+        let operator = self.coupling.operator(&self.model)?;
+        Ok(self.motion_by(operator.as_ref()))
+    }
+
+    fn motion_by(&self, operator: &dyn Operator<D>) -> LinearMotion {
+        LinearMotion {
+            stiffness: self.model.assemble(operator, &Silent),
+            mass: masses(&self.model, |material| self.density[material as usize]),
+            symmetry: self.coupling.symmetry(),
+        }
+    }
+}
 
 /// Stiffness and masses of a scene at rest, bonds intact and nothing held.
 pub struct LinearModel {
@@ -35,17 +87,12 @@ impl AnyScene {
 }
 
 fn linear_model<const D: usize>(scene: Scene<D>) -> Result<LinearModel, RunError> {
-    let (problem, rest) = problem(scene);
-    let (model, coupling) = Model::new(problem, &Silent)?;
-    let operator = coupling.operator(&model)?;
-    let density = |material: u16| rest.density[material as usize];
+    let laid = SceneModel::new(scene)?;
+    let operator = laid.coupling.operator(&laid.model)?;
+    let sites = &laid.model.sites;
     Ok(LinearModel {
-        beta: (0..model.sites.len()).map(|s| operator.beta(s)).collect(),
-        position: model.sites.iter().map(|s| padded(&s.position)).collect(),
-        motion: LinearMotion {
-            stiffness: model.assemble(operator.as_ref(), &Silent),
-            mass: masses(&model, density),
-            symmetry: coupling.symmetry(),
-        },
+        beta: (0..sites.len()).map(|s| operator.beta(s)).collect(),
+        position: sites.iter().map(|s| padded(&s.position)).collect(),
+        motion: laid.motion_by(operator.as_ref()),
     })
 }

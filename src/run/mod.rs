@@ -12,12 +12,15 @@
 //! | `proof/` | what is shown about a model before it is solved |
 //! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
 //! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
-//! | `linear.rs` | stiffness and masses alone, for studies of eigenvalues and waves |
+//! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
 //! | `rotation.rs`, `warnings.rs` | how far elements rotate; what of a model makes its results doubtful |
 //! | `write.rs` | the files of a run |
 //! | `error.rs` | what cannot be run, with place and remedy |
+//! | `block.rs` | a block from a scene, for unit tests |
 
 mod any_scene;
+#[cfg(test)]
+pub(crate) mod block;
 pub mod budget;
 pub mod chosen;
 mod definiteness;
@@ -40,7 +43,7 @@ pub use crate::run::placed_scene::PlacedScene;
 pub use any_scene::AnyScene;
 pub use budget::{Share, memory_budget, set_memory_budget};
 pub use error::RunError;
-pub use linear::LinearModel;
+pub use linear::{LinearModel, SceneModel};
 pub use motion::{RunOptions, StartFrom};
 pub use solution::Solved;
 pub use statics::solve_with;

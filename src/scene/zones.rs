@@ -7,7 +7,7 @@ use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::scene::selected_coupling::Joined;
@@ -132,7 +132,9 @@ pub(crate) fn zones<const D: usize>(
         .label(chosen, "works where both models overlap")
         .help("add [zones.transition] with around = ..., at least one horizon"));
     }
-    if !zones.contains(&Zone::Local) {
+    // partial stress needs no elements: it lets the horizon vary throughout a body
+    let needs_elements = !matches!(joined.coupling, CouplingSpec::PartialStress(_));
+    if needs_elements && !zones.contains(&Zone::Local) {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
             "the nonlocal and transition zones hold every cell: nothing is local",

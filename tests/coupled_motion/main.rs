@@ -2,7 +2,7 @@
 
 use bondline::coupling::motion::{BondBehaviour, Critical};
 use bondline::coupling::motion::{Motion, masses, scale_rows};
-use bondline::coupling::{BlendingFunction, Coupling, SiteKind};
+use bondline::coupling::{BlendingFunction, SiteKind};
 use bondline::fem;
 use bondline::peridynamics::kernel::Kinematics;
 use bondline::peridynamics::{Influence, Micromodulus};
@@ -50,7 +50,7 @@ fn cases() -> Vec<Case> {
     let methods = [
         Method::Splice,
         Method::Blending(BlendingFunction::Smooth),
-        Method::Meshfree(Influence::Gaussian),
+        Method::Meshfree,
     ];
     methods
         .into_iter()
@@ -74,17 +74,16 @@ fn with_motion<const D: usize, T>(
     visit: impl FnOnce(&Enclosed<D>, &mut Motion<'_, D>) -> T,
 ) -> T {
     let enclosed = Enclosed::<D>::new(case).unwrap();
-    let coupling = case.method.coupling::<D>();
-    with_motion_by(&enclosed, coupling.as_ref(), behaviour, visit)
+    with_motion_by(&enclosed, behaviour, visit)
 }
 
-/// As [`with_motion`], of a model that is there; `coupling` is one with the same sites.
+/// As [`with_motion`], of a model that is there.
 fn with_motion_by<const D: usize, T>(
     enclosed: &Enclosed<D>,
-    coupling: &dyn Coupling<D>,
     behaviour: &BondBehaviour<'_, D>,
     visit: impl FnOnce(&Enclosed<D>, &mut Motion<'_, D>) -> T,
 ) -> T {
+    let coupling = &enclosed.coupling;
     let operator = coupling.operator(&enclosed.model).unwrap();
     let mut motion = Motion::new(
         &enclosed.model,

@@ -5,13 +5,13 @@ use super::{
     with_motion_by,
 };
 use bondline::{
-    coupling::{SiteKind, Truncated, truncated::CutBonds},
+    coupling::SiteKind,
     peridynamics::{Influence, Micromodulus, kernel::Kinematics},
     system::{Breakage, Dynamic, Halfway, Interval, Symmetry},
     tensor::Vector,
 };
 use bondline_verify::{
-    enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths},
+    enclosed::{Case, Cells, Enclosed, Law, Method, Otherwise, SPACING, Widths},
     layers,
     tangents::{Numbers, out_of_balance},
 };
@@ -139,12 +139,13 @@ fn moments_of_a_seam_that_moves_add_up_to_zero() {
 fn forces_are_gradients_and_add_up_to_zero_where_cut_bonds_are_linear_and_others_are_not() {
     fn check<const D: usize>() {
         let case = breaking_at_the_seam();
-        let coupling = Truncated {
-            cut_bonds: CutBonds::Linear,
+        let linear = Otherwise {
+            coupling: Some("{ truncated = { cut-bonds = \"linear\" } }"),
+            ..Otherwise::default()
         };
-        let enclosed = Enclosed::<D>::with(&case, Box::new(coupling), case.law.law()).unwrap();
+        let enclosed = Enclosed::<D>::with(&case, &linear).unwrap();
         let exact = behaviour(Kinematics::Exact, Some(0.5));
-        with_motion_by(&enclosed, &coupling, &exact, |enclosed, motion| {
+        with_motion_by(&enclosed, &exact, |enclosed, motion| {
             let u = random(enclosed, 0.4 * SPACING);
             let mut force = vec![0.0; u.len()];
             assert!(
@@ -257,8 +258,7 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
     let laws = [breaking_at_the_seam(), breaking_states_at_the_seam()].map(|c| c.law);
     for law in laws {
         let e = layers::bodies::<2>(law, 2).unwrap();
-        let coupling = Method::Truncated.coupling::<2>();
-        let operator = coupling.operator(&e.model).unwrap();
+        let operator = e.coupling.operator(&e.model).unwrap();
         let behaviour = BondBehaviour {
             critical_stretch: Some(Critical::ByHorizon(vec![(coarse, 0.01), (fine, 0.015)])),
             ..behaviour(Kinematics::Exact, None)
@@ -311,7 +311,7 @@ struct Run {
 }
 
 /// Opens a crack along `y = −0.09` in a block under tension and lets it run; the outer rows are held.
-fn crack_beside_the_seam(coupling: Box<dyn bondline::coupling::Coupling<2>>) -> Run {
+fn crack_beside_the_seam(coupling: &str) -> Run {
     let case = Case {
         cells: Cells::Matching,
         widths: Widths {
@@ -323,14 +323,12 @@ fn crack_beside_the_seam(coupling: Box<dyn bondline::coupling::Coupling<2>>) -> 
         ..breaking_at_the_seam()
     };
     let (critical, line) = (0.002, -0.09);
-    let again = coupling.name();
-    let e = Enclosed::<2>::with(&case, coupling, case.law.law::<2>()).unwrap();
-    let coupling: Box<dyn bondline::coupling::Coupling<2>> = if again == "truncated" {
-        case.method.coupling()
-    } else {
-        Box::new(bondline::coupling::Nonlocal)
+    let typed = Otherwise {
+        coupling: Some(coupling),
+        ..Otherwise::default()
     };
-    let operator = coupling.operator(&e.model).unwrap();
+    let e = Enclosed::<2>::with(&case, &typed).unwrap();
+    let operator = e.coupling.operator(&e.model).unwrap();
     // the last rows of either body are held, and do not break
     let is_held = |x: &Vector<2>| x[1].abs() > 0.17 - 1e-9;
     let outside = |x: &Vector<2>| x.amax() > 0.1;
@@ -412,8 +410,8 @@ fn crack_beside_the_seam(coupling: Box<dyn bondline::coupling::Coupling<2>>) -> 
 
 #[test]
 fn a_crack_beside_the_seam_runs_as_in_peridynamics_alone() {
-    let whole = crack_beside_the_seam(Box::new(bondline::coupling::Nonlocal));
-    let coupled = crack_beside_the_seam(Method::Truncated.coupling());
+    let whole = crack_beside_the_seam("\"nonlocal\"");
+    let coupled = crack_beside_the_seam("\"truncated\"");
     // at first it crosses pieces only where whole bonds would be crossed: they take the same
     assert!(
         (coupled.taken[0] / whole.taken[0] - 1.0).abs() < 1e-12,

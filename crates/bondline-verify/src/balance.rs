@@ -171,10 +171,7 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
                     ));
                 }
             }
-            cases.push((
-                name,
-                bar(Method::Meshfree(INFLUENCE), law, ratio, 3 * ratio),
-            ));
+            cases.push((name, bar(Method::Meshfree, law, ratio, 3 * ratio)));
             cases.push((
                 name,
                 bar(
@@ -279,7 +276,7 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
         Method::Blending(BlendingFunction::Constant),
         Method::Blending(BlendingFunction::Linear),
         Method::Blending(BlendingFunction::Smooth),
-        Method::Meshfree(INFLUENCE),
+        Method::Meshfree,
         Method::Elements(FitDegree::Quadratic),
         Method::Truncated,
         Method::Balanced,

@@ -2,29 +2,33 @@
 
 use std::sync::Arc;
 
-use bondline::{
-    coupling::{
-        Balanced, Blending, BlendingFunction, Coupling, FitDegree, Local, Model, ModelError,
-        PartialStressElements, PartialStressMeshfree, Peridynamics, PointSource, Problem, Splice,
-        Surfaces, Truncated, Zone,
+use crate::{
+    meshes::{
+        gmsh,
+        scene::{self, SceneFailure},
     },
+    typed,
+};
+use bondline::{
+    coupling::{BlendingFunction, Coupling, FitDegree, Model},
     mesh::{
-        Mesh, MeshError,
+        MeshError,
         generate::{Axis, Grid},
     },
     peridynamics::{
-        BondBased, BondWeights, Correspondence, Influence, LinearPeridynamicSolid,
-        Micromodulus, PartialVolume,
+        BondBased, Correspondence, Influence, LinearPeridynamicSolid, Micromodulus,
         influence::{Alpha, Degree},
     },
-    progress::Silent,
-    shape::Barrier,
+    run::SceneModel,
     system::BlockCsr,
     tensor::{Tensor4, Vector},
 };
 
 /// Young's modulus of every case \[Pa\].
 pub const YOUNGS_MODULUS: f64 = 2e11;
+
+/// Poisson's ratio of every case whose law has one.
+pub const POISSON: f64 = 0.3;
 
 /// Spacing h of the lattice in every case \[m\]; no power of two, so that coordinates are rounded.
 pub const SPACING: f64 = 0.01;
@@ -38,19 +42,19 @@ pub const INFLUENCE: Influence = Influence::Polynomial {
 /// A coupling method with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
-    /// [`Splice`].
+    /// Each site takes the force of its own model.
     Splice,
-    /// [`Blending`].
+    /// Forces blended over the transition zone.
     Blending(BlendingFunction),
-    /// [`Balanced`] with a step in β at the edge of the nonlocal zone.
+    /// Half of a splice and half of a blending with a step in β at the edge of the nonlocal zone.
     Balanced,
-    /// [`Balanced`] with β over the transition zone.
+    /// The same with β over the transition zone.
     BalancedOver(BlendingFunction),
-    /// [`PartialStressMeshfree`] with this ω of the divergence.
-    Meshfree(Influence),
-    /// [`PartialStressElements`].
+    /// Partial stress at points; ω of the divergence is that of the law, which a scene cannot choose apart from it.
+    Meshfree,
+    /// Partial stress in elements.
     Elements(FitDegree),
-    /// [`Truncated`].
+    /// Bonds that end on faces.
     Truncated,
 }
 
@@ -61,7 +65,7 @@ impl Method {
         Self::Blending(BlendingFunction::Constant),
         Self::Blending(BlendingFunction::Linear),
         Self::Blending(BlendingFunction::Smooth),
-        Self::Meshfree(INFLUENCE),
+        Self::Meshfree,
         Self::Elements(FitDegree::Affine),
         Self::Elements(FitDegree::Quadratic),
         Self::Truncated,
@@ -80,7 +84,7 @@ impl Method {
             Self::BalancedOver(BlendingFunction::Constant) => "balanced constant",
             Self::BalancedOver(BlendingFunction::Linear) => "balanced linear",
             Self::BalancedOver(BlendingFunction::Smooth) => "balanced smooth",
-            Self::Meshfree(_) => "partial stress meshfree",
+            Self::Meshfree => "partial stress meshfree",
             Self::Elements(FitDegree::Affine) => "partial stress elements affine",
             Self::Elements(FitDegree::Quadratic) => "partial stress elements quadratic",
             Self::Truncated => "truncated",
@@ -95,21 +99,6 @@ impl Method {
     /// Whether the method takes a law.
     pub fn is_offered(self, law: Law) -> bool {
         self != Self::Truncated || !matches!(law, Law::Correspondence(_))
-    }
-
-    /// The coupling itself.
-    pub fn coupling<const D: usize>(self) -> Box<dyn Coupling<D>> {
-        match self {
-            Self::Splice => Box::new(Splice),
-            Self::Blending(function) => Box::new(Blending { function }),
-            Self::Balanced => Box::new(Balanced { function: None }),
-            Self::BalancedOver(function) => Box::new(Balanced {
-                function: Some(function),
-            }),
-            Self::Meshfree(influence) => Box::new(PartialStressMeshfree { influence }),
-            Self::Elements(fit) => Box::new(PartialStressElements { fit }),
-            Self::Truncated => Box::new(Truncated::default()),
-        }
     }
 }
 
@@ -141,19 +130,19 @@ impl Law {
         }
     }
 
-    /// Lamé parameters λ, μ \[Pa\] of the material of Young's modulus [`YOUNGS_MODULUS`]: plane strain in 2D;
-    /// Poisson ratio 1/4 where the law fixes it, else 0.3.
+    /// Lamé parameters λ, μ \[Pa\] of the material of Young's modulus [`YOUNGS_MODULUS`], by hand: a bar in 1D, plane strain in 2D;
+    /// Poisson ratio 1/4 where the law fixes it, else [`POISSON`].
     pub fn lame<const D: usize>(self) -> (f64, f64) {
         let e = YOUNGS_MODULUS;
         match (self, D) {
             (Self::BondBased(_), 1) => (e / 3.0, e / 3.0),
             (Self::BondBased(_), _) => (0.4 * e, 0.4 * e),
-            (_, 1) => (0.4 * e, 0.3 * e),
+            (_, 1) => (e - 2.0 * e / 2.6, e / 2.6),
             _ => (e * 0.3 / (1.3 * 0.4), e / 2.6),
         }
     }
 
-    /// The law itself.
+    /// The law itself, for bodies that are no scene: clouds of points at random.
     pub fn law<const D: usize>(self) -> Arc<dyn bondline::peridynamics::Law<D>> {
         let (lambda, mu) = self.lame::<D>();
         match self {
@@ -254,33 +243,46 @@ pub struct Case {
 /// Why a case was not built.
 #[derive(Debug, thiserror::Error)]
 pub enum EnclosedError {
-    /// The mesh.
+    /// The mesh of its file.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// The model.
+    /// The scene, or its model.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    Scene(#[from] SceneFailure),
 }
 
 /// An assembled case.
 pub struct Enclosed<const D: usize> {
     /// Its sites.
     pub model: Model<D>,
+    /// How its models are joined.
+    pub coupling: Box<dyn Coupling<D>>,
     /// Its stiffness.
     pub stiffness: BlockCsr,
     /// Half the width of the block \[m\].
     pub half: f64,
-    /// The typed elastic tensor \[Pa\].
+    /// The elastic tensor of the elements \[Pa\].
     pub tensor: Tensor4<D>,
+}
+
+/// What a block has otherwise than its case says.
+#[derive(Clone, Debug, Default)]
+pub struct Otherwise<'a> {
+    /// The coupling as a scene types it, on the lattice of the case.
+    pub coupling: Option<&'a str>,
+    /// Poisson's ratio.
+    pub poisson_ratio: Option<f64>,
+    /// Further tables of the scene: cracks.
+    pub tables: &'a str,
 }
 
 impl<const D: usize> Enclosed<D> {
     /// Builds and assembles a case; the lattice's points are the integer multiples of h, or with truncated bonds halfway between.
     ///
     /// # Errors
-    /// [`EnclosedError`] of the mesh or the model.
+    /// [`EnclosedError`] of the mesh, the scene or its model.
     pub fn new(case: &Case) -> Result<Self, EnclosedError> {
-        Self::with(case, case.method.coupling(), case.law.law::<D>())
+        Self::with(case, &Otherwise::default())
     }
 
     /// The same block with finite elements everywhere.
@@ -288,70 +290,53 @@ impl<const D: usize> Enclosed<D> {
     /// # Errors
     /// As [`Enclosed::new`].
     pub fn local(case: &Case) -> Result<Self, EnclosedError> {
-        Self::with(case, Box::new(Local), case.law.law::<D>())
+        let coupling = Some("\"local\"");
+        Self::with(
+            case,
+            &Otherwise {
+                coupling,
+                ..Otherwise::default()
+            },
+        )
     }
 
-    /// The block with another coupling or law than the case names.
+    /// The block with something else than the case names.
     ///
     /// # Errors
     /// As [`Enclosed::new`].
-    pub fn with(
-        case: &Case,
-        coupling: Box<dyn Coupling<D>>,
-        law: Arc<dyn bondline::peridynamics::Law<D>>,
-    ) -> Result<Self, EnclosedError> {
-        Self::with_barriers(case, coupling, law, Vec::new())
-    }
-
-    /// As [`Enclosed::with`], with cracks and slits.
-    ///
-    /// # Errors
-    /// As [`Enclosed::new`].
-    pub fn with_barriers(
-        case: &Case,
-        coupling: Box<dyn Coupling<D>>,
-        law: Arc<dyn bondline::peridynamics::Law<D>>,
-        barriers: Vec<Barrier<D>>,
-    ) -> Result<Self, EnclosedError> {
-        let (mesh, zones) = blocks::<D>(case.cells, case.widths)?;
-        let tensor = *law.linearised().tensor();
-        let horizon = f64::from(case.ratio) * SPACING;
-        // truncated bonds want the seam halfway between points
-        let origin = match case.method {
-            Method::Truncated => Vector::repeat(0.5 * SPACING),
-            _ => Vector::zeros(),
-        };
-        let problem = Problem {
-            cell_material: vec![0; mesh.cell_count()],
-            mesh,
-            zones,
-            tensors: vec![tensor],
-            peridynamic_material: 0,
-            peridynamics: Some(Peridynamics {
-                law,
-                horizon: Arc::new(move |_| horizon),
-                points: PointSource::Lattice {
-                    spacing: SPACING,
-                    origin,
-                },
-                weights: BondWeights::Isotropic,
-                volumes: PartialVolume::Full,
-                barriers,
-                voids: Vec::new(),
-                surfaces: Surfaces::Uncut,
-            }),
-            coupling,
-        };
-        let (model, coupling) = Model::new(problem, &Silent)?;
+    pub fn with(case: &Case, otherwise: &Otherwise<'_>) -> Result<Self, EnclosedError> {
+        let half = f64::from(case.widths.total()) * SPACING;
+        let file = case.cells.file::<D>(case.widths)?;
+        let files: Vec<(&str, &str)> = file.iter().map(|text| (MESH, text.as_str())).collect();
+        let SceneModel {
+            model, coupling, ..
+        } = scene::model(&case.text::<D>(otherwise), &files)?;
         let stiffness = {
-            let operator = coupling.operator(&model)?;
+            let operator = coupling.operator(&model).map_err(SceneFailure::from)?;
             model.assemble_unscaled(operator.as_ref())
         };
+        let tensor = *model.tensor_of_cell(0);
         Ok(Self {
             model,
+            coupling,
             stiffness,
-            half: f64::from(case.widths.total()) * SPACING,
+            half,
             tensor,
+        })
+    }
+
+    /// The model of a scene of a block `half` wide to either side, with its stiffness as a run has it.
+    ///
+    /// # Errors
+    /// [`SceneFailure`] of the scene or its model.
+    pub fn of_scene(text: &str, files: &[(&str, &str)], half: f64) -> Result<Self, SceneFailure> {
+        let laid = scene::model::<D>(text, files)?;
+        Ok(Self {
+            stiffness: laid.stiffness()?,
+            tensor: *laid.model.tensor_of_cell(0),
+            model: laid.model,
+            coupling: laid.coupling,
+            half,
         })
     }
 
@@ -366,32 +351,90 @@ impl<const D: usize> Enclosed<D> {
     }
 }
 
-/// Nested boxes of the three zones.
-fn blocks<const D: usize>(cells: Cells, widths: Widths) -> Result<(Mesh<D>, Vec<Zone>), MeshError> {
-    let half = f64::from(widths.total()) * SPACING;
+/// Name of the file of a mesh that a scene's own generators do not make.
+pub const MESH: &str = "mesh.msh";
+
+impl Cells {
+    /// Cells along an axis of a block.
+    fn along(self, widths: Widths) -> usize {
+        (2 * widths.total()).div_ceil(self.size()) as usize
+    }
+
+    /// The mesh as a file, where nodes are moved.
+    fn file<const D: usize>(self, widths: Widths) -> Result<Option<String>, MeshError> {
+        let fraction = match self {
+            Self::Matching | Self::Coarse | Self::Aligned(_) => return Ok(None),
+            Self::Jittered => 0.2,
+            Self::Simplices => 0.1,
+        };
+        let half = f64::from(widths.total()) * SPACING;
+        let mesh = jittered::<D>(half, self.along(widths), self == Self::Simplices, fraction)?;
+        Ok(Some(gmsh::of_mesh(&mesh, &[], |_| None)))
+    }
+}
+
+/// A block of boxes or simplices, `half` wide to either side, whose inner nodes are moved by up to this fraction of a cell.
+///
+/// # Errors
+/// [`MeshError`] of the generator.
+pub fn jittered<const D: usize>(
+    half: f64,
+    cells: usize,
+    simplices: bool,
+    fraction: f64,
+) -> Result<bondline::mesh::Mesh<D>, MeshError> {
     let mut grid = Grid::<D>::new(std::array::from_fn(|_| Axis::Uniform {
         min: -half,
         max: half,
-        cells: (2 * widths.total()).div_ceil(cells.size()) as usize,
+        cells,
     }));
-    if cells == Cells::Simplices {
+    if simplices {
         grid.simplices();
     }
-    // zones by the cells of the regular grid; moving nodes keeps the numbers of cells
-    let regular = grid.mesh()?;
-    let core = f64::from(widths.nonlocal) * SPACING;
-    let transition = core + f64::from(widths.transition) * SPACING;
-    let zones = (0..regular.cell_count())
-        .map(|c| match regular.centroid(c).amax() {
-            r if r < core => Zone::Nonlocal,
-            r if r < transition => Zone::Transition,
-            _ => Zone::Local,
-        })
-        .collect();
-    let mesh = match cells {
-        Cells::Matching | Cells::Coarse | Cells::Aligned(_) => regular,
-        Cells::Jittered => grid.jitter(0.2, 7).mesh()?,
-        Cells::Simplices => grid.jitter(0.1, 7).mesh()?,
-    };
-    Ok((mesh, zones))
+    grid.jitter(fraction, 7).mesh()
+}
+
+impl Case {
+    /// The case as a scene: nested boxes of the three zones. Moved nodes leave centroids in the box of their cell.
+    fn text<const D: usize>(&self, otherwise: &Otherwise<'_>) -> String {
+        let Self {
+            law, cells, widths, ..
+        } = *self;
+        let half = f64::from(widths.total()) * SPACING;
+        let mesh = match cells.is_aligned() {
+            true => typed::grid([-half; D], [half; D], [cells.along(widths); D]),
+            false => format!("[mesh.file]\npath = \"{MESH}\"\n"),
+        };
+        // truncated bonds want the seam halfway between points
+        let origin = match self.method {
+            Method::Truncated => 0.5 * SPACING,
+            _ => 0.0,
+        };
+        let core = f64::from(widths.nonlocal) * SPACING;
+        let transition = match widths.transition {
+            0 => String::new(),
+            width => {
+                let edge = core + f64::from(width) * SPACING;
+                format!("transition = {}\n", typed::cube::<D>(edge))
+            }
+        };
+        let own = typed::coupling(self.method);
+        format!(
+            "kinematics = \"{}\"\ncoupling = {}\n{mesh}{}[peridynamics]\nhorizon = {:?}\npoints.lattice = {{ spacing = {SPACING}, origin = {} }}\n{}{}[zones]\nnonlocal = {}\n{transition}{}{}",
+            typed::kinematics::<D>(),
+            otherwise.coupling.unwrap_or(&own),
+            typed::material(
+                law,
+                YOUNGS_MODULUS,
+                otherwise.poisson_ratio.unwrap_or(POISSON)
+            ),
+            f64::from(self.ratio) * SPACING,
+            typed::place([origin; D]),
+            typed::law_line(law),
+            typed::UNCUT,
+            typed::cube::<D>(core),
+            otherwise.tables,
+            typed::FREE
+        )
+    }
 }

@@ -3,23 +3,20 @@
 //! A body whose horizon jumps is either reciprocal or passes the patch test, not both: with bonds taken from both ends forces are pairwise, but a point beside the jump sees
 //! half of its bonds with another stiffness. Two lattices that end on the faces of a layer of elements, by truncated bonds, do both.
 
-use std::{ops::ControlFlow, sync::Arc};
+use std::ops::ControlFlow;
 
 use crate::{
     Effort,
-    enclosed::{Enclosed, INFLUENCE, Law, SPACING},
+    enclosed::{Enclosed, INFLUENCE, Law, Method, POISSON, SPACING, YOUNGS_MODULUS},
+    meshes::scene::{self, SceneFailure},
     patch::{affine_residual, solution_error},
     tangents::momentum,
+    typed,
 };
 use bondline::{
-    coupling::{
-        Coupling, Lattice, Model, Nonlocal, PartialStressMeshfree, Peridynamics, PointSource,
-        Problem, Surfaces, Truncated, Zone,
-    },
-    mesh::generate::{Axis, Grid},
     observe::report::{Columns, Row, Table},
-    peridynamics::{BondWeights, Micromodulus, PartialVolume},
-    progress::{Progress, Silent},
+    peridynamics::Micromodulus,
+    progress::Progress,
     solve::{
         explicit::{Explicit, ExplicitParams, State, Undriven},
         stable_step, stencils,
@@ -38,64 +35,30 @@ pub const AFFINE_LIMIT: f64 = 1e-11;
 pub const HORIZONS: u32 = 4;
 
 /// A block whose halves have lattices and horizons of their own, the larger ones where x is negative.
-pub fn bodies<const D: usize>(law: Law, ratio: u32) -> Result<Enclosed<D>, String> {
+///
+/// # Errors
+/// [`SceneFailure`] of the scene or its model.
+pub fn bodies<const D: usize>(law: Law, ratio: u32) -> Result<Enclosed<D>, SceneFailure> {
     // half of the block, of the peridynamic zone, in cells; the layer is the cell right of the middle
     let (half, zone): (u32, u32) = if D == 3 { (5, 3) } else { (11, 7) };
-    let grid = Grid::<D>::new(std::array::from_fn(|_| Axis::Uniform {
-        min: -f64::from(half) * SPACING,
-        max: f64::from(half) * SPACING,
-        cells: 2 * half as usize,
-    }));
-    let mesh = grid.mesh().map_err(|e| e.to_string())?;
-    let (mut zones, mut of_cell) = (Vec::new(), Vec::new());
-    for c in 0..mesh.cell_count() {
-        let x = mesh.centroid(c) / SPACING;
-        let is_layer = x[0] > 0.0 && x[0] < 1.0;
-        zones.push(if x.amax() < f64::from(zone) && !is_layer {
-            Zone::Nonlocal
-        } else {
-            Zone::Local
-        });
-        of_cell.push(u16::from(x[0] > 0.0));
-    }
-    let lattice = |spacing: f64| Lattice {
-        spacing,
-        origin: Vector::repeat(0.5 * spacing),
-        horizon: f64::from(ratio) * spacing,
-    };
-    let lattices = vec![lattice(SPACING), lattice(SPACING / f64::from(HORIZONS))];
-    let law = law.law::<D>();
-    let tensor = *law.linearised().tensor();
-    let horizon = lattices[0].horizon;
-    let problem = Problem {
-        cell_material: vec![0; mesh.cell_count()],
-        mesh,
-        zones,
-        tensors: vec![tensor],
-        peridynamic_material: 0,
-        peridynamics: Some(Peridynamics {
-            law,
-            horizon: Arc::new(move |_| horizon),
-            points: PointSource::Lattices { lattices, of_cell },
-            weights: BondWeights::Isotropic,
-            volumes: PartialVolume::Full,
-            barriers: Vec::new(),
-            voids: Vec::new(),
-            surfaces: Surfaces::Cut,
-        }),
-        coupling: Box::new(Truncated::default()),
-    };
-    let (model, coupling) = Model::new(problem, &Silent).map_err(|e| e.to_string())?;
-    let stiffness = {
-        let operator = coupling.operator(&model).map_err(|e| e.to_string())?;
-        model.assemble(operator.as_ref(), &Silent)
-    };
-    Ok(Enclosed {
-        model,
-        stiffness,
-        half: f64::from(half) * SPACING,
-        tensor,
-    })
+    let (end, zone) = (f64::from(half) * SPACING, f64::from(zone) * SPACING);
+    let fine = SPACING / f64::from(HORIZONS);
+    // what is left of it and touches it becomes the layer
+    let right = std::array::from_fn(|k| if k == 0 { SPACING } else { -zone });
+    let text = format!(
+        "kinematics = \"{}\"\ncoupling = \"truncated\"\n{}{}[peridynamics]\nhorizon = {:?}\npoints.lattice = {{ spacing = {SPACING}, origin = {} }}\n{}[zones]\nnonlocal = {}\n[zones.bodies.fine]\ninside = {}\nspacing = {fine:?}\nhorizon = {:?}\n{}",
+        typed::kinematics::<D>(),
+        typed::grid([-end; D], [end; D], [2 * half as usize; D]),
+        typed::material(law, YOUNGS_MODULUS, POISSON),
+        f64::from(ratio) * SPACING,
+        typed::place([0.5 * SPACING; D]),
+        typed::law_line(law),
+        typed::cube::<D>(zone),
+        typed::cuboid(right, [zone; D]),
+        f64::from(ratio) * fine,
+        typed::FREE
+    );
+    Enclosed::of_scene(&text, &[], end)
 }
 
 fn property_rows<const D: usize>(law: Law, ratio: u32) -> Vec<Row> {
@@ -103,7 +66,8 @@ fn property_rows<const D: usize>(law: Law, ratio: u32) -> Vec<Row> {
     let e = match bodies::<D>(law, ratio) {
         Ok(e) => e,
         Err(why) => {
-            return vec![Row::at_most(name, "residual", f64::NAN, AFFINE_LIMIT).because(why)];
+            let row = Row::at_most(name, "residual", f64::NAN, AFFINE_LIMIT);
+            return vec![row.because(why.to_string())];
         }
     };
     let places: Vec<Vector<D>> = e.positions().copied().collect();
@@ -185,108 +149,73 @@ impl Meeting {
     }
 }
 
-/// A bar of spacing 1 and modulus 1 from −`half` to `half`; the horizon changes at 0, larger on the left.
-fn bar(meeting: Meeting, half: u32, ratio: u32) -> Result<(LinearMotion, Vec<f64>, f64), String> {
+/// A bar of spacing 1, modulus 1 and density 1 from −`half` to `half` as a scene; the horizon changes at 0, larger on the left.
+fn bar_scene(meeting: Meeting, half: u32, ratio: u32) -> String {
     let fine = 1.0 / f64::from(HORIZONS);
     let (large, small) = (f64::from(ratio), f64::from(ratio) * fine);
-    let grid = Grid::<1>::new([Axis::Uniform {
-        min: -f64::from(half),
-        max: f64::from(half),
-        cells: 2 * half as usize,
-    }]);
-    let mesh = grid.mesh().map_err(|e| e.to_string())?;
-    let layer = match meeting {
-        Meeting::Layer(n) => n,
-        _ => 0,
+    let end = f64::from(half);
+    let between = |from: f64, to: f64| typed::cuboid([from], [to]);
+    let everywhere = "{ everywhere = true }";
+    let horizon = match meeting {
+        Meeting::Smaller => format!("{small:?}"),
+        Meeting::Jump | Meeting::Bridge => format!("\"if(x > 0, {small:?}, {large:?})\""),
+        _ => format!("{large:?}"),
     };
-    let x: Vec<f64> = (0..mesh.cell_count())
-        .map(|c| mesh.centroid(c)[0])
-        .collect();
-    let zones: Vec<Zone> = x
-        .iter()
-        .map(|&x| {
-            if x > 0.0 && x < f64::from(layer) {
-                Zone::Local
-            } else if meeting == Meeting::Bridge && x.abs() < large {
-                Zone::Transition
-            } else {
-                Zone::Nonlocal
-            }
-        })
-        .collect();
-    let lattice = |spacing: f64| Lattice {
-        spacing,
-        origin: Vector::repeat(0.5 * spacing),
-        horizon: f64::from(ratio) * spacing,
+    let spacing = match meeting {
+        Meeting::Layer(_) | Meeting::Coarse => 1.0,
+        _ => fine,
     };
-    let one = |spacing: f64| PointSource::Lattice {
-        spacing,
-        origin: Vector::repeat(0.5 * spacing),
+    let (coupling, zones) = match meeting {
+        Meeting::Layer(thick) => {
+            let layer = between(0.0, f64::from(thick));
+            let right = between(f64::from(thick), end);
+            let body = format!("inside = {right}\nspacing = {fine:?}\nhorizon = {small:?}\n");
+            let nonlocal = typed::without(everywhere, &layer);
+            (
+                "\"truncated\"".to_owned(),
+                format!("[zones]\nnonlocal = {nonlocal}\n[zones.bodies.fine]\n{body}"),
+            )
+        }
+        Meeting::Bridge => {
+            let bridge = between(-large, large);
+            let nonlocal = typed::without(everywhere, &bridge);
+            (
+                typed::coupling(Method::Meshfree),
+                format!("[zones]\nnonlocal = {nonlocal}\ntransition = {bridge}\n"),
+            )
+        }
+        _ => ("\"nonlocal\"".to_owned(), String::new()),
     };
-    let points = match meeting {
-        Meeting::Layer(_) => PointSource::Lattices {
-            lattices: vec![lattice(1.0), lattice(fine)],
-            of_cell: x.iter().map(|&x| u16::from(x > 0.0)).collect(),
-        },
-        Meeting::Coarse => one(1.0),
-        _ => one(fine),
-    };
-    let law = bondline::peridynamics::BondBased::<1>::new(Micromodulus::InverseDistance, 1.0 / 3.0);
-    let coupling: Box<dyn Coupling<1>> = match meeting {
-        Meeting::Layer(_) => Box::new(Truncated::default()),
-        Meeting::Bridge => Box::new(PartialStressMeshfree {
-            influence: INFLUENCE,
-        }),
-        _ => Box::new(Nonlocal),
-    };
-    let problem = Problem {
-        cell_material: vec![0; mesh.cell_count()],
-        mesh,
-        zones,
-        tensors: vec![*bondline::peridynamics::LinearForceState::tensor(&law)],
-        peridynamic_material: 0,
-        peridynamics: Some(Peridynamics {
-            law: Arc::new(law),
-            horizon: Arc::new(move |x| match meeting {
-                Meeting::Smaller => small,
-                Meeting::Jump | Meeting::Bridge if x[0] > 0.0 => small,
-                _ => large,
-            }),
-            points,
-            weights: BondWeights::Isotropic,
-            volumes: PartialVolume::Full,
-            barriers: Vec::new(),
-            voids: Vec::new(),
-            surfaces: Surfaces::Cut,
-        }),
-        coupling,
-    };
-    let (model, coupling) = Model::new(problem, &Silent).map_err(|e| e.to_string())?;
-    let operator = coupling.operator(&model).map_err(|e| e.to_string())?;
-    let mut stiffness = model.assemble(operator.as_ref(), &Silent);
-    let mut symmetry = coupling.symmetry();
+    format!(
+        "kinematics = \"bar\"\ncoupling = {coupling}\n{}{}[peridynamics]\nhorizon = {horizon}\npoints.lattice = {{ spacing = {spacing:?}, origin = [{:?}] }}\n{zones}{}",
+        typed::grid([-end], [end], [2 * half as usize]),
+        typed::material(Law::BondBased(Micromodulus::InverseDistance), 1.0, POISSON),
+        0.5 * spacing,
+        typed::FREE
+    )
+}
+
+/// The bar: how it moves, where its sites are, and its largest affine force per volume away from the ends.
+fn bar(meeting: Meeting, half: u32, ratio: u32) -> Result<(LinearMotion, Vec<f64>, f64), String> {
+    let laid = scene::model::<1>(&bar_scene(meeting, half, ratio), &[]);
+    let laid = laid.map_err(|e| e.to_string())?;
+    let mut motion = laid.motion().map_err(|e| e.to_string())?;
+    let sites = &laid.model.sites;
     if meeting == Meeting::Splice {
         let (other, ..) = bar(Meeting::Smaller, half, ratio)?;
-        let is_left = |s: usize| model.sites[s].position[0] < 0.0;
-        stiffness = stencils::splice(&stiffness, &other.stiffness, is_left);
-        symmetry = Symmetry::Unsymmetric;
+        let is_left = |s: usize| sites[s].position[0] < 0.0;
+        motion.stiffness = stencils::splice(&motion.stiffness, &other.stiffness, is_left);
+        motion.symmetry = Symmetry::Unsymmetric;
     }
-    let x: Vec<f64> = model.sites.iter().map(|s| s.position[0]).collect();
-    let volumes = model.sites.iter().map(|s| s.volume).collect();
-    // largest affine force per volume away from the ends
-    let force = stiffness.multiply(&x);
-    let ghost = model
-        .sites
+    let x: Vec<f64> = sites.iter().map(|s| s.position[0]).collect();
+    let force = motion.stiffness.multiply(&x);
+    let inside = f64::from(half) - 4.0 * f64::from(ratio);
+    let ghost = sites
         .iter()
         .zip(&force)
-        .filter(|(s, _)| s.position[0].abs() < f64::from(half) - 4.0 * large)
+        .filter(|(s, _)| s.position[0].abs() < inside)
         .map(|(s, f)| (f / s.volume).abs())
         .fold(0.0, f64::max);
-    let motion = LinearMotion {
-        stiffness,
-        mass: volumes,
-        symmetry,
-    };
     Ok((motion, x, ghost))
 }
 

@@ -26,7 +26,7 @@
 //! | `extremes` | units, places, laws, shapes and steps at their limits |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is their scene |
 //!
-//! `page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
+//! `typed.rs` has what the suites type of laws, couplings and shapes; `enclosed.rs`, `strip.rs` are scenes that several suites share. `page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 
 pub mod balance;
 pub mod bar;
@@ -51,6 +51,7 @@ pub mod spectrum;
 pub mod strip;
 pub mod tangents;
 pub mod truncated;
+pub mod typed;
 pub mod variable_horizon;
 pub mod wave;
 pub mod weights;

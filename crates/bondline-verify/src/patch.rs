@@ -9,7 +9,6 @@ use crate::enclosed::{
     Case, Cells, Enclosed, EnclosedError, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
 };
 use crate::fields::{Field, affine_modes, monomials, worst};
-use bondline::coupling::ModelError;
 use bondline::observe::report::{Columns, Row, Table};
 use bondline::progress::{Progress, Silent};
 use bondline::solve::FreeDofs;
@@ -301,7 +300,7 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
     };
     let enclosed = match Enclosed::<D>::new(case) {
         Ok(enclosed) => enclosed,
-        Err(e @ EnclosedError::Model(ModelError::Seam { .. })) => {
+        Err(EnclosedError::Scene(e)) if e.is_seam() => {
             return vec![Row::refused(&name, "residual", e.to_string())];
         }
         Err(e) => {

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use crate::{
     Effort,
-    enclosed::{INFLUENCE, Method},
-    strip::{Kind, Strip, StripCase, StripLaw},
+    enclosed::{INFLUENCE, Law, Method},
+    strip::{Kind, Strip, StripCase},
 };
 use bondline::{
     observe::report::{Columns, Row, Table},
@@ -71,7 +71,7 @@ pub struct Crossing {
     /// The method.
     pub method: Method,
     /// The law of the points.
-    pub law: StripLaw,
+    pub law: Law,
     /// m = δ/h.
     pub ratio: u32,
     /// Width of the transition zone in horizons.
@@ -204,9 +204,9 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
     let laws = [
         (
             "inverse distance",
-            StripLaw::BondBased(Micromodulus::InverseDistance),
+            Law::BondBased(Micromodulus::InverseDistance),
         ),
-        ("LPS P1/r", StripLaw::Lps(INFLUENCE)),
+        ("LPS P1/r", Law::StateBased(INFLUENCE)),
     ];
     let (ratios, widths): (&[u32], &[u32]) = match effort {
         Effort::Quick => (&[3], &[2, 4, 8]),
@@ -315,7 +315,7 @@ mod tests {
     fn a_seam_reflects_less_than_its_limit_and_a_contrast_what_theory_says() {
         let crossing = Crossing {
             method: Method::Splice,
-            law: StripLaw::BondBased(Micromodulus::InverseDistance),
+            law: Law::BondBased(Micromodulus::InverseDistance),
             ratio: 3,
             transition: 2,
             width: 4,

@@ -1,23 +1,19 @@
 //! A bar of square section with free sides: peridynamic throughout, and with a skin of finite elements one cell thick.
 
-use std::sync::Arc;
-
 use crate::{
     Effort,
-    enclosed::{INFLUENCE, Law, SPACING},
+    enclosed::{INFLUENCE, Law, POISSON, SPACING, YOUNGS_MODULUS},
+    meshes::scene,
+    typed,
 };
 use bondline::{
-    coupling::{
-        Coupling, Model, Nonlocal, Peridynamics, PointSource, Problem, SiteKind, Surfaces,
-        Truncated, Zone,
-    },
-    mesh::generate::{Axis, Grid},
+    coupling::SiteKind,
     observe::report::{Columns, Row, Table},
-    peridynamics::{BondWeights, Micromodulus, PartialVolume},
+    peridynamics::Micromodulus,
     progress::{Progress, Silent},
     solve::statics::{self, StaticParams, StaticProblem},
     system::Symmetry,
-    tensor::{Tensor4, Vector, padded},
+    tensor::{Vector, padded},
 };
 
 /// Largest error of an affine field, of Young's modulus and of Poisson's ratio with a skin.
@@ -35,56 +31,25 @@ struct Pulled {
 }
 
 /// Pulls the bar by its ends; what it shows is compared with the tensor of its elements.
-fn pull(
-    coupling: Box<dyn Coupling<3>>,
-    law: Law,
-    ratio: u32,
-    weights: BondWeights,
-) -> Result<Pulled, String> {
+fn pull(coupling: &str, law: Law, ratio: u32, weights: &str) -> Result<Pulled, String> {
     let half: [f64; 3] = std::array::from_fn(|i| 0.5 * CELLS[i] as f64 * SPACING);
-    let mesh = Grid::<3>::new(std::array::from_fn(|i| Axis::Uniform {
-        min: -half[i],
-        max: half[i],
-        cells: CELLS[i],
-    }))
-    .mesh()
-    .map_err(|e| e.to_string())?;
-    let skin = mesh.cells_at_boundary();
-    let zones = skin
-        .iter()
-        .map(|&s| if s { Zone::Local } else { Zone::Nonlocal })
-        .collect();
-    let (lambda, mu) = law.lame::<3>();
-    let horizon = f64::from(ratio) * SPACING;
-    let problem = Problem {
-        cell_material: vec![0; mesh.cell_count()],
-        zones,
-        mesh,
-        tensors: vec![Tensor4::isotropic(lambda, mu)],
-        peridynamic_material: 0,
-        peridynamics: Some(Peridynamics {
-            law: law.law(),
-            horizon: Arc::new(move |_| horizon),
-            points: PointSource::Lattice {
-                spacing: SPACING,
-                origin: Vector::repeat(0.5 * SPACING),
-            },
-            weights,
-            volumes: PartialVolume::Full,
-            barriers: Vec::new(),
-            voids: Vec::new(),
-            surfaces: Surfaces::Cut,
-        }),
-        coupling,
-    };
-    let (model, coupling) = Model::new(problem, &Silent).map_err(|e| e.to_string())?;
+    let text = format!(
+        "kinematics = \"solid\"\ncoupling = \"{coupling}\"\n{}{}[peridynamics]\nhorizon = {:?}\npoints.lattice = {{ spacing = {SPACING}, origin = {} }}\nweights = \"{weights}\"\n{}[zones]\nnonlocal = {{ everywhere = true }}\nskin = \"free-surfaces\"\n{}",
+        typed::grid(half.map(|h| -h), half, CELLS),
+        typed::material(law, YOUNGS_MODULUS, POISSON),
+        f64::from(ratio) * SPACING,
+        typed::place([0.5 * SPACING; 3]),
+        typed::law_line(law),
+        typed::FREE
+    );
+    let laid = scene::model::<3>(&text, &[]).map_err(|e| e.to_string())?;
+    let model = &laid.model;
     // uniaxial stress of the tensor that the elements have
     let c = model.tensor_of_cell(0);
     let (c11, c12) = (c.get(0, 0, 0, 0), c.get(0, 0, 1, 1));
     let ratio = c12 / (c11 + c12);
     let modulus = c11 - 2.0 * c12 * ratio;
-    let operator = coupling.operator(&model).map_err(|e| e.to_string())?;
-    let stiffness = model.assemble(operator.as_ref(), &Silent);
+    let stiffness = laid.stiffness().map_err(|e| e.to_string())?;
     let exact = |x: &Vector<3>| Vector::<3>::new(x[0], -ratio * x[1], -ratio * x[2]) * STRETCH;
     // both ends are held along x only; what is free of rigid motion, by the four lines in the middle of the ends' edges
     let layer = |x: f64, at: f64| (x.abs() - at).abs() < 0.6 * SPACING;
@@ -162,9 +127,6 @@ fn pull(
     })
 }
 
-/// Makes a coupling.
-type Make = fn() -> Box<dyn Coupling<3>>;
-
 /// The table of both bars, with isotropic and with plain weights.
 pub fn table(progress: &dyn Progress) -> Table {
     progress.stage("skin", None);
@@ -172,32 +134,27 @@ pub fn table(progress: &dyn Progress) -> Table {
         "3D bar with free sides, pulled at its ends: relative errors of the affine field, Young's modulus and Poisson's ratio, signed: positive is too stiff (as typed with isotropic weights, of the lattice's tensor with plain ones)",
         Columns::ByQuantity,
     );
-    let bars: [(&str, Make, bool); 2] = [
-        ("skin of elements", || Box::new(Truncated::default()), true),
-        ("peridynamics alone", || Box::new(Nonlocal), false),
+    let bars = [
+        ("skin of elements", "truncated", true),
+        ("peridynamics alone", "nonlocal", false),
     ];
+    let (state_based, pairwise) = (
+        Law::StateBased(INFLUENCE),
+        Law::BondBased(Micromodulus::InverseDistance),
+    );
     // with m = 3 bonds leave the body through the skin
     let cases = [
-        (Law::StateBased(INFLUENCE), 2, BondWeights::Isotropic),
-        (Law::StateBased(INFLUENCE), 2, BondWeights::Plain),
-        (Law::StateBased(INFLUENCE), 3, BondWeights::Isotropic),
-        (Law::StateBased(INFLUENCE), 3, BondWeights::Plain),
-        (
-            Law::BondBased(Micromodulus::InverseDistance),
-            3,
-            BondWeights::Isotropic,
-        ),
-        (
-            Law::BondBased(Micromodulus::InverseDistance),
-            3,
-            BondWeights::Plain,
-        ),
+        (state_based, 2, "isotropic"),
+        (state_based, 2, "plain"),
+        (state_based, 3, "isotropic"),
+        (state_based, 3, "plain"),
+        (pairwise, 3, "isotropic"),
+        (pairwise, 3, "plain"),
     ];
     for (law, ratio, weights) in cases {
         for (what, coupling, limited) in &bars {
-            let kind = format!("{weights:?}").to_lowercase();
-            let name = format!("{}, m = {ratio}, {kind} weights, {what}", law.name());
-            match pull(coupling(), law, ratio, weights) {
+            let name = format!("{}, m = {ratio}, {weights} weights, {what}", law.name());
+            match pull(coupling, law, ratio, weights) {
                 Ok(p) => {
                     for (quantity, value) in [
                         ("field", p.field),

@@ -6,8 +6,8 @@
 use rayon::prelude::*;
 
 use crate::Effort;
-use crate::enclosed::{INFLUENCE, Method};
-use crate::strip::{Kind, Strip, StripCase, StripLaw};
+use crate::enclosed::{INFLUENCE, Law, Method};
+use crate::strip::{Kind, Strip, StripCase};
 use bondline::coupling::{BlendingFunction, FitDegree};
 use bondline::observe::report::{Columns, Row, Table, Verdict};
 use bondline::peridynamics::influence::{Alpha, Degree};
@@ -41,7 +41,7 @@ impl Horizon {
 }
 
 /// The strip in 1D of which the spectra are computed.
-pub fn case(kind: Kind, law: StripLaw, ratio: u32) -> StripCase {
+pub fn case(kind: Kind, law: Law, ratio: u32) -> StripCase {
     StripCase {
         kind,
         law,
@@ -64,9 +64,9 @@ pub fn influence_name(influence: Influence) -> String {
     }
 }
 
-fn law_name(law: StripLaw) -> String {
+fn law_name(law: Law) -> String {
     match law {
-        StripLaw::BondBased(m) => format!(
+        Law::BondBased(m) => format!(
             "bond-based {}",
             match m {
                 Micromodulus::InverseDistance => "inverse distance".to_owned(),
@@ -76,8 +76,8 @@ fn law_name(law: StripLaw) -> String {
                 Micromodulus::Influence(w) => influence_name(w),
             }
         ),
-        StripLaw::Lps(w) => format!("LPS {}", influence_name(w)),
-        StripLaw::Correspondence(w) => format!("correspondence {}", influence_name(w)),
+        Law::StateBased(w) => format!("LPS {}", influence_name(w)),
+        Law::Correspondence(w) => format!("correspondence {}", influence_name(w)),
     }
 }
 
@@ -95,21 +95,21 @@ pub fn influences() -> Vec<Influence> {
     all
 }
 
-fn laws(effort: Effort) -> Vec<StripLaw> {
+fn laws(effort: Effort) -> Vec<Law> {
     let mut laws = vec![
-        StripLaw::BondBased(Micromodulus::InverseDistance),
-        StripLaw::BondBased(Micromodulus::Constant),
-        StripLaw::BondBased(Micromodulus::Triangular),
+        Law::BondBased(Micromodulus::InverseDistance),
+        Law::BondBased(Micromodulus::Constant),
+        Law::BondBased(Micromodulus::Triangular),
     ];
     match effort {
         Effort::Quick => laws.extend([
-            StripLaw::Lps(INFLUENCE),
-            StripLaw::Lps(Influence::Gaussian),
-            StripLaw::Correspondence(INFLUENCE),
+            Law::StateBased(INFLUENCE),
+            Law::StateBased(Influence::Gaussian),
+            Law::Correspondence(INFLUENCE),
         ]),
         Effort::Full => {
-            laws.extend(influences().into_iter().map(StripLaw::Lps));
-            laws.extend(influences().into_iter().map(StripLaw::Correspondence));
+            laws.extend(influences().into_iter().map(Law::StateBased));
+            laws.extend(influences().into_iter().map(Law::Correspondence));
         }
     }
     laws
@@ -137,7 +137,7 @@ fn kinds() -> Vec<Kind> {
 
 fn partial_stress() -> [Kind; 3] {
     [
-        Method::Meshfree(INFLUENCE),
+        Method::Meshfree,
         Method::Elements(FitDegree::Affine),
         Method::Elements(FitDegree::Quadratic),
     ]
@@ -158,7 +158,7 @@ fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row 
             verdict: Verdict::Refused,
             reason: Some(
                 match case.kind {
-                    Kind::Coupled(Method::Meshfree(_) | Method::Elements(_)) => REMEDY,
+                    Kind::Coupled(Method::Meshfree | Method::Elements(_)) => REMEDY,
                     _ => REMEDY_SEAM,
                 }
                 .to_owned(),
@@ -205,7 +205,7 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
         Effort::Quick => vec![2, 3, 4],
         Effort::Full => vec![2, 3, 4, 5, 6],
     };
-    let of = |kind: Kind, law: StripLaw, horizon: Horizon| -> (String, Vec<StripCase>) {
+    let of = |kind: Kind, law: Law, horizon: Horizon| -> (String, Vec<StripCase>) {
         let name = format!("{}, {}, {}", kind.name(), law_name(law), horizon.name());
         let cases = ratios
             .iter()
@@ -241,9 +241,9 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
 
 /// A small strip in two dimensions, with free sides.
 fn plane(effort: Effort) -> Table {
-    let law = StripLaw::BondBased(Micromodulus::InverseDistance);
-    let triangular = StripLaw::BondBased(Micromodulus::Triangular);
-    let lps = StripLaw::Lps(INFLUENCE);
+    let law = Law::BondBased(Micromodulus::InverseDistance);
+    let triangular = Law::BondBased(Micromodulus::Triangular);
+    let lps = Law::StateBased(INFLUENCE);
     let mut cases = Vec::new();
     for law in [law, triangular, lps] {
         for kind in kinds().into_iter().chain(partial_stress()) {
@@ -307,11 +307,11 @@ pub fn limit_by_growth(strip: &Strip, guess: f64) -> f64 {
 /// Certified and default step against the limit by eigenvalues and by bisection.
 fn steps(effort: Effort) -> Table {
     let laws = match effort {
-        Effort::Quick => vec![StripLaw::BondBased(Micromodulus::Triangular)],
+        Effort::Quick => vec![Law::BondBased(Micromodulus::Triangular)],
         Effort::Full => vec![
-            StripLaw::BondBased(Micromodulus::Triangular),
-            StripLaw::BondBased(Micromodulus::InverseDistance),
-            StripLaw::Lps(INFLUENCE),
+            Law::BondBased(Micromodulus::Triangular),
+            Law::BondBased(Micromodulus::InverseDistance),
+            Law::StateBased(INFLUENCE),
         ],
     };
     let mut cases = Vec::new();
@@ -389,12 +389,12 @@ mod tests {
 
     #[test]
     fn what_is_promised_is_stable_and_the_rest_is_refused() {
-        let stable = StripLaw::BondBased(Micromodulus::Triangular);
-        let wrong = StripLaw::BondBased(Micromodulus::Constant);
+        let stable = Law::BondBased(Micromodulus::Triangular);
+        let wrong = Law::BondBased(Micromodulus::Constant);
         for kind in [
             Kind::Coupled(Method::Splice),
             Kind::Coupled(Method::Blending(BlendingFunction::Smooth)),
-            Kind::Coupled(Method::Meshfree(INFLUENCE)),
+            Kind::Coupled(Method::Meshfree),
         ] {
             let row = row::<1>(String::new(), String::new(), &case(kind, stable, 3));
             assert_eq!(row.verdict, Verdict::Pass, "{kind:?} {}", row.value);
@@ -402,7 +402,7 @@ mod tests {
         // a constant micromodulus has a partial stress of the wrong sign for short waves; in meshfree form a scene pairs it with a Gaussian, whose sign turns with it
         for kind in partial_stress() {
             let row = row::<1>(String::new(), String::new(), &case(kind, wrong, 3));
-            if matches!(kind, Kind::Coupled(Method::Meshfree(_))) {
+            if matches!(kind, Kind::Coupled(Method::Meshfree)) {
                 assert_eq!(row.verdict, Verdict::Pass, "{kind:?} {}", row.value);
                 continue;
             }
@@ -416,7 +416,7 @@ mod tests {
 
     #[test]
     fn the_step_by_growth_is_that_of_the_eigenvalues() {
-        let law = StripLaw::BondBased(Micromodulus::InverseDistance);
+        let law = Law::BondBased(Micromodulus::InverseDistance);
         for kind in [Kind::Local, Kind::Coupled(Method::Splice)] {
             let rows = step_rows("", &case(kind, law, 3));
             assert!(

@@ -4,70 +4,11 @@
 
 use std::fmt::Write as _;
 
-use crate::enclosed::Method;
+use crate::enclosed::{Law, Method};
 use crate::meshes::scene;
-use bondline::coupling::{BlendingFunction, FitDegree};
-use bondline::peridynamics::influence::{Alpha, Degree};
-use bondline::peridynamics::{Influence, Micromodulus};
+use crate::typed;
 use bondline::run::LinearModel;
 use bondline::system::LinearMotion;
-
-/// The law of the points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum StripLaw {
-    /// Bond-based.
-    BondBased(Micromodulus),
-    /// Linear peridynamic solid, Poisson ratio 1/4.
-    Lps(Influence),
-    /// Correspondence, stabilised with 1, Poisson ratio 1/4.
-    Correspondence(Influence),
-}
-
-impl StripLaw {
-    /// The material's table, and the influence function where the law has one.
-    fn text(self, dimension: usize) -> (String, String) {
-        // λ = μ and C_1111 = 1: ν = 1/4 in the plane; in a bar 1/2, which no solid quite has
-        let (modulus, ratio) = match dimension {
-            1 => (1.0, 0.4999999),
-            _ => (5.0 / 6.0, 0.25),
-        };
-        let ratio = format!("poisson-ratio = {ratio}");
-        let table = |name: &str, rest: &str| {
-            format!("[materials.m.{name}]\nyoungs-modulus = {modulus}\ndensity = 1\n{rest}\n")
-        };
-        let influence = |w| format!("influence = {}\n", influence(w));
-        match self {
-            Self::BondBased(kernel) => {
-                let kernel = match kernel {
-                    Micromodulus::InverseDistance => "\"inverse-distance\"".to_owned(),
-                    Micromodulus::Uniform => "\"uniform\"".to_owned(),
-                    Micromodulus::Constant => "\"constant\"".to_owned(),
-                    Micromodulus::Triangular => "\"triangular\"".to_owned(),
-                    Micromodulus::Influence(w) => {
-                        format!("{{ influence = {} }}", self::influence(w))
-                    }
-                };
-                (
-                    table("bond-based", &format!("micromodulus = {kernel}")),
-                    String::new(),
-                )
-            }
-            Self::Lps(w) => (table("lps", &ratio), influence(w)),
-            Self::Correspondence(w) => (table("correspondence", &ratio), influence(w)),
-        }
-    }
-}
-
-/// An influence function as a scene has it.
-fn influence(w: Influence) -> String {
-    match w {
-        Influence::Gaussian => "\"gaussian\"".to_owned(),
-        Influence::Polynomial { degree, alpha } => {
-            let alpha = u8::from(alpha == Alpha::One);
-            format!("{{ degree = {}, alpha = {alpha} }}", Degree::order(degree))
-        }
-    }
-}
 
 /// What holds along the strip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,30 +33,10 @@ impl Kind {
 
     /// The coupling as a scene has it.
     fn text(self) -> String {
-        let beta = |function| match function {
-            BlendingFunction::Constant => "constant",
-            BlendingFunction::Linear => "linear",
-            BlendingFunction::Smooth => "smooth",
-        };
-        let method = match self {
-            Self::Local => return "\"local\"".to_owned(),
-            Self::Nonlocal => return "\"nonlocal\"".to_owned(),
-            Self::Coupled(method) => method,
-        };
-        match method {
-            Method::Splice => "\"splice\"".to_owned(),
-            Method::Truncated => "\"truncated\"".to_owned(),
-            Method::Balanced => "\"balanced\"".to_owned(),
-            Method::Blending(f) => format!("{{ blending = {{ beta = \"{}\" }} }}", beta(f)),
-            Method::BalancedOver(f) => format!("{{ balanced = {{ beta = \"{}\" }} }}", beta(f)),
-            Method::Meshfree(_) => "{ partial-stress = { form = \"meshfree\" } }".to_owned(),
-            Method::Elements(fit) => {
-                let fit = match fit {
-                    FitDegree::Affine => "affine",
-                    FitDegree::Quadratic => "quadratic",
-                };
-                format!("{{ partial-stress = {{ interface = \"{fit}\" }} }}")
-            }
+        match self {
+            Self::Local => "\"local\"".to_owned(),
+            Self::Nonlocal => "\"nonlocal\"".to_owned(),
+            Self::Coupled(method) => typed::coupling(method),
         }
     }
 }
@@ -125,8 +46,8 @@ impl Kind {
 pub struct StripCase {
     /// What holds along it.
     pub kind: Kind,
-    /// The law of the points.
-    pub law: StripLaw,
+    /// The law of the points; λ = μ.
+    pub law: Law,
     /// m = δ/h in the peridynamic zone.
     pub ratio: f64,
     /// δ/h where the transition meets the finite elements; the horizon runs straight between. Equal to `ratio` for a constant horizon.
@@ -190,24 +111,25 @@ impl StripCase {
         let borders = self.borders();
         let cell = self.cell.max(1);
         let width = self.across * cell;
-        let (material, influence) = self.law.text(D);
-        let along = self.lengths.iter().sum::<u32>() / cell;
-        let (kinematics, mesh) = match D {
-            1 => (
-                "bar",
-                format!("line]\nmin = 0\nmax = {}\nx.cells = {along}\n", borders[5]),
-            ),
-            _ => (
-                "plane-strain",
-                format!(
-                    "rectangle]\nmin = [0, 0]\nmax = [{}, {width}]\nx.cells = {along}\ny.cells = {}\n",
-                    borders[5], self.across
-                ),
-            ),
+        // λ = μ and C_1111 = 1: ν = 1/4 in the plane; in a bar 1/2, which no solid quite has
+        let material = match D {
+            1 => typed::material(self.law, 1.0, 0.4999999),
+            _ => typed::material(self.law, 5.0 / 6.0, 0.25),
         };
+        let influence = typed::law_line(self.law);
+        let along = self.lengths.iter().sum::<u32>() / cell;
+        let (length, width) = (borders[5], f64::from(width));
+        let cells = [along as usize, self.across as usize];
+        let mesh = typed::grid::<D>(
+            [0.0; D],
+            std::array::from_fn(|k| [length, width][k]),
+            std::array::from_fn(|k| cells[k]),
+        );
         let mut text = format!(
-            "kinematics = \"{kinematics}\"\ncoupling = {}\n[mesh.{mesh}{material}[solve.explicit]\nduration = 1\n[output]\nvtu = false\n",
-            self.kind.text()
+            "kinematics = \"{}\"\ncoupling = {}\n{mesh}{material}{}[output]\nvtu = false\n",
+            typed::kinematics::<D>(),
+            self.kind.text(),
+            typed::FREE
         );
         if self.kind != Kind::Local {
             let horizon = match self.ratio == self.edge_ratio {
@@ -223,19 +145,18 @@ impl StripCase {
                     (borders[4] - borders[3]).max(1.0)
                 ),
             };
-            let origin = if D == 1 { "0" } else { "[0, 0]" };
+            let origin = typed::place([0.0; D]);
             let _ = write!(
                 text,
                 "[peridynamics]\nhorizon = {horizon}\npoints.lattice = {{ spacing = 1, origin = {origin} }}\n{influence}"
             );
         }
         if let Kind::Coupled(method) = self.kind {
-            let part = |from: f64, to: f64| match D {
-                1 => format!("{{ box = {{ min = {from}, max = {to} }} }}"),
-                _ => format!(
-                    "{{ box = {{ min = [{from}, -1], max = [{to}, {}] }} }}",
-                    width + 1
-                ),
+            let part = |from: f64, to: f64| {
+                typed::cuboid::<D>(
+                    std::array::from_fn(|k| [from, -1.0][k]),
+                    std::array::from_fn(|k| [to, width + 1.0][k]),
+                )
             };
             let _ = writeln!(text, "[zones]\nnonlocal = {}", part(borders[2], borders[3]));
             if method.has_transition() {

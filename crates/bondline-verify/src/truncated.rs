@@ -1,7 +1,5 @@
 //! Truncated bonds, measured: symmetry, definiteness, affine fields, equilibrium, order in the horizon, and what a symmetric matrix saves.
 
-use std::sync::Arc;
-
 mod compared;
 mod zones;
 
@@ -10,13 +8,15 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::Effort;
-use crate::enclosed::{Case, Cells, Enclosed, INFLUENCE, Law, Method, Widths, YOUNGS_MODULUS};
+use crate::enclosed::{
+    self, Case, Cells, Enclosed, EnclosedError, INFLUENCE, Law, Method, Otherwise, Widths,
+};
 use crate::patch::affine_residual_where;
 use crate::tangents::momentum;
 use bondline::coupling::SiteKind;
 use bondline::fem::{self, Locator};
 use bondline::observe::report::{Columns, Row, Table};
-use bondline::peridynamics::{LinearPeridynamicSolid, Micromodulus};
+use bondline::peridynamics::Micromodulus;
 use bondline::progress::{Progress, Silent};
 use bondline::solve::FreeDofs;
 use bondline::solve::direct::{Analysis, Factor};
@@ -60,16 +60,39 @@ impl Material {
         }
     }
 
-    fn law<const D: usize>(self) -> Arc<dyn bondline::peridynamics::Law<D>> {
+    fn law(self) -> Law {
         match self {
-            Self::Pairwise(kernel) => Law::BondBased(kernel).law(),
-            Self::Lps(nu) => {
-                let e = YOUNGS_MODULUS;
-                let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
-                let mu = e / (2.0 * (1.0 + nu));
-                Arc::new(LinearPeridynamicSolid::new(INFLUENCE, lambda, mu))
-            }
+            Self::Pairwise(kernel) => Law::BondBased(kernel),
+            Self::Lps(_) => Law::StateBased(INFLUENCE),
         }
+    }
+
+    fn poisson_ratio(self) -> f64 {
+        match self {
+            Self::Pairwise(_) => enclosed::POISSON,
+            Self::Lps(nu) => nu,
+        }
+    }
+
+    /// A block of this material, by the case's coupling or the one that is typed.
+    fn block<const D: usize>(
+        self,
+        case: &Case,
+        coupling: Option<&str>,
+        tables: &str,
+    ) -> Result<Enclosed<D>, EnclosedError> {
+        let case = Case {
+            law: self.law(),
+            ..*case
+        };
+        Enclosed::with(
+            &case,
+            &Otherwise {
+                coupling,
+                poisson_ratio: Some(self.poisson_ratio()),
+                tables,
+            },
+        )
     }
 
     /// Whether the matrix has to be positive definite.
@@ -152,8 +175,7 @@ fn property_rows<const D: usize>(case: &Case, material: Material) -> Vec<Row> {
         case.cells.name(),
         2 * case.widths.nonlocal
     );
-    let coupling = case.method.coupling::<D>();
-    let e = match Enclosed::<D>::with(case, coupling, material.law()) {
+    let e = match material.block::<D>(case, None, "") {
         Ok(e) => e,
         Err(e) => {
             return vec![
@@ -336,20 +358,13 @@ fn solve<const D: usize>(e: &Enclosed<D>, symmetry: Symmetry) -> Result<Solved, 
 }
 
 /// Relative root-mean-square difference from the solution of finite elements alone on the same mesh, over all sites of the coupled model.
-fn difference<const D: usize>(
-    case: &Case,
-    material: Material,
-    coupled: &Method,
-) -> Result<f64, String> {
-    let text = |e: crate::enclosed::EnclosedError| e.to_string();
-    let e = Enclosed::<D>::with(case, coupled.coupling(), material.law()).map_err(text)?;
-    let local = Enclosed::<D>::with(case, Box::new(bondline::coupling::Local), material.law())
-        .map_err(text)?;
-    let symmetry = match coupled {
-        Method::Truncated => Symmetry::Symmetric,
-        _ => Symmetry::Unsymmetric,
+fn difference<const D: usize>(case: &Case, material: Material) -> Result<f64, String> {
+    let block = |coupling| {
+        let built = material.block::<D>(case, coupling, "");
+        built.map_err(|e| e.to_string())
     };
-    let u = solve(&e, symmetry)?.displacement;
+    let (e, local) = (block(None)?, block(Some("\"local\""))?);
+    let u = solve(&e, e.coupling.symmetry())?.displacement;
     let v = solve(&local, Symmetry::Symmetric)?.displacement;
     let mesh = &local.model.mesh;
     let locator = Locator::new(mesh, 0..mesh.cell_count());
@@ -398,7 +413,7 @@ fn order_rows<const D: usize>(table: &mut Table, effort: Effort, progress: &dyn 
                         method,
                         ..block::<D>(Cells::Matching, n / 2, n / 2, ratio)
                     };
-                    difference::<D>(&case, material, &method)
+                    difference::<D>(&case, material)
                 })
                 .collect();
             let name = format!("{D}D {}, m = {ratio}, {}", material.name(), method.name());
@@ -449,7 +464,7 @@ fn saving_rows<const D: usize>(table: &mut Table, half: u32, ratio: u32) {
             ..block::<D>(Cells::Matching, half / 2, half - half / 2, ratio)
         };
         let start = Instant::now();
-        let e = match Enclosed::<D>::with(&case, method.coupling(), Material::Lps(0.3).law()) {
+        let e = match Material::Lps(0.3).block::<D>(&case, None, "") {
             Ok(e) => e,
             Err(e) => {
                 table.push(Row::info(method.name(), "seconds", f64::NAN).because(e.to_string()));

@@ -3,32 +3,28 @@
 //! Source: [SAND2015-7998] section 7.2, figures 7.1 to 7.3. A displacement is prescribed, and the acceleration that the internal force gives is
 //! compared with `E u″/ρ`. The text prints E and ν; length, horizons and density are assumptions, stated in `docs/bars.md`.
 
-use std::{path::Path, sync::Arc};
+use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::Effort;
+use crate::{
+    Effort,
+    enclosed::{Law, Method},
+    meshes::scene::{self, SceneFailure},
+    typed,
+};
 use bondline::{
     assembly::Row as MatrixRow,
-    coupling::{
-        Coupling, Model, ModelError, Nonlocal, PartialStressMeshfree, Peridynamics, PointSource,
-        Problem, Surfaces, Zone,
-    },
-    material::{Elastic, Kinematics, MaterialError},
-    mesh::{
-        MeshError,
-        generate::{Axis, Grid},
-    },
     observe::{
         ObserveError,
         report::{Columns, Row, Table},
     },
     peridynamics::{
-        Law, BondWeights, Correspondence, Influence, LinearPeridynamicSolid, PartialVolume,
+        Influence,
         influence::{Alpha, Degree},
     },
     progress::Progress,
-    tensor::{Tensor4, Vector},
+    tensor::Vector,
 };
 use bondline_study::figure::{LinePlot, Series, Stroke};
 
@@ -59,6 +55,9 @@ pub fn horizon(x: f64) -> f64 {
     LARGE + (SMALL - LARGE) * ramp
 }
 
+/// The same as a scene types it.
+pub const HORIZON: &str = "0.25 - 0.15 * max(0, min(1, abs(x) - 2))";
+
 /// The laws that the bar is run with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BarLaw {
@@ -76,24 +75,19 @@ impl BarLaw {
         }
     }
 
-    fn law<const D: usize>(self) -> Result<(Arc<dyn Law<D>>, Tensor4<D>), MaterialError> {
-        let kinematics = if D == 1 {
-            Kinematics::Bar
-        } else {
-            Kinematics::Solid
-        };
-        let (lambda, mu) = Elastic::new(YOUNGS_MODULUS, 0.0, DENSITY)?.lame::<D>(kinematics)?;
-        let law: Arc<dyn Law<D>> = match self {
-            Self::Correspondence => {
-                Arc::new(Correspondence::new(Influence::Gaussian, lambda, mu, 0.0))
-            }
-            Self::Lps => Arc::new(LinearPeridynamicSolid::new(OMEGA, lambda, mu)),
-        };
-        Ok((law, Tensor4::isotropic(lambda, mu)))
+    /// The law, and what further of its material a scene types.
+    fn law(self) -> (Law, &'static str) {
+        match self {
+            Self::Correspondence => (
+                Law::Correspondence(Influence::Gaussian),
+                "stabilisation = 0\n",
+            ),
+            Self::Lps => (Law::StateBased(OMEGA), ""),
+        }
     }
 }
 
-/// ω of the LPS and of the divergence: `P_1/|ξ|`.
+/// ω of the LPS, and of the divergence beside it: `P_1/|ξ|`.
 const OMEGA: Influence = Influence::Polynomial {
     degree: Degree::P1,
     alpha: Alpha::One,
@@ -116,10 +110,11 @@ impl BarModel {
         }
     }
 
-    fn coupling<const D: usize>(self) -> Box<dyn Coupling<D>> {
+    /// The coupling as a scene types it.
+    fn coupling(self) -> String {
         match self {
-            Self::Standard => Box::new(Nonlocal),
-            Self::PartialStress => Box::new(PartialStressMeshfree { influence: OMEGA }),
+            Self::Standard => "\"nonlocal\"".to_owned(),
+            Self::PartialStress => typed::coupling(Method::Meshfree),
         }
     }
 }
@@ -151,74 +146,49 @@ pub fn linear_scale() -> f64 {
     SLOPE * YOUNGS_MODULUS / (DENSITY * LENGTH)
 }
 
-/// Why the bar could not be computed.
-#[derive(Debug, thiserror::Error)]
-pub enum BarError {
-    /// Its mesh.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// Its material.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
-    /// Its families.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-}
-
 /// Accelerations of the points on the axis of a bar of `D` dimensions, of points `spacing` apart and of a square section of
 /// `across` (odd) points a side (without meaning in 1D).
 ///
 /// # Errors
-/// [`BarError`], with what its part says.
+/// [`SceneFailure`] of its scene or model.
 pub fn profile<const D: usize>(
     law: BarLaw,
     model: BarModel,
     spacing: f64,
     across: usize,
-    horizon: fn(f64) -> f64,
+    horizon: &str,
     progress: &dyn Progress,
-) -> Result<Profile, BarError> {
-    let half = 0.5 * across as f64 * spacing;
-    let axes: [Axis; D] = std::array::from_fn(|k| match k {
-        0 => Axis::Uniform {
-            min: -0.5 * LENGTH,
-            max: 0.5 * LENGTH,
-            cells: (LENGTH / spacing).round() as usize,
-        },
-        _ => Axis::Uniform {
-            min: -half,
-            max: half,
-            cells: across,
-        },
-    });
-    let mesh = Grid::new(axes).mesh()?;
-    let cells = mesh.cell_count();
-    let (bond_law, tensor) = law.law::<D>()?;
-    let problem = Problem {
-        zones: vec![Zone::Transition; cells],
-        tensors: vec![tensor],
-        cell_material: vec![0; cells],
-        peridynamic_material: 0,
-        peridynamics: Some(Peridynamics {
-            law: bond_law,
-            horizon: Arc::new(move |x: &Vector<D>| horizon(x[0])),
-            points: PointSource::Lattice {
-                spacing,
-                origin: Vector::from_fn(|k, _| {
-                    0.5 * spacing - if k == 0 { 0.5 * LENGTH } else { half }
-                }),
-            },
-            weights: BondWeights::Isotropic,
-            volumes: PartialVolume::Full,
-            barriers: Vec::new(),
-            voids: Vec::new(),
-            surfaces: Surfaces::Uncut,
-        }),
-        coupling: model.coupling(),
-        mesh,
+) -> Result<Profile, SceneFailure> {
+    let section = 0.5 * across as f64 * spacing;
+    let half: [f64; D] = std::array::from_fn(|k| [0.5 * LENGTH, section][k.min(1)]);
+    let cells = (LENGTH / spacing).round() as usize;
+    let (bond_law, rest) = law.law();
+    // partial stress everywhere but at one end, out of reach of what is looked at: a scene has a nonlocal zone
+    let last = std::array::from_fn(|k| if k == 0 { half[0] - SMALL } else { -half[k] });
+    let text = format!(
+        "kinematics = \"{}\"\ncoupling = {}\n{}{}{rest}[peridynamics]\nhorizon = \"{horizon}\"\npoints.lattice = {{ spacing = {spacing:?}, origin = {} }}\n{}{}[zones]\nnonlocal = {}\ntransition = {{ everywhere = true }}\n{}",
+        typed::kinematics::<D>(),
+        model.coupling(),
+        typed::grid(
+            half.map(|h| -h),
+            half,
+            std::array::from_fn(|k| [cells, across][k.min(1)])
+        ),
+        typed::material(bond_law, YOUNGS_MODULUS, 0.0),
+        typed::place(half.map(|h| 0.5 * spacing - h)),
+        typed::law_line(bond_law),
+        typed::UNCUT,
+        typed::cuboid(last, half),
+        typed::FREE
+    );
+    progress.stage("sites and bonds", None);
+    let laid = scene::model::<D>(&text, &[])?;
+    let bar = &laid.model;
+    let operator = laid.coupling.operator(bar).map_err(SceneFailure::from)?;
+    let horizon = |x: f64| {
+        let at = Vector::from_fn(|k, _| if k == 0 { x } else { 0.0 });
+        (bar.peridynamics.as_ref()).map_or(0.0, |p| (p.horizon)(&at))
     };
-    let (bar, coupling) = Model::new(problem, progress)?;
-    let operator = coupling.operator(&bar)?;
     let field = |f: fn(f64) -> f64| -> Vec<f64> {
         bar.sites
             .iter()
@@ -309,7 +279,7 @@ fn dimension<const D: usize>(
     for &law in laws {
         for model in [BarModel::PartialStress, BarModel::Standard] {
             let case = format!("{D}D {}, {}", law.name(), model.name());
-            match profile::<D>(law, model, spacing, across, horizon, progress) {
+            match profile::<D>(law, model, spacing, across, HORIZON, progress) {
                 Ok(p) => {
                     rows(&case, model, &p, table);
                     if counted.replace(p.bonds).is_none() {
@@ -345,7 +315,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         BarModel::Standard,
         SPACING_1D,
         1,
-        |_| LARGE,
+        "0.25",
         progress,
     );
     if let Ok(p) = constant {
@@ -478,7 +448,7 @@ fn directed_bonds(cells: [i64; 3], ratio: f64) -> i64 {
 pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<(), FigureError> {
     let h = SPACING_1D;
     let profiles = [BarModel::Standard, BarModel::PartialStress].map(|model| {
-        profile::<1>(BarLaw::Correspondence, model, h, 1, horizon, progress)
+        profile::<1>(BarLaw::Correspondence, model, h, 1, HORIZON, progress)
             .map(|p| (model.name(), p))
     });
     let [standard, partial] = profiles;
@@ -532,7 +502,7 @@ pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<(), FigureError
 pub enum FigureError {
     /// The bar.
     #[error(transparent)]
-    Bar(#[from] BarError),
+    Bar(#[from] SceneFailure),
     /// The file.
     #[error(transparent)]
     Write(#[from] ObserveError),
@@ -548,14 +518,14 @@ mod tests {
         // E u'' / rho = 200e9 * 2e-3 / 7800, by hand
         assert!((exact_acceleration() - 51_282.051_282_051_28).abs() < 1e-9);
         for law in [BarLaw::Correspondence, BarLaw::Lps] {
-            let p = profile::<1>(law, BarModel::PartialStress, 0.05, 1, horizon, &Silent).unwrap();
+            let p = profile::<1>(law, BarModel::PartialStress, 0.05, 1, HORIZON, &Silent).unwrap();
             assert!(p.x.len() > 180 && p.x[0] < -4.7);
             for (l, q) in p.linear.iter().zip(&p.quadratic) {
                 assert!(l.abs() < 1e-8 * linear_scale(), "{law:?} {l}");
                 assert!((q / exact_acceleration() - 1.0).abs() < 1e-8, "{law:?} {q}");
             }
             // ghost forces where the horizon varies, and nowhere else
-            let s = profile::<1>(law, BarModel::Standard, 0.05, 1, horizon, &Silent).unwrap();
+            let s = profile::<1>(law, BarModel::Standard, 0.05, 1, HORIZON, &Silent).unwrap();
             for (x, a) in s.x.iter().zip(&s.linear) {
                 if x.abs() < 1.7 || x.abs() > 3.3 {
                     assert!(a.abs() < 1e-8 * linear_scale(), "{law:?} at {x}: {a}");

@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use crate::Effort;
-use crate::enclosed::{INFLUENCE, Method};
-use crate::strip::{Kind, Strip, StripCase, StripLaw};
+use crate::enclosed::{INFLUENCE, Law, Method};
+use crate::strip::{Kind, Strip, StripCase};
 use bondline::observe::report::{Columns, Row, Table};
 use bondline::peridynamics::Micromodulus;
 use bondline::progress::Progress;
@@ -37,7 +37,7 @@ const CLEAR: f64 = 1e-5;
 const WIDTH: f64 = 60.0;
 const ZONE: u32 = 600;
 
-fn strip_case(kind: Kind, law: StripLaw, ratio: u32) -> StripCase {
+fn strip_case(kind: Kind, law: Law, ratio: u32) -> StripCase {
     StripCase {
         kind,
         law,
@@ -236,7 +236,7 @@ pub fn own_energy(strip: &mut Strip, reach: f64) -> Result<OwnEnergy, String> {
 
 fn coupled_rows(name: &str, case: &StripCase) -> Vec<Row> {
     let remedy = match case.kind {
-        Kind::Coupled(Method::Meshfree(_) | Method::Elements(_)) => REMEDY,
+        Kind::Coupled(Method::Meshfree | Method::Elements(_)) => REMEDY,
         _ => REMEDY_SEAM,
     };
     let measured = || -> Result<Vec<Row>, String> {
@@ -264,11 +264,8 @@ fn coupled_rows(name: &str, case: &StripCase) -> Vec<Row> {
 /// Runs the suite.
 pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
     let laws = [
-        (
-            "bond-based",
-            StripLaw::BondBased(Micromodulus::InverseDistance),
-        ),
-        ("LPS P1/r", StripLaw::Lps(INFLUENCE)),
+        ("bond-based", Law::BondBased(Micromodulus::InverseDistance)),
+        ("LPS P1/r", Law::StateBased(INFLUENCE)),
     ];
     let small = |kind, law, across: u32| StripCase {
         lengths: [8, 4, 8, 4, 8],
@@ -343,7 +340,7 @@ mod tests {
             lengths: [30, 6, 30, 6, 30],
             ..strip_case(
                 Kind::Local,
-                StripLaw::BondBased(Micromodulus::InverseDistance),
+                Law::BondBased(Micromodulus::InverseDistance),
                 3,
             )
         };

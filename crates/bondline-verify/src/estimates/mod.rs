@@ -205,7 +205,7 @@ fn ghost_force(progress: &dyn Progress) -> Table {
             model,
             0.025,
             1,
-            |x| 0.2 + 0.06 * x.sin(),
+            "0.2 + 0.06 * sin(x)",
             progress,
         );
         table.push(match bar {

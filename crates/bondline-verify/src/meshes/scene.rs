@@ -1,12 +1,12 @@
-//! A scene as text, run in a folder of its own, and what it summed up.
+//! A scene as text, run in a folder of its own, and what it summed up; or its model alone.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use bondline::coupling::ModelError;
 use bondline::observe::summary::RunSummary;
 use bondline::progress::Silent;
-use bondline::run::AnyScene;
-use bondline::run::{LinearModel, Solved, solve_with};
+use bondline::run::{AnyScene, LinearModel, RunError, SceneModel, Solved, solve_with};
 use bondline::scene::{Scene, Source};
 use bondline::tensor::Vector;
 use bondline_study::Prediction;
@@ -114,6 +114,48 @@ pub fn linear_model(text: &str) -> Result<LinearModel, String> {
     load(text, &[], &folder)?
         .linear_model()
         .map_err(|e| e.to_string())
+}
+
+/// Why a scene has no model.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneFailure {
+    /// The scene is refused.
+    #[error("{0}")]
+    Scene(String),
+    /// Its model is.
+    #[error(transparent)]
+    Run(#[from] RunError),
+}
+
+impl SceneFailure {
+    /// Whether the seam of truncated bonds cannot be fitted.
+    pub fn is_seam(&self) -> bool {
+        matches!(self, Self::Run(RunError::Model(ModelError::Seam { .. })))
+    }
+}
+
+impl From<ModelError> for SceneFailure {
+    fn from(error: ModelError) -> Self {
+        Self::Run(error.into())
+    }
+}
+
+/// The model of a scene of `D` dimensions beside the files that it names (meshes), laid out as its run does.
+///
+/// # Errors
+/// The message of a refusal, one of a scene of another dimension among them.
+pub fn model<const D: usize>(
+    text: &str,
+    files: &[(&str, &str)],
+) -> Result<SceneModel<D>, SceneFailure> {
+    let scene = Folder::with(files).and_then(|folder| load(text, &[], &folder));
+    let scene = scene.map_err(SceneFailure::Scene)?.of_dimension::<D>();
+    let scene = scene.ok_or_else(|| {
+        SceneFailure::Scene(format!(
+            "the scene has another dimension than {D}; change its kinematics"
+        ))
+    })?;
+    Ok(SceneModel::new(scene)?)
 }
 
 /// A site of a solved static scene: its place, its displacement, and the volume that it stands for.

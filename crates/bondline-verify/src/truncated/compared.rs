@@ -9,17 +9,15 @@ use rayon::prelude::*;
 
 use super::Material;
 use crate::Effort;
-use crate::enclosed::{
-    Case, Cells, Enclosed, INFLUENCE, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
-};
+use crate::enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNGS_MODULUS};
+use crate::typed;
 use bondline::coupling::motion::{BondBehaviour, Critical};
 use bondline::coupling::motion::{Motion, masses};
-use bondline::coupling::{BlendingFunction, Coupling, FitDegree, Local, Nonlocal};
+use bondline::coupling::{BlendingFunction, FitDegree};
 use bondline::observe::report::{Columns, Row, Table};
 use bondline::peridynamics::Micromodulus;
 use bondline::peridynamics::kernel::Kinematics;
 use bondline::progress::{Progress, Silent};
-use bondline::shape::{Barrier, Shape};
 use bondline::solve::statics::{self, StaticParams, StaticProblem};
 use bondline::system::{Breakage, Dynamic, Halfway, Interval, Symmetry};
 use bondline::tensor::{Vector, padded};
@@ -30,7 +28,7 @@ const METHODS: [Method; 7] = [
     Method::Blending(BlendingFunction::Smooth),
     Method::Balanced,
     Method::BalancedOver(BlendingFunction::Smooth),
-    Method::Meshfree(INFLUENCE),
+    Method::Meshfree,
     Method::Elements(FitDegree::Affine),
 ];
 
@@ -77,11 +75,10 @@ fn line(method: Method, rows: i32) -> f64 {
     (f64::from(rows) + half) * SPACING
 }
 
-fn crack(x: f64, y: f64) -> Vec<Barrier<2>> {
-    vec![Barrier::Crack(Shape::Segment {
-        a: Vector::<2>::new(-x, y),
-        b: Vector::<2>::new(x, y),
-    })]
+/// A crack along x, as long to either side of the middle.
+fn crack(x: f64, y: f64) -> String {
+    let (from, to) = (typed::place([-x, y]), typed::place([x, y]));
+    format!("[cracks.c]\nsegment = {{ from = {from}, to = {to} }}\n")
 }
 
 /// A position as a number of half spacings.
@@ -89,14 +86,7 @@ fn key(x: &Vector<2>) -> [i64; 2] {
     std::array::from_fn(|a| (2.0 * x[a] / SPACING).round() as i64)
 }
 
-fn build(
-    case: &Case,
-    coupling: Box<dyn Coupling<2>>,
-    material: Material,
-    barriers: Vec<Barrier<2>>,
-) -> Result<Enclosed<2>, String> {
-    Enclosed::with_barriers(case, coupling, material.law(), barriers).map_err(|e| e.to_string())
-}
+const ALONE: &str = "\"nonlocal\"";
 
 /// Whether a site is within so many horizons of the outer boundary.
 fn is_band(e: &Enclosed<2>, x: &Vector<2>, horizons: u32) -> bool {
@@ -142,9 +132,12 @@ fn opened(e: &Enclosed<2>, symmetry: Symmetry) -> Result<HashMap<[i64; 2], Vecto
 fn at_rest(method: Method, material: Material) -> Result<[f64; 2], String> {
     let case = case(method, widths(method));
     let y = line(method, 0);
-    let with = |coupling| build(&case, coupling, material, crack(4.0 * SPACING, y));
-    let whole = opened(&with(Box::new(Nonlocal))?, Symmetry::Unsymmetric)?;
-    let coupled = opened(&with(method.coupling())?, Symmetry::Unsymmetric)?;
+    let with = |coupling| {
+        let built = material.block(&case, coupling, &crack(4.0 * SPACING, y));
+        built.map_err(|e| e.to_string())
+    };
+    let whole = opened(&with(Some(ALONE))?, Symmetry::Unsymmetric)?;
+    let coupled = opened(&with(None)?, Symmetry::Unsymmetric)?;
     let (mut error, mut size) = (0.0, 0.0);
     for (at, u) in &coupled {
         // nodes at the seam that carry no point
@@ -193,16 +186,16 @@ enum Breaks {
 
 fn run_crack(
     case: &Case,
-    coupling: Box<dyn Coupling<2>>,
-    again: &dyn Coupling<2>,
+    coupling: Option<&str>,
     y: f64,
     breaks: Breaks,
     steps: Option<usize>,
 ) -> Result<Run, String> {
     let material = Material::Pairwise(Micromodulus::InverseDistance);
-    let symmetry = again.symmetry();
-    let e = build(case, coupling, material, crack(4.0 * SPACING, y))?;
-    let operator = again.operator(&e.model).map_err(|e| e.to_string())?;
+    let built = material.block::<2>(case, coupling, &crack(4.0 * SPACING, y));
+    let e = built.map_err(|e| e.to_string())?;
+    let symmetry = e.coupling.symmetry();
+    let operator = e.coupling.operator(&e.model).map_err(|e| e.to_string())?;
     let outside = 12.25 * SPACING;
     let never =
         |x: &Vector<2>| is_band(&e, x, 1) || (breaks == Breaks::WithinZone && x.amax() > outside);
@@ -301,12 +294,10 @@ fn running(table: &mut Table) {
                 Breaks::WithinZone => ", bonds out of the zone whole",
             };
             let name = format!("{}, crack in the {place}{which}", method.name());
-            let alone = run_crack(&case, Box::new(Nonlocal), &Nonlocal, y, breaks, None);
+            let alone = run_crack(&case, Some(ALONE), y, breaks, None);
             let measured = alone.and_then(|whole| {
-                let again = method.coupling();
                 let steps = Some(whole.steps);
-                run_crack(&case, method.coupling(), again.as_ref(), y, breaks, steps)
-                    .map(|run| (whole, run))
+                run_crack(&case, None, y, breaks, steps).map(|run| (whole, run))
             });
             match measured {
                 Err(why) => vec![Row::refused(&name, "energy taken", why)],
@@ -413,8 +404,11 @@ fn sent_back(
             local: total - zone - transition,
         },
     );
-    let e = build(&case, method.coupling(), material, Vec::new())?;
-    let alone = build(&case, Box::new(Local), material, Vec::new())?;
+    let block = |coupling| {
+        let built = material.block::<2>(&case, coupling, "");
+        built.map_err(|e| e.to_string())
+    };
+    let (e, alone) = (block(None)?, block(Some("\"local\""))?);
     let speed = (e.tensor.get(0, 0, 0, 0) / DENSITY).sqrt();
     let step = 0.3 * SPACING / speed;
     let (width, edge) = (

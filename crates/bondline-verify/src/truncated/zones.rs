@@ -1,26 +1,20 @@
 //! Zones of any shape, on meshes that follow the lattice and on those that do not.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::{AFFINE_LIMIT, Material, rows_of};
 use crate::{
     Effort,
-    enclosed::{Enclosed, EnclosedError, SPACING},
+    enclosed::{Enclosed, EnclosedError, MESH, SPACING, YOUNGS_MODULUS, jittered},
+    meshes::{gmsh, scene},
     patch::IRREGULAR_LIMIT,
+    typed,
 };
 use bondline::{
-    coupling::{
-        Coupling, Model, ModelError, Peridynamics, PointSource, Problem, Surfaces, Truncated, Zone,
-        truncated::seam_conditions,
-    },
-    mesh::generate::{Axis, Grid},
+    coupling::{ModelError, truncated::seam_conditions},
     observe::report::{Columns, Row, Table},
-    peridynamics::{BondWeights, Micromodulus, PartialVolume},
-    progress::{Progress, Silent},
-    shape::{Barrier, Shape},
-    tensor::{Tensor4, Vector},
+    peridynamics::Micromodulus,
+    progress::Progress,
 };
 
 /// The shape of a zone; lengths are in cells, the zone reaches from −`half` to `half` where nothing else is said.
@@ -55,16 +49,26 @@ impl Form {
         }
     }
 
-    fn holds<const D: usize>(self, s: &Vector<D>, half: f64) -> bool {
-        let across = (1..D).all(|i| s[i].abs() < half);
-        let block = s.amax() < half;
+    /// The zone as a shape, `half` cells to either side in a block of `total`.
+    fn shape<const D: usize>(self, half: u32, total: u32, cell: f64) -> String {
+        let size = |cells: u32| f64::from(cells) * cell;
+        let (zone, end) = (size(half), size(total));
+        let block = typed::cube::<D>(zone);
+        // all of the zone in the other directions, this much along x
+        let slice = |from: f64, to: f64| {
+            let along = |first: f64, rest: f64| std::array::from_fn(|k| [first, rest][k.min(1)]);
+            typed::cuboid::<D>(along(from, -zone), along(to, zone))
+        };
         match self {
-            Self::Reentrant => block && !s.iter().all(|&s| s > 0.0),
-            Self::Hole => block && s.amax() > (half / 2.0).floor(),
-            Self::Two => across && s[0].abs() < half && !(0.0..1.0).contains(&s[0]),
-            Self::Boundary => across && s[0] < half,
             Self::Block | Self::Cracked => block,
-            Self::Ball => s.norm() < half,
+            Self::Reentrant => typed::without(&block, &typed::cuboid([0.0; D], [zone; D])),
+            Self::Hole => typed::without(&block, &typed::cube::<D>(size(half / 2))),
+            Self::Two => typed::without(&block, &slice(0.0, cell)),
+            Self::Boundary => slice(-end, zone),
+            Self::Ball => format!(
+                "{{ ball = {{ center = {}, radius = {zone:?} }} }}",
+                typed::place([0.0; D])
+            ),
         }
     }
 }
@@ -118,101 +122,57 @@ fn halves<const D: usize>(form: Form, size: u32) -> (u32, u32) {
     }
 }
 
-/// The model of a case, half the width of its block, and its tensor.
-fn model<const D: usize>(case: &Case) -> Result<Placed<D>, EnclosedError> {
+/// A case as a scene: its text, its mesh where that is a file, and half the width of its block.
+fn typed_case<const D: usize>(case: &Case) -> Result<(String, Option<String>, f64), EnclosedError> {
     let (zone, total) = halves::<D>(case.form, case.grain.size());
     let cell = f64::from(case.grain.size()) * SPACING;
-    let half = f64::from(total) * cell;
-    let mut grid = Grid::<D>::new(std::array::from_fn(|_| Axis::Uniform {
-        min: -half,
-        max: half,
-        cells: 2 * total as usize,
-    }));
-    if case.grain == Grain::Simplices {
-        grid.simplices();
-    }
-    let regular = grid.mesh()?;
-    let zones = (0..regular.cell_count())
-        .map(|c| {
-            // the middle of the box in which the cell lies
-            let s = regular.centroid(c) / cell;
-            if case
-                .form
-                .holds(&s.map(|s| s.floor() + 0.5), f64::from(zone))
-            {
-                Zone::Nonlocal
-            } else {
-                Zone::Local
+    let (half, cells) = (f64::from(total) * cell, 2 * total as usize);
+    let mut shape = case.form.shape::<D>(zone, total, cell);
+    let (mesh, file) = match case.grain {
+        Grain::Aligned(_) => (typed::grid([-half; D], [half; D], [cells; D]), None),
+        grain => {
+            let simplices = grain == Grain::Simplices;
+            let regular = jittered::<D>(half, cells, simplices, 0.0)?;
+            let moved = jittered::<D>(half, cells, simplices, 0.2)?;
+            // a ball goes by the middle of the box in which a cell lies; boxes hold moved centroids too
+            let in_ball = |c: usize| {
+                let middle = (regular.centroid(c) / cell).map(|s| s.floor() + 0.5);
+                (middle.norm() < f64::from(zone)).then_some(0)
+            };
+            if case.form == Form::Ball {
+                shape = "{ set = \"ball\" }".to_owned();
             }
-        })
-        .collect();
-    let mesh = match case.grain {
-        Grain::Aligned(_) => regular,
-        _ => grid.jitter(0.2, 7).mesh()?,
+            (
+                format!("[mesh.file]\npath = \"{MESH}\"\n"),
+                Some(gmsh::of_mesh(&moved, &["ball"], in_ball)),
+            )
+        }
     };
-    let law = case.material.law::<D>();
-    let tensor = *law.linearised().tensor();
-    let horizon = f64::from(case.ratio) * SPACING;
-    let end = (f64::from(zone) + 0.4) * cell;
-    let barriers = if case.form == Form::Cracked {
-        vec![Barrier::Crack(crack::<D>(end))]
-    } else {
-        Vec::new()
+    let law = case.material.law();
+    let cracks = match case.form {
+        Form::Cracked => crack::<D>((f64::from(zone) + 0.4) * cell),
+        _ => String::new(),
     };
-    let problem = Problem {
-        cell_material: vec![0; mesh.cell_count()],
-        mesh,
-        zones,
-        tensors: vec![tensor],
-        peridynamic_material: 0,
-        peridynamics: Some(Peridynamics {
-            law,
-            horizon: Arc::new(move |_| horizon),
-            points: PointSource::Lattice {
-                spacing: SPACING,
-                origin: Vector::repeat(0.5 * SPACING),
-            },
-            weights: BondWeights::Isotropic,
-            volumes: PartialVolume::Full,
-            barriers,
-            voids: Vec::new(),
-            surfaces: Surfaces::Uncut,
-        }),
-        coupling: Box::new(Truncated::default()),
-    };
-    let (model, coupling) = Model::new(problem, &Silent)?;
-    Ok(Placed {
-        model,
-        coupling,
-        half,
-        tensor,
-    })
+    let text = format!(
+        "kinematics = \"{}\"\ncoupling = \"truncated\"\n{mesh}{}[peridynamics]\nhorizon = {:?}\npoints.lattice = {{ spacing = {SPACING}, origin = {} }}\n{}{}[zones]\nnonlocal = {shape}\n{cracks}{}",
+        typed::kinematics::<D>(),
+        typed::material(law, YOUNGS_MODULUS, case.material.poisson_ratio()),
+        f64::from(case.ratio) * SPACING,
+        typed::place([0.5 * SPACING; D]),
+        typed::law_line(law),
+        typed::UNCUT,
+        typed::FREE
+    );
+    Ok((text, file, half))
 }
 
-struct Placed<const D: usize> {
-    model: Model<D>,
-    coupling: Box<dyn Coupling<D>>,
-    half: f64,
-    tensor: Tensor4<D>,
+fn files(file: &Option<String>) -> Vec<(&str, &str)> {
+    file.iter().map(|text| (MESH, text.as_str())).collect()
 }
 
 fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
-    let Placed {
-        model,
-        coupling,
-        half,
-        tensor,
-    } = model::<D>(case)?;
-    let stiffness = {
-        let operator = coupling.operator(&model)?;
-        model.assemble(operator.as_ref(), &Silent)
-    };
-    Ok(Enclosed {
-        model,
-        stiffness,
-        half,
-        tensor,
-    })
+    let (text, file, half) = typed_case::<D>(case)?;
+    Ok(Enclosed::of_scene(&text, &files(&file), half)?)
 }
 
 /// What stands in the way of a seam that does not follow the lattice, and whether it could be fitted.
@@ -224,12 +184,14 @@ fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<Row> {
         ratio,
     };
     let name = format!("{D}D, m = {ratio}, {}", grain.name());
-    let placed = match model::<D>(&case) {
-        Ok(placed) => placed,
+    let laid = typed_case::<D>(&case)
+        .and_then(|(text, file, _)| Ok(scene::model::<D>(&text, &files(&file))?));
+    let laid = match laid {
+        Ok(laid) => laid,
         Err(e) => return vec![Row::refused(name, "conditions", e.to_string())],
     };
     let mut rows = Vec::new();
-    if let Some(found) = seam_conditions(&placed.model) {
+    if let Some(found) = seam_conditions(&laid.model) {
         rows.push(Row::info(&name, "conditions", found.conditions as f64));
         rows.push(Row::info(&name, "rank", found.rank as f64));
         rows.push(Row::info(&name, "unknowns", found.unknowns as f64));
@@ -240,7 +202,7 @@ fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<Row> {
             found.out_of_reach,
         ));
     }
-    rows.push(match placed.coupling.operator(&placed.model) {
+    rows.push(match laid.coupling.operator(&laid.model) {
         Ok(_) => Row::info(&name, "left after the fit", 0.0),
         Err(ModelError::Seam { residual, .. }) => Row::info(&name, "left after the fit", residual)
             .because("refused when the model is made"),
@@ -278,20 +240,24 @@ pub(super) fn obstructions(effort: Effort, progress: &dyn Progress) -> Table {
 }
 
 /// The half plane `y = 0`, `x > 0` up to `end`: a segment in 2D, a rectangle through the block in 3D.
-fn crack<const D: usize>(end: f64) -> Shape<D> {
-    let corner = |x: f64, z: f64| Vector::<D>::from_fn(|i, _| [x, 0.0, z][i]);
-    match D {
-        3 => Shape::Polygon(vec![
-            corner(0.0, -end),
-            corner(end, -end),
-            corner(end, end),
-            corner(0.0, end),
-        ]),
-        _ => Shape::Segment {
-            a: corner(0.0, 0.0),
-            b: corner(end, 0.0),
-        },
-    }
+fn crack<const D: usize>(end: f64) -> String {
+    let shape = match D {
+        3 => format!(
+            "polygon = {:?}",
+            [
+                [0.0, 0.0, -end],
+                [end, 0.0, -end],
+                [end, 0.0, end],
+                [0.0, 0.0, end]
+            ]
+        ),
+        _ => format!(
+            "segment = {{ from = {}, to = {} }}",
+            typed::place([0.0; 2]),
+            typed::place([end, 0.0])
+        ),
+    };
+    format!("[cracks.c]\n{shape}\n")
 }
 
 fn rows<const D: usize>(case: &Case) -> Vec<Row> {
@@ -304,7 +270,7 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
     );
     let e = match build::<D>(case) {
         Ok(e) => e,
-        Err(e @ EnclosedError::Model(ModelError::Seam { .. })) => {
+        Err(EnclosedError::Scene(e)) if e.is_seam() => {
             return vec![Row::refused(name, "residual", e.to_string())];
         }
         Err(e) => {

@@ -1,16 +1,13 @@
 //! A square plate of cells of edge 1, each with points of one level or none: the grid of a refinement, and the body that it makes.
 
-use std::sync::Arc;
-
+use crate::{
+    enclosed::{Law, MESH},
+    meshes::{gmsh, scene},
+    typed,
+};
 use bondline::{
-    coupling::{
-        Coupling, Lattice, Model, Nonlocal, Peridynamics, PointSource, Problem, Surfaces,
-        Truncated, Zone,
-    },
     mesh::generate::{Axis, Grid},
-    peridynamics::{BondBased, LinearForceState, BondWeights, Micromodulus, PartialVolume},
-    progress::Silent,
-    shape::{Barrier, Shape},
+    peridynamics::Micromodulus,
     system::LinearMotion,
     tensor::Vector,
 };
@@ -37,14 +34,6 @@ pub struct Body {
     pub positions: Vec<Vector<2>>,
     /// Stiffness and masses.
     pub motion: LinearMotion,
-}
-
-/// A crack through the middle, along x.
-fn crack(half: f64) -> Barrier<2> {
-    Barrier::Crack(Shape::Segment {
-        a: Vector::<2>::new(-half, 0.0),
-        b: Vector::<2>::new(half, 0.0),
-    })
 }
 
 impl Plate {
@@ -104,20 +93,12 @@ impl Plate {
         levels
     }
 
-    /// The body of cells of these levels.
+    /// The body of cells of these levels, from a scene: levels and the layers between them are drawn by sets of cells.
     ///
     /// # Errors
-    /// Why the coupling refuses them, as text.
+    /// Why the scene or its model is refused, as text.
     pub fn body(&self, levels: &[u8]) -> Result<Body, String> {
         let half = self.half as f64;
-        let grid = Grid::<2>::new(std::array::from_fn(|_| Axis::Uniform {
-            min: -half,
-            max: half,
-            cells: self.cells(),
-        }));
-        let mesh = grid.mesh().map_err(|e| e.to_string())?;
-        let cell = |c: usize| self.index(self.cell_at(&mesh.centroid(c)));
-        let cells: Vec<usize> = (0..mesh.cell_count()).map(cell).collect();
         // a level whose cells are all elements has no lattice
         let mut used: Vec<u8> = (0..levels.len())
             .filter(|&c| !self.is_layer(levels, c))
@@ -125,74 +106,76 @@ impl Plate {
             .collect();
         used.sort_unstable();
         used.dedup();
-        let lattice = |&level: &u8| {
-            let spacing = self.spacing(usize::from(level));
-            Lattice {
-                spacing,
-                origin: Vector::repeat(0.5 * spacing),
-                horizon: self.m * spacing,
-            }
-        };
-        let lattices: Vec<Lattice<2>> = used.iter().map(lattice).collect();
-        let (zones, coupling, points): (_, Box<dyn Coupling<2>>, _) = match lattices[..] {
-            [only] => {
-                let points = PointSource::Lattice {
-                    spacing: only.spacing,
-                    origin: only.origin,
-                };
-                (
-                    vec![Zone::Nonlocal; cells.len()],
-                    Box::new(Nonlocal),
-                    points,
-                )
+        let sizes: Vec<[f64; 2]> = used
+            .iter()
+            .map(|&level| self.spacing(usize::from(level)))
+            .map(|spacing| [spacing, self.m * spacing])
+            .collect();
+        let [spacing, horizon] = sizes[0];
+        let names: Vec<String> = used.iter().map(|level| format!("level-{level}")).collect();
+        let (coupling, mesh, zones, file) = match used[..] {
+            [_] => {
+                let mesh = typed::grid([-half; 2], [half; 2], [self.cells(); 2]);
+                ("nonlocal", mesh, String::new(), None)
             }
             _ => {
-                let zone = |&c: &usize| match self.is_layer(levels, c) {
-                    true => Zone::Local,
-                    false => Zone::Nonlocal,
-                };
-                let of_cell = |&c: &usize| used.partition_point(|&l| l < levels[c]) as u16;
-                let points = PointSource::Lattices {
-                    of_cell: cells.iter().map(of_cell).collect(),
-                    lattices: lattices.clone(),
-                };
-                (
-                    cells.iter().map(zone).collect(),
-                    Box::new(Truncated::default()),
-                    points,
-                )
+                let sets: Vec<String> = (names.iter())
+                    .map(|name| format!("{{ set = \"{name}\" }}"))
+                    .collect();
+                let mut zones = format!("[zones]\nnonlocal.any = [{}]\n", sets.join(", "));
+                for ((name, set), [spacing, horizon]) in names.iter().zip(&sets).zip(&sizes).skip(1)
+                {
+                    zones += &format!(
+                        "[zones.bodies.{name}]\ninside = {set}\nspacing = {spacing:?}\nhorizon = {horizon:?}\n"
+                    );
+                }
+                let mesh = format!("[mesh.file]\npath = \"{MESH}\"\n");
+                ("truncated", mesh, zones, Some(self.file(levels, &used)?))
             }
         };
-        let law = BondBased::<2>::new(Micromodulus::InverseDistance, 1.0 / 3.0);
-        let horizon = lattices[0].horizon;
-        let problem = Problem {
-            cell_material: vec![0; cells.len()],
-            mesh,
-            zones,
-            tensors: vec![*law.tensor()],
-            peridynamic_material: 0,
-            peridynamics: Some(Peridynamics {
-                law: Arc::new(law),
-                horizon: Arc::new(move |_| horizon),
-                points,
-                weights: BondWeights::Isotropic,
-                volumes: PartialVolume::Full,
-                barriers: self.crack.map(crack).into_iter().collect(),
-                voids: Vec::new(),
-                surfaces: Surfaces::Cut,
-            }),
-            coupling,
-        };
-        let (model, coupling) = Model::new(problem, &Silent).map_err(|e| e.to_string())?;
-        let operator = coupling.operator(&model).map_err(|e| e.to_string())?;
+        let crack = self.crack.map_or(String::new(), |half| {
+            format!(
+                "[cracks.c]\nsegment = {{ from = [{:?}, 0], to = [{half:?}, 0] }}\n",
+                -half
+            )
+        });
+        // C_1111 = 1 where λ = μ
+        let material = typed::material(
+            Law::BondBased(Micromodulus::InverseDistance),
+            5.0 / 6.0,
+            0.25,
+        );
+        let text = format!(
+            "kinematics = \"plane-strain\"\ncoupling = \"{coupling}\"\n{mesh}{material}[peridynamics]\nhorizon = {horizon:?}\npoints.lattice = {{ spacing = {spacing:?}, origin = {} }}\n{zones}{crack}{}",
+            typed::place([0.5 * spacing; 2]),
+            typed::FREE
+        );
+        let files: Vec<(&str, &str)> = file.iter().map(|f| (MESH, f.as_str())).collect();
+        let laid = scene::model::<2>(&text, &files).map_err(|e| e.to_string())?;
         Ok(Body {
-            positions: model.sites.iter().map(|s| s.position).collect(),
-            motion: LinearMotion {
-                stiffness: model.assemble(operator.as_ref(), &Silent),
-                mass: model.sites.iter().map(|s| s.volume).collect(),
-                symmetry: coupling.symmetry(),
-            },
+            positions: laid.model.sites.iter().map(|s| s.position).collect(),
+            motion: laid.motion().map_err(|e| e.to_string())?,
         })
+    }
+
+    /// The mesh, with a set for the points of each level that is used.
+    fn file(&self, levels: &[u8], used: &[u8]) -> Result<String, String> {
+        let half = self.half as f64;
+        let grid = Grid::<2>::new(std::array::from_fn(|_| Axis::Uniform {
+            min: -half,
+            max: half,
+            cells: self.cells(),
+        }));
+        let mesh = grid.mesh().map_err(|e| e.to_string())?;
+        let names: Vec<String> = used.iter().map(|level| format!("level-{level}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        Ok(gmsh::of_mesh(&mesh, &names, |c| {
+            let cell = self.index(self.cell_at(&mesh.centroid(c)));
+            match self.is_layer(levels, cell) {
+                true => None,
+                false => used.iter().position(|&level| level == levels[cell]),
+            }
+        }))
     }
 }
 

@@ -1,0 +1,105 @@
+//! Meshes as Gmsh 2.2 text: what a scene reads where its own generators do not make them.
+
+use std::fmt::Write as _;
+
+use bondline::mesh::{CellShape, Mesh};
+use bondline::tensor::padded;
+
+/// Kinds of elements in a file.
+pub const LINE: usize = 1;
+/// Three nodes in a plane.
+pub const TRIANGLE: usize = 2;
+/// Four nodes in a plane.
+pub const QUADRILATERAL: usize = 3;
+/// Four nodes in space.
+pub const TETRAHEDRON: usize = 4;
+/// Eight nodes.
+pub const HEXAHEDRON: usize = 5;
+
+/// An element: its kind, the number of its set (0 for none), and its nodes from 0.
+pub type Element = (usize, usize, Vec<usize>);
+
+/// The text of a file: dimension, number (from 1) and name of each set, nodes \[m\], elements. Numbers keep all their digits.
+pub fn text(sets: &[(usize, usize, &str)], nodes: &[[f64; 3]], elements: &[Element]) -> String {
+    // writing to a string cannot fail
+    let mut text = String::from("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
+    let _ = writeln!(text, "$PhysicalNames\n{}", sets.len());
+    for (dimension, number, name) in sets {
+        let _ = writeln!(text, "{dimension} {number} \"{name}\"");
+    }
+    let _ = writeln!(text, "$EndPhysicalNames\n$Nodes\n{}", nodes.len());
+    for (n, [x, y, z]) in nodes.iter().enumerate() {
+        let _ = writeln!(text, "{} {x:?} {y:?} {z:?}", n + 1);
+    }
+    let _ = writeln!(text, "$EndNodes\n$Elements\n{}", elements.len());
+    for (e, (kind, set, nodes)) in elements.iter().enumerate() {
+        let _ = write!(text, "{} {kind} 2 {set} {set}", e + 1);
+        for n in nodes {
+            let _ = write!(text, " {}", n + 1);
+        }
+        text.push('\n');
+    }
+    text.push_str("$EndElements\n");
+    text
+}
+
+/// A mesh whose cells are drawn as sets, each cell in one of them or in none; `set_of` gives the place of a cell's set among `names`.
+pub fn of_mesh<const D: usize>(
+    mesh: &Mesh<D>,
+    names: &[&str],
+    set_of: impl Fn(usize) -> Option<usize>,
+) -> String {
+    let sets: Vec<_> = names.iter().zip(1..).map(|(n, k)| (D, k, *n)).collect();
+    let nodes: Vec<_> = mesh.nodes.iter().map(padded).collect();
+    let element = |c: usize| {
+        let kind = match mesh.shapes[c] {
+            CellShape::Line2 => LINE,
+            CellShape::Tri3 => TRIANGLE,
+            CellShape::Quad4 => QUADRILATERAL,
+            CellShape::Tet4 => TETRAHEDRON,
+            CellShape::Hex8 => HEXAHEDRON,
+            CellShape::Vertex => 15,
+        };
+        let nodes = mesh.cell(c).iter().map(|&n| n as usize).collect();
+        (kind, set_of(c).map_or(0, |s| s + 1), nodes)
+    };
+    let elements: Vec<Element> = (0..mesh.cell_count()).map(element).collect();
+    text(&sets, &nodes, &elements)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bondline::mesh::generate::{Axis, Grid};
+    use bondline::mesh::read;
+
+    #[test]
+    fn a_mesh_comes_back_as_it_was_written() {
+        fn check<const D: usize>(simplices: bool) {
+            let axis = || Axis::Uniform {
+                min: -0.1,
+                max: 0.3,
+                cells: 3,
+            };
+            let mut grid = Grid::<D>::new(std::array::from_fn(|_| axis()));
+            if simplices {
+                grid.simplices();
+            }
+            let mesh = grid.jitter(0.2, 7).mesh().unwrap();
+            let written = of_mesh(&mesh, &["a", "b"], |c| [Some(0), None, Some(1)][c % 3]);
+            let folder = crate::meshes::scene::Folder::with(&[("mesh.msh", &written)]).unwrap();
+            let found: Mesh<D> = read::read(&folder.path().join("mesh.msh")).unwrap();
+            assert_eq!(found.nodes, mesh.nodes);
+            assert_eq!(found.shapes, mesh.shapes);
+            assert_eq!(found.connectivity, mesh.connectivity);
+            let third = |k| (0..mesh.cell_count() as u32).filter(move |c| c % 3 == k);
+            assert!(found.cell_sets["a"].iter().copied().eq(third(0)));
+            assert!(found.cell_sets["b"].iter().copied().eq(third(2)));
+        }
+        check::<1>(false);
+        check::<2>(false);
+        check::<2>(true);
+        check::<3>(false);
+        check::<3>(true);
+    }
+}
