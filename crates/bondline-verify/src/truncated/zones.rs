@@ -30,7 +30,7 @@ enum Form {
     Two,
     /// Up to the boundary of the mesh.
     Boundary,
-    /// With a crack from its middle through the seam.
+    /// With a crack from its middle to a quarter of a cell before the seam: through elements a scene takes none.
     Cracked,
     /// About a ball.
     Ball,
@@ -44,7 +44,7 @@ impl Form {
             Self::Hole => "elements inside",
             Self::Two => "two zones",
             Self::Boundary => "at the boundary",
-            Self::Cracked => "crack through the seam",
+            Self::Cracked => "crack up to the seam",
             Self::Ball => "staircase of a ball",
         }
     }
@@ -150,7 +150,7 @@ fn typed_case<const D: usize>(case: &Case) -> Result<(String, Option<String>, f6
     };
     let law = case.material.law();
     let cracks = match case.form {
-        Form::Cracked => crack::<D>((f64::from(zone) + 0.4) * cell),
+        Form::Cracked => crack::<D>((f64::from(zone) - 0.25) * cell),
         _ => String::new(),
     };
     let text = format!(
