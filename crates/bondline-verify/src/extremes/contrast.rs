@@ -1,6 +1,5 @@
 //! A plate that is up to 1e8 times stiffer or softer right beyond the seam.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use super::{
@@ -8,6 +7,7 @@ use super::{
     kept, refused,
 };
 use crate::Effort;
+use crate::meshes::gmsh;
 use bondline::observe::report::Row;
 
 /// Relative residual that every solution must reach.
@@ -22,50 +22,38 @@ const CELLS: usize = 24;
 /// The square as a Gmsh file: two materials that meet in the middle, sets of its sides.
 fn mesh() -> String {
     let n = CELLS;
-    let node = |i: usize, j: usize| j * (n + 1) + i + 1;
-    let mut text = String::from("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n6\n");
-    for (d, k, name) in [
-        (2, 1, "near"),
-        (2, 2, "far"),
-        (1, 3, "left"),
-        (1, 4, "right"),
-        (1, 5, "bottom"),
-        (1, 6, "top"),
-    ] {
-        // writing to a string cannot fail
-        let _ = writeln!(text, "{d} {k} \"{name}\"");
-    }
-    let _ = writeln!(text, "$EndPhysicalNames\n$Nodes\n{}", (n + 1) * (n + 1));
-    for j in 0..=n {
-        for i in 0..=n {
-            let (x, y) = (i as f64 / n as f64, j as f64 / n as f64);
-            let _ = writeln!(text, "{} {x} {y} 0", node(i, j));
-        }
-    }
+    let node = |i: usize, j: usize| j * (n + 1) + i;
+    let names = ["near", "far", "left", "right", "bottom", "top"];
+    let sets: Vec<_> = (names.iter().zip(1..))
+        .map(|(name, k)| (if k < 3 { 2 } else { 1 }, k, *name))
+        .collect();
+    let nodes: Vec<[f64; 3]> = (0..(n + 1) * (n + 1))
+        .map(|k| [k % (n + 1), k / (n + 1), 0].map(|i| i as f64 / n as f64))
+        .collect();
     let mut elements = Vec::new();
     for k in 0..n {
-        elements.push(format!("1 2 3 3 {} {}", node(0, k), node(0, k + 1)));
-        elements.push(format!("1 2 4 4 {} {}", node(n, k), node(n, k + 1)));
-        elements.push(format!("1 2 5 5 {} {}", node(k, 0), node(k + 1, 0)));
-        elements.push(format!("1 2 6 6 {} {}", node(k, n), node(k + 1, n)));
+        for (set, ends) in [
+            (3, [node(0, k), node(0, k + 1)]),
+            (4, [node(n, k), node(n, k + 1)]),
+            (5, [node(k, 0), node(k + 1, 0)]),
+            (6, [node(k, n), node(k + 1, n)]),
+        ] {
+            elements.push((gmsh::LINE, set, ends.to_vec()));
+        }
     }
     for j in 0..n {
         for i in 0..n {
-            let material = if 2 * i < n { 1 } else { 2 };
-            elements.push(format!(
-                "3 2 {material} {material} {} {} {} {}",
+            let cell = [
                 node(i, j),
                 node(i + 1, j),
                 node(i + 1, j + 1),
-                node(i, j + 1)
-            ));
+                node(i, j + 1),
+            ];
+            let material = if 2 * i < n { 1 } else { 2 };
+            elements.push((gmsh::QUADRILATERAL, material, cell.to_vec()));
         }
     }
-    let _ = writeln!(text, "$EndNodes\n$Elements\n{}", elements.len());
-    for (k, e) in elements.iter().enumerate() {
-        let _ = writeln!(text, "{} {e}", k + 1);
-    }
-    text + "$EndElements\n"
+    gmsh::text(&sets, &nodes, &elements)
 }
 
 fn scene(coupling: &str, modulus: f64) -> String {

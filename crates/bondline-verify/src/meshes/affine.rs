@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::scene;
+use super::{gmsh, scene};
 use crate::Effort;
 use bondline::{
+    mesh::CellShape,
     observe::report::{Columns, Row, Table},
     progress::Progress,
 };
@@ -165,30 +166,18 @@ fn solid(name: &'static str, split: Split, place: impl Fn(f64, f64, f64) -> [f64
     }
 }
 
-/// The text of a Gmsh file, format 2.2, of cells of one shape, with its boundary as the set `outer`.
+/// The text of a file of cells of one shape, with its boundary as the set `outer`.
 fn gmsh(nodes: Vec<[f64; 3]>, cells: &[Vec<usize>]) -> String {
-    use std::fmt::Write as _;
     // four nodes make a quadrilateral or a tetrahedron
     let is_plane = nodes.iter().all(|x| x[2] == 0.0);
-    let (kind, facet_kind, facets): (_, _, &[&[usize]]) = match (cells[0].len(), is_plane) {
-        (4, true) => (3, 1, &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]]),
-        (4, false) => (4, 2, &[&[0, 1, 2], &[0, 1, 3], &[0, 2, 3], &[1, 2, 3]]),
-        _ => (
-            5,
-            3,
-            &[
-                &[0, 1, 2, 3],
-                &[4, 5, 6, 7],
-                &[0, 1, 5, 4],
-                &[1, 2, 6, 5],
-                &[2, 3, 7, 6],
-                &[3, 0, 4, 7],
-            ],
-        ),
+    let (kind, facet_kind, shape) = match (cells[0].len(), is_plane) {
+        (4, true) => (gmsh::QUADRILATERAL, gmsh::LINE, CellShape::Quad4),
+        (4, false) => (gmsh::TETRAHEDRON, gmsh::TRIANGLE, CellShape::Tet4),
+        _ => (gmsh::HEXAHEDRON, gmsh::QUADRILATERAL, CellShape::Hex8),
     };
     let mut seen: BTreeMap<Vec<usize>, (Vec<usize>, usize)> = BTreeMap::new();
     for cell in cells {
-        for facet in facets {
+        for facet in shape.facets() {
             let list: Vec<usize> = facet.iter().map(|&a| cell[a]).collect();
             let mut key = list.clone();
             key.sort_unstable();
@@ -198,26 +187,10 @@ fn gmsh(nodes: Vec<[f64; 3]>, cells: &[Vec<usize>]) -> String {
     let outer = seen.into_values().filter(|(_, times)| *times == 1);
     let outer = outer.map(|(list, _)| (facet_kind, 2, list));
     let inner = cells.iter().map(|cell| (kind, 1, cell.clone()));
-    let elements: Vec<(i32, i32, Vec<usize>)> = outer.chain(inner).collect();
-    let dimension = if is_plane { 2 } else { 3 };
-    let mut text = format!(
-        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n{} 2 \"outer\"\n{dimension} 1 \"body\"\n$EndPhysicalNames\n$Nodes\n{}\n",
-        dimension - 1,
-        nodes.len()
-    );
-    for (k, [x, y, z]) in nodes.iter().enumerate() {
-        let _ = writeln!(text, "{} {x:.17} {y:.17} {z:.17}", k + 1);
-    }
-    let _ = writeln!(text, "$EndNodes\n$Elements\n{}", elements.len());
-    for (k, (kind, tag, list)) in elements.iter().enumerate() {
-        let _ = write!(text, "{} {kind} 2 {tag} {tag}", k + 1);
-        list.iter().for_each(|n| {
-            let _ = write!(text, " {}", n + 1);
-        });
-        text.push('\n');
-    }
-    text.push_str("$EndElements\n");
-    text
+    let elements: Vec<gmsh::Element> = outer.chain(inner).collect();
+    let dimension = shape.dimension();
+    let sets = [(dimension - 1, 2, "outer"), (dimension, 1, "body")];
+    gmsh::text(&sets, &nodes, &elements)
 }
 
 /// Couplings by what a scene types, and whether they have a transition zone.

@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 
 use rayon::prelude::*;
 
-use super::scene;
+use super::{gmsh, scene};
 use crate::Effort;
 use bondline::{
     observe::report::{Columns, Row, Table},
@@ -220,7 +220,7 @@ fn polar(n: usize, [inner, outer]: [f64; 2], turn: Turn) -> String {
         Turn::Whole => around,
     };
     let node = |i: usize, j: usize| i * columns + j % columns;
-    let mut mesh = Gmsh::default();
+    let mut mesh = Polar::default();
     for i in 0..=radial {
         let r = inner + (outer - inner) * i as f64 / radial as f64;
         for j in 0..columns {
@@ -236,20 +236,20 @@ fn polar(n: usize, [inner, outer]: [f64; 2], turn: Turn) -> String {
                 node(i + 1, j + 1),
                 node(i, j + 1),
             ];
-            mesh.cells.push((QUADRILATERAL, BODY, cell.to_vec()));
+            mesh.cells.push((gmsh::QUADRILATERAL, BODY, cell.to_vec()));
         }
     }
     for j in 0..around {
         mesh.cells
-            .push((LINE, INNER, vec![node(0, j), node(0, j + 1)]));
+            .push((gmsh::LINE, INNER, vec![node(0, j), node(0, j + 1)]));
         mesh.cells
-            .push((LINE, HELD, vec![node(radial, j), node(radial, j + 1)]));
+            .push((gmsh::LINE, HELD, vec![node(radial, j), node(radial, j + 1)]));
     }
     if turn == Turn::Quarter {
         for i in 0..radial {
             for j in [0, around] {
                 mesh.cells
-                    .push((LINE, HELD, vec![node(i, j), node(i + 1, j)]));
+                    .push((gmsh::LINE, HELD, vec![node(i, j), node(i + 1, j)]));
             }
         }
     }
@@ -260,9 +260,9 @@ fn polar(n: usize, [inner, outer]: [f64; 2], turn: Turn) -> String {
 fn octant(n: usize, [inner, outer]: [f64; 2]) -> String {
     let radial = ((outer - inner) * n as f64).round() as usize;
     let across = (std::f64::consts::FRAC_PI_8 * (inner + outer) * n as f64).round() as usize;
-    let mut mesh = Gmsh::default();
+    let mut mesh = Polar::default();
     let mut known = std::collections::HashMap::new();
-    let mut node = |mesh: &mut Gmsh, block: usize, k: [usize; 3]| {
+    let mut node = |mesh: &mut Polar, block: usize, k: [usize; 3]| {
         let slope = |i: usize| (std::f64::consts::FRAC_PI_4 * i as f64 / across as f64).tan();
         let mut x = [0.0; 3];
         x[block] = 1.0;
@@ -292,19 +292,19 @@ fn octant(n: usize, [inner, outer]: [f64; 2]) -> String {
                     // the sides of the octant are where a block's first cells begin
                     if i == 0 {
                         let face = vec![cell[0], cell[3], cell[7], cell[4]];
-                        mesh.cells.push((SQUARE_FACE, HELD, face));
+                        mesh.cells.push((gmsh::QUADRILATERAL, HELD, face));
                     }
                     if j == 0 {
                         let face = vec![cell[0], cell[1], cell[5], cell[4]];
-                        mesh.cells.push((SQUARE_FACE, HELD, face));
+                        mesh.cells.push((gmsh::QUADRILATERAL, HELD, face));
                     }
                     if k == 0 {
-                        mesh.cells.push((SQUARE_FACE, INNER, low.to_vec()));
+                        mesh.cells.push((gmsh::QUADRILATERAL, INNER, low.to_vec()));
                     }
                     if k + 1 == radial {
-                        mesh.cells.push((SQUARE_FACE, HELD, high.to_vec()));
+                        mesh.cells.push((gmsh::QUADRILATERAL, HELD, high.to_vec()));
                     }
-                    mesh.cells.push((HEXAHEDRON, BODY, cell));
+                    mesh.cells.push((gmsh::HEXAHEDRON, BODY, cell));
                 }
             }
         }
@@ -312,47 +312,26 @@ fn octant(n: usize, [inner, outer]: [f64; 2]) -> String {
     mesh.text(3)
 }
 
-/// Kinds of elements and numbers of sets in a file.
-const LINE: usize = 1;
-const QUADRILATERAL: usize = 3;
-const SQUARE_FACE: usize = 3;
-const HEXAHEDRON: usize = 5;
+/// Numbers of sets in a file.
 const BODY: usize = 1;
 const INNER: usize = 2;
 const HELD: usize = 3;
 
-/// A mesh in the format Gmsh 2.2: nodes, and cells by kind, set and nodes.
+/// Nodes, and cells by kind, set and nodes.
 #[derive(Default)]
-struct Gmsh {
+struct Polar {
     nodes: Vec<[f64; 3]>,
-    cells: Vec<(usize, usize, Vec<usize>)>,
+    cells: Vec<gmsh::Element>,
 }
 
-impl Gmsh {
+impl Polar {
     fn text(&self, dimension: usize) -> String {
-        let mut text = String::from("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n");
-        let names = [
+        let sets = [
             (dimension, BODY, "body"),
             (dimension - 1, INNER, "inner"),
             (dimension - 1, HELD, "held"),
         ];
-        for (d, set, name) in names {
-            let _ = writeln!(text, "{d} {set} \"{name}\"");
-        }
-        let _ = writeln!(text, "$EndPhysicalNames\n$Nodes\n{}", self.nodes.len());
-        for (i, x) in self.nodes.iter().enumerate() {
-            let _ = writeln!(text, "{} {} {} {}", i + 1, x[0], x[1], x[2]);
-        }
-        let _ = writeln!(text, "$EndNodes\n$Elements\n{}", self.cells.len());
-        for (i, (kind, set, nodes)) in self.cells.iter().enumerate() {
-            let _ = write!(text, "{} {kind} 2 {set} {set}", i + 1);
-            for n in nodes {
-                let _ = write!(text, " {}", n + 1);
-            }
-            text.push('\n');
-        }
-        text.push_str("$EndElements\n");
-        text
+        gmsh::text(&sets, &self.nodes, &self.cells)
     }
 }
 
