@@ -2,14 +2,141 @@
 //!
 //! One place for each, so that a suite differs from a scene of a person only in who types it.
 
-use crate::enclosed::{Law, Method};
+use std::sync::Arc;
+
 use bondline::{
     coupling::{BlendingFunction, FitDegree},
     peridynamics::{
-        Influence, Micromodulus,
+        BondBased, Correspondence, Influence, LinearPeridynamicSolid, Micromodulus,
         influence::{Alpha, Degree},
     },
 };
+
+/// Young's modulus of every case \[Pa\].
+pub const YOUNGS_MODULUS: f64 = 2e11;
+
+/// Poisson's ratio of every case whose law has one.
+pub const POISSON: f64 = 0.3;
+
+/// `P_1/|ξ|`: the influence function with which every method behaved in the table of `docs/patch-test.md`.
+pub const INFLUENCE: Influence = Influence::Polynomial {
+    degree: Degree::P1,
+    alpha: Alpha::One,
+};
+
+/// A coupling method with its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Each site takes the force of its own model.
+    Splice,
+    /// Forces blended over the transition zone.
+    Blending(BlendingFunction),
+    /// Half of a splice and half of a blending with a step in β at the edge of the nonlocal zone.
+    Balanced,
+    /// The same with β over the transition zone.
+    BalancedOver(BlendingFunction),
+    /// Partial stress at points; ω of the divergence is that of the law, which a scene cannot choose apart from it.
+    Meshfree,
+    /// Partial stress in elements.
+    Elements(FitDegree),
+    /// Bonds that end on faces.
+    Truncated,
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: [Self; 10] = [
+        Self::Splice,
+        Self::Blending(BlendingFunction::Constant),
+        Self::Blending(BlendingFunction::Linear),
+        Self::Blending(BlendingFunction::Smooth),
+        Self::Meshfree,
+        Self::Elements(FitDegree::Affine),
+        Self::Elements(FitDegree::Quadratic),
+        Self::Truncated,
+        Self::Balanced,
+        Self::BalancedOver(BlendingFunction::Smooth),
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Splice => "splice",
+            Self::Blending(BlendingFunction::Constant) => "blending constant",
+            Self::Blending(BlendingFunction::Linear) => "blending linear",
+            Self::Blending(BlendingFunction::Smooth) => "blending smooth",
+            Self::Balanced => "balanced",
+            Self::BalancedOver(BlendingFunction::Constant) => "balanced constant",
+            Self::BalancedOver(BlendingFunction::Linear) => "balanced linear",
+            Self::BalancedOver(BlendingFunction::Smooth) => "balanced smooth",
+            Self::Meshfree => "partial stress meshfree",
+            Self::Elements(FitDegree::Affine) => "partial stress elements affine",
+            Self::Elements(FitDegree::Quadratic) => "partial stress elements quadratic",
+            Self::Truncated => "truncated",
+        }
+    }
+
+    /// Whether a transition zone has a meaning of its own.
+    pub fn has_transition(self) -> bool {
+        !matches!(self, Self::Splice | Self::Truncated | Self::Balanced)
+    }
+
+    /// Whether the method takes a law.
+    pub fn is_offered(self, law: Law) -> bool {
+        self != Self::Truncated || !matches!(law, Law::Correspondence(_))
+    }
+}
+
+/// A peridynamic law with its kernel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// [`BondBased`].
+    BondBased(Micromodulus),
+    /// [`LinearPeridynamicSolid`].
+    StateBased(Influence),
+    /// [`Correspondence`], stabilised with 1.
+    Correspondence(Influence),
+}
+
+impl Law {
+    /// Every law, with its usual kernel.
+    pub const ALL: [Self; 3] = [
+        Self::BondBased(Micromodulus::InverseDistance),
+        Self::StateBased(INFLUENCE),
+        Self::Correspondence(INFLUENCE),
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BondBased(_) => "bond-based",
+            Self::StateBased(_) => "LPS",
+            Self::Correspondence(_) => "correspondence",
+        }
+    }
+
+    /// Lamé parameters λ, μ \[Pa\] of the material of Young's modulus [`YOUNGS_MODULUS`], by hand: a bar in 1D, plane strain in 2D;
+    /// Poisson ratio 1/4 where the law fixes it, else [`POISSON`].
+    pub fn lame<const D: usize>(self) -> (f64, f64) {
+        let e = YOUNGS_MODULUS;
+        match (self, D) {
+            (Self::BondBased(_), 1) => (e / 3.0, e / 3.0),
+            (Self::BondBased(_), _) => (0.4 * e, 0.4 * e),
+            (_, 1) => (e - 2.0 * e / 2.6, e / 2.6),
+            _ => (e * 0.3 / (1.3 * 0.4), e / 2.6),
+        }
+    }
+
+    /// The law itself, for bodies that are no scene: clouds of points at random.
+    pub fn law<const D: usize>(self) -> Arc<dyn bondline::peridynamics::Law<D>> {
+        let (lambda, mu) = self.lame::<D>();
+        match self {
+            Self::BondBased(kernel) => Arc::new(BondBased::<D>::new(kernel, mu)),
+            Self::StateBased(w) => Arc::new(LinearPeridynamicSolid::<D>::new(w, lambda, mu)),
+            Self::Correspondence(w) => Arc::new(Correspondence::<D>::new(w, lambda, mu, 1.0)),
+        }
+    }
+}
 
 /// Coordinates with all their digits, `[0.5, -0.25]`.
 pub fn place<const D: usize>(x: [f64; D]) -> String {
