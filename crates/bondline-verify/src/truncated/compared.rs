@@ -12,7 +12,7 @@ use crate::Effort;
 use crate::enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNGS_MODULUS};
 use crate::typed;
 use bondline::coupling::motion::{BondBehaviour, Critical};
-use bondline::coupling::motion::{Motion, masses};
+use bondline::coupling::motion::{Motion, masses, scale_rows};
 use bondline::coupling::{BlendingFunction, FitDegree};
 use bondline::observe::report::{Columns, Row, Table};
 use bondline::peridynamics::Micromodulus;
@@ -368,7 +368,9 @@ fn pulse(e: &Enclosed<2>, meets: Meets, width: f64, zone: f64, step: f64) -> Vec
     };
     let mut u = field(&shape);
     let mut v = field(&|s| speed * 2.0 * s / (width * width) * shape(s));
+    // a run moves by scaled rows
     let mut force = e.stiffness.multiply(&u);
+    scale_rows(&e.model, &mut force);
     let time = (3.0 * width + 2.0 * f64::from(RATIO) * SPACING + 2.0 * width) / speed;
     for _ in 0..(time / step).ceil() as usize {
         for (dof, (v, f)) in v.iter_mut().zip(&force).enumerate() {
@@ -376,6 +378,7 @@ fn pulse(e: &Enclosed<2>, meets: Meets, width: f64, zone: f64, step: f64) -> Vec
         }
         u.iter_mut().zip(&v).for_each(|(u, v)| *u += step * v);
         e.stiffness.multiply_into(&u, &mut force);
+        scale_rows(&e.model, &mut force);
     }
     u
 }
