@@ -308,3 +308,49 @@ impl Case {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elements_have_the_tensor_of_the_law_by_hand() {
+        fn check<const D: usize>() {
+            for law in Law::ALL {
+                let case = Case {
+                    method: Method::Splice,
+                    law,
+                    cells: Cells::Matching,
+                    widths: Widths {
+                        nonlocal: 2,
+                        transition: 0,
+                        local: 3,
+                    },
+                    ratio: 2,
+                };
+                let (lambda, mu) = law.lame::<D>();
+                let mut off = Enclosed::<D>::new(&case).unwrap().tensor;
+                off.add_scaled(-1.0, &Tensor4::isotropic(lambda, mu));
+                assert!(off.amax() < 1e-15 * YOUNGS_MODULUS, "{D}D {law:?}");
+            }
+        }
+        check::<1>();
+        check::<2>();
+        check::<3>();
+    }
+
+    #[test]
+    fn a_scene_of_another_dimension_is_refused() {
+        let text = format!(
+            "kinematics = \"bar\"\n{}{}{}",
+            typed::grid([0.0], [1.0], [4]),
+            typed::material(Law::ALL[0], 1.0, POISSON),
+            typed::FREE
+        );
+        let error = scene::model::<2>(&text, &[]).err().unwrap();
+        assert!(
+            error.to_string().contains("another dimension than 2"),
+            "{error}"
+        );
+    }
+}
