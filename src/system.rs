@@ -141,6 +141,10 @@ pub trait Dynamic: Send + Sync {
     /// `y = K x` with the tangent `K` at rest, broken bonds left out.
     fn tangent_into(&self, x: &[f64], y: &mut [f64]);
 
+    /// The displacement \[m\] over which forces are differenced where the tangent at a displacement is wanted, far below the distance of sites; none where forces with bonds held
+    /// are linear, so that the tangent at rest is that at any displacement.
+    fn difference_length(&self) -> Option<f64>;
+
     /// For every unknown an upper bound of `Σ_b |K_ab|`, with the tangent at rest.
     fn row_sums(&self) -> Vec<f64>;
 
@@ -253,6 +257,10 @@ impl Dynamic for LinearMotion {
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.stiffness.multiply_into(x, y);
+    }
+
+    fn difference_length(&self) -> Option<f64> {
+        None
     }
 
     fn row_sums(&self) -> Vec<f64> {

@@ -44,7 +44,13 @@ pub struct Motion<'a, const D: usize> {
     energy: ElementEnergy,
     /// What breaking bonds has cost so far.
     spent: Dissipation,
+    /// See [`Dynamic::difference_length`].
+    difference_length: Option<f64>,
 }
+
+/// The displacement over which forces are differenced, over the spacing of the points: differences of the lengths of bonds keep nine digits then, and forces change by no more than
+/// that from what is linear.
+const DIFFERENCED: f64 = 1e-7;
 
 impl<'a, const D: usize> Motion<'a, D> {
     /// Lays out masses, rows and bonds.
@@ -101,7 +107,12 @@ impl<'a, const D: usize> Motion<'a, D> {
         );
         let mass = masses(model, density);
         let energy = ElementEnergy::new(model);
+        let is_linear_unless_broken = behaviour.kinematics == Kinematics::Linear
+            && behaviour.contact.is_none()
+            && law.is_none_or(|law| law.is_linear());
         Ok(Self {
+            difference_length: (body.is_some() && !is_linear_unless_broken)
+                .then(|| DIFFERENCED * model.spacing()),
             model,
             symmetry,
             mass,
@@ -297,6 +308,10 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
             seam.add_tangent(x, y);
         }
         scale_rows(self.model, y);
+    }
+
+    fn difference_length(&self) -> Option<f64> {
+        self.difference_length
     }
 
     fn row_sums(&self) -> Vec<f64> {

@@ -1,5 +1,8 @@
 //! Static equilibrium of a model under its conditions: assembly, loads, supports, solution.
 
+use std::ops::ControlFlow;
+use std::time::Instant;
+
 use super::budget;
 use super::loads::{loads, supports};
 use crate::coupling::{Coupling, Model, Operator};
@@ -8,8 +11,13 @@ use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::conditions::Condition;
 use crate::scene::validated::Solver;
-use crate::solve::statics::{self, StaticParams, StaticProblem, StaticSolution};
-use crate::system::{BlockCsr, Symmetry};
+use crate::solve::explicit::Drive;
+use crate::solve::krylov::LinearMap;
+use crate::solve::quasi_static::{self, LoadState, QuasiStaticParams};
+use crate::solve::statics::{
+    self, Method, MethodUsed, StaticInfo, StaticParams, StaticProblem, StaticSolution,
+};
+use crate::system::{BlockCsr, Dynamic, Symmetry};
 use crate::tensor::padded;
 
 /// A model at rest under its conditions, about to be solved.
@@ -33,17 +41,22 @@ pub(crate) struct Equilibrium {
     /// The condition that holds each dof.
     pub holder: Vec<Option<usize>>,
     pub solution: StaticSolution,
+    /// Internal force \[N\] at the solution.
+    pub internal: Vec<f64>,
+    /// Energy stored there \[J\]; none of a matrix that is not symmetric.
+    pub energy: Option<f64>,
     /// What the symmetry of the matrix decided.
     pub choices: Vec<Choice>,
     pub timings: Timings,
 }
 
-/// Assembles, hands the stiffness to `prove`, which tells the seconds that it took, and solves.
+/// Assembles, hands the stiffness to `prove`, which tells the seconds that it took, and solves; `system` is what has forces that are not linear, if they are not.
 ///
 /// # Errors
 /// [`RunError`] for a condition that meets no site, and for a system without a solution.
 pub(crate) fn equilibrium<const D: usize>(
     at: &At<'_, D>,
+    system: Option<&mut dyn Dynamic>,
     mut timings: Timings,
     prove: impl FnOnce(&BlockCsr) -> Result<f64, RunError>,
     progress: &dyn Progress,
@@ -59,17 +72,25 @@ pub(crate) fn equilibrium<const D: usize>(
     let symmetry = symmetry(at.coupling, || stiffness.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");
     timings.add("proof", prove(&stiffness)?);
-    let solution = statics::solve(
-        &StaticProblem {
-            stiffness: &stiffness,
-            symmetry,
-            positions: &positions,
-            load: &load,
-            prescribed: &prescribed,
-        },
-        &params(at.solver),
-        progress,
-    )?;
+    let static_problem = StaticProblem {
+        stiffness: &stiffness,
+        symmetry,
+        positions: &positions,
+        load: &load,
+        prescribed: &prescribed,
+    };
+    let params = params(at.solver);
+    let (solution, internal, energy) = match system {
+        None => {
+            let solution = statics::solve(&static_problem, &params, progress)?;
+            let u = &solution.displacement;
+            let internal = stiffness.multiply(u);
+            let energy = (symmetry == Symmetry::Symmetric)
+                .then(|| 0.5 * u.iter().zip(&internal).map(|(u, f)| u * f).sum::<f64>());
+            (solution, internal, energy)
+        }
+        Some(system) => nonlinear(system, &static_problem, &params, model, progress)?,
+    };
     let info = &solution.info;
     timings.add("ordering", info.ordering_seconds);
     timings.add("factorisation", info.factor_seconds);
@@ -81,9 +102,110 @@ pub(crate) fn equilibrium<const D: usize>(
         applied,
         holder,
         solution,
+        internal,
+        energy,
         choices,
         timings,
     })
+}
+
+/// Loads and supports that do not change.
+struct Still<'a> {
+    load: &'a [f64],
+    prescribed: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Drive for Still<'_> {
+    fn load_into(&self, _time: f64, load: &mut [f64]) {
+        load.copy_from_slice(self.load);
+    }
+
+    fn prescribed(&self) -> &[u32] {
+        &self.prescribed
+    }
+
+    fn displacement_into(&self, _time: f64, values: &mut [f64]) {
+        values.copy_from_slice(&self.values);
+    }
+}
+
+/// Equilibrium of forces that are not linear, by Newton's method: the solution, its internal forces and its energy.
+fn nonlinear<const D: usize>(
+    system: &mut dyn Dynamic,
+    problem: &StaticProblem<'_>,
+    params: &StaticParams,
+    model: &Model<D>,
+    progress: &dyn Progress,
+) -> Result<(StaticSolution, Vec<f64>, Option<f64>), RunError> {
+    let clock = Instant::now();
+    let factors = match may_factorise(model, params.method, problem.symmetry) {
+        true => statics::factors(problem, params, progress)?,
+        false => None,
+    };
+    let factor_seconds = clock.elapsed().as_secs_f64();
+    progress.stage("Newton's method", None);
+    let held = |value: &Option<f64>| value.is_some();
+    let drive = Still {
+        load: problem.load,
+        prescribed: (0..problem.prescribed.len() as u32)
+            .filter(|&dof| held(&problem.prescribed[dof as usize]))
+            .collect(),
+        values: problem.prescribed.iter().copied().flatten().collect(),
+    };
+    let mut state = LoadState::at_rest(problem.load.len());
+    let (mut internal, mut energy, mut relative_residual) = (Vec::new(), 0.0, 0.0);
+    let done = quasi_static::run(
+        system,
+        &drive,
+        QuasiStaticParams {
+            equilibrium: quasi_static::Equilibrium::Newton,
+            tolerance: params.tolerance.max(quasi_static::TIGHTEST),
+            ..QuasiStaticParams::default()
+        },
+        factors.as_ref().map(|(factor, _)| factor as &dyn LinearMap),
+        &|step| (step == 0).then_some(0.0),
+        &mut state,
+        &mut |seen| {
+            internal = seen.force.to_vec();
+            energy = seen.system.stored_energy(&seen.state.u);
+            relative_residual = seen.residual;
+            ControlFlow::Break(())
+        },
+    )?;
+    let reactions = (internal.iter().zip(problem.load).zip(problem.prescribed))
+        .map(|((f, load), held)| if held.is_some() { f - load } else { 0.0 })
+        .collect();
+    let solution = StaticSolution {
+        displacement: state.u,
+        reactions,
+        info: StaticInfo {
+            method: MethodUsed::Newton,
+            ordering: None,
+            free_dofs: problem.load.len() - drive.prescribed.len(),
+            matrix_nnz: problem.stiffness.nonzeros(),
+            factor_nnz: factors.map_or(0, |(_, info)| info.cost.factor_nnz),
+            factor_bytes: 0,
+            ordering_seconds: 0.0,
+            factor_seconds,
+            solve_seconds: clock.elapsed().as_secs_f64() - factor_seconds,
+            iterations: done.iterations,
+            relative_residual,
+        },
+    };
+    Ok((solution, internal, Some(energy)))
+}
+
+/// Whether factors of the stiffness may lead Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone, whose condition is that
+/// of L/δ and not of L/h, so that conjugate gradients without a matrix take less time and an eighth of the memory.
+pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
+    let is_point = |site: usize| model.point_of(site).is_some();
+    let only_points = || symmetry == Symmetry::Symmetric && (0..model.sites.len()).all(is_point);
+    match method {
+        Method::Krylov => false,
+        Method::Direct => true,
+        Method::Auto => !only_points(),
+    }
 }
 
 /// What the solver is asked for, with the memory that is left to it.

@@ -12,7 +12,7 @@ use crate::scene::follow::Follow;
 use crate::scene::initial::Initial;
 use crate::scene::materials::Ratio;
 use crate::scene::points::Points;
-use crate::scene::spec::{Joining, SurfacesSpec, WeightsSpec};
+use crate::scene::spec::{BondsSpec, Joining, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
 use crate::tensor::{Vector, padded};
 
@@ -48,6 +48,24 @@ impl<const D: usize> Rest<D> {
     /// What was chosen for the accuracy, the zone and the coupling, in this order.
     pub fn made(&self) -> impl Iterator<Item = &Choice> {
         self.choices.iter().chain(&self.placed).chain(&self.chosen)
+    }
+
+    /// What makes the forces of bonds that are intact depend on the displacement otherwise than linearly, as a choice; none where they do not.
+    pub fn nonlinear(&self, model: &Model<D>) -> Option<Choice> {
+        let law = &model
+            .peridynamics
+            .as_ref()
+            .filter(|_| model.body().is_some())?
+            .law;
+        let (choice, why) = match (self.breaking.bonds, law.is_linear()) {
+            (BondsSpec::Linear, true) => return None,
+            (BondsSpec::Exact, _) => ("geometrically exact bonds", "bonds = \"exact\""),
+            (BondsSpec::Linear, false) => ("bonds that are not linear", "as their law says"),
+        };
+        Some(Choice {
+            choice: choice.to_owned(),
+            why: why.to_owned(),
+        })
     }
 
     /// The coupling as a choice: why it was made, or what it does if the scene names it.

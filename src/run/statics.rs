@@ -23,7 +23,7 @@ use crate::run::error::RunError;
 use crate::run::warnings::{indefinite, out_of_balance, warnings};
 use crate::scene::solve::Solve;
 use crate::scene::validated::{Output, Scene};
-use crate::system::{BlockCsr, Symmetry};
+use crate::system::{BlockCsr, Dynamic};
 use crate::tensor::Vector;
 
 /// Runs a scene and writes its outputs.
@@ -115,8 +115,11 @@ fn solve_chosen<const D: usize>(
         clock.lap(&mut taken, "proof");
         Ok(taken.total())
     };
+    let mut system = motion::system::still(model, coupling, operator.as_ref(), &rest)?;
+    let is_linear = system.is_none();
     let computed;
-    let equilibrium = match &kept {
+    // what placed the zone was solved with linear forces
+    let equilibrium = match kept.as_ref().filter(|_| is_linear) {
         Some(k) => {
             let seconds = prove(&k.equilibrium.stiffness)?;
             k.equilibrium.timings.add_to(&mut timings);
@@ -133,6 +136,7 @@ fn solve_chosen<const D: usize>(
                     solver: &rest.solver,
                     time: 0.0,
                 },
+                system.as_mut().map(|s| s as &mut dyn Dynamic),
                 Timings::default(),
                 prove,
                 progress,
@@ -148,12 +152,15 @@ fn solve_chosen<const D: usize>(
         applied,
         holder,
         solution,
+        internal,
+        energy,
         ..
     } = equilibrium;
     let symmetry = *symmetry;
     let info = &solution.info;
     watch = Stopwatch::start();
     choices.extend(equilibrium.choices.iter().cloned());
+    choices.extend(rest.nonlinear(model));
     choices.push(Choice {
         choice: info.method.name().to_owned(),
         why: format!("{} system of {} unknowns", symmetry.name(), info.free_dofs),
@@ -161,7 +168,6 @@ fn solve_chosen<const D: usize>(
     choices.extend(volumes_choice(model));
 
     let u = &solution.displacement;
-    let internal = stiffness.multiply(u);
     let residual: Vec<f64> = internal.iter().zip(load).map(|(k, f)| k - f).collect();
     let mut reactions = vec![Vector::<D>::zeros(); rest.conditions.len()];
     for (dof, holder) in holder.iter().enumerate() {
@@ -194,7 +200,7 @@ fn solve_chosen<const D: usize>(
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
-    let rotations = Rotations::new(model, true);
+    let rotations = Rotations::new(model, is_linear);
     let rotation = rotations
         .largest(u)
         .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
@@ -251,8 +257,7 @@ fn solve_chosen<const D: usize>(
                 force: r.iter().copied().collect(),
             })
             .collect(),
-        energy: (symmetry == Symmetry::Symmetric)
-            .then(|| 0.5 * u.iter().zip(&internal).map(|(u, f)| u * f).sum::<f64>()),
+        energy: *energy,
         motion: None,
         files,
     };

@@ -91,6 +91,8 @@ pub(crate) fn breaking<const D: usize>(
         .label(typed.span(), "of what?")
         .help("give the material a fracture-energy, or remove this"));
     }
+    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
     let bonds = match typed {
         Some(bonds) => {
@@ -113,24 +115,17 @@ pub(crate) fn breaking<const D: usize>(
             }
             *bonds.get_ref()
         }
-        None if fracture.is_some() || spec.contact.is_some() => BondsSpec::Exact,
+        // nothing breaks where nothing moves
+        None if !is_static && (fracture.is_some() || spec.contact.is_some()) => BondsSpec::Exact,
         None => BondsSpec::Linear,
     };
-    let solve = spec.solve.as_ref().map(|s| s.get_ref());
-    let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
-    if let (Some(bonds), true) = (typed, is_static)
-        && *bonds.get_ref() == BondsSpec::Exact
-    {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            "`peridynamics.bonds` is \"exact\", and a static scene is solved to first order",
-        )
-        .label(bonds.span(), "of bonds that rotate and stretch")
-        .help("add [solve.quasi-static] with steps = ..., or remove it"));
-    }
+    let remembers = || {
+        let states = material.law.force_state();
+        states.is_some_and(|states| !states.history().is_empty())
+    };
     if let (true, true, Some((name, _))) = (
         is_static,
-        has_points && !material.law.is_linear(),
+        has_points && remembers(),
         spec.materials
             .iter()
             .find(|(name, _)| name.value == material.name),
@@ -138,11 +133,11 @@ pub(crate) fn breaking<const D: usize>(
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
             format!(
-                "the law of the material `{name}`, {}, is not linear, and a static scene is solved to first order",
+                "the law of the material `{name}`, {}, remembers, and a static scene has no time",
                 material.law.name()
             ),
         )
-        .label(name.span.clone(), "its bonds follow the load step by step")
+        .label(name.span.clone(), "its forces depend on how the load came")
         .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]"));
     }
     let mut no_fail = Vec::with_capacity(spec.no_fail.len());

@@ -170,6 +170,9 @@ impl Dynamic for Fed {
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.system.tangent_into(x, y);
     }
+    fn difference_length(&self) -> Option<f64> {
+        None
+    }
     fn row_sums(&self) -> Vec<f64> {
         self.system.row_sums()
     }

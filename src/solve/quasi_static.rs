@@ -3,8 +3,8 @@
 //! At a load step the prescribed dofs and the loads take their values at that (pseudo-)time. Then, in turn, equilibrium is sought with all bonds held
 //! as they stand, and bonds beyond their critical stretch break, until none does. Two ways to equilibrium:
 //!
-//! * **Secant**: `u ← u + K⁻¹ (f − F(u))` with the tangent at rest, broken bonds left out; conjugate gradients or GMRES by its symmetry,
-//!   preconditioned by the factors of the tangent before bonds broke, or by the row sums. One iteration where `F` is linear; where it gets stuck, relaxation goes on.
+//! * **Newton** (`newton.rs`): `u ← u + K⁻¹ (f − F(u))`, with the tangent at rest while that leads quickly, else with that at the present displacement; conjugate gradients or GMRES by
+//!   its symmetry, preconditioned by the factors of the tangent before bonds broke, or by the row sums. One iteration where `F` is linear; where it gets stuck, relaxation goes on.
 //! * **Relaxation**: the motion `M̃ ü + c M̃ u̇ = f − F(u)` in steps of one, with fictitious masses `m̃_a = ¼ Σ_b |K_ab|` that make the step stable, and
 //!   the damping that is critical for the mode in motion, `c = 2 √(v·ΔF / v·M̃ v)` (\[Underwood1983\], with the increment in place of the displacement). It needs
 //!   no solve, and needs eigenvalues that are real and not negative.
@@ -14,17 +14,19 @@
 
 use std::ops::ControlFlow;
 
+use newton::Tangent;
+
 use crate::{
-    progress::Silent,
     solve::{
         FreeDofs,
         explicit::Drive,
-        krylov::{KrylovParams, LinearMap, add_scaled, conjugate_gradients, dot, gmres, norm},
+        krylov::{LinearMap, add_scaled, dot, norm},
     },
-    system::{Breakage, Dynamic, Halfway, Interval, Symmetry},
+    system::{Breakage, Dynamic, Halfway, Interval},
 };
 
 mod error;
+mod newton;
 
 pub use error::QuasiStaticError;
 
@@ -32,9 +34,9 @@ pub use error::QuasiStaticError;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Equilibrium {
-    /// By the tangent at rest.
+    /// By Newton's method.
     #[default]
-    Secant,
+    Newton,
     /// By damped motion.
     Relaxation,
 }
@@ -56,7 +58,7 @@ pub struct QuasiStaticParams {
 impl Default for QuasiStaticParams {
     fn default() -> Self {
         QuasiStaticParams {
-            equilibrium: Equilibrium::Secant,
+            equilibrium: Equilibrium::Newton,
             tolerance: 1e-8,
             max_iterations: 50_000,
             max_rounds: 100_000,
@@ -121,32 +123,11 @@ pub struct QuasiStaticInfo {
     pub iterations: usize,
 }
 
-/// The tangent at rest on free dofs.
-struct Tangent<'a> {
-    system: &'a dyn Dynamic,
-    free: &'a FreeDofs,
-}
-
-impl LinearMap for Tangent<'_> {
-    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
-        self.system.tangent_into(x, y);
-        self.free.clear_prescribed(y);
-    }
-}
-
-/// The inverse of the row sums.
-struct Diagonal<'a>(&'a [f64]);
-
-impl LinearMap for Diagonal<'_> {
-    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
-        for ((y, x), s) in y.iter_mut().zip(x).zip(self.0) {
-            *y = x * s;
-        }
-    }
-}
-
 /// Round-off of displacements, over them: forces within it of balance cannot come nearer.
 const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
+
+/// The least residual, relative to all forces, that is asked for: differences of the lengths of bonds know no more.
+pub const TIGHTEST: f64 = 1e-10;
 
 /// Where there is a load, as much of it as round-off may leave: a body that nothing holds moves until round-off hides any load.
 const HIDDEN: f64 = 1e-6;
@@ -177,6 +158,8 @@ struct Run<'a> {
     time: f64,
     /// From the load step before to this one; of no length at the first.
     interval: Interval,
+    /// Which tangent leads to equilibrium in this load step.
+    tangent: Tangent,
 }
 
 /// The work of a load step.
@@ -233,7 +216,7 @@ impl Residual {
 
 /// Runs load steps, those that `state` has done left out; `times` is the time of each by its number, none beyond the last. After each, `observe` may stop.
 ///
-/// `near` is an inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves the secant iterations.
+/// `near` is an inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves Newton's method iterations.
 ///
 /// # Errors
 /// [`QuasiStaticError`], each with load step, time, place and remedy.
@@ -280,6 +263,7 @@ pub fn run(
         step: state.step,
         time: 0.0,
         interval: Interval::AT_ONCE,
+        tangent: Tangent::AtRest,
     };
     let mut values = vec![0.0; prescribed.len()];
     let mut info = QuasiStaticInfo::default();
@@ -307,12 +291,11 @@ pub fn run(
         work.find_row_sums();
         let mut moved = 0.0;
         for (&k, v) in prescribed.iter().zip(&values) {
-            let u = &mut state.u[k as usize];
-            moved += work.resisted(k as usize, v - *u);
-            *u = *v;
+            moved += work.resisted(k as usize, v - state.u[k as usize]);
         }
         work.balanced = work.balanced.max(MOVED * moved.sqrt());
-        let (mut broken, mut rounds, mut iterations) = (0, 0, 0);
+        let (mut broken, mut rounds) = (0, 0);
+        let mut iterations = work.set_out(&mut state.u, &prescribed, &values)?;
         let residual = loop {
             let (count, residual) = work.equilibrium(&mut state.u)?;
             iterations += count;
@@ -370,7 +353,7 @@ impl Run<'_> {
     fn equilibrium(&mut self, u: &mut [f64]) -> Result<(usize, f64), QuasiStaticError> {
         self.find_row_sums();
         let (iterations, residual) = match self.params.equilibrium {
-            Equilibrium::Secant => match self.by_secant(u) {
+            Equilibrium::Newton => match self.by_newton(u) {
                 // where bonds have turned far from rest, or hang together by single bonds, its tangent leads nowhere
                 Err(
                     stuck @ (QuasiStaticError::NoEquilibrium { .. }
@@ -419,6 +402,11 @@ impl Run<'_> {
                 false => self.force[k],
             })
             .collect()
+    }
+
+    /// Whether equilibrium is found by Newton's method.
+    fn is_newton(&self) -> bool {
+        self.params.equilibrium == Equilibrium::Newton
     }
 
     /// Whether a load acts.
@@ -479,59 +467,6 @@ impl Run<'_> {
                 "take smaller load steps, or allow more iterations or a larger residual (max-iterations, tolerance)"
             },
         }
-    }
-
-    fn by_secant(&mut self, u: &mut [f64]) -> Result<(usize, Residual), QuasiStaticError> {
-        let mut iterations = 0;
-        let mut residual = self.evaluate(u)?;
-        while !residual.is_enough() {
-            if iterations >= self.params.max_iterations {
-                return Err(self.no_equilibrium(residual, iterations));
-            }
-            let params = KrylovParams {
-                tolerance: (0.1 * residual.enough / residual.size).clamp(1e-13, 1e-2),
-                max_iterations: self.params.max_iterations - iterations,
-                ..KrylovParams::default()
-            };
-            let tangent = Tangent {
-                system: &*self.system,
-                free: &self.free,
-            };
-            let diagonal = Diagonal(&self.inverse);
-            let near = self.near.unwrap_or(&diagonal);
-            let remedy = match (self.is_loaded(), self.near) {
-                (true, _) => {
-                    "a load that nothing bears has none: hold the body, or prescribe displacements instead of forces"
-                }
-                (_, None) => {
-                    "take solver.method = \"direct\", whose factors lead the iteration, or smaller load steps"
-                }
-                _ => "take smaller load steps",
-            };
-            let solved = match self.system.symmetry() {
-                Symmetry::Symmetric => {
-                    conjugate_gradients(&tangent, near, &self.residual, &params, &Silent)
-                }
-                Symmetry::Unsymmetric => gmres(&tangent, near, &self.residual, &params, &Silent),
-            };
-            let (correction, info) = solved.map_err(|source| QuasiStaticError::Linear {
-                step: self.step,
-                time: self.time,
-                source,
-                remedy,
-            })?;
-            iterations += info.iterations.max(1);
-            add_scaled(1.0, &correction, u);
-            let before = residual.size;
-            residual = self.evaluate(u)?;
-            // no nearer: a tangent at rest too far from the present one
-            if !residual.is_enough() && residual.size > 0.999 * before {
-                let error = self.no_equilibrium(residual, iterations);
-                add_scaled(-1.0, &correction, u);
-                return Err(error);
-            }
-        }
-        Ok((iterations, residual))
     }
 
     fn by_relaxation(&mut self, u: &mut [f64]) -> Result<(usize, Residual), QuasiStaticError> {

@@ -1,4 +1,6 @@
 use super::*;
+use crate::progress::Silent;
+use crate::system::Symmetry;
 use crate::{
     solve::statics::{self, StaticParams, StaticProblem},
     system::{BlockCsr, LinearMotion},
@@ -107,8 +109,8 @@ fn without_breaking_it_is_the_static_solve() {
         middle: 13,
     };
     for (skew, equilibrium) in [
-        (0.0, Equilibrium::Secant),
-        (0.1, Equilibrium::Secant),
+        (0.0, Equilibrium::Newton),
+        (0.1, Equilibrium::Newton),
         (0.0, Equilibrium::Relaxation),
         (0.1, Equilibrium::Relaxation),
     ] {
@@ -210,6 +212,10 @@ impl Dynamic for Bundle {
         y.copy_from_slice(&[-fibres, fibres - spring, spring]);
     }
 
+    fn difference_length(&self) -> Option<f64> {
+        None
+    }
+
     fn row_sums(&self) -> Vec<f64> {
         let (n, s) = (self.alive(), self.spring);
         vec![2.0 * n, 2.0 * (n + s), 2.0 * s]
@@ -256,7 +262,7 @@ impl Drive for Grip {
 #[test]
 fn a_bundle_of_fibres_follows_its_curve() {
     // elongation x of n fibres with limits i/n: the force is n (1 − x) x up to the fibres' steps, largest n/4 at x = 1/2 (Daniels)
-    for equilibrium in [Equilibrium::Secant, Equilibrium::Relaxation] {
+    for equilibrium in [Equilibrium::Newton, Equilibrium::Relaxation] {
         let count = 50;
         let mut bundle = Bundle::new(count, 1e4);
         let times: Vec<f64> = (1..=90).map(|k| (k as f64 + 0.5) / 100.0).collect();
@@ -302,7 +308,7 @@ fn a_bundle_under_dead_load_breaks_at_its_strength() {
         let end = go(
             &mut bundle,
             &Grip::Force,
-            Equilibrium::Secant,
+            Equilibrium::Newton,
             &times,
             &mut |s| {
                 broken = s.state.broken;
@@ -439,4 +445,110 @@ fn runs_resume_and_trouble_is_named() {
         matches!(error, Err(QuasiStaticError::NotFinite { .. })),
         "{error:?}"
     );
+}
+
+/// A chain whose springs bear `k e + b e³` at the elongation `e`.
+struct Hardening {
+    k: Vec<f64>,
+    b: f64,
+    mass: Vec<f64>,
+}
+
+impl Dynamic for Hardening {
+    fn block(&self) -> usize {
+        1
+    }
+
+    fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    fn commit(&mut self) {}
+
+    fn internal_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        _interval: Interval,
+        _breakage: Breakage,
+    ) -> u64 {
+        force.fill(0.0);
+        for (i, k) in self.k.iter().enumerate() {
+            let e = u[i + 1] - u[i];
+            let f = k * e + self.b * e.powi(3);
+            force[i] -= f;
+            force[i + 1] += f;
+        }
+        0
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        for (i, k) in self.k.iter().enumerate() {
+            let f = k * (x[i + 1] - x[i]);
+            y[i] -= f;
+            y[i + 1] += f;
+        }
+    }
+
+    fn difference_length(&self) -> Option<f64> {
+        Some(1e-7)
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        let mut sums = vec![0.0; self.mass.len()];
+        for (i, k) in self.k.iter().enumerate() {
+            sums[i] += 2.0 * k;
+            sums[i + 1] += 2.0 * k;
+        }
+        sums
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Symmetric
+    }
+
+    fn stored_energy(&self, _u: &[f64]) -> f64 {
+        0.0
+    }
+}
+
+#[test]
+fn springs_a_thousand_times_stiffer_than_at_rest_bear_one_force() {
+    // pulled in one step until b e² is some 1000 k: each spring bears the force of the support, and their elongations, from that force by Cardano's formula, add up
+    let n = 30;
+    let k: Vec<f64> = (0..n).map(|i| 1.0 + (i % 4) as f64).collect();
+    let mut system = Hardening {
+        k: k.clone(),
+        b: 100.0,
+        mass: vec![1.0; n + 1],
+    };
+    let drive = Pulled {
+        ends: [0, n as u32],
+        middle: n,
+    };
+    let reach = 4.0 * n as f64;
+    let mut found = (0.0, Vec::new());
+    let info = go(
+        &mut system,
+        &drive,
+        Equilibrium::Newton,
+        &[reach],
+        &mut |s| found = (s.force[n], s.state.u.clone()),
+    )
+    .expect("equilibrium");
+    let (force, u) = found;
+    let elongation = |k: f64| {
+        let (half, third) = (force / 200.0, k / 300.0);
+        let root = (half * half + third.powi(3)).sqrt();
+        (half + root).cbrt() + (half - root).cbrt()
+    };
+    let total: f64 = k.iter().map(|&k| elongation(k)).sum();
+    assert!((total - reach).abs() < 1e-8 * reach, "{total} {reach}");
+    for (i, &k) in k.iter().enumerate() {
+        let e = u[i + 1] - u[i];
+        assert!((e - elongation(k)).abs() < 1e-8, "{i}: {e}");
+    }
+    // products of conjugate gradients: the tangent at rest alone would need thousands
+    assert!(info.iterations < 400, "{info:?}");
 }

@@ -92,6 +92,8 @@ pub enum MethodUsed {
     ConjugateGradients,
     /// Restarted GMRES with multigrid.
     Gmres,
+    /// Newton's method, led by factors of the stiffness or by its row sums.
+    Newton,
     /// Nothing was free.
     None,
 }
@@ -104,6 +106,7 @@ impl MethodUsed {
             Self::Lu => "LU factorisation",
             Self::ConjugateGradients => "conjugate gradients with multigrid",
             Self::Gmres => "GMRES with multigrid",
+            Self::Newton => "Newton's method",
             Self::None => "no solver",
         }
     }

@@ -376,6 +376,10 @@ impl Dynamic for SubCycled<'_> {
         self.correct(&self.fine.columns, Terms::Signed, y);
     }
 
+    fn difference_length(&self) -> Option<f64> {
+        self.system.difference_length()
+    }
+
     fn row_sums(&self) -> Vec<f64> {
         let mut sums = self.system.row_sums();
         let mut sizes = self.fine.columns.clone();

@@ -13,12 +13,12 @@ use bondline::observe::summary::{Choice, peak_memory_bytes, resident_memory_byte
 use bondline::progress::Progress;
 use bondline::run::RunError;
 use bondline::run::budget::Share;
+use bondline::run::equilibrium::may_factorise;
 use bondline::run::motion::STILL;
 use bondline::run::motion::drive::SceneDrive;
 use bondline::run::motion::explicit::{moment, sizes};
 use bondline::run::motion::laid_out::{LaidOut, breaks, laid_out};
 use bondline::run::motion::pace::{held, paced};
-use bondline::run::motion::quasi_static::may_factorise;
 use bondline::run::motion::record::Recorder;
 use bondline::run::motion::system::start;
 use bondline::run::proof::growth::Asked;

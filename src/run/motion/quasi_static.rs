@@ -33,7 +33,7 @@ use crate::solve::direct::Factor;
 use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{self, Equilibrium, LoadState, LoadStep, QuasiStaticParams};
-use crate::solve::statics::{self, Method, StaticProblem};
+use crate::solve::statics::{self, StaticProblem};
 use crate::system::Symmetry;
 use crate::tensor::padded;
 
@@ -85,7 +85,7 @@ fn load_steps<const D: usize>(
     };
     let params = QuasiStaticParams {
         equilibrium: match spec.method {
-            LoadStepSpec::Implicit => Equilibrium::Secant,
+            LoadStepSpec::Implicit => Equilibrium::Newton,
             LoadStepSpec::Relaxation => Equilibrium::Relaxation,
         },
         tolerance: spec.tolerance,
@@ -94,14 +94,14 @@ fn load_steps<const D: usize>(
     };
     choices.push(Choice {
         choice: match params.equilibrium {
-            Equilibrium::Secant => "the tangent at rest, without a matrix",
+            Equilibrium::Newton => "Newton's method, without a matrix",
             Equilibrium::Relaxation => "adaptive dynamic relaxation",
         }
         .to_owned(),
         why: format!("{} load steps to t = {}", spec.steps, number(spec.duration)),
     });
     let near = match params.equilibrium {
-        Equilibrium::Secant => {
+        Equilibrium::Newton => {
             let symmetry = moving.system.symmetry();
             let near = factors(model, operator, symmetry, rest, &mut choices, progress)?;
             watch.lap(&mut timings, "factorisation");
@@ -299,19 +299,7 @@ fn load_steps<const D: usize>(
 /// cost an iteration.
 const RAISED: f64 = 1e-10;
 
-/// Whether factors may lead the secant: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone, whose condition is that
-/// of L/δ and not of L/h, so that conjugate gradients without a matrix take less time and an eighth of the memory.
-pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
-    let is_point = |site: usize| model.point_of(site).is_some();
-    let only_points = || symmetry == Symmetry::Symmetric && (0..model.sites.len()).all(is_point);
-    match method {
-        Method::Krylov => false,
-        Method::Direct => true,
-        Method::Auto => !only_points(),
-    }
-}
-
-/// Factors of the stiffness before bonds break, which lead the secant; none where `[solver]` asks for an iteration, or `"auto"` finds factors dear.
+/// Factors of the stiffness before bonds break, which lead Newton's method; none where `[solver]` asks for an iteration, or `"auto"` finds factors dear.
 fn factors<const D: usize>(
     model: &Model<D>,
     operator: &dyn Operator<D>,
@@ -321,7 +309,7 @@ fn factors<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Option<Factor>, RunError> {
     let params = equilibrium::params(&rest.solver);
-    if !may_factorise(model, params.method, symmetry) {
+    if !equilibrium::may_factorise(model, params.method, symmetry) {
         return Ok(None);
     }
     let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;

@@ -42,9 +42,10 @@ pub(crate) fn dynamic<'a, const D: usize>(
 ) -> Result<Moving<'a>, RunError> {
     let breaking = &rest.breaking;
     let critical_stretch = critical_stretch(model, rest)?;
-    let (bonds, kinematics) = match breaking.bonds {
-        BondsSpec::Exact => ("geometrically exact bonds", Kinematics::Exact),
-        BondsSpec::Linear => ("bonds linear in the displacement", Kinematics::Linear),
+    let kinematics = kinematics(rest);
+    let bonds = match kinematics {
+        Kinematics::Exact => "geometrically exact bonds",
+        Kinematics::Linear => "bonds linear in the displacement",
     };
     let storage = match breaking.precision {
         PrecisionSpec::Double => Storage::Double,
@@ -159,6 +160,43 @@ pub(crate) fn dynamic<'a, const D: usize>(
             })
         }
         Err(error) => Err(error.into()),
+    }
+}
+
+/// The system of a static scene whose forces are not linear, by its law or its exact bonds; none where they are.
+///
+/// # Errors
+/// [`RunError::Motion`] for bonds that cannot stretch.
+pub(crate) fn still<'a, const D: usize>(
+    model: &'a Model<D>,
+    coupling: &dyn Coupling<D>,
+    operator: &dyn Operator<D>,
+    rest: &Rest<D>,
+) -> Result<Option<Motion<'a, D>>, RunError> {
+    let kinematics = kinematics(rest);
+    if rest.nonlinear(model).is_none() {
+        return Ok(None);
+    }
+    let behaviour = BondBehaviour {
+        kinematics,
+        critical_stretch: None,
+        no_fail: &|_| false,
+        contact: None,
+        storage: Storage::Double,
+        broken: None,
+    };
+    let density = |material: u16| rest.density[material as usize];
+    let symmetry = coupling.symmetry();
+    Ok(Some(Motion::new(
+        model, operator, symmetry, density, &behaviour,
+    )?))
+}
+
+/// How bonds deform.
+fn kinematics<const D: usize>(rest: &Rest<D>) -> Kinematics {
+    match rest.breaking.bonds {
+        BondsSpec::Exact => Kinematics::Exact,
+        BondsSpec::Linear => Kinematics::Linear,
     }
 }
 

@@ -171,6 +171,7 @@ fn solved<const D: usize>(
             solver,
             time: t,
         },
+        None,
         timings,
         |_| Ok(0.0),
         &Silent,

@@ -116,7 +116,7 @@ pub struct QuasiStaticSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoadStepSpec {
-    /// By the tangent at rest, broken bonds left out.
+    /// By Newton's method, without a matrix.
     #[default]
     Implicit,
     /// Adaptive dynamic relaxation: no matrix.
