@@ -168,6 +168,7 @@ pub mod material;
 pub mod mesh;
 pub mod observe;
 pub mod peridynamics;
+pub mod predict;
 pub mod progress;
 pub mod regular_file;
 pub mod run;

@@ -191,6 +191,16 @@ pub trait Dynamic: Send + Sync {
         self.dissipation().map(|d| d.total())
     }
 
+    /// Stress \[Pa\] of the sites whose force states are not linear, as tensors padded with zeros.
+    fn stresses(&self, _u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        Vec::new()
+    }
+
+    /// What the law remembers of each site, by name; zero for a site that remembers nothing.
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+        Vec::new()
+    }
+
     /// Damage of each site, `1 − Σ V of intact bonds / Σ V of all`; none if nothing can break.
     fn damage(&self) -> Option<Vec<f64>> {
         None

@@ -140,7 +140,14 @@ fn the_additions_of_the_page_build_and_run() {
     // the dependencies are those that are built already; the copy itself is not optimised, which is faster
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
     let output = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
-        .args(["build", "--release", "--offline", "--workspace", "--bin", NAME])
+        .args([
+            "build",
+            "--release",
+            "--offline",
+            "--workspace",
+            "--bin",
+            NAME,
+        ])
         .args(PACKAGES.map(|p| format!("--config=profile.release.package.{p}.opt-level=0")))
         .arg("--target-dir")
         .arg(target)

@@ -27,6 +27,7 @@ pub(crate) mod behaviour;
 mod body;
 mod dissipation;
 mod energy;
+mod force_states;
 mod rows;
 
 /// A coupled model as a system that moves.
@@ -466,6 +467,14 @@ impl<const D: usize> Dynamic for Motion<'_, D> {
         let spent = self.of_last_breaks(at);
         self.spent.energy += spent.energy;
         self.spent.area += spent.area;
+    }
+
+    fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        self.stresses_of_points(u)
+    }
+
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+        self.remembered_by_points()
     }
 
     fn damage(&self) -> Option<Vec<f64>> {

@@ -1,7 +1,7 @@
 //! Isotropic linear elasticity.
 
-use super::{Kinematics, LocalLaw, MaterialError};
-use crate::tensor::Tensor4;
+use super::{Kinematics, LocalLaw, LocalResponse, MaterialError};
+use crate::tensor::{Tensor, Tensor4};
 
 /// An isotropic, linearly elastic solid, validated.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -133,12 +133,34 @@ impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
     fn tangent(&self) -> &Tensor4<D> {
         &self.stiffness
     }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn history(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn respond(
+        &self,
+        gradient: &Tensor<D>,
+        _step: f64,
+        _past: &[f64],
+        _present: &mut [f64],
+    ) -> LocalResponse<D> {
+        let stress = self.stiffness.contract(gradient);
+        LocalResponse {
+            stress,
+            stored: 0.5 * stress.dot(gradient),
+            dissipated: 0.0,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tensor::Tensor;
 
     #[test]
     fn reduced_laws_are_the_solid_with_its_constraint() {

@@ -169,7 +169,7 @@ type Held = (Vec<Option<f64>>, Vec<Option<usize>>);
 /// The prescribed displacement of each dof at time `t`, and the condition that prescribes it.
 ///
 /// # Errors
-/// As [`holders`].
+/// [`RunError::Idle`] for a condition that meets no site.
 pub fn supports<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
@@ -348,7 +348,7 @@ pub(crate) fn split_facets<const D: usize>(
 /// The applied force of each dof at time `t`, and that of each condition.
 ///
 /// # Errors
-/// As [`Loads::new`].
+/// [`RunError::Idle`] for a load that meets no site.
 pub fn loads<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],

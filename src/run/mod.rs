@@ -12,6 +12,7 @@
 //! | `proof/` | what is shown about a model before it is solved |
 //! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
 //! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
+//! | `samples.rs` | displacements of a static scene at places, for studies of convergence |
 //! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
 //! | `rotation.rs`, `warnings.rs` | how far elements rotate; what of a model makes its results doubtful |
 //! | `write.rs` | the files of a run |
@@ -33,6 +34,7 @@ pub(crate) mod placed_scene;
 mod placement;
 pub mod proof;
 mod rotation;
+mod samples;
 pub mod setup;
 pub mod solution;
 mod statics;
@@ -45,6 +47,7 @@ pub use budget::{Share, memory_budget, set_memory_budget};
 pub use error::RunError;
 pub use linear::{LinearModel, SceneModel};
 pub use motion::{RunOptions, StartFrom};
+pub use samples::Samples;
 pub use solution::Solved;
 pub use statics::solve_with;
 pub use write::write;

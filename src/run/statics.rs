@@ -195,6 +195,7 @@ fn solve_chosen<const D: usize>(
         displacement: u,
         residual: &residual,
         zone_of_site: &zone_of_site,
+        system: system.as_ref().map(|s| s as &dyn Dynamic),
         broken: &[],
     };
     let files = visit(&rest.output, &solved)?;

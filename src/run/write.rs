@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use rayon::prelude::*;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::solution::Solved;
 use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
@@ -295,15 +295,25 @@ pub fn snapshot<const D: usize>(
         );
     }
     let intact = Intact::of(solved);
+    // of force states that are not linear; the others follow from the displacements
+    let known: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
+        .map(|system| system.stresses(solved.displacement))
+        .unwrap_or_default()
+        .into_iter()
+        .collect();
     let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
         .into_par_iter()
         .filter(|&site| {
             shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
         })
         .map(|site| {
-            let stress = model.point_of(site).map_or(Tensor::zeros(), |(body, p)| {
-                body.partial_stress_of(p, solved.displacement, |j| intact.stands(p, j))
-            });
+            let stress = match (known.get(&(site as u32)), model.point_of(site)) {
+                (Some(rows), _) => Tensor::from_fn(|i, j| rows[i][j]),
+                (None, Some((body, p))) => {
+                    body.partial_stress_of(p, solved.displacement, |j| intact.stands(p, j))
+                }
+                (None, None) => Tensor::zeros(),
+            };
             (site, strain(&solved.point_gradient(site, &intact)), stress)
         })
         .collect();

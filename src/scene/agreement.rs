@@ -69,6 +69,36 @@ pub(crate) fn balanced_seam<const D: usize>(
     .help("use coupling = \"truncated\", whose seam is in equilibrium at any stretch, or \"nonlocal\""))
 }
 
+/// Refuses finite elements of a law whose classical stress is not linear: they would stay elastic where the points yield.
+pub(crate) fn elastic_elements<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    cell_material: &[u16],
+    zones: &[Zone],
+) -> Result<(), SceneError> {
+    let bends = |m: &Material<D>| !m.law.is_linear() && !m.law.linearised().is_ordinary();
+    let cells = zones.iter().zip(cell_material);
+    let local = cells.filter(|(zone, _)| **zone == Zone::Local);
+    let mut of_local = local.map(|(_, &m)| &materials[m as usize]);
+    let Some(material) = of_local.find(|m| bends(m)) else {
+        return Ok(());
+    };
+    let name = spec.materials.get_key_value(material.name.as_str());
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!(
+            "finite elements of the material `{}` would stay elastic, and its law, {}, is not",
+            material.name,
+            material.law.name()
+        ),
+    )
+    .label(
+        name.map_or(0..0, |(k, _)| k.span.clone()),
+        "of this material",
+    )
+    .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
+}
+
 /// Refuses a horizon below the spacing of the points.
 pub(crate) fn horizon<const D: usize>(
     spec: &SceneSpec,

@@ -157,6 +157,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             &joined.coupling,
             &self.materials[peridynamic as usize],
         )?;
+        agreement::elastic_elements(spec, &self.materials, &self.cell_material, &zones)?;
         let breaking = {
             let has_points = zones.iter().any(|zone| *zone != Zone::Local);
             breaking::breaking(

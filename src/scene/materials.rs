@@ -89,7 +89,7 @@ pub(crate) fn materials<const D: usize>(
     for (number, (name, material)) in spec.iter().enumerate() {
         let number = number as u16;
         let (lame, density) = constants::<D>(name, material, kinematics)?;
-        let (law, cells) = law_and_cells(name, material, influence, lame)?;
+        let (law, cells) = law_and_cells(name, material, influence, kinematics, lame)?;
         found.push(Material {
             name: name.value.clone(),
             law,
@@ -145,6 +145,7 @@ fn law_and_cells<'a, const D: usize>(
     name: &Text,
     spec: &'a MaterialSpec,
     influence: Influence,
+    kinematics: Kinematics,
     (lambda, mu): (f64, f64),
 ) -> Result<(Arc<dyn Law<D>>, Option<&'a Text>), SceneError> {
     Ok(match spec {
@@ -177,6 +178,20 @@ fn law_and_cells<'a, const D: usize>(
             )
         }
         MaterialSpec::Named(m) => {
+            let known = m.law.kinematics();
+            if !known.contains(&kinematics) {
+                let others: Vec<&str> = known.iter().map(|k| k.name()).collect();
+                return Err(SceneError::new(
+                    SceneErrorKind::Conflict,
+                    format!(
+                        "the law `{}` of the material `{name}` does not hold for kinematics = \"{}\"",
+                        m.law.key(),
+                        kinematics.name()
+                    ),
+                )
+                .label(name.span.clone(), "its stress out of the plane is not known")
+                .help(format!("it holds for {}", others.join(", "))));
+            }
             let mut values = Vec::with_capacity(m.parameters.len());
             for (parameter, typed) in m.law.parameters().iter().zip(&m.parameters) {
                 values.push(match typed {
@@ -193,7 +208,11 @@ fn law_and_cells<'a, const D: usize>(
                     None => parameter.default.unwrap_or_default(),
                 });
             }
-            let constants = Constants { lambda, shear: mu };
+            let constants = Constants {
+                lambda,
+                shear: mu,
+                influence,
+            };
             (m.law.build(constants, &values), m.cells.as_ref())
         }
     })

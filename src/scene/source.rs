@@ -130,7 +130,7 @@ impl Source {
     /// checkpoint is written.
     ///
     /// # Errors
-    /// As [`Source::merged`].
+    /// [`SceneErrorKind::Syntax`] where the text is no TOML, [`SceneErrorKind::Choice`] where a table holds none or several of keys of which it must hold one.
     pub(crate) fn fingerprint(&self) -> Result<Fingerprint, SceneError> {
         let mut print = Fingerprint::default();
         print.add(env!("CARGO_PKG_VERSION").as_bytes());
@@ -141,7 +141,7 @@ impl Source {
     /// The scene with all overrides applied, without places.
     ///
     /// # Errors
-    /// As [`Source::merged`].
+    /// [`SceneErrorKind::Syntax`] where the text is no TOML, [`SceneErrorKind::Choice`] where a table holds none or several of keys of which it must hold one.
     pub fn table(&self) -> Result<toml::Table, SceneError> {
         Ok(plain_table(self.merged()?.get_ref()))
     }

@@ -14,57 +14,25 @@
 
 use std::ops::ControlFlow;
 
-use newton::Tangent;
+use residual::{MOVED, Residual, Run, Tangent};
 
 use crate::{
     solve::{
         FreeDofs,
         explicit::Drive,
-        krylov::{LinearMap, add_scaled, dot, norm},
+        krylov::{LinearMap, add_scaled, dot},
     },
     system::{Breakage, Dynamic, Halfway, Interval},
 };
 
 mod error;
 mod newton;
+mod params;
+mod residual;
 
 pub use error::QuasiStaticError;
-
-/// How equilibrium is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Equilibrium {
-    /// By Newton's method.
-    #[default]
-    Newton,
-    /// By damped motion.
-    Relaxation,
-}
-
-/// When a load step is done.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct QuasiStaticParams {
-    /// How equilibrium is found.
-    pub equilibrium: Equilibrium,
-    /// `‖f − F‖₂` on free dofs to be reached, relative to the norm of all internal and external forces, or of those in equilibrium before bonds broke
-    /// in this load step.
-    pub tolerance: f64,
-    /// Products with the stiffness, or passes over the bonds, for one equilibrium.
-    pub max_iterations: usize,
-    /// Times that bonds may break within one load step.
-    pub max_rounds: usize,
-}
-
-impl Default for QuasiStaticParams {
-    fn default() -> Self {
-        QuasiStaticParams {
-            equilibrium: Equilibrium::Newton,
-            tolerance: 1e-8,
-            max_iterations: 50_000,
-            max_rounds: 100_000,
-        }
-    }
-}
+pub use params::{Equilibrium, QuasiStaticParams};
+pub use residual::TIGHTEST;
 
 /// All that a run carries from load step to load step, but for the damage, which the system keeps.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -123,44 +91,8 @@ pub struct QuasiStaticInfo {
     pub iterations: usize,
 }
 
-/// Round-off of displacements, over them: forces within it of balance cannot come nearer.
-const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
-
-/// The least residual, relative to all forces, that is asked for: differences of the lengths of bonds know no more.
-pub const TIGHTEST: f64 = 1e-10;
-
-/// Where there is a load, as much of it as round-off may leave: a body that nothing holds moves until round-off hides any load.
-const HIDDEN: f64 = 1e-6;
-
-/// What supports that move would meet if nothing else moved, times this, counts as force: about what an intact body a thousand spacings long resists with.
-const MOVED: f64 = 1e-3;
-
 /// A relaxation whose residual grows by so much will not come back.
 const RAN_AWAY: f64 = 1e6;
-
-/// What to do where a load acts.
-const UNBORNE: &str = "a load that nothing bears has none: hold the body, take smaller load steps, or prescribe displacements instead of forces";
-
-/// The work space of a run.
-struct Run<'a> {
-    system: &'a mut dyn Dynamic,
-    near: Option<&'a dyn LinearMap>,
-    params: QuasiStaticParams,
-    free: FreeDofs,
-    load: Vec<f64>,
-    force: Vec<f64>,
-    residual: Vec<f64>,
-    /// `1/Σ_b |K_ab|`.
-    inverse: Vec<f64>,
-    /// Norm of the forces in the last equilibrium of this load step.
-    balanced: f64,
-    step: u64,
-    time: f64,
-    /// From the load step before to this one; of no length at the first.
-    interval: Interval,
-    /// Which tangent leads to equilibrium in this load step.
-    tangent: Tangent,
-}
 
 /// The work of a load step.
 struct Account {
@@ -187,30 +119,6 @@ impl Account {
         }
         self.acting = now;
         self.u.copy_from_slice(u);
-    }
-}
-
-/// `‖f − F‖₂` on free dofs.
-#[derive(Clone, Copy)]
-struct Residual {
-    size: f64,
-    /// The forces that it is measured by.
-    scale: f64,
-    /// What it has to come to.
-    enough: f64,
-}
-
-impl Residual {
-    fn is_enough(self) -> bool {
-        self.size <= self.enough
-    }
-
-    fn relative(self) -> f64 {
-        if self.scale > 0.0 {
-            self.size / self.scale
-        } else {
-            0.0
-        }
     }
 }
 
@@ -371,102 +279,6 @@ impl Run<'_> {
         };
         self.balanced = residual.scale;
         Ok((iterations, residual.relative()))
-    }
-
-    /// Broken bonds have left the rows; a bond that turns resists where it did not at rest, so that a site has one number.
-    fn find_row_sums(&mut self) {
-        let sums = self.system.row_sums();
-        let block = self.free.block();
-        for (inverse, sums) in self.inverse.chunks_mut(block).zip(sums.chunks(block)) {
-            let sum = sums.iter().copied().fold(0.0, f64::max);
-            inverse.fill(if sum > 0.0 { 1.0 / sum } else { 0.0 });
-        }
-    }
-
-    /// `(u Σ_b |K_ab|)²`.
-    fn resisted(&self, dof: usize, u: f64) -> f64 {
-        let inverse = self.inverse[dof];
-        if inverse > 0.0 {
-            (u / inverse).powi(2)
-        } else {
-            0.0
-        }
-    }
-
-    /// The forces that do work: loads on free dofs, internal forces where supports hold.
-    fn acting(&self) -> Vec<f64> {
-        let block = self.free.block();
-        (0..self.force.len())
-            .map(|k| match self.free.is_free(k / block, k % block) {
-                true => self.load[k],
-                false => self.force[k],
-            })
-            .collect()
-    }
-
-    /// Whether equilibrium is found by Newton's method.
-    fn is_newton(&self) -> bool {
-        self.params.equilibrium == Equilibrium::Newton
-    }
-
-    /// Whether a load acts.
-    fn is_loaded(&self) -> bool {
-        self.load.iter().any(|f| *f != 0.0)
-    }
-
-    /// `f − F` on free dofs, and its norm.
-    fn evaluate(&mut self, u: &[f64]) -> Result<Residual, QuasiStaticError> {
-        self.system
-            .internal_force_into(u, &mut self.force, self.interval, Breakage::Held);
-        for ((r, f), k) in self.residual.iter_mut().zip(&self.load).zip(&self.force) {
-            *r = f - k;
-        }
-        self.free.clear_prescribed(&mut self.residual);
-        let forces = norm(&self.force) + norm(&self.load);
-        let size = norm(&self.residual);
-        if !(size.is_finite() && forces.is_finite()) {
-            let bad = |k: &usize| !(self.force[*k].is_finite() && self.load[*k].is_finite());
-            let dof = (0..u.len()).find(bad).unwrap_or(0);
-            return Err(QuasiStaticError::NotFinite {
-                step: self.step,
-                time: self.time,
-                site: dof / self.free.block(),
-            });
-        }
-        let resisted: f64 = (0..u.len()).map(|k| self.resisted(k, u[k])).sum();
-        let mut round_off = ROUND_OFF * resisted.sqrt();
-        if self.is_loaded() {
-            round_off = round_off.min(HIDDEN * norm(&self.load));
-        }
-        let scale = forces.max(self.balanced);
-        Ok(Residual {
-            size,
-            scale,
-            enough: (self.params.tolerance * scale).max(round_off),
-        })
-    }
-
-    /// The site at which the residual is largest.
-    fn worst(&self) -> usize {
-        let size = |k: usize| self.residual[k].abs();
-        let worst =
-            (0..self.residual.len()).fold(0, |best, k| if size(k) > size(best) { k } else { best });
-        worst / self.free.block()
-    }
-
-    fn no_equilibrium(&self, residual: Residual, iterations: usize) -> QuasiStaticError {
-        QuasiStaticError::NoEquilibrium {
-            step: self.step,
-            time: self.time,
-            residual: residual.relative(),
-            iterations,
-            site: self.worst(),
-            remedy: if self.is_loaded() {
-                UNBORNE
-            } else {
-                "take smaller load steps, or allow more iterations or a larger residual (max-iterations, tolerance)"
-            },
-        }
     }
 
     fn by_relaxation(&mut self, u: &mut [f64]) -> Result<(usize, Residual), QuasiStaticError> {

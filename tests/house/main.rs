@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use imports::{Imports, ItemPath};
 
 /// Modules of the library and, above them, the other crates, the lowest first.
-const FLOORS: [&str; 19] = [
+const FLOORS: [&str; 20] = [
     "tensor",
     "progress",
     "regular_file",
@@ -24,6 +24,7 @@ const FLOORS: [&str; 19] = [
     "coupling",
     "scene",
     "run",
+    "predict",
     "terminal",
     "study",
     "verify",

@@ -3,12 +3,10 @@
 use std::path::Path;
 
 use crate::figure::{LinePlot, Scale, Series, Stroke};
-use bondline::run::{AnyScene, PlacedScene};
-use bondline::run::{RunError, Solved, solve_with};
+use bondline::run::{RunError, Samples};
 use bondline::scene::spec::{AxisSpec, MeshSpec, PointsSpec};
 use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source};
 use bondline::{
-    coupling::Sampler,
     observe::{
         ObserveError,
         csv::{CsvTable, Entry},
@@ -16,7 +14,6 @@ use bondline::{
     },
     progress::Progress,
     regular_file,
-    tensor::{Vector, padded},
 };
 
 /// What shrinks from level to level. Source: \[Bobaru2009\] section 3.
@@ -160,7 +157,7 @@ pub fn converge(
     }
     let spec = SceneSpec::parse(&source).map_err(scene_error)?;
     let directory = path.parent().unwrap_or(Path::new(""));
-    let mut solved: Vec<Snapshot> = Vec::new();
+    let mut solved: Vec<Samples> = Vec::new();
     // of a scene that does not place its points, the spacing that its first level got
     let mut chosen = None;
     let mut positions = Vec::new();
@@ -181,12 +178,8 @@ pub fn converge(
         if level == 0 {
             chosen = crate::load::lattice_spacing(&scene);
         }
-        let snapshot = match scene {
-            AnyScene::Bar(s) => snapshot(*s, &mut positions, progress),
-            AnyScene::Plane(s) => snapshot(*s, &mut positions, progress),
-            AnyScene::Solid(s) => snapshot(*s, &mut positions, progress),
-        };
-        solved.push(snapshot.map_err(|e| ConvergeError::Run {
+        let samples = scene.samples(&mut positions, progress);
+        solved.push(samples.map_err(|e| ConvergeError::Run {
             level,
             source: Box::new(e),
         })?);
@@ -271,66 +264,17 @@ fn refined(
     Ok(overrides)
 }
 
-/// Displacements of one level at the samples.
-struct Snapshot {
-    horizon: f64,
-    spacing: f64,
-    dofs: usize,
-    samples: Vec<Option<[f64; 3]>>,
-}
-
-/// At most so many samples are compared; of more sites, every so many.
-const MOST_SAMPLES: usize = 20_000;
-
-/// Solves a level and takes its displacement at `positions`, which the first level fills with its own sites.
-fn snapshot<const D: usize>(
-    scene: PlacedScene<D>,
-    positions: &mut Vec<[f64; 3]>,
-    progress: &dyn Progress,
-) -> Result<Snapshot, RunError> {
-    let (low, high) = scene.mesh.bounds();
-    let horizon = scene.horizon_at(&((low + high) * 0.5));
-    let cell = ((high - low).product() / scene.mesh.cell_count() as f64).powf(1.0 / D as f64);
-    let mut snapshot = Snapshot {
-        horizon,
-        spacing: 0.0,
-        dofs: 0,
-        samples: Vec::new(),
-    };
-    solve_with(scene, progress, |_, solved: &Solved<'_, D>| {
-        let sampler = Sampler::new(solved.model);
-        let points = solved.model.spacing();
-        snapshot.spacing = if points > 0.0 { points } else { cell };
-        snapshot.dofs = solved.displacement.len();
-        if positions.is_empty() {
-            let sites = &solved.model.sites;
-            let every = sites.len().div_ceil(MOST_SAMPLES).max(1);
-            positions.extend(sites.iter().step_by(every).map(|s| padded(&s.position)));
-        }
-        snapshot.samples = positions
-            .iter()
-            .map(|x| {
-                let x = Vector::from_fn(|a, _| x[a]);
-                let u = sampler.displacement(&x, solved.displacement)?;
-                Some(padded(&u))
-            })
-            .collect();
-        Ok(Vec::new())
-    })?;
-    Ok(snapshot)
-}
-
-fn compare(refinement: Refinement, solved: &[Snapshot]) -> Result<Converged, ConvergeError> {
+fn compare(refinement: Refinement, solved: &[Samples]) -> Result<Converged, ConvergeError> {
     let Some(last) = solved.last() else {
         return Err(ConvergeError::Samples);
     };
-    let common: Vec<usize> = (0..last.samples.len())
-        .filter(|&k| solved.iter().all(|s| s.samples[k].is_some()))
+    let common: Vec<usize> = (0..last.displacement.len())
+        .filter(|&k| solved.iter().all(|s| s.displacement[k].is_some()))
         .collect();
     if common.is_empty() {
         return Err(ConvergeError::Samples);
     }
-    let at = |s: &Snapshot, k: usize| s.samples[k].unwrap_or_default();
+    let at = |s: &Samples, k: usize| s.displacement[k].unwrap_or_default();
     let square = |u: [f64; 3]| u.iter().map(|c| c * c).sum::<f64>();
     let (mut scale, mut most) = (0.0, 0.0f64);
     for &k in &common {

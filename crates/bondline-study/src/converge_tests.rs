@@ -1,18 +1,18 @@
 use super::*;
 use bondline::progress::Silent;
 
-fn snapshot(spacing: f64, error: f64) -> Snapshot {
-    Snapshot {
+fn snapshot(spacing: f64, error: f64) -> Samples {
+    Samples {
         horizon: 3.0 * spacing,
         spacing,
         dofs: 1,
-        samples: vec![Some([1.0 + error, 0.0, 0.0]), None, Some([2.0, error, 0.0])],
+        displacement: vec![Some([1.0 + error, 0.0, 0.0]), None, Some([2.0, error, 0.0])],
     }
 }
 
 #[test]
 fn orders_of_a_power_law_are_its_power() {
-    let levels: Vec<Snapshot> = [0.4, 0.2, 0.1, 0.05]
+    let levels: Vec<Samples> = [0.4, 0.2, 0.1, 0.05]
         .map(|h: f64| snapshot(h, 0.1 * h.powf(1.5)))
         .into();
     let found = compare(Refinement::M, &levels).unwrap();
@@ -122,7 +122,7 @@ fn the_raw_triangular_bar_converges_as_its_stiffness() {
 
 #[test]
 fn a_study_leaves_one_line_per_level() {
-    let levels: Vec<Snapshot> = [0.4, 0.2, 0.1].map(|h: f64| snapshot(h, 0.1 * h)).into();
+    let levels: Vec<Samples> = [0.4, 0.2, 0.1].map(|h: f64| snapshot(h, 0.1 * h)).into();
     let found = compare(Refinement::M, &levels).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("study.csv");

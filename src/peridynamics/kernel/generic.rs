@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{
-    BondPass, BondSetup, Kinematics,
+    BondPass, BondSetup, ForceStates, Kinematics,
     list::{extension, ratio, stretched},
 };
 use crate::{
@@ -16,7 +16,7 @@ use crate::{
         Present, StatePart, body::split_rows,
     },
     system::{Breakage, Interval},
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// No bond from the other end.
@@ -508,6 +508,10 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         true
     }
 
+    fn force_states(&self) -> Option<&dyn ForceStates<D>> {
+        Some(self)
+    }
+
     fn memory_bytes(&self) -> usize {
         let bonds = self.families.neighbours.len();
         let vectors = self.position.len() + self.force_state.len();
@@ -519,5 +523,37 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             + bonds * 9
             + self.row.len() * 2
             + history * 8
+    }
+}
+
+impl<const D: usize> ForceStates<D> for Generic<D> {
+    fn partial_stress(&self, i: usize, u: &[f64]) -> Tensor<D> {
+        let mut s = Scratch::default();
+        self.respond(
+            i,
+            &|j| at(u, j),
+            |bond| self.intact[bond],
+            0.0,
+            &self.past,
+            &mut s,
+        );
+        let bonds = s.force.iter().zip(&s.bonds).zip(&s.volumes);
+        bonds.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
+            sum + force * xi.transpose() * *volume
+        })
+    }
+
+    fn family_size(&self, point: usize) -> usize {
+        self.range(point).len()
+    }
+
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let names = self.layout.point;
+        let column = |k: usize| {
+            let points = self.past.point.chunks_exact(names.len());
+            points.map(|numbers| numbers[k]).collect()
+        };
+        let named = names.iter().enumerate();
+        named.map(|(k, name)| (*name, column(k))).collect()
     }
 }

@@ -178,7 +178,16 @@ fn consistent<const D: usize>(counts: [usize; D]) {
                 let at = |s: f64| -> Vec<f64> {
                     u.iter().zip(&direction).map(|(u, d)| u + s * d).collect()
                 };
-                let slope = (pass.stored_energy(&at(1e-5)) - pass.stored_energy(&at(-1e-5))) / 2e-5;
+                // what is stored, and what is dissipated on the way there
+                let state = pass.damage_state();
+                let mut spent = |s: f64| {
+                    pass.force_into(&at(s), &mut minus, now, Breakage::Held);
+                    let dissipated = pass.commit();
+                    let sum = pass.stored_energy(&at(s)) + dissipated;
+                    assert!(pass.restore_damage(&state), "{name}");
+                    sum
+                };
+                let slope = (spent(1e-5) - spent(-1e-5)) / 2e-5;
                 pass.force_into(&u, &mut plus, now, Breakage::Held);
                 let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
                 assert!(

@@ -545,6 +545,10 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         false
     }
 
+    fn force_states(&self) -> Option<&dyn super::ForceStates<D>> {
+        None
+    }
+
     fn memory_bytes(&self) -> usize {
         let numbers = self.u.iter().map(Vec::len).sum::<usize>()
             + self.volume.len()

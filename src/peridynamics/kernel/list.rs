@@ -520,6 +520,10 @@ impl<const D: usize> BondPass<D> for List<D> {
         false
     }
 
+    fn force_states(&self) -> Option<&dyn super::ForceStates<D>> {
+        None
+    }
+
     fn memory_bytes(&self) -> usize {
         let bytes = std::mem::size_of::<f64>();
         let solid = self.solid.as_ref().map_or(0, |s| 4 * s.theta.len() * bytes);

@@ -51,6 +51,7 @@ pub use stencil::BlockSetup;
 pub(crate) use list::{extension, ratio, stretched};
 
 use crate::system::{Breakage, Interval};
+use crate::tensor::Tensor;
 
 /// One sweep over the bonds of a cloud.
 ///
@@ -116,8 +117,23 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Puts back what [`BondPass::damage_state`] gave; false, and nothing changed, if it belongs to another pass.
     fn restore_damage(&mut self, state: &[u64]) -> bool;
 
+    /// The force states that it computes one by one, for what is told of them; none of an accelerator.
+    fn force_states(&self) -> Option<&dyn ForceStates<D>>;
+
     /// Bytes that the pass holds.
     fn memory_bytes(&self) -> usize;
+}
+
+/// What force states tell of a body.
+pub trait ForceStates<const D: usize> {
+    /// The partial stress `Σ T⟨ξ⟩ ⊗ ξ V` of a point at the displacements `u` \[Pa\], [SAND2015-7998] eq. (2.19), by its intact bonds; `u` has `D` numbers per point.
+    fn partial_stress(&self, point: usize, u: &[f64]) -> Tensor<D>;
+
+    /// Number of bonds of a point's family.
+    fn family_size(&self, point: usize) -> usize;
+
+    /// What points remember, by name: one number per point.
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)>;
 }
 
 /// The pass that suits the setup: over the lattice where the points fill one, over lists otherwise.

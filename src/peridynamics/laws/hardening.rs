@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
+    material::Kinematics,
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Micromodulus, Past, Present,
@@ -25,6 +26,7 @@ impl<const D: usize> NamedLaw<D> for Hardening<D> {
     const ABOUT: &'static str =
         "Bonds that act alone and stiffen as they stretch: c s (1 + β s²) instead of c s.";
     const RATIO: Ratio = Ratio::Pairwise;
+    const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
     const PARAMETERS: &'static [Parameter] = &[Parameter {
         key: "hardening",
         about: "β: the force of a bond grows by β s² beyond proportion; negative values soften, down to −1/(3 s²) at the largest stretch s.",

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
+    material::Kinematics,
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Micromodulus, Past, Present,
@@ -28,6 +29,7 @@ impl<const D: usize> NamedLaw<D> for Maxwell<D> {
     const KEY: &'static str = "viscoelastic-bond";
     const ABOUT: &'static str = "Bonds that act alone, each a spring beside one Maxwell arm; the constants are those at once.";
     const RATIO: Ratio = Ratio::Pairwise;
+    const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
     const PARAMETERS: &'static [Parameter] = &[
         Parameter {
             key: "relaxing-share",

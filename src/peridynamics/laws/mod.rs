@@ -7,6 +7,7 @@
 //! | `correspondence.rs` | elastic correspondence, to first order | section 7.2 |
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
+//! | `plastic.rs` | correspondence with J2 plasticity | section 7.2 |
 //!
 //! A law that implements [`NamedLaw`] and has its line in the list at the end of this file is a material of scenes, by its key.
 
@@ -15,16 +16,19 @@ mod correspondence;
 mod hardening;
 mod lps;
 mod maxwell;
+mod plastic;
 
 use std::sync::Arc;
 
-use crate::peridynamics::Law;
+use crate::material::Kinematics;
+use crate::peridynamics::{Influence, Law};
 
 pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
 pub use hardening::Hardening;
 pub use lps::LinearPeridynamicSolid;
 pub use maxwell::Maxwell;
+pub use plastic::PlasticCorrespondence;
 
 /// A number that a law takes beside the elastic constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,13 +56,15 @@ pub enum Ratio {
     Any,
 }
 
-/// Elastic constants of a scene's material, of its dimension \[Pa\].
+/// Elastic constants of a scene's material, of its dimension \[Pa\], and what else scenes give to all laws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constants {
     /// Lamé's λ.
     pub lambda: f64,
     /// Shear modulus μ.
     pub shear: f64,
+    /// The influence function ω of the scene, for laws that have one \[1\].
+    pub influence: Influence,
 }
 
 /// A law as scenes name it: its key, its numbers, and how it is made of them.
@@ -69,6 +75,8 @@ pub trait NamedLaw<const D: usize>: Law<D> {
     const ABOUT: &'static str;
     /// Which Poisson ratios it has.
     const RATIO: Ratio;
+    /// Bodies that it holds for.
+    const KINEMATICS: &'static [Kinematics];
     /// What it takes beside the elastic constants.
     const PARAMETERS: &'static [Parameter];
 
@@ -79,12 +87,13 @@ pub trait NamedLaw<const D: usize>: Law<D> {
 /// Every law of this folder with usual numbers, for tests that hold for all of them.
 #[cfg(test)]
 pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
-    use crate::peridynamics::{Influence, Micromodulus};
+    use crate::peridynamics::Micromodulus;
     let constants = Constants {
         lambda: 1.7,
         shear: 1.3,
+        influence: Influence::Gaussian,
     };
-    let Constants { lambda, shear } = constants;
+    let Constants { lambda, shear, .. } = constants;
     let typed: [Arc<dyn Law<D>>; 3] = [
         Arc::new(BondBased::new(Micromodulus::InverseDistance, shear)),
         Arc::new(LinearPeridynamicSolid::new(
@@ -131,6 +140,11 @@ macro_rules! named_laws {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::RATIO,)* }
             }
 
+            /// Bodies that it holds for.
+            pub fn kinematics(self) -> &'static [Kinematics] {
+                match self { $(Self::$law => <$law<1> as NamedLaw<1>>::KINEMATICS,)* }
+            }
+
             /// What it takes beside the elastic constants.
             pub fn parameters(self) -> &'static [Parameter] {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::PARAMETERS,)* }
@@ -147,4 +161,5 @@ macro_rules! named_laws {
 named_laws! {
     Hardening,
     Maxwell,
+    PlasticCorrespondence,
 }

@@ -233,6 +233,7 @@ fn leg<'r, const D: usize>(
                 displacement: &moment.state.u,
                 residual: &[],
                 zone_of_site: &zones,
+                system: Some(moment.system),
                 broken: &moment.broken_bonds(),
             })
         };

@@ -133,6 +133,7 @@ fn load_steps<const D: usize>(
                 displacement: &moment.state.u,
                 residual: &[],
                 zone_of_site: &zones,
+                system: Some(moment.system),
                 broken: &moment.broken_bonds(),
             })
         };

@@ -426,6 +426,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if let Some(damage) = &damage {
             more.push(OverSites::Scalar("damage", damage));
         }
+        let remembered = moment.system.remembered();
+        for (name, values) in &remembered {
+            more.push(OverSites::Scalar(name, values));
+        }
         self.series
             .push(moment.state.time, snapshot(solved, &more, Shown::All))?;
         self.seconds += begun.elapsed().as_secs_f64();

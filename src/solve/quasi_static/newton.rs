@@ -6,7 +6,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::{QuasiStaticError, Residual, Run};
+use super::error::QuasiStaticError;
+use super::residual::{Residual, Run, Tangent};
 use crate::{
     progress::Silent,
     solve::{
@@ -15,15 +16,6 @@ use crate::{
     },
     system::{Breakage, Dynamic, Interval, Symmetry},
 };
-
-/// Which tangent a correction is found with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tangent {
-    /// That at rest, broken bonds left out: one pass for a product, and factors at hand.
-    AtRest,
-    /// That at the present displacement.
-    Present,
-}
 
 /// The residual over that before, beyond which the tangent at rest leads too slowly.
 const SLOW: f64 = 0.1;

@@ -16,7 +16,7 @@ const MOST: usize = 4;
 /// Smaller and smaller neighbourhoods in which the order is looked for.
 const ZOOMS: usize = 50;
 
-/// The factor by which predictions are judged; [`CHOICES`] and [`CHECKS`] say how many keep to it.
+/// The factor by which predictions are judged; `CHOICES` and `CHECKS` say how many keep to it.
 pub const SPREAD: f64 = 3.0;
 
 /// How many errors that a choice predicted were within [`SPREAD`] of the measured ones; `docs/choosing.md` says of which scenes.

@@ -29,14 +29,14 @@ use std::time::Instant;
 pub use choose::{Candidate, Chosen};
 pub use open::Family;
 
-pub use super::error_prediction::{Against, ErrorPrediction};
+pub use bondline::predict::{Against, ErrorPrediction};
 
 pub use estimate::{SPREAD, difference};
 pub use pilot::Bench;
 use versions::predicted_error;
 
-use crate::counted::{ANSWERS, TENTH};
-use crate::resource_estimate::Prediction;
+use bondline::predict::Prediction;
+use bondline::predict::counted::{ANSWERS, TENTH};
 use bondline::progress::Progress;
 use bondline::run::AnyScene;
 use bondline::run::RunError;
@@ -89,7 +89,7 @@ pub fn check(
         scene.chose(chosen.choices.clone());
     }
     let begun = Instant::now();
-    let mut prediction = crate::prediction::predict(scene, progress)?;
+    let mut prediction = bondline::predict::predict(scene, progress)?;
     if let (Some(_), None) = (&prediction.counted, pilots) {
         prediction.no_error = Some("the model was counted, not laid out".to_owned());
         return Ok(prediction);
@@ -114,7 +114,7 @@ pub fn check(
     Ok(prediction)
 }
 
-/// The error of a complete scene, from versions of it that take [`PILOTS`] of its predicted time, or `least` seconds; else why there is none.
+/// The error of a complete scene, from versions of it that take `PILOTS` of its predicted time, or `least` seconds; else why there is none.
 ///
 /// # Errors
 /// [`SceneError`] of the scene itself.

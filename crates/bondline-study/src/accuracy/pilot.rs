@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::output_cost::TrialFolder;
 use crate::variants::{self, Measured, Quantity};
 use bondline::observe::summary::RunSummary;
+use bondline::predict::output_cost::TrialFolder;
 use bondline::progress::Silent;
 use bondline::run::AnyScene;
 use bondline::scene::Source;

@@ -10,39 +10,39 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::error_prediction::ErrorPrediction;
-use crate::output_cost::{made_up, output_seconds};
-use bondline::assembly::Pattern;
-use bondline::coupling::edge::Edge;
-use bondline::coupling::{Model, PointSource, SiteKind, Zone};
-use bondline::mesh::Mesh;
-use bondline::observe::proof::{Proof, Severity};
-use bondline::observe::report::{aligned, number};
-use bondline::observe::summary::{
+use super::output_cost::{made_up, output_seconds};
+use crate::assembly::Pattern;
+use crate::coupling::edge::Edge;
+use crate::coupling::{Model, PointSource, SiteKind, Zone};
+use crate::mesh::Mesh;
+use crate::observe::proof::{Proof, Severity};
+use crate::observe::report::{aligned, number};
+use crate::observe::summary::{
     Choice, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
     resident_memory_bytes,
 };
-use bondline::peridynamics::{
+use crate::peridynamics::{
     BondWeights, LatticeFamily, PartialVolume, TIE_TOLERANCE, isotropic_shell_factors,
 };
-use bondline::progress::Progress;
-use bondline::run::RunError;
-use bondline::run::budget::{Share, largest, memory_budget};
-use bondline::run::equilibrium;
-use bondline::run::loads;
-use bondline::run::proof::{self, Subject};
-use bondline::run::setup::{self, Rest};
-use bondline::run::solution::{self, Solved};
-use bondline::run::warnings::doubts;
-use bondline::scene::Scene;
-use bondline::scene::spec::{Joining, ZonesNeeded};
-use bondline::solve::FreeDofs;
-use bondline::solve::direct::Analysis;
-use bondline::solve::ordering::SiteGraph;
-use bondline::solve::rehearsal::{rehearse, seconds_per_scalar};
-use bondline::solve::statics::{MethodUsed, StaticError, expected_method};
-use bondline::solve::symbolic::FactorCost;
-use bondline::system::Symmetry;
-use bondline::tensor::padded;
+use crate::progress::Progress;
+use crate::run::RunError;
+use crate::run::budget::{Share, largest, memory_budget};
+use crate::run::equilibrium;
+use crate::run::loads;
+use crate::run::proof::{self, Subject};
+use crate::run::setup::{self, Rest};
+use crate::run::solution::{self, Solved};
+use crate::run::warnings::doubts;
+use crate::scene::Scene;
+use crate::scene::spec::{Joining, ZonesNeeded};
+use crate::solve::FreeDofs;
+use crate::solve::direct::Analysis;
+use crate::solve::ordering::SiteGraph;
+use crate::solve::rehearsal::{rehearse, seconds_per_scalar};
+use crate::solve::statics::{MethodUsed, StaticError, expected_method};
+use crate::solve::symbolic::FactorCost;
+use crate::system::Symmetry;
+use crate::tensor::padded;
 
 /// What a run will need.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -83,7 +83,7 @@ pub struct Prediction {
     pub proof: Proof,
     /// What will be costly or inaccurate.
     pub warnings: Vec<String>,
-    /// How far results will be from those of a finer model, where runs with other spacings tell; see [`check`](fn@crate::check).
+    /// How far results will be from those of a finer model, where runs with other spacings tell; as `bondline check` finds out.
     pub error: Option<ErrorPrediction>,
     /// Why there is none, if it was looked for.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -324,6 +324,7 @@ pub(crate) fn predict<const D: usize>(
         displacement: &displacement,
         residual: &displacement,
         zone_of_site: &zones,
+        system: None,
         broken: &[],
     };
     timings.add("output", output_seconds(&rest.output, &made_up)?);
@@ -364,9 +365,8 @@ pub(crate) fn warnings<const D: usize>(
 ) -> Vec<String> {
     let mut list = Vec::new();
     // families are judged by the one spacing of a model
-    let alone = |p: &&bondline::coupling::Peridynamics<D>| {
-        !matches!(p.points, PointSource::Lattices { .. })
-    };
+    let alone =
+        |p: &&crate::coupling::Peridynamics<D>| !matches!(p.points, PointSource::Lattices { .. });
     if let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref().filter(alone)) {
         let h = model.spacing();
         let smallest = body

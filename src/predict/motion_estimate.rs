@@ -2,34 +2,34 @@
 
 use std::time::Instant;
 
-use crate::output_cost::{TrialFolder, file_seconds, made_up};
-use crate::resource_estimate::{
+use super::output_cost::{TrialFolder, file_seconds, made_up};
+use super::resource_estimate::{
     MotionPrediction, OUTPUT_BYTES, Planned, Prediction, holds, warnings,
 };
-use bondline::coupling::Sampler;
-use bondline::observe::checkpoint::CheckpointFile;
-use bondline::observe::series::Series;
-use bondline::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
-use bondline::progress::Progress;
-use bondline::run::RunError;
-use bondline::run::budget::Share;
-use bondline::run::equilibrium::may_factorise;
-use bondline::run::motion::STILL;
-use bondline::run::motion::drive::SceneDrive;
-use bondline::run::motion::explicit::{moment, sizes};
-use bondline::run::motion::laid_out::{LaidOut, breaks, laid_out};
-use bondline::run::motion::pace::{held, paced};
-use bondline::run::motion::record::Recorder;
-use bondline::run::motion::system::start;
-use bondline::run::proof::growth::Asked;
-use bondline::run::solution::{self, Solved};
-use bondline::run::write::OverSites;
-use bondline::scene::spec::LoadStepSpec;
-use bondline::scene::{Explicit as Spec, QuasiStatic, Solve};
-use bondline::scene::{Output, Scene};
-use bondline::solve::FreeDofs;
-use bondline::solve::explicit::{Explicit, ExplicitParams};
-use bondline::solve::statics::MethodUsed;
+use crate::coupling::Sampler;
+use crate::observe::checkpoint::CheckpointFile;
+use crate::observe::series::Series;
+use crate::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
+use crate::progress::Progress;
+use crate::run::RunError;
+use crate::run::budget::Share;
+use crate::run::equilibrium::may_factorise;
+use crate::run::motion::STILL;
+use crate::run::motion::drive::SceneDrive;
+use crate::run::motion::explicit::{moment, sizes};
+use crate::run::motion::laid_out::{LaidOut, breaks, laid_out};
+use crate::run::motion::pace::{held, paced};
+use crate::run::motion::record::Recorder;
+use crate::run::motion::system::start;
+use crate::run::proof::growth::Asked;
+use crate::run::solution::{self, Solved};
+use crate::run::write::OverSites;
+use crate::scene::spec::LoadStepSpec;
+use crate::scene::{Explicit as Spec, QuasiStatic, Solve};
+use crate::scene::{Output, Scene};
+use crate::solve::FreeDofs;
+use crate::solve::explicit::{Explicit, ExplicitParams};
+use crate::solve::statics::MethodUsed;
 
 /// Steps are taken for a tenth of the run to tell what one costs, for this long at most \[s\].
 const TRIED_FOR: f64 = 0.5;
@@ -219,6 +219,7 @@ fn steps<const D: usize>(
             displacement: &u,
             residual: &[],
             zone_of_site: &solution::zone_of_site(model),
+            system: None,
             broken: &[],
         };
         let mut series = Series::new(folder.path(), "trial");

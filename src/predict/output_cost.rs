@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use bondline::observe::ObserveError;
-use bondline::observe::vtu::{Compression, Snapshot, write_vtu};
-use bondline::run::solution::Solved;
-use bondline::run::write::{OverSites, Shown, snapshot, write};
-use bondline::scene::Output;
+use crate::observe::ObserveError;
+use crate::observe::vtu::{Compression, Snapshot, write_vtu};
+use crate::run::solution::Solved;
+use crate::run::write::{OverSites, Shown, snapshot, write};
+use crate::scene::Output;
 
 /// Cells and points of the larger of two trial files, at least.
 const SHOWN: usize = 1500;
@@ -23,7 +23,7 @@ const SHARE: f64 = 0.05;
 static FOLDERS: AtomicUsize = AtomicUsize::new(0);
 
 /// A folder that goes when it is dropped.
-pub(crate) struct TrialFolder(PathBuf);
+pub struct TrialFolder(PathBuf);
 
 impl TrialFolder {
     /// A folder beside the results, so that it lies on the same disk, or among temporary files where there is none yet.

@@ -1,17 +1,17 @@
 //! What a run will need, counted from volumes: the answer where laying the model out would take longer than a check may.
 
 use super::resource_estimate::Prediction;
-use bondline::observe::proof::Proof;
-use bondline::observe::summary::{Choice, Sizes, Timings};
-use bondline::peridynamics::Influence;
-use bondline::run::budget::Counts;
-use bondline::scene::Scene;
+use crate::observe::proof::Proof;
+use crate::observe::summary::{Choice, Sizes, Timings};
+use crate::peridynamics::Influence;
+use crate::run::budget::Counts;
+use crate::scene::Scene;
 
 /// Seconds that `check` may take, or a [`TENTH`] of the run if that is more.
-pub(crate) const ANSWERS: f64 = 5.0;
+pub const ANSWERS: f64 = 5.0;
 
 /// See [`ANSWERS`].
-pub(crate) const TENTH: f64 = 0.1;
+pub const TENTH: f64 = 0.1;
 
 /// The counts of a scene as a prediction, where laying it out would take longer than `check` may; `None` where it would not.
 pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {

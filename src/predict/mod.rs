@@ -1,12 +1,26 @@
 //! What a run will need, without solving.
+//!
+//! | file | what |
+//! |---|---|
+//! | `resource_estimate.rs` | of a static scene: sizes, memory, time |
+//! | `motion_estimate.rs` | of one that moves |
+//! | `counted.rs` | the same from volumes, where the model is too large to be laid out |
+//! | `output_cost.rs` | what outputs will cost |
+//! | `error_prediction.rs` | an error, predicted |
 
-use bondline::progress::Progress;
-use bondline::run::chosen::with_choice;
-use bondline::run::{AnyScene, RunError};
-use bondline::scene::{Scene, Solve};
+pub mod counted;
+mod error_prediction;
+mod motion_estimate;
+pub mod output_cost;
+mod resource_estimate;
 
-use crate::resource_estimate::Prediction;
-use crate::{counted, motion_estimate, resource_estimate};
+pub use error_prediction::{Against, ErrorPrediction};
+pub use resource_estimate::{MotionPrediction, Prediction};
+
+use crate::progress::Progress;
+use crate::run::chosen::with_choice;
+use crate::run::{AnyScene, RunError};
+use crate::scene::{Scene, Solve};
 
 /// What a run of a scene will need, without solving; counted from volumes where laying the model out would take too long, see [`Prediction::counted`].
 ///

@@ -1,0 +1,225 @@
+//! Von Mises plasticity with linear isotropic hardening, for small strains.
+
+use super::{Kinematics, LocalLaw, LocalResponse};
+use crate::tensor::{Tensor, Tensor4, strain};
+
+/// Rate-independent J2 plasticity: `σ = C : (ε − ε_p)`, `f = √(3/2) |dev σ| − (σ_y + H α) ≤ 0`, `ε̇_p = α̇ √(3/2) dev σ/|dev σ|`.
+///
+/// The stress at the end of a step is found by radial return (\[SimoHughes1998\] box 3.1), which is exact for loads that keep their direction. α is the equivalent plastic strain; the plastic work
+/// beyond `½ H α²`, which is stored, is dissipated: `σ_y α`.
+///
+/// In a bar the stress is uniaxial; plane bodies are in plane strain.
+#[derive(Clone, Debug)]
+pub struct J2<const D: usize> {
+    elastic: Tensor4<D>,
+    shear: f64,
+    yield_stress: f64,
+    hardening: f64,
+}
+
+impl<const D: usize> J2<D> {
+    /// A material of the Lamé parameters of `D` dimensions, the yield stress σ_y and the hardening modulus H \[Pa\].
+    pub fn new(lambda: f64, shear: f64, yield_stress: f64, hardening: f64) -> Self {
+        Self {
+            elastic: Tensor4::isotropic(lambda, shear),
+            shear,
+            yield_stress,
+            hardening,
+        }
+    }
+
+    /// The kinematics in which the law holds.
+    pub const KINEMATICS: &'static [Kinematics] =
+        &[Kinematics::Bar, Kinematics::PlaneStrain, Kinematics::Solid];
+
+    /// The stress deviator of a solid, `(in plane, out of plane)`, from the strain `e` that is elastic in plane and `out` out of it; in a bar the stress.
+    fn deviator(&self, e: &Tensor<D>, out: f64) -> (Tensor<D>, f64) {
+        if D == 1 {
+            return (self.elastic.contract(e), 0.0);
+        }
+        let mean = (e.trace() + out) / 3.0;
+        let dev = (e - Tensor::identity() * mean) * (2.0 * self.shear);
+        // a solid has all of its deviator in the tensor
+        let across = if D == 2 { out - mean } else { 0.0 };
+        (dev, 2.0 * self.shear * across)
+    }
+}
+
+/// Independent components of a symmetric tensor, row by row.
+fn components<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
+    (0..D).flat_map(|i| (i..D).map(move |j| (i, j)))
+}
+
+impl<const D: usize> LocalLaw<D> for J2<D> {
+    fn tangent(&self) -> &Tensor4<D> {
+        &self.elastic
+    }
+
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    fn history(&self) -> &'static [&'static str] {
+        match D {
+            1 => &["plastic strain xx", "equivalent plastic strain"],
+            2 => &[
+                "plastic strain xx",
+                "plastic strain xy",
+                "plastic strain yy",
+                "equivalent plastic strain",
+            ],
+            _ => &[
+                "plastic strain xx",
+                "plastic strain xy",
+                "plastic strain xz",
+                "plastic strain yy",
+                "plastic strain yz",
+                "plastic strain zz",
+                "equivalent plastic strain",
+            ],
+        }
+    }
+
+    fn respond(
+        &self,
+        gradient: &Tensor<D>,
+        _step: f64,
+        past: &[f64],
+        present: &mut [f64],
+    ) -> LocalResponse<D> {
+        let mut plastic = Tensor::<D>::zeros();
+        for ((i, j), p) in components::<D>().zip(past) {
+            plastic[(i, j)] = *p;
+            plastic[(j, i)] = *p;
+        }
+        let before = past[past.len() - 1];
+        // out of the plane the plastic strain makes up for that within it, and the elastic one for it; in a solid both are zero
+        let out = |plastic: &Tensor<D>| if D == 2 { plastic.trace() } else { 0.0 };
+        let total = strain(gradient);
+        let elastic = total - plastic;
+        let (dev, dev_out) = self.deviator(&elastic, out(&plastic));
+        let norm = (dev.norm_squared() + dev_out * dev_out).sqrt();
+        // what a unit of α takes from the equivalent stress
+        let (equivalent, stiffness) = match D {
+            1 => (norm, self.elastic.get(0, 0, 0, 0)),
+            _ => (1.5f64.sqrt() * norm, 3.0 * self.shear),
+        };
+        let excess = equivalent - (self.yield_stress + self.hardening * before);
+        let flow = (excess / (stiffness + self.hardening)).max(0.0);
+        if flow > 0.0 {
+            let along = if D == 1 { 1.0 } else { 1.5f64.sqrt() };
+            plastic += dev * (flow * along / norm);
+        }
+        let alpha = before + flow;
+        for ((i, j), p) in components::<D>().zip(present.iter_mut()) {
+            *p = plastic[(i, j)];
+        }
+        present[past.len() - 1] = alpha;
+        let elastic = total - plastic;
+        let out = out(&plastic);
+        let mut stress = self.elastic.contract(&elastic);
+        let lambda = self.elastic.get(0, 0, 0, 0) - 2.0 * self.shear;
+        let mut stored = 0.5 * stress.dot(&elastic);
+        if D == 2 {
+            // the strain out of the plane, which is elastic against the plastic one
+            stress += Tensor::identity() * (lambda * out);
+            let across = lambda * (elastic.trace() + out) + 2.0 * self.shear * out;
+            stored = 0.5 * (stress.dot(&elastic) + across * out);
+        }
+        LocalResponse {
+            stress,
+            stored: stored + 0.5 * self.hardening * alpha * alpha,
+            dissipated: self.yield_stress * flow,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Elastic;
+
+    const YIELD: f64 = 250.0;
+    const HARDENING: f64 = 9e3;
+
+    /// Responds to strains one after another; the last stress, what is stored and what was dissipated.
+    fn follow<const D: usize>(law: &J2<D>, path: &[Tensor<D>]) -> (Tensor<D>, f64, f64) {
+        let mut past = vec![0.0; law.history().len()];
+        let mut lost = 0.0;
+        let mut last = (Tensor::zeros(), 0.0);
+        for strain in path {
+            let mut present = past.clone();
+            let found = law.respond(strain, 1.0, &past, &mut present);
+            past = present;
+            lost += found.dissipated;
+            last = (found.stress, found.stored);
+        }
+        (last.0, last.1, lost)
+    }
+
+    fn law<const D: usize>(kinematics: Kinematics) -> J2<D> {
+        let solid = Elastic::new(2e5, 0.3, 1.0).unwrap();
+        let (lambda, shear) = solid.lame::<D>(kinematics).unwrap();
+        J2::new(lambda, shear, YIELD, HARDENING)
+    }
+
+    #[test]
+    fn a_bar_follows_its_bilinear_curve_and_unloads_elastically() {
+        let law = law::<1>(Kinematics::Bar);
+        let strain = |e: f64| Tensor::<1>::from_element(e);
+        let (top, e) = (4e-3, 2e5);
+        let tangent = e * HARDENING / (e + HARDENING);
+        let expected = YIELD + tangent * (top - YIELD / e);
+        let (stress, ..) = follow(&law, &[strain(1e-3), strain(top)]);
+        assert!((stress[0] - expected).abs() < 1e-9 * YIELD, "{stress}");
+        // back to no stress, and as far again into compression, where the grown yield surface holds
+        let back = top - expected / e;
+        let (stress, ..) = follow(&law, &[strain(top), strain(back)]);
+        assert!(stress[0].abs() < 1e-9 * YIELD);
+        let turned = top - 2.0 * expected / e;
+        let (stress, ..) = follow(&law, &[strain(top), strain(turned)]);
+        assert!((stress[0] + expected).abs() < 1e-9 * YIELD, "{stress}");
+    }
+
+    #[test]
+    fn shear_hardens_with_the_modulus_of_the_flow_rule_in_any_dimension() {
+        // pure shear: τ = σ_y/√3 at first, then dτ/dγ = 1/(1/μ + 3/H)
+        let mu = 2e5 / 2.6;
+        let gamma = 1e-2;
+        let first = YIELD / 3f64.sqrt();
+        let expected = first + (gamma - first / mu) / (1.0 / mu + 3.0 / HARDENING);
+        let mut e2 = Tensor::<2>::zeros();
+        e2[(0, 1)] = gamma;
+        let (stress, ..) = follow(&law::<2>(Kinematics::PlaneStrain), &[e2]);
+        assert!((stress[(0, 1)] - expected).abs() < 1e-9 * YIELD, "{stress}");
+        let mut e3 = Tensor::<3>::zeros();
+        e3[(1, 2)] = gamma;
+        let (stress, ..) = follow(&law::<3>(Kinematics::Solid), &[e3]);
+        assert!((stress[(1, 2)] - expected).abs() < 1e-9 * YIELD, "{stress}");
+    }
+
+    #[test]
+    fn plane_strain_is_a_solid_that_cannot_strain_across() {
+        let (flat, solid) = (
+            law::<2>(Kinematics::PlaneStrain),
+            law::<3>(Kinematics::Solid),
+        );
+        let path: Vec<Tensor<2>> = (1..9)
+            .map(|k| {
+                let t = f64::from(k) * 0.7;
+                Tensor::<2>::new(t.sin(), 0.8 * t.cos(), 0.0, (2.1 * t).sin()) * 4e-3
+            })
+            .collect();
+        let padded: Vec<Tensor<3>> = path
+            .iter()
+            .map(|e| Tensor::<3>::from_fn(|i, j| if i < 2 && j < 2 { e[(i, j)] } else { 0.0 }))
+            .collect();
+        let (a, stored, lost) = follow(&flat, &path);
+        let (b, stored_3, lost_3) = follow(&solid, &padded);
+        for (i, j) in components::<2>() {
+            assert!((a[(i, j)] - b[(i, j)]).abs() < 1e-10 * YIELD, "{i}{j}");
+        }
+        assert!((stored - stored_3).abs() < 1e-10 * stored_3);
+        assert!((lost - lost_3).abs() < 1e-10 * lost_3 && lost > 0.0);
+    }
+}

@@ -1,0 +1,37 @@
+//! How load steps are solved.
+
+/// How equilibrium is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Equilibrium {
+    /// By Newton's method.
+    #[default]
+    Newton,
+    /// By damped motion.
+    Relaxation,
+}
+
+/// When a load step is done.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct QuasiStaticParams {
+    /// How equilibrium is found.
+    pub equilibrium: Equilibrium,
+    /// `‖f − F‖₂` on free dofs to be reached, relative to the norm of all internal and external forces, or of those in equilibrium before bonds broke
+    /// in this load step.
+    pub tolerance: f64,
+    /// Products with the stiffness, or passes over the bonds, for one equilibrium.
+    pub max_iterations: usize,
+    /// Times that bonds may break within one load step.
+    pub max_rounds: usize,
+}
+
+impl Default for QuasiStaticParams {
+    fn default() -> Self {
+        QuasiStaticParams {
+            equilibrium: Equilibrium::Newton,
+            tolerance: 1e-8,
+            max_iterations: 50_000,
+            max_rounds: 100_000,
+        }
+    }
+}

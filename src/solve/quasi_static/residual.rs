@@ -1,0 +1,178 @@
+//! The residual of a load step, and the forces that it is measured by.
+
+use super::error::QuasiStaticError;
+use super::params::{Equilibrium, QuasiStaticParams};
+use crate::{
+    solve::{
+        FreeDofs,
+        krylov::{LinearMap, norm},
+    },
+    system::{Breakage, Dynamic, Interval},
+};
+
+/// Round-off of displacements, over them: forces within it of balance cannot come nearer.
+const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
+
+/// The least residual, relative to all forces, that is asked for: differences of the lengths of bonds know no more.
+pub const TIGHTEST: f64 = 1e-10;
+
+/// Where there is a load, as much of it as round-off may leave: a body that nothing holds moves until round-off hides any load.
+const HIDDEN: f64 = 1e-6;
+
+/// What supports that move would meet if nothing else moved, times this, counts as force: about what an intact body a thousand spacings long resists with.
+pub(super) const MOVED: f64 = 1e-3;
+
+/// What to do where a load acts.
+const UNBORNE: &str = "a load that nothing bears has none: hold the body, take smaller load steps, or prescribe displacements instead of forces";
+
+/// Which tangent a correction is found with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tangent {
+    /// That at rest, broken bonds left out: one pass for a product, and factors at hand.
+    AtRest,
+    /// That at the present displacement.
+    Present,
+}
+
+/// The work space of a run.
+pub(super) struct Run<'a> {
+    pub system: &'a mut dyn Dynamic,
+    pub near: Option<&'a dyn LinearMap>,
+    pub params: QuasiStaticParams,
+    pub free: FreeDofs,
+    pub load: Vec<f64>,
+    pub force: Vec<f64>,
+    pub residual: Vec<f64>,
+    /// `1/Σ_b |K_ab|`.
+    pub inverse: Vec<f64>,
+    /// Norm of the forces in the last equilibrium of this load step.
+    pub balanced: f64,
+    pub step: u64,
+    pub time: f64,
+    /// From the load step before to this one; of no length at the first.
+    pub interval: Interval,
+    /// Which tangent leads to equilibrium in this load step.
+    pub tangent: Tangent,
+}
+
+/// `‖f − F‖₂` on free dofs.
+#[derive(Clone, Copy)]
+pub(super) struct Residual {
+    pub size: f64,
+    /// The forces that it is measured by.
+    pub scale: f64,
+    /// What it has to come to.
+    pub enough: f64,
+}
+
+impl Residual {
+    pub fn is_enough(self) -> bool {
+        self.size <= self.enough
+    }
+
+    pub fn relative(self) -> f64 {
+        if self.scale > 0.0 {
+            self.size / self.scale
+        } else {
+            0.0
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Broken bonds have left the rows; a bond that turns resists where it did not at rest, so that a site has one number.
+    pub fn find_row_sums(&mut self) {
+        let sums = self.system.row_sums();
+        let block = self.free.block();
+        for (inverse, sums) in self.inverse.chunks_mut(block).zip(sums.chunks(block)) {
+            let sum = sums.iter().copied().fold(0.0, f64::max);
+            inverse.fill(if sum > 0.0 { 1.0 / sum } else { 0.0 });
+        }
+    }
+
+    /// `(u Σ_b |K_ab|)²`.
+    pub fn resisted(&self, dof: usize, u: f64) -> f64 {
+        let inverse = self.inverse[dof];
+        if inverse > 0.0 {
+            (u / inverse).powi(2)
+        } else {
+            0.0
+        }
+    }
+
+    /// The forces that do work: loads on free dofs, internal forces where supports hold.
+    pub fn acting(&self) -> Vec<f64> {
+        let block = self.free.block();
+        (0..self.force.len())
+            .map(|k| match self.free.is_free(k / block, k % block) {
+                true => self.load[k],
+                false => self.force[k],
+            })
+            .collect()
+    }
+
+    /// Whether equilibrium is found by Newton's method.
+    pub fn is_newton(&self) -> bool {
+        self.params.equilibrium == Equilibrium::Newton
+    }
+
+    /// Whether a load acts.
+    pub fn is_loaded(&self) -> bool {
+        self.load.iter().any(|f| *f != 0.0)
+    }
+
+    /// `f − F` on free dofs, and its norm.
+    pub fn evaluate(&mut self, u: &[f64]) -> Result<Residual, QuasiStaticError> {
+        self.system
+            .internal_force_into(u, &mut self.force, self.interval, Breakage::Held);
+        for ((r, f), k) in self.residual.iter_mut().zip(&self.load).zip(&self.force) {
+            *r = f - k;
+        }
+        self.free.clear_prescribed(&mut self.residual);
+        let forces = norm(&self.force) + norm(&self.load);
+        let size = norm(&self.residual);
+        if !(size.is_finite() && forces.is_finite()) {
+            let bad = |k: &usize| !(self.force[*k].is_finite() && self.load[*k].is_finite());
+            let dof = (0..u.len()).find(bad).unwrap_or(0);
+            return Err(QuasiStaticError::NotFinite {
+                step: self.step,
+                time: self.time,
+                site: dof / self.free.block(),
+            });
+        }
+        let resisted: f64 = (0..u.len()).map(|k| self.resisted(k, u[k])).sum();
+        let mut round_off = ROUND_OFF * resisted.sqrt();
+        if self.is_loaded() {
+            round_off = round_off.min(HIDDEN * norm(&self.load));
+        }
+        let scale = forces.max(self.balanced);
+        Ok(Residual {
+            size,
+            scale,
+            enough: (self.params.tolerance * scale).max(round_off),
+        })
+    }
+
+    /// The site at which the residual is largest.
+    pub fn worst(&self) -> usize {
+        let size = |k: usize| self.residual[k].abs();
+        let worst =
+            (0..self.residual.len()).fold(0, |best, k| if size(k) > size(best) { k } else { best });
+        worst / self.free.block()
+    }
+
+    pub fn no_equilibrium(&self, residual: Residual, iterations: usize) -> QuasiStaticError {
+        QuasiStaticError::NoEquilibrium {
+            step: self.step,
+            time: self.time,
+            residual: residual.relative(),
+            iterations,
+            site: self.worst(),
+            remedy: if self.is_loaded() {
+                UNBORNE
+            } else {
+                "take smaller load steps, or allow more iterations or a larger residual (max-iterations, tolerance)"
+            },
+        }
+    }
+}
