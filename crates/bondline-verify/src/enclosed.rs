@@ -266,7 +266,7 @@ pub fn jittered<const D: usize>(
 
 impl Case {
     /// The case as a scene: nested boxes of the three zones. Moved nodes leave centroids in the box of their cell.
-    fn text<const D: usize>(&self, otherwise: &Otherwise<'_>) -> String {
+    pub fn text<const D: usize>(&self, otherwise: &Otherwise<'_>) -> String {
         let Self {
             law, cells, widths, ..
         } = *self;

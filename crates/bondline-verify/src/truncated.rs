@@ -9,12 +9,14 @@ use rayon::prelude::*;
 
 use crate::Effort;
 use crate::enclosed::{
-    self, Case, Cells, Enclosed, EnclosedError, INFLUENCE, Law, Method, Otherwise, Widths,
+    self, Case, Cells, Enclosed, EnclosedError, INFLUENCE, Law, Method, Otherwise, SPACING, Widths,
 };
+use crate::meshes::scene;
 use crate::patch::affine_residual_where;
 use crate::tangents::momentum;
+use crate::typed;
 use bondline::coupling::SiteKind;
-use bondline::fem::{self, Locator};
+use bondline::fem;
 use bondline::observe::report::{Columns, Row, Table};
 use bondline::peridynamics::Micromodulus;
 use bondline::progress::{Progress, Silent};
@@ -294,7 +296,6 @@ fn body_force<const D: usize>(s: &Vector<D>) -> Vector<D> {
 
 /// A solved block.
 struct Solved {
-    displacement: Vec<f64>,
     seconds: f64,
     /// Of the factorisation; zero for an iterative method.
     bytes: u64,
@@ -350,40 +351,55 @@ fn solve<const D: usize>(e: &Enclosed<D>, symmetry: Symmetry) -> Result<Solved, 
     )
     .map_err(|e| e.to_string())?;
     Ok(Solved {
-        displacement: solution.displacement,
         seconds: start.elapsed().as_secs_f64(),
         bytes: solution.info.factor_bytes,
         method: solution.info.method.name(),
     })
 }
 
-/// Relative root-mean-square difference from the solution of finite elements alone on the same mesh, over all sites of the coupled model.
-fn difference<const D: usize>(case: &Case, material: Material) -> Result<f64, String> {
-    let block = |coupling| {
-        let built = material.block::<D>(case, coupling, "");
-        built.map_err(|e| e.to_string())
-    };
-    let (e, local) = (block(None)?, block(Some("\"local\""))?);
-    let u = solve(&e, e.coupling.symmetry())?.displacement;
-    let v = solve(&local, Symmetry::Symmetric)?.displacement;
-    let mesh = &local.model.mesh;
-    let locator = Locator::new(mesh, 0..mesh.cell_count());
-    let (mut error, mut norm) = (0.0, 0.0);
-    for (s, site) in e.model.sites.iter().enumerate() {
-        let Some(found) = locator.locate(mesh, &site.position, 1e-9) else {
-            continue;
-        };
-        let mut there = Vector::<D>::zeros();
-        for (&n, &w) in mesh
-            .cell(found.cell)
-            .iter()
-            .zip(&found.shape[..found.nodes])
-        {
-            there += local.model.node_transfer.displacement::<D>(n as usize, &v) * w;
+/// The smooth body force of [`body_force`] and supports of the whole boundary, as a scene has them; `half` is half of the block \[m\].
+fn loaded<const D: usize>(half: f64) -> String {
+    const AXES: [&str; 3] = ["x", "y", "z"];
+    const SIDES: [&str; 6] = ["left", "right", "bottom", "top", "back", "front"];
+    let mut text = "[conditions.load.body-force]\n".to_owned();
+    for i in 0..D {
+        let (own, next) = (AXES[i], AXES[(i + 1) % D]);
+        text +=
+            &format!("{own} = \"cos(1.5*{own}/{half:?} + 0.4) + 0.5*sin(2*{next}/{half:?})\"\n");
+    }
+    for side in &SIDES[..2 * D] {
+        text += &format!("[conditions.{side}.displacement]\non = \"{side}\"\n");
+        for axis in &AXES[..D] {
+            text += &format!("{axis} = 0\n");
         }
-        let here = Vector::<D>::from_column_slice(&u[s * D..][..D]);
-        error += site.volume * (here - there).norm_squared();
-        norm += site.volume * there.norm_squared();
+    }
+    text
+}
+
+/// Relative root-mean-square difference from the solution of finite elements alone on the same mesh, over sites of the coupled scene.
+fn difference<const D: usize>(case: &Case, material: Material) -> Result<f64, String> {
+    let case = Case {
+        law: material.law(),
+        ..*case
+    };
+    let tables = loaded::<D>(f64::from(case.widths.total()) * SPACING);
+    let text = |coupling| {
+        let otherwise = Otherwise {
+            coupling,
+            poisson_ratio: Some(material.poisson_ratio()),
+            tables: &tables,
+        };
+        case.text::<D>(&otherwise).replace(typed::FREE, "")
+    };
+    let mut places = Vec::new();
+    let coupled = scene::samples(&text(None), &mut places)?;
+    let local = scene::samples(&text(Some("\"local\"")), &mut places)?;
+    let (mut error, mut norm) = (0.0, 0.0);
+    for (u, v) in coupled.displacement.iter().zip(&local.displacement) {
+        if let (Some(u), Some(v)) = (u, v) {
+            error += u.iter().zip(v).map(|(u, v)| (u - v).powi(2)).sum::<f64>();
+            norm += v.iter().map(|v| v * v).sum::<f64>();
+        }
     }
     Ok((error / norm).sqrt())
 }

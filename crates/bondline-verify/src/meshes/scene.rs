@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bondline::coupling::ModelError;
 use bondline::observe::summary::RunSummary;
 use bondline::progress::Silent;
-use bondline::run::{AnyScene, LinearModel, RunError, SceneModel, Solved, solve_with};
+use bondline::run::{AnyScene, LinearModel, RunError, Samples, SceneModel, Solved, solve_with};
 use bondline::scene::{Scene, Source};
 use bondline::tensor::Vector;
 use bondline_study::Prediction;
@@ -114,6 +114,16 @@ pub fn linear_model(text: &str) -> Result<LinearModel, String> {
     load(text, &[], &folder)?
         .linear_model()
         .map_err(|e| e.to_string())
+}
+
+/// Displacements of a static scene at `places`, which become its own sites where there are none; see [`AnyScene::samples`].
+///
+/// # Errors
+/// The message of a refusal.
+pub fn samples(text: &str, places: &mut Vec<[f64; 3]>) -> Result<Samples, String> {
+    let folder = Folder::with(&[])?;
+    let scene = load(text, &[], &folder)?;
+    scene.samples(places, &Silent).map_err(|e| e.to_string())
 }
 
 /// Why a scene has no model.
