@@ -260,8 +260,15 @@ pub(crate) fn predict<const D: usize>(
         dofs: model.sites.len() * D,
         nonzeros,
     };
+    let nonlinear = rest.nonlinear(&model);
+    // led by the factors of the stiffness, where these are worth their cost
+    let solver_name = match nonlinear {
+        None => method.name(),
+        Some(_) => MethodUsed::Newton.name(),
+    };
+    choices.extend(nonlinear);
     choices.push(Choice {
-        choice: method.name().to_owned(),
+        choice: solver_name.to_owned(),
         why: format!("{} system of {} unknowns", symmetry.name(), free.count()),
     });
     if let Some(p) = &model.peridynamics {

@@ -13,9 +13,9 @@ use crate::scene::conditions::Condition;
 use crate::scene::validated::Solver;
 use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
-use crate::solve::quasi_static::{self, LoadState, QuasiStaticParams};
+use crate::solve::quasi_static::{self, LoadState, QuasiStaticError, QuasiStaticParams};
 use crate::solve::statics::{
-    self, Method, MethodUsed, StaticInfo, StaticParams, StaticProblem, StaticSolution,
+    self, Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticProblem, StaticSolution,
 };
 use crate::system::{BlockCsr, Dynamic, Symmetry};
 use crate::tensor::padded;
@@ -139,6 +139,7 @@ fn nonlinear<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<(StaticSolution, Vec<f64>, Option<f64>), RunError> {
     let clock = Instant::now();
+    statics::well_posed(problem)?;
     let factors = match may_factorise(model, params.method, problem.symmetry) {
         true => statics::factors(problem, params, progress)?,
         false => None,
@@ -172,7 +173,8 @@ fn nonlinear<const D: usize>(
             relative_residual = seen.residual;
             ControlFlow::Break(())
         },
-    )?;
+    )
+    .map_err(|error| without_steps(error, problem.positions))?;
     let reactions = (internal.iter().zip(problem.load).zip(problem.prescribed))
         .map(|((f, load), held)| if held.is_some() { f - load } else { 0.0 })
         .collect();
@@ -193,7 +195,33 @@ fn nonlinear<const D: usize>(
             relative_residual,
         },
     };
-    Ok((solution, internal, Some(energy)))
+    let energy = (problem.symmetry == Symmetry::Symmetric).then_some(energy);
+    Ok((solution, internal, energy))
+}
+
+/// Why a static scene has no solution, which knows of no load steps.
+fn without_steps(error: QuasiStaticError, positions: &[[f64; 3]]) -> RunError {
+    match error {
+        QuasiStaticError::NoEquilibrium {
+            residual,
+            iterations,
+            site,
+            ..
+        } => StaticError::NoEquilibrium {
+            residual,
+            iterations,
+            site,
+            position: positions[site],
+        }
+        .into(),
+        QuasiStaticError::NotFinite { site, .. } => StaticError::NotFinite {
+            what: "internal force",
+            site,
+            position: positions[site],
+        }
+        .into(),
+        other => other.into(),
+    }
 }
 
 /// Whether factors of the stiffness may lead Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone, whose condition is that

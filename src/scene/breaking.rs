@@ -94,11 +94,10 @@ pub(crate) fn breaking<const D: usize>(
     let solve = spec.solve.as_ref().map(|s| s.get_ref());
     let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
+    let is_objective = (material.law.force_state()).is_some_and(|f| f.is_objective());
     let bonds = match typed {
         Some(bonds) => {
-            if *bonds.get_ref() == BondsSpec::Exact
-                && !(material.law.force_state()).is_some_and(|f| f.is_objective())
-            {
+            if *bonds.get_ref() == BondsSpec::Exact && !is_objective {
                 return Err(SceneError::new(
                     SceneErrorKind::Conflict,
                     format!(
@@ -115,8 +114,10 @@ pub(crate) fn breaking<const D: usize>(
             }
             *bonds.get_ref()
         }
-        // nothing breaks where nothing moves
-        None if !is_static && (fracture.is_some() || spec.contact.is_some()) => BondsSpec::Exact,
+        // nothing breaks where nothing moves, and a law for small strains stays linear
+        None if !is_static && is_objective && (fracture.is_some() || spec.contact.is_some()) => {
+            BondsSpec::Exact
+        }
         None => BondsSpec::Linear,
     };
     let remembers = || {

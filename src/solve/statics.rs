@@ -203,6 +203,21 @@ pub enum StaticError {
         /// Iterations or refinement steps done.
         iterations: usize,
     },
+    /// Newton's method found no equilibrium of forces that are not linear.
+    #[error(
+        "no equilibrium was found: the residual is {residual:.1e} of the forces after {iterations} iterations, largest \
+         at site {site} {position:?}; apply the loads in steps ([solve.quasi-static]), in which a body follows its path"
+    )]
+    NoEquilibrium {
+        /// Relative residual.
+        residual: f64,
+        /// Iterations spent.
+        iterations: usize,
+        /// Where the residual is largest.
+        site: usize,
+        /// Its position.
+        position: [f64; 3],
+    },
     /// The elimination order could not be computed.
     #[error(transparent)]
     Ordering(#[from] OrderingError),
@@ -235,9 +250,8 @@ pub fn solve(
     params: &StaticParams,
     progress: &dyn Progress,
 ) -> Result<StaticSolution, StaticError> {
-    check(problem)?;
+    let free = well_posed(problem)?;
     let matrix = problem.stiffness;
-    let free = FreeDofs::from_prescribed(problem.prescribed, matrix.block.max(1));
     let mut info = StaticInfo {
         method: MethodUsed::None,
         ordering: None,
@@ -257,9 +271,6 @@ pub fn solve(
         .map(|p| p.unwrap_or(0.0))
         .collect();
     if info.free_dofs > 0 {
-        if let Some(motion) = singular::unheld_bodies(matrix, &free, problem.positions) {
-            return Err(singular_error(motion, problem.positions));
-        }
         methods::solve_free(problem, &free, params, progress, &mut u, &mut info)?;
     }
     let mut reactions = matrix.multiply(&u);
@@ -276,6 +287,20 @@ pub fn solve(
         reactions,
         info,
     })
+}
+
+/// The free dofs of a problem whose numbers are finite and whose bodies cannot move as rigid ones.
+///
+/// # Errors
+/// [`StaticError`] with the site; for free rigid-body motions with their names.
+pub fn well_posed(problem: &StaticProblem<'_>) -> Result<FreeDofs, StaticError> {
+    check(problem)?;
+    let matrix = problem.stiffness;
+    let free = FreeDofs::from_prescribed(problem.prescribed, matrix.block.max(1));
+    match singular::unheld_bodies(matrix, &free, problem.positions) {
+        Some(motion) if free.count() > 0 => Err(singular_error(motion, problem.positions)),
+        _ => Ok(free),
+    }
 }
 
 fn check(problem: &StaticProblem<'_>) -> Result<(), StaticError> {

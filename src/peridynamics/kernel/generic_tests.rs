@@ -194,33 +194,8 @@ fn consistent<const D: usize>(counts: [usize; D]) {
                     (slope - work).abs() < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
                     "{name}: force is no derivative of the energy, {slope} {work}"
                 );
-                let scale = largest(&plus) * n as f64;
-                for a in 0..D {
-                    let total: f64 = plus.iter().skip(a).step_by(D).sum();
-                    assert!(total.abs() < 1e-15 * scale, "{name}: momentum {total:e}");
-                    for b in (0..a).filter(|_| kinematics == Kinematics::Exact) {
-                        let y = |i: usize, a: usize| case.position[i][a] + u[i * D + a];
-                        let moment: f64 = (0..n / D)
-                            .map(|i| y(i, a) * plus[i * D + b] - y(i, b) * plus[i * D + a])
-                            .sum();
-                        assert!(moment.abs() < 1e-14 * scale, "{name}: moment {moment:e}");
-                    }
-                }
-                let sums = pass.row_sums();
-                for row in [0, n / 2, n - 1] {
-                    let mut sum = 0.0;
-                    for c in 0..n {
-                        let mut x = vec![0.0; n];
-                        x[c] = 1.0;
-                        pass.tangent_into(&x, &mut tangent);
-                        sum += tangent[row].abs();
-                    }
-                    assert!(
-                        sum <= sums[row] * (1.0 + 1e-12) && sum > 0.2 * sums[row],
-                        "{name}: row sums {sum} {}",
-                        sums[row]
-                    );
-                }
+                balances(&case, &u, &plus, kinematics, &name);
+                row_sums_bound_rows(pass.as_ref(), n, &name);
             });
         }
     }

@@ -208,3 +208,46 @@ pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
         .zip(b)
         .fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()))
 }
+
+/// The forces at the displacement `u` add up to zero; of exact bonds so do their moments about the deformed places.
+pub(super) fn balances<const D: usize>(
+    case: &Case<D>,
+    u: &[f64],
+    force: &[f64],
+    kinematics: Kinematics,
+    name: &str,
+) {
+    let n = force.len();
+    let scale = largest(force) * n as f64;
+    for a in 0..D {
+        let total: f64 = force.iter().skip(a).step_by(D).sum();
+        assert!(total.abs() < 1e-15 * scale, "{name}: momentum {total:e}");
+        for b in (0..a).filter(|_| kinematics == Kinematics::Exact) {
+            let y = |i: usize, a: usize| case.position[i][a] + u[i * D + a];
+            let moment: f64 = (0..n / D)
+                .map(|i| y(i, a) * force[i * D + b] - y(i, b) * force[i * D + a])
+                .sum();
+            assert!(moment.abs() < 1e-14 * scale, "{name}: moment {moment:e}");
+        }
+    }
+}
+
+/// Row sums bound the rows of the tangent, and not by far; `n` unknowns.
+pub(super) fn row_sums_bound_rows<const D: usize>(pass: &dyn BondPass<D>, n: usize, name: &str) {
+    let sums = pass.row_sums();
+    let mut column = vec![0.0; n];
+    for row in [0, n / 2, n - 1] {
+        let mut sum = 0.0;
+        for c in 0..n {
+            let mut x = vec![0.0; n];
+            x[c] = 1.0;
+            pass.tangent_into(&x, &mut column);
+            sum += column[row].abs();
+        }
+        assert!(
+            sum <= sums[row] * (1.0 + 1e-12) && sum > 0.2 * sums[row],
+            "{name}: row sums {sum} {}",
+            sums[row]
+        );
+    }
+}

@@ -150,6 +150,17 @@ macro_rules! named_laws {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::PARAMETERS,)* }
             }
 
+            /// Whether its bonds can break: what that costs is known ([`Law::bond_energy`]).
+            pub fn has_breakable_bonds(self) -> bool {
+                let constants = Constants {
+                    lambda: 1.0,
+                    shear: 1.0,
+                    influence: Influence::Gaussian,
+                };
+                let values: Vec<f64> = self.parameters().iter().map(|p| p.usual).collect();
+                self.build::<1>(constants, &values).bond_energy(1.0).is_some()
+            }
+
             /// The law; `values` are those of [`Named::parameters`].
             pub fn build<const D: usize>(self, constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
                 match self { $(Self::$law => <$law<D> as NamedLaw<D>>::build(constants, values),)* }

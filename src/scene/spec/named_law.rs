@@ -58,7 +58,11 @@ static FIELDS: LazyLock<Vec<Vec<&'static str>>> = LazyLock::new(|| {
 
 /// Whether materials of a law have a common key.
 fn takes(law: Named, key: &str) -> bool {
-    key != "poisson-ratio" || law.ratio() == Ratio::Any
+    match key {
+        "poisson-ratio" => law.ratio() == Ratio::Any,
+        "fracture-energy" | "critical-stretch" => law.has_breakable_bonds(),
+        _ => true,
+    }
 }
 
 fn fields(law: Named) -> &'static [&'static str] {
