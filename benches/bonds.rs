@@ -4,15 +4,15 @@
 //!
 //! Times of one thread are CPU times, so that other programs on the machine do not count; times of two threads are wall-clock times, the least of many. Markdown comes out.
 
-use bondline::peridynamics::contact::{Contact, ContactSetup};
-use bondline::peridynamics::kernel::{
+use bondline::peridynamics::bond_force::{
     BlockSetup, BondForce, BondPass, BondSetup, CriticalStretch, Failure, Kinematics, Layout,
     Storage, block_pass, bond_pass, instructions,
 };
+use bondline::peridynamics::contact::{Contact, ContactSetup};
 use bondline::peridynamics::{Families, TIE_TOLERANCE};
-use bondline::system::{Breakage, Interval};
+use bondline::system::{FailureUpdate, Interval};
 use bondline::tensor::Vector;
-use bondline_study::figure::{LinePlot, Scale, Series, Stroke};
+use bondline_study::line_plot::{LinePlot, Scale, Series, Stroke};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -146,7 +146,7 @@ fn list<const D: usize>(
         volume: &vec![H.powi(D as i32); n],
         families: &families,
         rows: &[],
-        idle: &[],
+        without_energy: &[],
         force: law.force(),
         kinematics: Kinematics::Exact,
         failure: critical.map(|s| Failure {
@@ -179,11 +179,12 @@ fn time<const D: usize>(pass: &mut dyn BondPass<D>, passes: usize) -> Vec<f64> {
     let mut force = vec![0.0; u.len()];
     let bonds = pass.bonds() as f64;
     pool(1).install(|| {
-        pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+        pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
         (0..passes)
             .map(|_| {
                 let start = cpu();
-                let broken = pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+                let broken =
+                    pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
                 assert_eq!(broken, 0);
                 (cpu() - start) / bonds
             })
@@ -213,7 +214,7 @@ fn time_with_contact(pass: &mut dyn BondPass<3>, n: usize, passes: usize) -> Vec
         (0..=passes)
             .map(|_| {
                 let start = cpu();
-                pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+                pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
                 contact.add_force(&u, &|i, j| pass.bonded(i, j), &mut force);
                 (cpu() - start) / bonds
             })
@@ -231,7 +232,9 @@ fn walls<const D: usize>(pass: &mut dyn BondPass<D>, rounds: usize) -> [f64; 2] 
     for _ in 0..rounds {
         for (pool, least) in pools.iter().zip(&mut least) {
             let start = Instant::now();
-            pool.install(|| pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed));
+            pool.install(|| {
+                pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update)
+            });
             *least = least.min(start.elapsed().as_secs_f64() * 1e9 / pass.bonds() as f64);
         }
     }
@@ -527,7 +530,7 @@ fn memory() {
         let mut pass = make();
         let u = motion(pass.points() * 3);
         let mut force = vec![0.0; u.len()];
-        pass.force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+        pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
         let bytes = (resident() - before) / pass.bonds() as f64;
         println!("| {name} | {:.1e} | {bytes:.2} |", pass.bonds() as f64);
     };

@@ -12,8 +12,8 @@ use bondline::observe::{
     summary::{Ended, MotionSummary},
 };
 use bondline_study::{
-    figure::{LinePlot, Series, Stroke},
-    trade::distance_from_path,
+    line_plot::{LinePlot, Series, Stroke},
+    pareto::distance_from_path,
 };
 use shared::{Columns, Failure, argument, run};
 

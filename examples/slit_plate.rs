@@ -26,7 +26,7 @@ use bondline::{
     scene::{Condition, Field},
     tensor::{Vector, strain},
 };
-use bondline_study::map::FieldMap;
+use bondline_study::field_plot::FieldMap;
 use bondline_terminal::progress::TerminalProgress;
 
 type Failure = Box<dyn std::error::Error>;

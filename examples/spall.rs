@@ -7,7 +7,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use bondline::observe::report::{self, Row, Table};
-use bondline_study::figure::{LinePlot, Series, Stroke};
+use bondline_study::line_plot::{LinePlot, Series, Stroke};
 use shared::{Columns, Failure, argument, at, between, run, running_mean};
 
 mod shared;

@@ -5,10 +5,10 @@
 
 use rayon::prelude::*;
 
-mod product;
-mod sharing;
+mod shared_blocks;
+mod spmv;
 
-pub use sharing::{GatheredRows, RowBatch, SharedRows};
+pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
 
 /// Whether the tangent of a system is symmetric; solvers choose by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -32,11 +32,11 @@ impl Symmetry {
 
 /// Whether a pass over the bonds may break them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Breakage {
+pub enum FailureUpdate {
     /// A bond beyond its critical stretch breaks, for good, and carries nothing from this pass on.
-    Allowed,
+    Update,
     /// Bonds stay as they stand: trial states of an implicit solve, energies, output.
-    Held,
+    Frozen,
 }
 
 /// The step that a force ends: laws with memory integrate over it, from the state that was committed last.
@@ -117,25 +117,25 @@ impl<'a> Halfway<'a> {
 
 /// A system that moves: `M ü = f(t) − F(u)`, with lumped masses.
 ///
-/// Shapes: `u`, `force`, `x`, `y` and the row sums have [`Dynamic::block`] numbers per site. Units: \[m\], \[N\] (per area of a bar of unit section in 1D, per
+/// Shapes: `u`, `force`, `x`, `y` and the row sums have [`SemiDiscrete::block`] numbers per site. Units: \[m\], \[N\] (per area of a bar of unit section in 1D, per
 /// thickness in 2D). Every method gives the same bits for any number of threads.
-pub trait Dynamic: Send + Sync {
+pub trait SemiDiscrete: Send + Sync {
     /// Unknowns per site (the dimension).
     fn block(&self) -> usize;
 
     /// Lumped mass of each site \[kg\].
     fn mass(&self) -> &[f64];
 
-    /// Overwrites `force` with the internal force `F(u, t, Δt)` at the end of an interval that begins where [`Dynamic::commit`] was called last (`K u` of a linear system); returns how many bonds this pass broke.
+    /// Overwrites `force` with the internal force `F(u, t, Δt)` at the end of an interval that begins where [`SemiDiscrete::commit`] was called last (`K u` of a linear system); returns how many bonds this pass broke.
     fn internal_force_into(
         &mut self,
         u: &[f64],
         force: &mut [f64],
         interval: Interval,
-        breakage: Breakage,
+        breakage: FailureUpdate,
     ) -> u64;
 
-    /// Ends the interval at the displacement of the last call of [`Dynamic::internal_force_into`]: what laws remember is from now on what they remembered there. A trial that is not committed leaves no trace.
+    /// Ends the interval at the displacement of the last call of [`SemiDiscrete::internal_force_into`]: what laws remember is from now on what they remembered there. A trial that is not committed leaves no trace.
     fn commit(&mut self);
 
     /// `y = K x` with the tangent `K` at rest, broken bonds left out.
@@ -149,16 +149,16 @@ pub trait Dynamic: Send + Sync {
     fn row_sums(&self) -> Vec<f64>;
 
     /// Upper bound of what forces that rest does not show (contact) may add to the eigenvalues of `M⁻¹ K` \[1/s²\].
-    fn hidden_rate(&self) -> f64 {
+    fn contact_frequency_bound(&self) -> f64 {
         0.0
     }
 
     /// Whether the tangent of each site, its row and its column, never changes; none does if the system does not know.
-    fn unbreakable(&self) -> Vec<bool> {
+    fn tangent_is_constant(&self) -> Vec<bool> {
         vec![false; self.mass().len()]
     }
 
-    /// Rows of the tangent at rest, in the order of `sites`: those of [`Dynamic::unbreakable`] sites and of sites that these are columns of.
+    /// Rows of the tangent at rest, in the order of `sites`: those of [`SemiDiscrete::tangent_is_constant`] sites and of sites that these are columns of.
     fn tangent_rows(&self, _sites: &[u32]) -> BlockCsr {
         BlockCsr::default()
     }
@@ -179,14 +179,14 @@ pub trait Dynamic: Send + Sync {
         None
     }
 
-    /// Puts an earlier account of [`Dynamic::dissipation`] in the place of this one: that of another layout of the same body.
+    /// Puts an earlier account of [`SemiDiscrete::dissipation`] in the place of this one: that of another layout of the same body.
     fn set_dissipation(&mut self, _dissipation: Dissipation) {}
 
-    /// Adds to the account what the bonds cost that the last call of [`Dynamic::internal_force_into`] broke, with the energies of the displacement `at`.
+    /// Adds to the account what the bonds cost that the last call of [`SemiDiscrete::internal_force_into`] broke, with the energies of the displacement `at`.
     /// Whoever lets bonds break calls this before anything else.
     fn account_for_breaks(&mut self, _at: &Halfway<'_>) {}
 
-    /// All energy of [`Dynamic::dissipation`] \[J\].
+    /// All energy of [`SemiDiscrete::dissipation`] \[J\].
     fn dissipated_energy(&self) -> Option<f64> {
         self.dissipation().map(|d| d.total())
     }
@@ -226,7 +226,7 @@ pub trait Dynamic: Send + Sync {
         Vec::new()
     }
 
-    /// Puts back what [`Dynamic::damage_state`] gave; false if it belongs to another model.
+    /// Puts back what [`SemiDiscrete::damage_state`] gave; false if it belongs to another model.
     fn restore_damage(&mut self, state: &[u64]) -> bool {
         state.is_empty()
     }
@@ -243,7 +243,7 @@ pub struct LinearMotion {
     pub symmetry: Symmetry,
 }
 
-impl Dynamic for LinearMotion {
+impl SemiDiscrete for LinearMotion {
     fn block(&self) -> usize {
         self.stiffness.block
     }
@@ -257,7 +257,7 @@ impl Dynamic for LinearMotion {
         u: &[f64],
         force: &mut [f64],
         _interval: Interval,
-        _breakage: Breakage,
+        _breakage: FailureUpdate,
     ) -> u64 {
         self.stiffness.multiply_into(u, force);
         0
@@ -277,7 +277,7 @@ impl Dynamic for LinearMotion {
         self.stiffness.row_sums()
     }
 
-    fn unbreakable(&self) -> Vec<bool> {
+    fn tangent_is_constant(&self) -> Vec<bool> {
         vec![true; self.mass.len()]
     }
 
@@ -360,7 +360,7 @@ impl BlockCsr {
 
     /// `y = K x`, threaded over rows; the same bits for any number of threads, and whether or not rows share their blocks.
     pub fn multiply_into(&self, x: &[f64], y: &mut [f64]) {
-        product::multiply_into(self, x, y);
+        spmv::multiply_into(self, x, y);
     }
 
     /// `y = K x` of a matrix whose [rows add up to zero](Self::rows_add_up_to_zero), with differences of `x` within each row.
@@ -368,7 +368,7 @@ impl BlockCsr {
     /// What `x` has in common along a row drops out of it before it is multiplied, so that the rounding does not grow with it. Rows that share their blocks with those before them are multiplied as by
     /// [`BlockCsr::multiply_into`]. Threaded over rows; the same bits for any number of threads.
     pub fn multiply_differences_into(&self, x: &[f64], y: &mut [f64]) {
-        product::multiply_differences_into(self, x, y);
+        spmv::multiply_differences_into(self, x, y);
     }
 
     /// Whether every row gives nothing for an `x` that is the same at all sites, to 1e-12 of the sizes of its entries.

@@ -5,7 +5,7 @@ use bondline::{
     progress::Silent,
 };
 use bondline_verify::{
-    Effort, balance, extremes, layers, partial_volumes, skin, tangents, weights,
+    Effort, balance, extremes, layers, partial_volumes, surface_layer, tangents, weights,
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -92,7 +92,7 @@ fn partial_volumes_fill_the_ball() {
 
 #[test]
 fn skins_and_layers_are_exact() {
-    let tables = skin::run(Effort::Quick, &Silent);
+    let tables = surface_layer::run(Effort::Quick, &Silent);
     assert_no_short(&tables);
     assert_eq!(count(&tables, "modulus", Verdict::Pass), 6);
     let tables = layers::run(Effort::Quick, &Silent);

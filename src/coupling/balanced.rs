@@ -39,7 +39,7 @@ impl<const D: usize> Coupling<D> for Balanced {
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         let Some(body) = model.body() else {
-            return Ok(Box::new(super::single::OwnModel { model }));
+            return Ok(Box::new(super::uncoupled::OwnModel { model }));
         };
         let share = SpliceShare {
             pair: 0.5,

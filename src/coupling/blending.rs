@@ -6,8 +6,8 @@ use crate::{
     assembly::Row,
     coupling::{
         CellRole, Coupling, Model, ModelError, Operator, Zone,
-        derivative::{self, DerivativeWeights},
-        edge::Edge,
+        least_squares_gradient::{self, DerivativeWeights},
+        zone_distance::Edge,
     },
     mesh::Mesh,
     peridynamics::PdBody,
@@ -68,7 +68,7 @@ impl<const D: usize> Coupling<D> for Blending {
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         let Some(body) = model.body() else {
-            return Ok(Box::new(super::single::OwnModel { model }));
+            return Ok(Box::new(super::uncoupled::OwnModel { model }));
         };
         let beta = at_points(Some(self.function), model, body);
         Ok(Box::new(Blended::new(
@@ -187,7 +187,7 @@ impl<'a, const D: usize> Blended<'a, D> {
                     .iter()
                     .map(|&j| (j, body.bond(i, j as usize)))
                     .collect();
-                match derivative::quadratic(model.spacing(), &neighbours) {
+                match least_squares_gradient::quadratic(model.spacing(), &neighbours) {
                     Some(weights) => Ok(Some(weights)),
                     None => Err(ModelError::Derivative {
                         position: body.cloud.position[i].iter().copied().collect(),

@@ -2,7 +2,7 @@
 //!
 //! | file | method | source |
 //! |---|---|---|
-//! | `single.rs` | pure FE, pure PD: ordinary values of the same switch | |
+//! | `uncoupled.rs` | pure FE, pure PD: ordinary values of the same switch | |
 //! | `splice.rs` | each site takes the equation of its own model | [SAND2015-7998] eq. (2.30) |
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
 //! | `balanced.rs` | half of a splice's rows, half of a blending's: no force out of balance under quartic fields | `docs/methods.md` |
@@ -10,13 +10,13 @@
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
-//! | `lattices.rs`, `lattice_axes.rs` | shared: one lattice of points, or several that elements keep apart; its axes | |
-//! | `place.rs`, `points.rs`, `bonds.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
+//! | `multi_lattice.rs`, `lattice_axes.rs` | shared: one lattice of points, or several that elements keep apart; its axes | |
+//! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
-//! | `derivative.rs`, `fit.rs`, `edge.rs`, `sample.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
-//! | `need.rs` | where the local model would be wrong, and where a bond could break | |
-//! | `motion.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
-//! | `carry.rs` | a motion handed from one layout of zones to another | |
+//! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
+//! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
+//! | `semidiscrete.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
+//! | `state_transfer.rs` | a motion handed from one layout of zones to another | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
 //! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
@@ -26,42 +26,42 @@
 
 pub mod balanced;
 pub mod blending;
-mod bonds;
-pub mod carry;
-pub mod derivative;
-pub mod edge;
-mod fit;
+mod bond_cutting;
+pub mod error_indicator;
+pub mod field_evaluation;
+mod interface_interpolation;
 mod lattice_axes;
-mod lattices;
+pub mod least_squares_gradient;
 pub mod model;
-pub mod motion;
-pub mod need;
+mod multi_lattice;
 pub mod partial_stress;
-mod place;
-pub mod points;
+pub mod point_cloud;
+mod point_generation;
 pub mod problem;
 mod recovery;
 mod rows;
-pub mod sample;
-pub mod single;
+pub mod semidiscrete;
 pub mod splice;
+pub mod state_transfer;
 pub mod tributary;
 pub mod truncated;
+pub mod uncoupled;
+pub mod zone_distance;
 
 pub use balanced::Balanced;
 pub use blending::{Blending, BlendingFunction};
-pub use carry::{BrokenBonds, Carried, CarryError, Carrying};
-pub use derivative::FitDegree;
-pub use fit::Bins;
+pub use field_evaluation::{Carrier, Sampler};
+pub use interface_interpolation::Bins;
+pub use least_squares_gradient::FitDegree;
 pub use model::{Model, Site, SiteKind};
-pub use motion::Motion;
 pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
 pub use problem::{Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
-pub use sample::{Carrier, Sampler};
-pub use single::{Local, Nonlocal};
+pub use semidiscrete::CoupledSystem;
 pub use splice::Splice;
+pub use state_transfer::{BrokenBonds, Carried, CarryError, Carrying};
 pub use tributary::Tributary;
-pub use truncated::{SeamBonds, Truncated};
+pub use truncated::{NonlinearSeam, Truncated};
+pub use uncoupled::{Local, Nonlocal};
 
 use crate::{assembly::Row, mesh::Mesh, peridynamics::LinearForceState, system::Symmetry};
 
@@ -180,7 +180,7 @@ pub trait Operator<const D: usize>: Sync {
     fn add_row_beside_bonds(&self, _site: usize, _row: &mut Row<D>) {}
 
     /// The bonds of a seam that may be geometrically exact, and break, where the operator has such: a motion takes them over, and the rest of the rows from [`Operator::add_row_without_bonds`].
-    fn seam_bonds(&self) -> Option<SeamBonds<D>> {
+    fn seam_bonds(&self) -> Option<NonlinearSeam<D>> {
         None
     }
 

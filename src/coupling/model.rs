@@ -9,11 +9,11 @@ use crate::{
     assembly::Transfer,
     coupling::{
         CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Reach, Surfaces, Zone,
-        bonds::{self, LatticeFactors, WholeFamily},
-        fit::{self, Sites},
-        lattices::{self, Grown, Passing},
-        place::{self, Beyond},
-        points::{PointCloud, Volumes},
+        bond_cutting::{self, LatticeFactors, WholeFamily},
+        interface_interpolation::{self, Sites},
+        multi_lattice::{self, CompletedLattice, ContinuedLattice},
+        point_cloud::{PointCloud, Volumes},
+        point_generation::{self, Beyond},
         recovery::Patch,
         tributary::Tributary,
     },
@@ -71,7 +71,7 @@ pub struct Model<const D: usize> {
     point_zone: Vec<Zone>,
     node_cells: (Vec<u32>, Vec<u32>),
     pub(super) interface: Interface,
-    passing: Option<Passing<D>>,
+    passing: Option<ContinuedLattice<D>>,
     /// What interpolation lacks in elements, where elements carry the partial stress of points between their nodes.
     pub(super) patches: FxHashMap<u32, Patch<D>>,
     /// The whole family of a lattice with plain weights, whose tensor the elements have.
@@ -86,7 +86,7 @@ pub struct Model<const D: usize> {
     /// Bond factors and horizon of each lattice.
     pub(super) factors: Vec<(LatticeFactors<D>, f64)>,
     /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
-    pub(super) worked_out: OnceLock<Box<dyn Any + Send + Sync>>,
+    pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
 }
 
 impl<const D: usize> Model<D> {
@@ -139,7 +139,7 @@ impl<const D: usize> Model<D> {
             tributary: Tributary::default(),
             row_scale: None,
             factors: Vec::new(),
-            worked_out: OnceLock::new(),
+            operator_cache: OnceLock::new(),
         };
         let has_points = model.roles.contains(&CellRole::Points);
         if has_points && model.peridynamics.is_none() {
@@ -157,7 +157,7 @@ impl<const D: usize> Model<D> {
                 };
                 model.check_lattices(p)?;
                 let reach = reach(coupling.as_ref(), p);
-                place::place(&model.mesh, &model.zones, &model.roles, p, reach, beyond)?
+                point_generation::place(&model.mesh, &model.zones, &model.roles, p, reach, beyond)?
             }
             _ => Vec::new(),
         };
@@ -271,7 +271,7 @@ impl<const D: usize> Model<D> {
             .map(|(l, cloud)| self.grow(p, cloud, l, reach))
             .collect::<Result<Vec<_>, _>>()?
             .into_iter();
-        let Some(Grown {
+        let Some(CompletedLattice {
             mut cloud,
             mut families,
             mut passing,
@@ -319,7 +319,8 @@ impl<const D: usize> Model<D> {
             node_site,
             barriers: &barriers,
         };
-        self.node_transfer = fit::fit_nodes(&sites, coupling.interface(), &cloud)?;
+        self.node_transfer =
+            interface_interpolation::fit_nodes(&sites, coupling.interface(), &cloud)?;
         let (transfer, _) = self.transfer_of(&sites, &cloud, |i| point_site[i]);
         if let Some((wide, renumbered)) = wide {
             let site = |i: usize| point_site[renumbered[i] as usize];
@@ -359,8 +360,8 @@ impl<const D: usize> Model<D> {
         }
         if let Some(families) = passing {
             let is_regular = constant && p.weights != BondWeights::Fitted;
-            let whole = lattices::whole_families(p, &factors, &horizons, is_regular)?;
-            self.passing = Some(Passing {
+            let whole = multi_lattice::whole_families(p, &factors, &horizons, is_regular)?;
+            self.passing = Some(ContinuedLattice {
                 families,
                 whole,
                 of_point,
@@ -395,7 +396,7 @@ impl<const D: usize> Model<D> {
         let Some(p) = &self.peridynamics else { return };
         let surface = (p.surfaces == Surfaces::Cut).then(|| self.mesh.outer_facets());
         let longest = position.iter().map(|x| (p.horizon)(x)).fold(0.0, f64::max);
-        bonds::cut(p, &self.mesh, surface, longest, position, families);
+        bond_cutting::cut(p, &self.mesh, surface, longest, position, families);
     }
 
     /// The peridynamic body, if there is one.
@@ -513,7 +514,7 @@ impl<const D: usize> Model<D> {
     }
 
     /// The lattice behind the faces at which bonds end, if they do.
-    pub(super) fn passing(&self) -> Option<&Passing<D>> {
+    pub(super) fn passing(&self) -> Option<&ContinuedLattice<D>> {
         self.passing.as_ref()
     }
 

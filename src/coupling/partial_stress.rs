@@ -13,7 +13,7 @@ use crate::{
         Bound, Cloud, Conditions, Ends, Factors, Families, Influence, LinearForceState, PdBody,
         PdError, TIE_TOLERANCE,
         alike::{self, Shape},
-        weights,
+        moment_fitted_weights,
     },
     tensor::{Tensor, Vector},
 };
@@ -333,8 +333,9 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
 
     /// Whether weights that are not negative carry affine fields.
     fn is_met_by_positive(&self, bonds: &[(Vector<D>, f64)], horizon: f64) -> bool {
-        self.conditions(bonds, horizon)
-            .is_none_or(|(base, c)| weights::fit(bonds, &base, &c, Bound::AtLeast(0.0)).is_ok())
+        self.conditions(bonds, horizon).is_none_or(|(base, c)| {
+            moment_fitted_weights::fit(bonds, &base, &c, Bound::AtLeast(0.0)).is_ok()
+        })
     }
 
     /// Weights that are exact for quadratic fields and not negative, where they are asked for and there are bonds enough to expect some.
@@ -345,16 +346,17 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         bonds: &[(Vector<D>, f64)],
         base: &[f64],
         affine: &Conditions<D>,
-    ) -> Option<weights::Fit> {
+    ) -> Option<moment_fitted_weights::Fit> {
         let conditions = affine.clone().with_vanishing_moments(5);
         if !self.between_nodes || bonds.len() < 2 * conditions.rows.len() {
             return None;
         }
-        let smallest = weights::fit(bonds, base, &conditions, Bound::Free).ok()?;
+        let smallest = moment_fitted_weights::fit(bonds, base, &conditions, Bound::Free).ok()?;
         if smallest.smallest_factor >= 0.0 {
             return Some(smallest);
         }
-        let bounded = || weights::fit(bonds, base, &conditions, Bound::AtLeast(0.0)).ok();
+        let bounded =
+            || moment_fitted_weights::fit(bonds, base, &conditions, Bound::AtLeast(0.0)).ok();
         if D < 3 { bounded() } else { None }
     }
 
@@ -363,12 +365,13 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         let Some((base, conditions)) = self.conditions(bonds, horizon) else {
             return Ok(vec![1.0; bonds.len()]);
         };
-        let positive = |c: &Conditions<D>| weights::fit(bonds, &base, c, Bound::AtLeast(0.0));
+        let positive =
+            |c: &Conditions<D>| moment_fitted_weights::fit(bonds, &base, c, Bound::AtLeast(0.0));
         let fit = match self.quadratic(bonds, &base, &conditions) {
             Some(fit) => Ok(fit),
             None => positive(&conditions),
         }
-        .or_else(|_| weights::fit(bonds, &base, &conditions, Bound::Free))?;
+        .or_else(|_| moment_fitted_weights::fit(bonds, &base, &conditions, Bound::Free))?;
         let factor = |(g, b): (&f64, &f64)| if *b > 0.0 { g / b } else { 1.0 };
         Ok(fit.values.iter().zip(&base).map(factor).collect())
     }

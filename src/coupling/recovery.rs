@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use crate::{
     assembly::Transfer,
     coupling::{
-        CellRole, Interface, Model, SiteKind, derivative,
-        fit::{Bins, Sites},
-        points::PointCloud,
+        CellRole, Interface, Model, SiteKind,
+        interface_interpolation::{Bins, Sites},
+        least_squares_gradient,
+        point_cloud::PointCloud,
     },
     mesh::Mesh,
     peridynamics::alike::{Shape, first_alike},
@@ -133,7 +134,7 @@ fn lacking<const D: usize>(
     shape: &[f64],
     x: &Vector<D>,
 ) -> Vec<f64> {
-    let of = |p: &Vector<D>| derivative::second_monomials(&((p - centre) / size));
+    let of = |p: &Vector<D>| least_squares_gradient::second_monomials(&((p - centre) / size));
     let mut lacking = of(x);
     for (&n, &s) in mesh.cell(cell as usize).iter().zip(shape) {
         for (d, q) in lacking.iter_mut().zip(of(&mesh.nodes[n as usize])) {
@@ -248,7 +249,7 @@ impl<const D: usize> Around<'_, D> {
             .map(|(k, shape)| {
                 let data: Vec<Vector<D>> = shape.bonds.iter().map(|b| b.0).collect();
                 (first_alike[k] == k)
-                    .then(|| derivative::second_derivatives(&data))
+                    .then(|| least_squares_gradient::second_derivatives(&data))
                     .flatten()
             })
             .collect();

@@ -1,7 +1,7 @@
 //! Splice: each site takes the equation of its own model, and sees across the seam the continuation of that model.
 
 use crate::{
-    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, single::OwnModel},
+    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, uncoupled::OwnModel},
     mesh::Mesh,
 };
 

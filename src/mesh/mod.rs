@@ -11,14 +11,14 @@
 //! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
-//! | `cutter.rs` | which bonds leave the mesh |
-//! | `spread.rs` | sets of cells that grow and shrink |
+//! | `visibility.rs` | which bonds leave the mesh |
+//! | `dilate_erode.rs` | sets of cells that grow and shrink |
 //! | `error.rs` | what can be wrong |
 
 use std::collections::BTreeMap;
 
 pub mod boundary;
-pub mod cutter;
+mod dilate_erode;
 mod error;
 pub mod generate;
 pub mod gmsh;
@@ -26,7 +26,7 @@ mod gmsh_kinds;
 pub mod quality;
 pub(crate) mod raw;
 pub mod read;
-mod spread;
+pub mod visibility;
 pub mod vtk;
 pub(crate) mod vtk_grid;
 mod vtk_legacy;

@@ -18,7 +18,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::ObserveError;
-use super::file::{sync_folder, write_whole};
+use super::atomic_file::{sync_folder, write_whole};
 use crate::regular_file;
 
 /// The letters at the beginning of a file.

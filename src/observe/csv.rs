@@ -5,7 +5,7 @@ use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::ObserveError;
-use super::file::{create_parent, write_whole};
+use super::atomic_file::{create_parent, write_whole};
 use crate::regular_file;
 
 /// One entry of a row.

@@ -12,22 +12,22 @@
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs`, `motion_summary.rs` | what one run did: sizes, choices, timings, balance; energies over time |
 //! | `proof.rs` | what was shown about a model before it was solved |
-//! | `switch.rs` | changes of the nonlocal zone during a run |
-//! | `file.rs` | whole files or none: written beside, then renamed |
+//! | `rezoning_event.rs` | changes of the nonlocal zone during a run |
+//! | `atomic_file.rs` | whole files or none: written beside, then renamed |
 
+pub mod atomic_file;
 pub mod checkpoint;
 pub mod claim;
 pub mod cracks;
 pub mod csv;
 mod data_array;
-pub mod file;
 pub mod history;
 mod motion_summary;
 pub mod proof;
 pub mod report;
+pub mod rezoning_event;
 pub mod series;
 pub mod summary;
-pub mod switch;
 pub mod vtu;
 
 use std::path::PathBuf;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::cracks::CrackSummary;
 use super::report::{components, grouped, number};
-use super::switch::{self, Switch};
+use super::rezoning_event::{self, Switch};
 
 /// Why a run in time ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -182,7 +182,7 @@ impl MotionSummary {
                 grouped(self.broken_bonds as usize)
             )?;
         }
-        switch::write(&self.switches, self.nonlocal_share, f)?;
+        rezoning_event::write(&self.switches, self.nonlocal_share, f)?;
         if let Some((time, place)) = &self.edge_reached {
             writeln!(
                 f,

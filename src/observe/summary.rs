@@ -143,7 +143,7 @@ pub struct Sizes {
 
 /// A decision that the scene left open.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Choice {
+pub struct Decision {
     /// What was chosen.
     pub choice: String,
     /// For which reason.
@@ -183,7 +183,7 @@ pub struct RunSummary {
     /// How large the model is.
     pub sizes: Sizes,
     /// Decisions that the scene left open.
-    pub choices: Vec<Choice>,
+    pub choices: Vec<Decision>,
     /// Seconds per stage.
     pub timings: Timings,
     /// Seconds of all stages.
@@ -396,7 +396,7 @@ mod tests {
                 bonds: 1_234_567,
                 ..Sizes::default()
             },
-            choices: vec![Choice {
+            choices: vec![Decision {
                 choice: "LU".into(),
                 why: "the tangent is not symmetric".into(),
             }],

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::ObserveError;
+use super::atomic_file::write_whole;
 pub use super::data_array::Compression;
 use super::data_array::{Number, encoded};
-use super::file::write_whole;
 use crate::mesh::{CellShape, Mesh};
 use crate::tensor::{Tensor, Vector, padded};
 

@@ -9,7 +9,7 @@ use crate::{
     assembly::{Row, Transfer},
     peridynamics::{
         Bound, Families, Family, LinearForceState, PdError, PointError, Reversed, StatePart,
-        collapsed_tensor, weights,
+        collapsed_tensor, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -356,18 +356,18 @@ impl<const D: usize> PdBody<D> {
         &self,
         j: usize,
         u: &[f64],
-        stands: impl Fn(usize) -> bool,
+        is_intact: impl Fn(usize) -> bool,
     ) -> Tensor<D> {
         let (_, omega) = self.kernel(j);
         let shape = (!self.pairwise).then(|| {
             let family = self.families.of(j).iter().map(|&l| l as usize);
-            let standing = family.zip(omega).filter(|(l, _)| stands(*l));
+            let standing = family.zip(omega).filter(|(l, _)| is_intact(*l));
             standing.fold(Tensor::zeros(), |shape, (l, omega)| {
                 let xi = self.bond(j, l);
                 shape + xi * xi.transpose() * (omega * self.cloud.volume[l])
             })
         });
-        self.stress_of(j, u, stands, shape)
+        self.stress_of(j, u, is_intact, shape)
     }
 
     fn stress_of(
@@ -427,8 +427,8 @@ fn fitted<const D: usize>(
     let Some((base, conditions)) = law.moment_conditions(bonds, horizon) else {
         return Ok(vec![1.0; bonds.len()]);
     };
-    let fit = weights::fit(bonds, &base, &conditions, Bound::AtLeast(0.0))
-        .or_else(|_| weights::fit(bonds, &base, &conditions, Bound::Free))?;
+    let fit = moment_fitted_weights::fit(bonds, &base, &conditions, Bound::AtLeast(0.0))
+        .or_else(|_| moment_fitted_weights::fit(bonds, &base, &conditions, Bound::Free))?;
     Ok(fit
         .values
         .iter()

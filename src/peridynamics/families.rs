@@ -1,6 +1,6 @@
 //! Families: which points lie within each point's horizon.
 //!
-//! The result does not depend on the number of threads. The search itself is in `grid.rs`.
+//! The result does not depend on the number of threads. The search itself is in `cell_list.rs`.
 
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! The nonlinear response of a law: force states of deformed families, and what points and bonds remember.
 //!
-//! A law gives the force state `T⟨ξ⟩` of one family at a time, [SAND2015-7998] eq. (2.3). [`crate::peridynamics::kernel`] passes over all families, adds `T_i⟨ξ⟩ − T_j⟨−ξ⟩` up,
+//! A law gives the force state `T⟨ξ⟩` of one family at a time, [SAND2015-7998] eq. (2.3). [`crate::peridynamics::bond_force`] passes over all families, adds `T_i⟨ξ⟩ − T_j⟨−ξ⟩` up,
 //! breaks bonds, and keeps the history. So a law that is written here runs in load steps and in explicit motion, beside every seam, with damage, energies and checkpoints.
 
 use crate::{peridynamics::StatePart, tensor::Vector};

@@ -5,9 +5,9 @@ use crate::peridynamics::{BondEnergy, ForceState, LinearForceState};
 /// A fast pass over all bonds that computes what a law's [`ForceState`] says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Accelerator {
-    /// [`crate::peridynamics::kernel::BondForce::Pairwise`].
+    /// [`crate::peridynamics::bond_force::BondForce::Pairwise`].
     Pairwise,
-    /// [`crate::peridynamics::kernel::BondForce::Solid`].
+    /// [`crate::peridynamics::bond_force::BondForce::Solid`].
     Solid {
         /// Bulk modulus of `D` dimensions \[Pa\].
         bulk: f64,

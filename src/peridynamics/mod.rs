@@ -5,15 +5,15 @@
 //! | `influence.rs` | influence functions ω, micromoduli λ | [SAND2015-7998] eq. (5.8), (3.1) |
 //! | `families.rs` | neighbour search with a horizon per point | eq. (5.2) |
 //! | `lattice_families.rs` | the same for points of one lattice and one horizon, without a search | |
-//! | `offsets.rs` | a value for each bond of a lattice | |
-//! | `shells.rs` | isotropic weights of a lattice, shell by shell | eq. (3.6) as a sum |
-//! | `weights.rs` | moment-fitted weights of one irregular family | |
+//! | `offset_table.rs` | a value for each bond of a lattice | |
+//! | `shell_weights.rs` | isotropic weights of a lattice, shell by shell | eq. (3.6) as a sum |
+//! | `moment_fitted_weights.rs` | moment-fitted weights of one irregular family | |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is | |
 //! | `linear_force_state.rs` | its linearisation at rest | eq. (2.19), (5.16) |
 //! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.3) |
 //! | `laws/` | the laws, one file each | eq. (3.1), (5.16), section 7.2 |
-//! | `fracture.rs` | critical stretch from the fracture energy | \[Silling2005\] |
+//! | `critical_stretch.rs` | critical stretch from the fracture energy | \[Silling2005\] |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
@@ -22,38 +22,38 @@
 
 pub(crate) mod alike;
 pub mod body;
+pub mod bond_force;
+pub mod bounded_least_norm;
+mod cell_list;
 pub mod contact;
 mod crack_area;
+pub mod critical_stretch;
 pub mod families;
 pub mod force_state;
-pub mod fracture;
-mod grid;
 pub mod influence;
-pub mod kernel;
 mod lattice_families;
 pub mod law;
 pub mod laws;
-pub mod least_change;
 pub mod linear_force_state;
-pub(crate) mod offsets;
+pub mod moment_fitted_weights;
+pub(crate) mod offset_table;
 pub mod partial_volume;
 pub mod shape_tensor;
-pub mod shells;
-pub mod weights;
+pub mod shell_weights;
 
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use crack_area::CrackArea;
+pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, Present};
-pub use fracture::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use influence::{Influence, Micromodulus};
 pub use law::{Accelerator, Law};
 pub use laws::{BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell};
 pub use linear_force_state::{Family, LinearForceState, StatePart, collapsed_tensor};
+pub use moment_fitted_weights::{Bound, Conditions, FitError};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
-pub use shells::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
-pub use weights::{Bound, Conditions, FitError};
+pub use shell_weights::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
 
 use crate::tensor::Vector;
 

@@ -1,6 +1,6 @@
 //! The shape tensor of a family and its inverse.
 
-use super::weights::place;
+use super::moment_fitted_weights::place;
 use crate::tensor::{Tensor, Vector};
 
 /// Largest condition number of a shape tensor that is inverted.
@@ -83,7 +83,7 @@ mod tests {
         assert!((k - Tensor::<3>::identity() * (6.0 * h.powi(5))).amax() < 1e-15);
         let inverse = invert_shape_tensor(&k, 6).unwrap();
         assert!((inverse * k - Tensor::<3>::identity()).amax() < 1e-15);
-        let m: f64 = crate::peridynamics::weights::weighted_volume(&bonds, &[3.0; 6]);
+        let m: f64 = crate::peridynamics::moment_fitted_weights::weighted_volume(&bonds, &[3.0; 6]);
         assert!((m - k.trace()).abs() < 1e-15);
     }
 

@@ -2,7 +2,7 @@
 
 use super::resource_estimate::Prediction;
 use crate::observe::proof::Proof;
-use crate::observe::summary::{Choice, Sizes, Timings};
+use crate::observe::summary::{Decision, Sizes, Timings};
 use crate::peridynamics::Influence;
 use crate::run::budget::Counts;
 use crate::scene::Scene;
@@ -26,7 +26,7 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
     timings.add("sites and bonds", lay_out);
     timings.add("solve", run);
     let mut choices = scene.choices.clone();
-    choices.push(Choice {
+    choices.push(Decision {
         choice: format!("coupling {}", joining.name),
         why: scene
             .coupling_why

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// What a predicted error is measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Against {
+pub enum ErrorReference {
     /// Elasticity: nothing is cut, and no bond can break, so that the horizon is a number of the method.
     Elasticity,
     /// Peridynamics everywhere, with the horizon of the scene.
@@ -14,7 +14,7 @@ pub enum Against {
     FinerScene,
 }
 
-impl std::fmt::Display for Against {
+impl std::fmt::Display for ErrorReference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Elasticity => "elasticity",
@@ -32,7 +32,7 @@ pub struct ErrorPrediction {
     /// The relative error.
     pub error: f64,
     /// Against what.
-    pub against: Against,
+    pub against: ErrorReference,
     /// The measured error was within this factor in so many scenes as `share` says.
     pub spread: f64,
     /// Of how many scenes that is true, see `docs/choosing.md`.

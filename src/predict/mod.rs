@@ -6,15 +6,17 @@
 //! | `motion_estimate.rs` | of one that moves |
 //! | `counted.rs` | the same from volumes, where the model is too large to be laid out |
 //! | `output_cost.rs` | what outputs will cost |
+//! | `display.rs` | a prediction, as people read it |
 //! | `error_prediction.rs` | an error, predicted |
 
 pub mod counted;
+mod display;
 mod error_prediction;
 mod motion_estimate;
 pub mod output_cost;
 mod resource_estimate;
 
-pub use error_prediction::{Against, ErrorPrediction};
+pub use error_prediction::{ErrorPrediction, ErrorReference};
 pub use resource_estimate::{MotionPrediction, Prediction};
 
 use crate::progress::Progress;

@@ -9,19 +9,19 @@ use super::resource_estimate::{
 use crate::coupling::Sampler;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::series::Series;
-use crate::observe::summary::{Choice, peak_memory_bytes, resident_memory_bytes};
+use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
 use crate::run::RunError;
 use crate::run::budget::Share;
 use crate::run::equilibrium::may_factorise;
 use crate::run::motion::STILL;
-use crate::run::motion::drive::SceneDrive;
+use crate::run::motion::dynamic_system::start;
 use crate::run::motion::explicit::{moment, sizes};
-use crate::run::motion::laid_out::{LaidOut, breaks, laid_out};
-use crate::run::motion::pace::{held, paced};
-use crate::run::motion::record::Recorder;
-use crate::run::motion::system::start;
-use crate::run::proof::growth::Asked;
+use crate::run::motion::setup::{ModelSetup, breaks, laid_out};
+use crate::run::motion::time_dependent_loads::SceneDrive;
+use crate::run::motion::time_step::{held, paced};
+use crate::run::motion::writer::Recorder;
+use crate::run::proof::growth::GrowthQuestion;
 use crate::run::solution::{self, Solved};
 use crate::run::write::OverSites;
 use crate::scene::spec::LoadStepSpec;
@@ -67,7 +67,7 @@ fn explicit<const D: usize>(
     spec: &Spec,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    let nothing = |_: &_, _: &mut Vec<Choice>| Ok(());
+    let nothing = |_: &_, _: &mut Vec<Decision>| Ok(());
     laid_out(scene, progress, nothing, |laid_out, ()| {
         steps(laid_out, spec, progress)
     })
@@ -75,7 +75,7 @@ fn explicit<const D: usize>(
 
 /// Sizes, memory and the choices so far, as they stand with what moves.
 fn prediction<const D: usize>(
-    laid_out: &LaidOut<'_, D>,
+    laid_out: &ModelSetup<'_, D>,
     held: usize,
     files: Files,
     state: Option<u64>,
@@ -129,13 +129,13 @@ enum Files {
 }
 
 fn steps<const D: usize>(
-    mut laid_out: LaidOut<'_, D>,
+    mut laid_out: ModelSetup<'_, D>,
     spec: &Spec,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
     let (model, rest) = (laid_out.model, laid_out.rest);
     let held = held(model, &rest.conditions)?;
-    let asked = Asked {
+    let asked = GrowthQuestion {
         remedy: laid_out.remedy,
         proved: laid_out.proved,
         policy: spec.growing_modes,
@@ -277,7 +277,7 @@ pub(crate) fn load_steps<const D: usize>(
     spec: &QuasiStatic,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    let nothing = |_: &_, _: &mut Vec<Choice>| Ok(());
+    let nothing = |_: &_, _: &mut Vec<Decision>| Ok(());
     laid_out(scene, progress, nothing, |laid_out, ()| {
         let held = held(laid_out.model, &laid_out.rest.conditions)?;
         progress.finish();
@@ -295,7 +295,7 @@ pub(crate) fn load_steps<const D: usize>(
 
 /// Memory and operations of the factors that lead the iteration, if there are any.
 fn factors<const D: usize>(
-    laid_out: &LaidOut<'_, D>,
+    laid_out: &ModelSetup<'_, D>,
     spec: &QuasiStatic,
     held: &[u32],
     prediction: &mut Prediction,

@@ -4,7 +4,6 @@
 //! Each row of the stiffness is computed and dropped at once; only its pattern stays, from which ordering and symbolic
 //! factorisation follow. That costs the time of an assembly and a tenth of its memory, and no factorisation.
 
-use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -12,13 +11,12 @@ use serde::Serialize;
 use super::error_prediction::ErrorPrediction;
 use super::output_cost::{made_up, output_seconds};
 use crate::assembly::Pattern;
-use crate::coupling::edge::Edge;
+use crate::coupling::zone_distance::Edge;
 use crate::coupling::{Model, PointSource, SiteKind, Zone};
 use crate::mesh::Mesh;
 use crate::observe::proof::{Proof, Severity};
-use crate::observe::report::{aligned, number};
 use crate::observe::summary::{
-    Choice, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
+    Decision, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
     resident_memory_bytes,
 };
 use crate::peridynamics::{
@@ -30,15 +28,15 @@ use crate::run::budget::{Share, largest, memory_budget};
 use crate::run::equilibrium;
 use crate::run::loads;
 use crate::run::proof::{self, Subject};
-use crate::run::setup::{self, Rest};
+use crate::run::setup::{self, RunSettings};
 use crate::run::solution::{self, Solved};
 use crate::run::warnings::doubts;
 use crate::scene::Scene;
-use crate::scene::spec::{Joining, ZonesNeeded};
+use crate::scene::spec::{CouplingTraits, ZonesNeeded};
 use crate::solve::FreeDofs;
 use crate::solve::direct::Analysis;
+use crate::solve::factor_time_estimate::{rehearse, seconds_per_scalar};
 use crate::solve::ordering::SiteGraph;
-use crate::solve::rehearsal::{rehearse, seconds_per_scalar};
 use crate::solve::statics::{MethodUsed, StaticError, expected_method};
 use crate::solve::symbolic::FactorCost;
 use crate::system::Symmetry;
@@ -77,7 +75,7 @@ pub struct Prediction {
     /// Seconds of all stages.
     pub total_seconds: f64,
     /// What the scene asks for or leaves open.
-    pub choices: Vec<Choice>,
+    pub choices: Vec<Decision>,
     /// What was shown about the model before it was solved.
     #[serde(skip_serializing_if = "Proof::is_empty")]
     pub proof: Proof,
@@ -155,7 +153,7 @@ impl Planned {
         model: &Model<D>,
         pattern: &Pattern,
         free: &FreeDofs,
-        rest: &Rest<D>,
+        rest: &RunSettings<D>,
         symmetry: Symmetry,
     ) -> Result<Self, RunError> {
         let nonzeros = pattern.stored * D * D;
@@ -267,12 +265,12 @@ pub(crate) fn predict<const D: usize>(
         Some(_) => MethodUsed::Newton.name(),
     };
     choices.extend(nonlinear);
-    choices.push(Choice {
+    choices.push(Decision {
         choice: solver_name.to_owned(),
         why: format!("{} system of {} unknowns", symmetry.name(), free.count()),
     });
     if let Some(p) = &model.peridynamics {
-        choices.push(Choice {
+        choices.push(Decision {
             choice: format!("{:?} bond weights", p.weights),
             why: match p.weights {
                 BondWeights::Plain => {
@@ -367,7 +365,7 @@ const MANY_BONDS: usize = 100_000_000;
 
 pub(crate) fn warnings<const D: usize>(
     model: &Model<D>,
-    joining: Joining,
+    joining: CouplingTraits,
     prediction: &Prediction,
 ) -> Vec<String> {
     let mut list = Vec::new();
@@ -469,107 +467,6 @@ fn transition_width<const D: usize>(mesh: &Mesh<D>, zones: &[Zone]) -> Option<f6
         }
     }
     narrowest.is_finite().then_some(narrowest)
-}
-
-impl fmt::Display for Prediction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let found = match &self.counted {
-            None => "the scene is right".to_owned(),
-            Some(why) => {
-                format!("counted from volumes, not proven: {why}; `run` proves it before it solves")
-            }
-        };
-        writeln!(
-            f,
-            "{} ({}D, coupling: {}): {found}\n",
-            self.scene, self.dimension, self.coupling
-        )?;
-        let s = &self.sizes;
-        let mut grid = vec![vec!["size".to_owned(), "number".to_owned()]];
-        for (name, value) in [
-            ("FE nodes", s.nodes),
-            ("FE cells", s.cells),
-            ("PD points", s.points),
-            ("bonds", s.bonds),
-            ("sites", s.sites),
-            ("unknowns", self.unknowns),
-            ("non-zeros", s.nonzeros),
-            ("factor non-zeros", self.factor_nonzeros as usize),
-        ] {
-            if self.motion.is_some() && name.ends_with("non-zeros") {
-                // bonds are passed over, not assembled
-                continue;
-            }
-            grid.push(vec![name.to_owned(), grouped(value)]);
-        }
-        writeln!(f, "{}", aligned(&grid))?;
-        for c in &self.choices {
-            writeln!(f, "chosen: {} ({})", c.choice, c.why)?;
-        }
-        writeln!(f, "{}", self.proof)?;
-        for share in &self.memory {
-            writeln!(
-                f,
-                "memory of {:<12} {}",
-                share.name,
-                bytes_text(share.bytes)
-            )?;
-        }
-        writeln!(
-            f,
-            "peak memory            {}",
-            bytes_text(self.peak_memory_bytes)
-        )?;
-        if self.operations > 0.0 {
-            writeln!(
-                f,
-                "factorisation          {:.1e} operations",
-                self.operations
-            )?;
-        }
-        if let Some(m) = &self.motion {
-            writeln!(
-                f,
-                "stable step            {} (row sums guarantee {}; their largest is at {:?})",
-                number(m.stable_step),
-                number(m.certified_step),
-                m.certified_at
-            )?;
-            writeln!(
-                f,
-                "steps                  {} of {}, {:.3e} s each",
-                grouped(m.steps as usize),
-                number(m.step),
-                m.seconds_per_step
-            )?;
-        }
-        writeln!(
-            f,
-            "time                   about {:.1} s on {} threads",
-            self.total_seconds,
-            rayon::current_num_threads()
-        )?;
-        if let Some(e) = &self.error {
-            writeln!(
-                f,
-                "error                  about {} of {} against {}, within a factor of {} in {} that were measured (order {:.1}, from {} runs with other spacings, {:.2} s)",
-                number(e.error),
-                e.quantities.join(", "),
-                e.against,
-                e.spread,
-                e.share,
-                e.order,
-                e.pilots,
-                e.seconds
-            )?;
-        } else if let Some(why) = &self.no_error {
-            writeln!(f, "error                  not predicted: {why}")?;
-        }
-        for warning in &self.warnings {
-            writeln!(f, "warning: {warning}")?;
-        }
-        Ok(())
-    }
 }
 
 /// Refuses a run whose model, laid out, shows that it needs more memory than there is.

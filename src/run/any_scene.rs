@@ -8,11 +8,11 @@ use super::budget;
 use super::error::RunError;
 use super::motion::RunOptions;
 use super::placed_scene::PlacedScene;
-use super::placement::{self};
 use super::statics;
+use super::zone_placement::{self};
 use crate::material::Kinematics;
 use crate::observe::checkpoint::Fingerprint;
-use crate::observe::summary::{Choice, RunSummary};
+use crate::observe::summary::{Decision, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
 use crate::scene::source::read;
@@ -28,7 +28,7 @@ fn placed<const D: usize>(
     fingerprint: Fingerprint,
 ) -> Result<Box<PlacedScene<D>>, SceneError> {
     let draft = Draft::new(spec, kinematics, directory, name, fingerprint)?;
-    let Some(found) = placement::placed(&draft)? else {
+    let Some(found) = zone_placement::placed(&draft)? else {
         return Ok(Box::new(draft.scene(None)?.into()));
     };
     let mut scene = draft.scene(Some(&found.zone))?;
@@ -75,7 +75,7 @@ impl AnyScene {
     }
 
     /// Keeps what was chosen for an accuracy, to be told with the results.
-    pub fn chose(&mut self, choices: Vec<Choice>) {
+    pub fn chose(&mut self, choices: Vec<Decision>) {
         let known = match self {
             Self::Bar(s) => &mut s.choices,
             Self::Plane(s) => &mut s.choices,

@@ -3,7 +3,7 @@
 //! Truncated bonds of an LPS below the Poisson ratio of a pairwise law have dilatations of negative stiffness. Whole bonds outweigh them down to a bulk modulus of zero, pieces need not: the matrix at hand decides.
 
 use crate::coupling::{Definiteness, Model, Operator};
-use crate::observe::summary::Choice;
+use crate::observe::summary::Decision;
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::materials::Ratio;
@@ -25,7 +25,7 @@ pub(crate) fn check<const D: usize>(
     model: &Model<D>,
     operator: &dyn Operator<D>,
     ratio: Ratio,
-    choices: &mut Vec<Choice>,
+    choices: &mut Vec<Decision>,
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
     if operator.definiteness() != Definiteness::NegativeTerms {
@@ -38,7 +38,7 @@ pub(crate) fn check<const D: usize>(
     };
     match factorised(model, operator, f64::INFINITY, progress) {
         Ok(()) => {
-            choices.push(Choice {
+            choices.push(Decision {
                 choice: "the seam is stable".to_owned(),
                 why: format!(
                     "Poisson's ratio {:.4} is below {:.4}, so its dilatations have a negative stiffness; a Cholesky factorisation of the matrix at rest found no negative eigenvalue",

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::budget;
 use super::loads::{loads, supports};
 use crate::coupling::{Coupling, Model, Operator};
-use crate::observe::summary::{Applied, Choice, Stopwatch, Timings};
+use crate::observe::summary::{Applied, Decision, Stopwatch, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::conditions::Condition;
@@ -17,11 +17,11 @@ use crate::solve::quasi_static::{self, LoadState, QuasiStaticError, QuasiStaticP
 use crate::solve::statics::{
     self, Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticProblem, StaticSolution,
 };
-use crate::system::{BlockCsr, Dynamic, Symmetry};
+use crate::system::{BlockCsr, SemiDiscrete, Symmetry};
 use crate::tensor::padded;
 
 /// A model at rest under its conditions, about to be solved.
-pub(crate) struct At<'a, const D: usize> {
+pub(crate) struct StaticInput<'a, const D: usize> {
     pub model: &'a Model<D>,
     pub coupling: &'a dyn Coupling<D>,
     pub operator: &'a dyn Operator<D>,
@@ -46,7 +46,7 @@ pub(crate) struct Equilibrium {
     /// Energy stored there \[J\]; none of a matrix that is not symmetric.
     pub energy: Option<f64>,
     /// What the symmetry of the matrix decided.
-    pub choices: Vec<Choice>,
+    pub choices: Vec<Decision>,
     pub timings: Timings,
 }
 
@@ -55,8 +55,8 @@ pub(crate) struct Equilibrium {
 /// # Errors
 /// [`RunError`] for a condition that meets no site, and for a system without a solution.
 pub(crate) fn equilibrium<const D: usize>(
-    at: &At<'_, D>,
-    system: Option<&mut dyn Dynamic>,
+    at: &StaticInput<'_, D>,
+    system: Option<&mut dyn SemiDiscrete>,
     mut timings: Timings,
     prove: impl FnOnce(&BlockCsr) -> Result<f64, RunError>,
     progress: &dyn Progress,
@@ -132,7 +132,7 @@ impl Drive for Still<'_> {
 
 /// Equilibrium of forces that are not linear, by Newton's method: the solution, its internal forces and its energy.
 fn nonlinear<const D: usize>(
-    system: &mut dyn Dynamic,
+    system: &mut dyn SemiDiscrete,
     problem: &StaticProblem<'_>,
     params: &StaticParams,
     model: &Model<D>,
@@ -251,7 +251,7 @@ pub fn params(solver: &Solver) -> StaticParams {
 pub fn symmetry<const D: usize>(
     coupling: &dyn Coupling<D>,
     asymmetry: impl FnOnce() -> f64,
-    choices: &mut Vec<Choice>,
+    choices: &mut Vec<Decision>,
 ) -> Symmetry {
     const ROUND_OFF: f64 = 1e-12;
     if coupling.symmetry() == Symmetry::Symmetric {
@@ -259,7 +259,7 @@ pub fn symmetry<const D: usize>(
         if asymmetry <= ROUND_OFF {
             return Symmetry::Symmetric;
         }
-        choices.push(Choice {
+        choices.push(Decision {
             choice: "unsymmetric solver".to_owned(),
             why: format!("the stiffness differs from its transpose by {asymmetry:.1e}"),
         });

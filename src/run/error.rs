@@ -1,6 +1,6 @@
 //! Why a scene that is right could not be run.
 
-use crate::coupling::motion::behaviour::MotionError;
+use crate::coupling::semidiscrete::behaviour::SystemError;
 use crate::coupling::{CarryError, ModelError};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointError;
@@ -58,7 +58,7 @@ pub enum RunError {
     SubCycling(#[from] SubCyclingError),
     /// The bonds cannot move.
     #[error(transparent)]
-    Motion(#[from] MotionError),
+    System(#[from] SystemError),
     /// The fracture energy gives no critical stretch.
     #[error("the material of the points cannot break: {0}")]
     Fracture(#[from] FractureError),

@@ -1,7 +1,7 @@
 //! The model of a scene about rest: what studies of stiffness, eigenvalues and waves look at.
 
 use super::setup::problem;
-use crate::coupling::motion::masses;
+use crate::coupling::semidiscrete::masses;
 use crate::coupling::{Coupling, Model, Operator};
 use crate::progress::Silent;
 use crate::run::AnyScene;

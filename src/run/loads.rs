@@ -186,7 +186,7 @@ pub fn supports<const D: usize>(
 
 /// What a load acts on; the force of any field follows from it without another search.
 #[derive(Clone, Debug)]
-struct Bearer<const D: usize> {
+struct LoadTarget<const D: usize> {
     condition: usize,
     /// Facets of finite elements.
     facets: Vec<Facet>,
@@ -202,7 +202,7 @@ struct Bearer<const D: usize> {
 /// By virtual work: a finite element gives its nodes their consistent forces, a part of the peridynamic zone or of its surface gives the sites that it follows the force on it. Total and first moment are those of the load itself.
 pub(crate) struct Loads<'a, const D: usize> {
     model: &'a Model<D>,
-    bearers: Vec<Bearer<D>>,
+    targets: Vec<LoadTarget<D>>,
 }
 
 impl<'a, const D: usize> Loads<'a, D> {
@@ -213,7 +213,7 @@ impl<'a, const D: usize> Loads<'a, D> {
     pub fn new(model: &'a Model<D>, conditions: &[Condition<D>]) -> Result<Self, RunError> {
         let mut loads = Self {
             model,
-            bearers: Vec::new(),
+            targets: Vec::new(),
         };
         for (number, condition) in conditions.iter().enumerate() {
             let detail = match condition.components.depends_on_position() {
@@ -241,7 +241,7 @@ impl<'a, const D: usize> Loads<'a, D> {
                 }
                 _ => continue,
             };
-            let bearer = Bearer {
+            let target = LoadTarget {
                 condition: number,
                 facets,
                 cells,
@@ -249,21 +249,21 @@ impl<'a, const D: usize> Loads<'a, D> {
                 detail,
             };
             let mut met = false;
-            loads.each(&bearer, |_| Vector::zeros(), |_, _| met = true);
+            loads.each(&target, |_| Vector::zeros(), |_, _| met = true);
             if !met {
                 return Err(RunError::Idle {
                     condition: condition.name.clone(),
                     remedy: "name a set on the boundary of the body, or enlarge the shape: it acts on the cells whose centroid it holds",
                 });
             }
-            loads.bearers.push(bearer);
+            loads.targets.push(target);
         }
         Ok(loads)
     }
 
     /// The conditions that load, by their numbers.
     pub fn conditions(&self) -> impl Iterator<Item = usize> + '_ {
-        self.bearers.iter().map(|b| b.condition)
+        self.targets.iter().map(|b| b.condition)
     }
 
     /// Adds the force of one condition with the field `field` to `load`; returns the sum of what it added.
@@ -274,8 +274,8 @@ impl<'a, const D: usize> Loads<'a, D> {
         load: &mut [f64],
     ) -> Vector<D> {
         let mut sum = Vector::zeros();
-        for bearer in self.bearers.iter().filter(|b| b.condition == condition) {
-            self.each(bearer, &field, |site, f| {
+        for target in self.targets.iter().filter(|b| b.condition == condition) {
+            self.each(target, &field, |site, f| {
                 sum += f;
                 for k in 0..D {
                     load[site * D + k] += f[k];
@@ -288,7 +288,7 @@ impl<'a, const D: usize> Loads<'a, D> {
     /// Hands each site's force to `add`.
     fn each(
         &self,
-        bearer: &Bearer<D>,
+        target: &LoadTarget<D>,
         field: impl Fn(&Vector<D>) -> Vector<D>,
         mut add: impl FnMut(usize, Vector<D>),
     ) {
@@ -299,17 +299,17 @@ impl<'a, const D: usize> Loads<'a, D> {
                 add(site as usize, f * w);
             }
         };
-        for facet in &bearer.facets {
+        for facet in &target.facets {
             for (n, f) in fem::traction_vector(mesh, facet, &field) {
                 on_node(n, f);
             }
         }
-        for &c in &bearer.cells {
+        for &c in &target.cells {
             for (n, f) in fem::body_force_vector(mesh, c, &field) {
                 on_node(n, f);
             }
         }
-        bearer.parts.each(bearer.detail, field, add);
+        target.parts.each(target.detail, field, add);
     }
 }
 

@@ -31,7 +31,6 @@ mod linear;
 pub mod loads;
 pub mod motion;
 pub(crate) mod placed_scene;
-mod placement;
 pub mod proof;
 mod rotation;
 mod samples;
@@ -40,6 +39,7 @@ pub mod solution;
 mod statics;
 pub mod warnings;
 pub mod write;
+mod zone_placement;
 
 pub use crate::run::placed_scene::PlacedScene;
 pub use any_scene::AnyScene;

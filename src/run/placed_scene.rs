@@ -1,6 +1,6 @@
 //! A scene whose nonlocal zone is placed.
 
-use super::placement::Kept;
+use super::zone_placement::CachedSolution;
 use crate::scene::Scene;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 pub struct PlacedScene<const D: usize> {
     /// The scene.
     pub scene: Scene<D>,
-    pub(super) kept: Option<Arc<Kept<D>>>,
+    pub(super) kept: Option<Arc<CachedSolution<D>>>,
 }
 
 impl<const D: usize> From<Scene<D>> for PlacedScene<D> {

@@ -4,20 +4,20 @@ use std::sync::Arc;
 
 use crate::coupling::{self, Model, PointSource, Problem, Surfaces, Zone};
 use crate::observe::checkpoint::Fingerprint;
-use crate::observe::summary::Choice;
+use crate::observe::summary::Decision;
 use crate::peridynamics::{BondWeights, PartialVolume};
-use crate::scene::breaking::Breaking;
+use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
-use crate::scene::follow::Follow;
+use crate::scene::failure::Breaking;
 use crate::scene::initial::Initial;
 use crate::scene::materials::Ratio;
 use crate::scene::points::Points;
-use crate::scene::spec::{BondsSpec, Joining, SurfacesSpec, WeightsSpec};
+use crate::scene::spec::{BondsSpec, CouplingTraits, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
 use crate::tensor::{Vector, padded};
 
 /// What of a scene remains once its problem is built.
-pub struct Rest<const D: usize> {
+pub struct RunSettings<const D: usize> {
     /// Supports and loads.
     pub conditions: Vec<Condition<D>>,
     /// How systems of equations are solved.
@@ -37,21 +37,21 @@ pub struct Rest<const D: usize> {
     /// Density of each material.
     pub density: Vec<f64>,
     /// The coupling, where the scene names none.
-    pub chosen: Option<Choice>,
+    pub chosen: Option<Decision>,
     /// How the zone was placed, where the scene draws none.
-    pub placed: Option<Choice>,
+    pub placed: Option<Decision>,
     /// What was chosen for the accuracy that the scene wants.
-    pub choices: Vec<Choice>,
+    pub choices: Vec<Decision>,
 }
 
-impl<const D: usize> Rest<D> {
+impl<const D: usize> RunSettings<D> {
     /// What was chosen for the accuracy, the zone and the coupling, in this order.
-    pub fn made(&self) -> impl Iterator<Item = &Choice> {
+    pub fn made(&self) -> impl Iterator<Item = &Decision> {
         self.choices.iter().chain(&self.placed).chain(&self.chosen)
     }
 
     /// What makes the forces of bonds that are intact depend on the displacement otherwise than linearly, as a choice; none where they do not.
-    pub fn nonlinear(&self, model: &Model<D>) -> Option<Choice> {
+    pub fn nonlinear(&self, model: &Model<D>) -> Option<Decision> {
         let law = &model
             .peridynamics
             .as_ref()
@@ -62,15 +62,15 @@ impl<const D: usize> Rest<D> {
             (BondsSpec::Exact, _) => ("geometrically exact bonds", "bonds = \"exact\""),
             (BondsSpec::Linear, false) => ("bonds that are not linear", "as their law says"),
         };
-        Some(Choice {
+        Some(Decision {
             choice: choice.to_owned(),
             why: why.to_owned(),
         })
     }
 
     /// The coupling as a choice: why it was made, or what it does if the scene names it.
-    pub fn coupling(&self, joining: Joining) -> Choice {
-        self.chosen.clone().unwrap_or_else(|| Choice {
+    pub fn coupling(&self, joining: CouplingTraits) -> Decision {
+        self.chosen.clone().unwrap_or_else(|| Decision {
             choice: format!("coupling {}", joining.name),
             why: joining.about.to_owned(),
         })
@@ -78,7 +78,7 @@ impl<const D: usize> Rest<D> {
 }
 
 /// The problem of a scene, and what remains of the scene.
-pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
+pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) {
     let material = scene
         .zones
         .iter()
@@ -89,7 +89,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
     let law = Arc::clone(&stuff.law);
     let ratio = Ratio::new(stuff.lame, scene.kinematics);
     let method = scene.coupling.build(law.linearised().divergence());
-    let chosen = scene.coupling_why.map(|why| Choice {
+    let chosen = scene.coupling_why.map(|why| Decision {
         choice: format!("coupling {}", scene.coupling.joining().name),
         why,
     });
@@ -132,7 +132,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
             peridynamics,
             coupling: method,
         },
-        Rest {
+        RunSettings {
             conditions: scene.conditions,
             solver: scene.solver,
             output: scene.output,
@@ -150,7 +150,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, Rest<D>) {
 }
 
 /// Says which partial volumes are in use, if not full ones.
-pub fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Choice> {
+pub fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
     let volumes = model.peridynamics.as_ref()?.volumes;
     let why = match volumes {
         PartialVolume::Full => return None,
@@ -158,7 +158,7 @@ pub fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Choice> {
         PartialVolume::Hhb => "a ramp over the spacing about the horizon",
         PartialVolume::Exact => "what the horizon cuts from each cell of the lattice",
     };
-    Some(Choice {
+    Some(Decision {
         choice: format!("{volumes:?} partial volumes"),
         why: why.to_owned(),
     })

@@ -1,7 +1,7 @@
 //! A solved scene, and where its sites lie.
 
 use crate::coupling::{Model, Operator, SiteKind, Zone};
-use crate::system::Dynamic;
+use crate::system::SemiDiscrete;
 
 /// A solved scene.
 pub struct Solved<'a, const D: usize> {
@@ -16,7 +16,7 @@ pub struct Solved<'a, const D: usize> {
     /// Which zone each site lies in.
     pub zone_of_site: &'a [Zone],
     /// What has forces that are not linear, or moves; none of a linear static scene.
-    pub system: Option<&'a dyn Dynamic>,
+    pub system: Option<&'a dyn SemiDiscrete>,
     /// Bonds that broke in motion, by the sites of their ends, each once for each direction.
     pub broken: &'a [(u32, u32)],
 }

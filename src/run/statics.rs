@@ -1,13 +1,13 @@
 //! From a validated scene to its solution: the only place where scene, core, solver and observers meet.
 
 use super::chosen::with_choice;
-use super::equilibrium::{At, Equilibrium, equilibrium};
+use super::equilibrium::{Equilibrium, StaticInput, equilibrium};
 use super::motion::{self, RunOptions};
-use super::placement::Kept;
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::setup::{problem, volumes_choice};
 use super::solution::{Solved, zone_of_site};
+use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::coupling::{Model, SiteKind};
 use crate::observe::ObserveError;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
-    Choice, Reaction, Rotation, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
+    Decision, Reaction, Rotation, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::run::definiteness;
@@ -23,7 +23,7 @@ use crate::run::error::RunError;
 use crate::run::warnings::{indefinite, out_of_balance, warnings};
 use crate::scene::solve::Solve;
 use crate::scene::validated::{Output, Scene};
-use crate::system::{BlockCsr, Dynamic};
+use crate::system::{BlockCsr, SemiDiscrete};
 use crate::tensor::Vector;
 
 /// Runs a scene and writes its outputs.
@@ -69,7 +69,7 @@ pub fn solve_with<const D: usize>(
 
 fn solve_chosen<const D: usize>(
     scene: Scene<D>,
-    kept: Option<Arc<Kept<D>>>,
+    kept: Option<Arc<CachedSolution<D>>>,
     progress: &dyn Progress,
     visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
 ) -> Result<RunSummary, RunError> {
@@ -92,7 +92,7 @@ fn solve_chosen<const D: usize>(
     };
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(model)?;
-    let mut choices: Vec<Choice> = rest.made().cloned().collect();
+    let mut choices: Vec<Decision> = rest.made().cloned().collect();
     definiteness::check(model, operator.as_ref(), rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
     let mut proof = Proof::default();
@@ -115,7 +115,7 @@ fn solve_chosen<const D: usize>(
         clock.lap(&mut taken, "proof");
         Ok(taken.total())
     };
-    let mut system = motion::system::still(model, coupling, operator.as_ref(), &rest)?;
+    let mut system = motion::dynamic_system::still(model, coupling, operator.as_ref(), &rest)?;
     let is_linear = system.is_none();
     let computed;
     // what placed the zone was solved with linear forces
@@ -128,7 +128,7 @@ fn solve_chosen<const D: usize>(
         }
         None => {
             computed = equilibrium(
-                &At {
+                &StaticInput {
                     model,
                     coupling,
                     operator: operator.as_ref(),
@@ -136,7 +136,7 @@ fn solve_chosen<const D: usize>(
                     solver: &rest.solver,
                     time: 0.0,
                 },
-                system.as_mut().map(|s| s as &mut dyn Dynamic),
+                system.as_mut().map(|s| s as &mut dyn SemiDiscrete),
                 Timings::default(),
                 prove,
                 progress,
@@ -161,7 +161,7 @@ fn solve_chosen<const D: usize>(
     watch = Stopwatch::start();
     choices.extend(equilibrium.choices.iter().cloned());
     choices.extend(rest.nonlinear(model));
-    choices.push(Choice {
+    choices.push(Decision {
         choice: info.method.name().to_owned(),
         why: format!("{} system of {} unknowns", symmetry.name(), info.free_dofs),
     });
@@ -195,7 +195,7 @@ fn solve_chosen<const D: usize>(
         displacement: u,
         residual: &residual,
         zone_of_site: &zone_of_site,
-        system: system.as_ref().map(|s| s as &dyn Dynamic),
+        system: system.as_ref().map(|s| s as &dyn SemiDiscrete),
         broken: &[],
     };
     let files = visit(&rest.output, &solved)?;

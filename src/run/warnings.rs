@@ -3,13 +3,13 @@
 use crate::coupling::{CellRole, Model, Zone};
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::report::number;
-use crate::scene::spec::Joining;
+use crate::scene::spec::CouplingTraits;
 use crate::shape::Barrier;
 use crate::solve::statics::MethodUsed;
 use crate::system::Symmetry;
 
 /// All doubts about a model.
-pub fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String> {
+pub fn doubts<const D: usize>(model: &Model<D>, joining: CouplingTraits) -> Vec<String> {
     let all = [one_sided(model), crack_beside_seam(model, joining)];
     all.into_iter().flatten().collect()
 }
@@ -17,7 +17,7 @@ pub fn doubts<const D: usize>(model: &Model<D>, joining: Joining) -> Vec<String>
 /// The warnings of a proof, then all doubts.
 pub(crate) fn warnings<const D: usize>(
     model: &Model<D>,
-    joining: Joining,
+    joining: CouplingTraits,
     proof: &Proof,
 ) -> Vec<String> {
     let proved = proof.messages(Severity::Warning).map(str::to_owned);
@@ -33,7 +33,11 @@ pub(crate) fn warnings<const D: usize>(
 const OUT_OF_BALANCE: f64 = 0.002;
 
 /// A solution whose loads and reactions do not balance.
-pub(crate) fn out_of_balance(force: &[f64], relative: f64, joining: Joining) -> Option<String> {
+pub(crate) fn out_of_balance(
+    force: &[f64],
+    relative: f64,
+    joining: CouplingTraits,
+) -> Option<String> {
     (relative > OUT_OF_BALANCE).then(|| {
         let force: Vec<String> = force.iter().map(|f| number(*f)).collect();
         format!(
@@ -71,7 +75,7 @@ fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
 }
 
 /// Cracks and voids so near to the seam that what is computed on this side of it lacks bonds: `bondline verify extremes`, "Cracks beside the seam".
-fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: Joining) -> Option<String> {
+fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: CouplingTraits) -> Option<String> {
     let p = model.peridynamics.as_ref()?;
     let horizons = match joining.name {
         "splice" => SPLICE,

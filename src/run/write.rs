@@ -167,7 +167,7 @@ impl Intact {
         )
     }
 
-    fn stands(&self, i: usize, j: usize) -> bool {
+    fn is_intact(&self, i: usize, j: usize) -> bool {
         self.0.is_empty() || !self.0.contains(&(i as u32, j as u32))
     }
 }
@@ -196,7 +196,7 @@ impl<const D: usize> Solved<'_, D> {
             .families
             .of(p)
             .iter()
-            .filter(|&&j| intact.stands(p, j as usize))
+            .filter(|&&j| intact.is_intact(p, j as usize))
             .map(|&j| (body.bond(p, j as usize), j as usize))
             .collect();
         let nearest = bonds
@@ -310,7 +310,7 @@ pub fn snapshot<const D: usize>(
             let stress = match (known.get(&(site as u32)), model.point_of(site)) {
                 (Some(rows), _) => Tensor::from_fn(|i, j| rows[i][j]),
                 (None, Some((body, p))) => {
-                    body.partial_stress_of(p, solved.displacement, |j| intact.stands(p, j))
+                    body.partial_stress_of(p, solved.displacement, |j| intact.is_intact(p, j))
                 }
                 (None, None) => Tensor::zeros(),
             };

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::check;
+use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::{Region, region, unknown_set};
@@ -324,7 +324,7 @@ pub(crate) fn components<const D: usize>(
     }
     for (axis, expression) in axes.iter().zip(given) {
         if let Some(e) = expression {
-            check::no_further_axes::<D>(&format!("{place}.{axis}"), e)?;
+            bounds_checks::no_further_axes::<D>(&format!("{place}.{axis}"), e)?;
         }
     }
     if given.iter().all(|e| e.is_none()) {

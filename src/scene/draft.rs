@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::check;
+use super::bounds_checks;
 use super::conditions::{self, Condition};
 use super::error::{SceneError, SceneErrorKind};
 use super::initial::Initial;
@@ -18,14 +18,15 @@ use super::unused::Parts;
 use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
-    agreement, bodies, breaking, follow, initial, joined, obstacles, output, solve, zones,
+    adaptive_zone, agreement, coupling_selection, cracks_and_voids, failure, initial,
+    lattice_regions, output, solve, zones,
 };
 use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::report::number;
-use crate::observe::summary::Choice;
+use crate::observe::summary::Decision;
 use crate::peridynamics::Influence;
 use crate::scene::points::Points;
 
@@ -118,7 +119,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         instead: Option<&CouplingSpec>,
     ) -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
         let (spec, mesh) = (self.spec, &self.mesh);
-        let mut joined = joined::joined(spec, &self.materials, mesh, placed, instead)?;
+        let mut joined = coupling_selection::joined(spec, &self.materials, mesh, placed, instead)?;
         let joining = joined.joining;
         if spec.peridynamics.is_none()
             && !matches!(joining.zones, ZonesNeeded::Everywhere(Zone::Local))
@@ -136,13 +137,13 @@ impl<'a, const D: usize> Draft<'a, D> {
             .transpose()?;
         let choices = peridynamics.as_ref().and_then(points_choice);
         let peridynamics = peridynamics
-            .map(|p| bodies::bodies(spec, joining, p, mesh, &mut zones))
+            .map(|p| lattice_regions::bodies(spec, joining, p, mesh, &mut zones))
             .transpose()?;
         agreement::one_peridynamic_material(spec, &self.materials, &self.cell_material, &zones)?;
         if let Some(p) = &peridynamics {
             agreement::horizon(spec, p, mesh, &zones)?;
         }
-        let (voids, barriers) = obstacles::obstacles(spec, mesh, &zones)?;
+        let (voids, barriers) = cracks_and_voids::obstacles(spec, mesh, &zones)?;
         if matches!(self.solve, Solve::Explicit(_)) {
             densities(spec, &self.materials)?;
         }
@@ -160,14 +161,14 @@ impl<'a, const D: usize> Draft<'a, D> {
         agreement::elastic_elements(spec, &self.materials, &self.cell_material, &zones)?;
         let breaking = {
             let has_points = zones.iter().any(|zone| *zone != Zone::Local);
-            breaking::breaking(
+            failure::breaking(
                 spec,
                 &self.materials[peridynamic as usize],
                 has_points,
                 mesh,
             )?
         };
-        let follow = follow::follow(
+        let follow = adaptive_zone::follow(
             spec,
             &mut joined,
             &self.solve,
@@ -207,11 +208,11 @@ impl<'a, const D: usize> Draft<'a, D> {
 }
 
 /// Says where points lie that the scene does not place.
-fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Choice> {
+fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
     let Points::Lattice { spacing, .. } = &p.points else {
         return None;
     };
-    Some(Choice {
+    Some(Decision {
         choice: format!("points on a lattice of spacing {}", number(*spacing)),
         why: p.points_why.clone()?,
     })
@@ -250,7 +251,7 @@ fn default_influence() -> Result<Influence, SceneError> {
 fn solver(spec: &SceneSpec) -> Result<Solver, SceneError> {
     let s = &spec.solver;
     let tolerance = match &s.tolerance {
-        Some(t) => check::within(
+        Some(t) => bounds_checks::within(
             "solver.tolerance",
             t,
             t.value > 0.0 && t.value < 1.0,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::check;
+use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics;
 use super::region::cells_of_set;
@@ -169,7 +169,7 @@ fn law_and_cells<'a, const D: usize>(
         MaterialSpec::Correspondence(m) => {
             let place = format!("materials.{name}.correspondence.stabilisation");
             let stabilisation = match &m.stabilisation {
-                Some(s) => check::not_negative(&place, s)?,
+                Some(s) => bounds_checks::not_negative(&place, s)?,
                 None => 1.0,
             };
             (
@@ -195,7 +195,7 @@ fn law_and_cells<'a, const D: usize>(
             let mut values = Vec::with_capacity(m.parameters.len());
             for (parameter, typed) in m.law.parameters().iter().zip(&m.parameters) {
                 values.push(match typed {
-                    Some(typed) => check::within(
+                    Some(typed) => bounds_checks::within(
                         &format!("materials.{name}.{}.{}", m.law.key(), parameter.key),
                         typed,
                         typed.value >= parameter.least && typed.value <= parameter.most,
@@ -226,11 +226,11 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
     match (energy, stretch) {
         (None, None) => Ok(None),
         (Some(e), None) => {
-            let energy = check::positive(&place("fracture-energy"), e)?;
+            let energy = bounds_checks::positive(&place("fracture-energy"), e)?;
             Ok(Some(Fracture::Energy(energy)))
         }
         (None, Some(s)) => {
-            let stretch = check::positive(&place("critical-stretch"), s)?;
+            let stretch = bounds_checks::positive(&place("critical-stretch"), s)?;
             Ok(Some(Fracture::Stretch(stretch)))
         }
         (Some(e), Some(s)) => Err(SceneError::new(
@@ -270,8 +270,8 @@ fn constants<const D: usize>(
         ),
     };
     let place = |key: &str| format!("materials.{name}.{kind}.{key}");
-    check::positive(&place("youngs-modulus"), modulus)?;
-    let e = check::within(
+    bounds_checks::positive(&place("youngs-modulus"), modulus)?;
+    let e = bounds_checks::within(
         &place("youngs-modulus"),
         modulus,
         modulus.value >= 1.0 / STIFFEST && modulus.value <= STIFFEST,
@@ -279,11 +279,11 @@ fn constants<const D: usize>(
         "choose units in which it lies between 1e-100 and 1e100",
     )?;
     let density = match density {
-        Some(d) => check::not_negative(&place("density"), d)?,
+        Some(d) => bounds_checks::not_negative(&place("density"), d)?,
         None => 0.0,
     };
     let nu = match (ratio, kinematics) {
-        (Some(ratio), _) => check::within(
+        (Some(ratio), _) => bounds_checks::within(
             &place("poisson-ratio"),
             ratio,
             ratio.value > -1.0 && ratio.value < 0.5,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use toml::Spanned;
 
-use super::check;
+use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{corners, position};
 use super::source::Span;
@@ -209,7 +209,7 @@ fn axis(
             count.value as f64,
         )),
         AxisSpec::Spacing(spacing) => {
-            let h = check::positive(&format!("{place}.spacing"), spacing)?;
+            let h = bounds_checks::positive(&format!("{place}.spacing"), spacing)?;
             let count = (length / h).round().max(1.0);
             // `as` saturates; the total is refused before anything is allocated
             let cells = count as usize;
@@ -217,9 +217,9 @@ fn axis(
         }
         AxisSpec::Graded(g) => {
             let fine = position::<2>(&format!("{place}.graded.fine"), &g.fine)?;
-            let spacing = check::positive(&format!("{place}.graded.spacing"), &g.spacing)?;
+            let spacing = bounds_checks::positive(&format!("{place}.graded.spacing"), &g.spacing)?;
             let ratio = match &g.growth {
-                Some(growth) => check::within(
+                Some(growth) => bounds_checks::within(
                     &format!("{place}.graded.growth"),
                     growth,
                     growth.value >= 1.0,
@@ -229,7 +229,9 @@ fn axis(
                 None => 1.3,
             };
             let largest = match &g.largest {
-                Some(largest) => check::positive(&format!("{place}.graded.largest"), largest)?,
+                Some(largest) => {
+                    bounds_checks::positive(&format!("{place}.graded.largest"), largest)?
+                }
                 None => length,
             };
             let outside = (length - (fine[1] - fine[0])).max(0.0);

@@ -3,35 +3,34 @@
 //! | file | what |
 //! |---|---|
 //! | `source.rs` | the text and its overrides on one axis of positions |
-//! | `choice.rs` | tables of exactly one key, and how overrides replace them |
+//! | `tagged_table.rs` | tables of exactly one key, and how overrides replace them |
 //! | `expression.rs`, `value.rs` | numbers, expressions, coordinates with their places |
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `bodies.rs`, `materials.rs`, `peridynamics.rs`, `default_points.rs`, `points.rs`, `obstacles.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `breaking.rs`, `follow.rs`, `output.rs` | its parts |
-//! | `joined.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
-//! | `check.rs` | numbers within their bounds |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `peridynamics.rs`, `default_points.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs` | its parts |
+//! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `bounds_checks.rs` | numbers within their bounds |
 //! | `agreement.rs` | whether parts that are right alone agree |
 //! | `unused.rs` | parts of a scene that touch nothing |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy of what is typed |
 
+pub(crate) mod adaptive_zone;
 pub(crate) mod agreement;
-pub(crate) mod bodies;
-pub(crate) mod breaking;
-pub(crate) mod check;
-pub(crate) mod choice;
+pub(crate) mod bounds_checks;
 pub(crate) mod conditions;
+pub(crate) mod coupling_selection;
+pub(crate) mod cracks_and_voids;
 pub mod default_points;
 pub(crate) mod draft;
 pub(crate) mod error;
 pub(crate) mod expression;
-pub(crate) mod follow;
+pub(crate) mod failure;
 pub(crate) mod initial;
-pub(crate) mod joined;
+pub(crate) mod lattice_regions;
 pub(crate) mod materials;
 pub(crate) mod meshing;
-pub(crate) mod obstacles;
 pub(crate) mod output;
 pub(crate) mod parse;
 pub(crate) mod peridynamics;
@@ -41,6 +40,7 @@ pub(crate) mod selected_coupling;
 pub(crate) mod solve;
 pub(crate) mod source;
 pub mod spec;
+pub(crate) mod tagged_table;
 pub(crate) mod template;
 pub(crate) mod unused;
 pub(crate) mod validated;
@@ -48,11 +48,11 @@ pub(crate) mod value;
 pub(crate) mod zones;
 
 pub use crate::scene::points::Points;
-pub use breaking::{Breaking, Contact};
+pub use adaptive_zone::Follow;
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
-pub use follow::Follow;
+pub use failure::{Breaking, Contact};
 pub use initial::{Initial, InitialKind};
 pub use materials::{Fracture, Material};
 pub use peridynamics::Peridynamics;

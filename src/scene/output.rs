@@ -1,6 +1,6 @@
 //! What a scene writes: lines, probes, tips of cracks.
 
-use super::check;
+use super::bounds_checks;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
@@ -168,7 +168,7 @@ fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip
         .help("give the direction in which the crack runs"));
     }
     let threshold = match &spec.threshold {
-        Some(t) => check::within(
+        Some(t) => bounds_checks::within(
             &format!("{place}.threshold"),
             t,
             t.value > 0.0 && t.value < 1.0,

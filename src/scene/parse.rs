@@ -4,10 +4,10 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
-use super::choice;
 use super::error::{SceneError, SceneErrorKind};
 use super::source::{Source, Span};
 use super::spec::SceneSpec;
+use super::tagged_table;
 
 impl SceneSpec {
     /// Reads a scene.
@@ -57,7 +57,7 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
         } else {
             place.dotted()
         };
-        return choice::unknown(word, &at, known).label(span, "not known here");
+        return tagged_table::unknown(word, &at, known).label(span, "not known here");
     }
     if message.starts_with("missing field") {
         let key = names.first().copied().unwrap_or_default();
@@ -104,10 +104,10 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
             format!("{at} must make exactly one choice"),
         )
         .label(span, "a table of one key belongs here")
-        .help(match choice::options(&path) {
+        .help(match tagged_table::options(&path) {
             Some(options) => format!(
                 "write {{ key = ... }} with one of {}",
-                choice::quoted(options)
+                tagged_table::quoted(options)
             ),
             None => "see `bondline schema` for the choices".to_owned(),
         });

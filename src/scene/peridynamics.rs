@@ -1,6 +1,6 @@
 //! The peridynamic choices of a validated scene: horizon, points, weights, influence function, partial volumes.
 
-use super::check;
+use super::bounds_checks;
 use super::default_points::default_points;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
@@ -67,14 +67,14 @@ pub(crate) fn peridynamics<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],
 ) -> Result<Peridynamics<D>, SceneError> {
-    check::no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
+    bounds_checks::no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
     solve::still("peridynamics.horizon", &spec.horizon)?;
     if let Some(value) = spec.horizon.as_constant() {
         let number = Number {
             value,
             span: spec.horizon.span.clone(),
         };
-        check::positive("peridynamics.horizon", &number)?;
+        bounds_checks::positive("peridynamics.horizon", &number)?;
     }
     let mut points_why = None;
     let points = match &spec.points {
@@ -86,7 +86,8 @@ pub(crate) fn peridynamics<const D: usize>(
         }
         Some(PointsSpec::Cells) => Points::Cells,
         Some(PointsSpec::Lattice(lattice)) => {
-            let spacing = check::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
+            let spacing =
+                bounds_checks::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
             let (lo, hi) = mesh.bounds();
             let count: f64 = (hi - lo).iter().map(|l| l / spacing).product();
             if count > 1e9 {
@@ -156,14 +157,14 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::coupling::motion::behaviour::{BondBehaviour, Critical};
-    use crate::coupling::{Motion, Sampler};
-    use crate::peridynamics::kernel::Kinematics as BondKinematics;
+    use crate::coupling::semidiscrete::behaviour::{BondBehaviour, Critical};
+    use crate::coupling::{CoupledSystem, Sampler};
+    use crate::peridynamics::bond_force::Kinematics as BondKinematics;
     use crate::progress::Silent;
     use crate::run::AnyScene;
     use crate::run::{Solved, solve_with};
     use crate::scene::Source;
-    use crate::system::{Breakage, Dynamic, Interval, Symmetry};
+    use crate::system::{FailureUpdate, Interval, SemiDiscrete, Symmetry};
     use crate::tensor::Tensor4;
 
     /// A plate whose edge moves as `u = G x`; a lattice with δ/h = 3.3 in its middle.
@@ -404,12 +405,12 @@ y = 0.01
                     critical_stretch: Some(Critical::Uniform(1.0)),
                     no_fail: &|_| false,
                     contact: None,
-                    storage: crate::peridynamics::kernel::Storage::Double,
+                    storage: crate::peridynamics::bond_force::Storage::Double,
                     broken: None,
                 };
                 let operator = solved.operator;
                 let mut motion =
-                    Motion::new(model, operator, Symmetry::Unsymmetric, |_| 1.0, &behaviour)
+                    CoupledSystem::new(model, operator, Symmetry::Unsymmetric, |_| 1.0, &behaviour)
                         .unwrap();
                 let wave = |s: &crate::coupling::Site<2>| {
                     let x = s.position;
@@ -417,7 +418,12 @@ y = 0.01
                 };
                 let u: Vec<f64> = model.sites.iter().flat_map(wave).collect();
                 let mut force = vec![0.0; u.len()];
-                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+                motion.internal_force_into(
+                    &u,
+                    &mut force,
+                    Interval::AT_ONCE,
+                    FailureUpdate::Update,
+                );
                 let wanted = model.assemble(operator, &Silent).multiply(&u);
                 let largest =
                     |v: &mut dyn Iterator<Item = f64>| v.fold(0.0, |m: f64, v| m.max(v.abs()));

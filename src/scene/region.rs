@@ -1,9 +1,9 @@
 //! Shapes and regions of a validated scene.
 
-use super::choice;
 use super::error::{SceneError, SceneErrorKind};
 use super::source::Span;
 use super::spec::{BoxSpec, NearSpec, SegmentSpec, ShapeSpec};
+use super::tagged_table;
 use super::value::{Coordinates, Text};
 use crate::mesh::Mesh;
 use crate::shape::Shape;
@@ -180,7 +180,7 @@ fn cuboid<const D: usize>(place: &str, b: &BoxSpec) -> Result<Shape<D>, SceneErr
 }
 
 fn near<const D: usize>(place: &str, n: &NearSpec) -> Result<Region<D>, SceneError> {
-    let within = super::check::not_negative(&format!("{place}.within"), &n.within)?;
+    let within = super::bounds_checks::not_negative(&format!("{place}.within"), &n.within)?;
     let mut shapes: Vec<(&str, Shape<D>)> = Vec::new();
     if let Some(p) = &n.point {
         let a = position(&format!("{place}.point"), p)?;
@@ -210,7 +210,7 @@ fn near<const D: usize>(place: &str, n: &NearSpec) -> Result<Region<D>, SceneErr
             SceneErrorKind::Choice,
             match names.as_slice() {
                 [] => format!("`{place}` names no shape"),
-                _ => format!("`{place}` names {} at once", choice::quoted(&names)),
+                _ => format!("`{place}` names {} at once", tagged_table::quoted(&names)),
             },
         )
         .label(n.within.span.clone(), "within what?")
@@ -231,7 +231,7 @@ pub(crate) fn region<const D: usize>(
         ShapeSpec::Box(b) => plain(cuboid(&format!("{place}.box"), b)?),
         ShapeSpec::Ball(b) => plain(Shape::Ball {
             center: position(&format!("{place}.ball.center"), &b.center)?,
-            radius: super::check::positive(&format!("{place}.ball.radius"), &b.radius)?,
+            radius: super::bounds_checks::positive(&format!("{place}.ball.radius"), &b.radius)?,
         }),
         ShapeSpec::Point(p) => {
             let a = position(&format!("{place}.point"), p)?;
@@ -306,7 +306,7 @@ pub(crate) fn unknown_set<const D: usize>(
     let list = if known.is_empty() {
         format!("the mesh has no {wanted}; name one in Gmsh as a physical group")
     } else {
-        format!("it has the {wanted} {}", choice::quoted(known))
+        format!("it has the {wanted} {}", tagged_table::quoted(known))
     };
     SceneError::new(SceneErrorKind::UnknownSet, message)
         .label(name.span.clone(), format!("no {wanted}"))

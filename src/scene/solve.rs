@@ -2,7 +2,7 @@
 
 use toml::Spanned;
 
-use super::check;
+use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::spec::{
@@ -154,7 +154,7 @@ fn pace(every: Option<&Every>) -> Option<Pace> {
 
 fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
     let place = |key: &str| format!("solve.explicit.{key}");
-    let duration = check::positive(&place("duration"), &spec.duration)?;
+    let duration = bounds_checks::positive(&place("duration"), &spec.duration)?;
     let step = match spec.step.value {
         Some(value) if !(value > 0.0 && value <= duration) => {
             return Err(SceneError::new(
@@ -170,7 +170,7 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
         step => step,
     };
     let fraction = match &spec.step_fraction {
-        Some(f) => check::within(
+        Some(f) => bounds_checks::within(
             &place("step-fraction"),
             f,
             f.value > 0.0 && f.value <= 1.0,
@@ -181,7 +181,7 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
     };
     let interval = |key: &str, number: &Option<Number>, default: f64| match number {
         None => Ok(default),
-        Some(n) => check::within(
+        Some(n) => bounds_checks::within(
             &place(key),
             n,
             n.value > 0.0 && n.value <= duration,
@@ -223,7 +223,7 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
         sub_steps: sub_steps(spec.sub_steps.as_ref())?,
         growing_modes: spec.growing_modes,
         largest_energy_gain: match &spec.largest_energy_gain {
-            Some(gain) => check::positive(&place("largest-energy-gain"), gain)?,
+            Some(gain) => bounds_checks::positive(&place("largest-energy-gain"), gain)?,
             None => LARGEST_ENERGY_GAIN,
         },
         largest_rotation: rotation(&place("largest-rotation"), spec.largest_rotation.as_ref())?,
@@ -244,7 +244,7 @@ fn rotation(place: &str, degrees: Option<&Number>) -> Result<Option<f64>, SceneE
     let Some(degrees) = degrees else {
         return Ok(None);
     };
-    let value = check::within(
+    let value = bounds_checks::within(
         place,
         degrees,
         degrees.value > 0.0 && degrees.value <= 180.0,
@@ -288,11 +288,11 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
     };
     let steps = count("steps", &spec.steps)?;
     let duration = match &spec.duration {
-        Some(d) => check::positive(&place("duration"), d)?,
+        Some(d) => bounds_checks::positive(&place("duration"), d)?,
         None => 1.0,
     };
     let tolerance = match &spec.tolerance {
-        Some(t) => check::within(
+        Some(t) => bounds_checks::within(
             &place("tolerance"),
             t,
             t.value > 0.0 && t.value < 1.0,

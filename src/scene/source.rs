@@ -8,8 +8,8 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::choice;
 use super::error::{SceneError, SceneErrorKind};
+use super::tagged_table;
 use crate::observe::checkpoint::Fingerprint;
 use crate::regular_file;
 
@@ -115,14 +115,14 @@ impl Source {
     pub(crate) fn merged(&self) -> Result<Spanned<DeTable<'_>>, SceneError> {
         let mut root = self.parse(&self.pieces[0])?;
         for piece in &self.pieces[1..] {
-            choice::merge(
+            tagged_table::merge(
                 root.get_mut(),
                 self.parse(piece)?.into_inner(),
                 keys(&piece.text),
                 &mut Vec::new(),
             );
         }
-        choice::normalise(root.get_mut(), &mut Vec::new()).map_err(|e| e.shown_in(self))?;
+        tagged_table::normalise(root.get_mut(), &mut Vec::new()).map_err(|e| e.shown_in(self))?;
         Ok(root)
     }
 

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::breaking::Breaking;
+use super::adaptive_zone::Follow;
 use super::conditions::Condition;
-use super::follow::Follow;
+use super::failure::Breaking;
 use super::initial::Initial;
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
@@ -15,7 +15,7 @@ use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
-use crate::observe::summary::Choice;
+use crate::observe::summary::Decision;
 use crate::shape::{Barrier, Shape};
 use crate::solve::ordering::Ordering;
 use crate::tensor::{Vector, padded};
@@ -44,7 +44,7 @@ pub struct Scene<const D: usize> {
     /// How the nonlocal zone came about; none if the scene draws it.
     pub placement: Option<Placement>,
     /// What was chosen for the accuracy that the scene wants, and for points that it does not place.
-    pub choices: Vec<Choice>,
+    pub choices: Vec<Decision>,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
     /// Empty regions: no point lies inside.
@@ -75,7 +75,7 @@ pub struct Scene<const D: usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     /// What was chosen, and why.
-    pub choice: Choice,
+    pub choice: Decision,
     /// Seconds of all but the solution that the run goes on with.
     pub seconds: f64,
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::check;
+use super::bounds_checks;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
@@ -10,7 +10,7 @@ use super::source::Span;
 use super::spec::{CouplingSpec, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
-use crate::scene::selected_coupling::Joined;
+use crate::scene::selected_coupling::SelectedCoupling;
 use crate::tensor::{Vector, padded};
 
 /// The nonlocal zone that a scene needs.
@@ -25,7 +25,7 @@ pub(crate) struct Placed {
 /// The model of each cell; `placed` is the nonlocal zone of a scene that does not draw it.
 pub(crate) fn zones<const D: usize>(
     spec: &SceneSpec,
-    joined: &Joined,
+    joined: &SelectedCoupling,
     mesh: &Mesh<D>,
     placed: Option<&Placed>,
 ) -> Result<Vec<Zone>, SceneError> {
@@ -166,7 +166,7 @@ fn transition_cells<const D: usize>(
     let place = "zones.transition";
     let shape = match spec.clone() {
         TransitionSpec::Around(width) => {
-            let width = check::positive("zones.transition.around", &width)?;
+            let width = bounds_checks::positive("zones.transition.around", &width)?;
             return Ok(around(nonlocal, inner, mesh, width));
         }
         TransitionSpec::Box(s) => ShapeSpec::Box(s),

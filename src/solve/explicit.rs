@@ -23,7 +23,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::system::{Breakage, Dynamic, Halfway, Interval};
+use crate::system::{FailureUpdate, Halfway, Interval, SemiDiscrete};
 
 mod state;
 
@@ -51,7 +51,7 @@ struct Sums {
 
 /// A motion under way.
 pub struct Explicit<'a> {
-    system: &'a mut dyn Dynamic,
+    system: &'a mut dyn SemiDiscrete,
     drive: &'a dyn Drive,
     params: ExplicitParams,
     state: State,
@@ -79,7 +79,7 @@ impl<'a> Explicit<'a> {
     /// # Errors
     /// [`ExplicitError`] if state, step, masses or drive are not those of a motion of this system.
     pub fn new(
-        system: &'a mut dyn Dynamic,
+        system: &'a mut dyn SemiDiscrete,
         drive: &'a dyn Drive,
         params: ExplicitParams,
         mut state: State,
@@ -102,9 +102,9 @@ impl<'a> Explicit<'a> {
         let mut force = vec![0.0; dofs];
         // a resumed state has broken its bonds already
         let breakage = if starts {
-            Breakage::Allowed
+            FailureUpdate::Update
         } else {
-            Breakage::Held
+            FailureUpdate::Frozen
         };
         let at_start = Interval {
             end: state.time,
@@ -250,7 +250,7 @@ impl<'a> Explicit<'a> {
             &self.state.u,
             &mut self.force,
             interval,
-            Breakage::Allowed,
+            FailureUpdate::Update,
         );
         if broken > 0 {
             self.system.account_for_breaks(&Halfway {
@@ -432,7 +432,7 @@ impl<'a> Explicit<'a> {
     }
 
     /// What moves.
-    pub fn system(&self) -> &dyn Dynamic {
+    pub fn system(&self) -> &dyn SemiDiscrete {
         &*self.system
     }
 

@@ -1,20 +1,20 @@
 //! Solvers of `K u = f`: elimination orders, a multifrontal direct solver, Krylov methods with multigrid, and the
 //! static problem that chooses among them; explicit dynamics with its stable step and sub-cycling; quasi-static load steps.
 
-mod aggregate;
+mod aggregation;
 pub mod direct;
 pub(crate) mod direct_params;
 pub mod explicit;
-mod front;
-pub mod growth;
+pub mod factor_time_estimate;
+mod frontal_matrix;
+pub mod instability_growth;
 pub mod krylov;
 mod multifrontal;
 pub mod multigrid;
 mod neighbourhood;
 pub mod ordering;
 pub mod quasi_static;
-pub mod rehearsal;
-mod singular;
+mod singularity_diagnosis;
 pub mod smoother;
 pub mod stable_step;
 pub mod statics;

@@ -3,7 +3,7 @@
 use crate::progress::Progress;
 use crate::solve::FreeDofs;
 use crate::solve::direct_params::{DirectError, DirectParams};
-use crate::solve::front::{self, BadPivot};
+use crate::solve::frontal_matrix::{self, BadPivot};
 use crate::solve::ordering::SiteGraph;
 use crate::solve::symbolic::Symbolic;
 use crate::system::{BlockCsr, Symmetry};
@@ -195,13 +195,13 @@ impl<'a> Assembly<'a> {
         }
         let mut permutation = vec![0; if symmetric { 0 } else { p }];
         if symmetric {
-            front::cholesky(&mut front.panel, &mut front.schur, p, r).map_err(|BadPivot(k)| {
-                DirectError::NotPositive {
+            frontal_matrix::cholesky(&mut front.panel, &mut front.schur, p, r).map_err(
+                |BadPivot(k)| DirectError::NotPositive {
                     site: self.pivot(s, k).0,
-                }
-            })?;
+                },
+            )?;
         } else {
-            front::lu(
+            frontal_matrix::lu(
                 &mut front.panel,
                 &mut front.upper,
                 &mut front.schur,
@@ -373,7 +373,7 @@ pub(crate) fn trial_front(p: usize, r: usize, rows: &[usize], symmetry: Symmetry
     let mut permutation = vec![0; if symmetric { 0 } else { p }];
     if symmetric {
         // the diagonal dominates
-        let _ = front::cholesky(&mut front.panel, &mut front.schur, p, r);
+        let _ = frontal_matrix::cholesky(&mut front.panel, &mut front.schur, p, r);
     } else {
         let Front {
             panel,
@@ -381,7 +381,7 @@ pub(crate) fn trial_front(p: usize, r: usize, rows: &[usize], symmetry: Symmetry
             schur,
             ..
         } = &mut front;
-        front::lu(panel, upper, schur, &mut permutation, p, r);
+        frontal_matrix::lu(panel, upper, schur, &mut permutation, p, r);
     }
     std::hint::black_box(&front.panel);
 }

@@ -5,7 +5,7 @@
 //! the smoother is a Chebyshev polynomial of block-Jacobi, the coarsest level is factorised.
 
 use crate::progress::Silent;
-use crate::solve::aggregate::{
+use crate::solve::aggregation::{
     Aggregates, Prolongation, coarse_matrix, rigid_near_null_space, smoothed,
 };
 use crate::solve::direct::{Analysis, Factor};

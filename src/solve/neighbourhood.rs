@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use crate::system::{BlockCsr, Dynamic, LinearMotion};
+use crate::system::{BlockCsr, LinearMotion, SemiDiscrete};
 
 /// A part of a model.
 pub(super) struct Neighbourhood {
@@ -16,7 +16,12 @@ pub(super) struct Neighbourhood {
 
 impl Neighbourhood {
     /// The sites that `seed` is linked to, those that they are linked to, and so on, until there are `most`; none of a system that does not tell its rows.
-    pub fn of(system: &dyn Dynamic, seed: u32, prescribed: &[u32], most: usize) -> Option<Self> {
+    pub fn of(
+        system: &dyn SemiDiscrete,
+        seed: u32,
+        prescribed: &[u32],
+        most: usize,
+    ) -> Option<Self> {
         let mut sites = vec![seed];
         let mut known: HashSet<u32> = sites.iter().copied().collect();
         let mut level = sites.clone();

@@ -22,7 +22,7 @@ use crate::{
         explicit::Drive,
         krylov::{LinearMap, add_scaled, dot},
     },
-    system::{Breakage, Dynamic, Halfway, Interval},
+    system::{FailureUpdate, Halfway, Interval, SemiDiscrete},
 };
 
 mod error;
@@ -77,7 +77,7 @@ pub struct LoadStep<'a> {
     /// Relative residual reached.
     pub residual: f64,
     /// What is deformed.
-    pub system: &'a dyn Dynamic,
+    pub system: &'a dyn SemiDiscrete,
 }
 
 /// What a run did.
@@ -95,14 +95,14 @@ pub struct QuasiStaticInfo {
 const RAN_AWAY: f64 = 1e6;
 
 /// The work of a load step.
-struct Account {
+struct Balance {
     u: Vec<f64>,
     /// Loads on free dofs, internal forces where supports hold.
     acting: Vec<f64>,
     work: f64,
 }
 
-impl Account {
+impl Balance {
     fn of(run: &Run<'_>, u: &[f64]) -> Self {
         Self {
             u: u.to_vec(),
@@ -129,7 +129,7 @@ impl Account {
 /// # Errors
 /// [`QuasiStaticError`], each with load step, time, place and remedy.
 pub fn run(
-    system: &mut dyn Dynamic,
+    system: &mut dyn SemiDiscrete,
     drive: &dyn Drive,
     params: QuasiStaticParams,
     near: Option<&dyn LinearMap>,
@@ -187,7 +187,7 @@ pub fn run(
         if let Some(before) = before {
             drive.load_into(before, &mut work.load);
             work.balanced = work.evaluate(&state.u)?.scale;
-            account = Some(Account::of(&work, &state.u));
+            account = Some(Balance::of(&work, &state.u));
         }
         let interval = Interval {
             end: time,
@@ -214,7 +214,7 @@ pub fn run(
                 &state.u,
                 &mut work.force,
                 interval,
-                Breakage::Allowed,
+                FailureUpdate::Update,
             );
             if now == 0 {
                 break residual;

@@ -75,7 +75,7 @@ fn of(times: &[f64]) -> impl Fn(u64) -> Option<f64> {
 }
 
 fn go(
-    system: &mut dyn Dynamic,
+    system: &mut dyn SemiDiscrete,
     drive: &dyn Drive,
     equilibrium: Equilibrium,
     times: &[f64],
@@ -176,7 +176,7 @@ impl Bundle {
     }
 }
 
-impl Dynamic for Bundle {
+impl SemiDiscrete for Bundle {
     fn block(&self) -> usize {
         1
     }
@@ -192,10 +192,10 @@ impl Dynamic for Bundle {
         u: &[f64],
         force: &mut [f64],
         _interval: Interval,
-        breakage: Breakage,
+        breakage: FailureUpdate,
     ) -> u64 {
         let mut broken = 0;
-        if breakage == Breakage::Allowed {
+        if breakage == FailureUpdate::Update {
             for (intact, limit) in self.intact.iter_mut().zip(&self.limits) {
                 if *intact && u[1] - u[0] > *limit {
                     *intact = false;
@@ -454,7 +454,7 @@ struct Hardening {
     mass: Vec<f64>,
 }
 
-impl Dynamic for Hardening {
+impl SemiDiscrete for Hardening {
     fn block(&self) -> usize {
         1
     }
@@ -470,7 +470,7 @@ impl Dynamic for Hardening {
         u: &[f64],
         force: &mut [f64],
         _interval: Interval,
-        _breakage: Breakage,
+        _breakage: FailureUpdate,
     ) -> u64 {
         force.fill(0.0);
         for (i, k) in self.k.iter().enumerate() {

@@ -9,16 +9,16 @@
 //!   `k` products on `n` unknowns `λ ≤ θ/(1 − ε)` fails with a probability of at most `1.648 √n exp(−√ε (2k − 1))` (\[Kuczynski1992\], theorem 3, symmetric);
 //!   `ε` is [`MARGIN`], and `k` is chosen for one in 10⁹. Without symmetry there is no such theorem and the same margin is kept.
 //!
-//! Contact is not in the tangent at rest: what it may add to λ at most ([`Dynamic::hidden_rate`]) is added to both bounds.
+//! Contact is not in the tangent at rest: what it may add to λ at most ([`SemiDiscrete::contact_frequency_bound`]) is added to both bounds.
 //!
-//! The second question is that of [`crate::solve::growth`].
+//! The second question is that of [`crate::solve::instability_growth`].
 
 use crate::{
     solve::{
         FreeDofs,
         krylov::{add_scaled, dot, norm},
     },
-    system::{Dynamic, Symmetry},
+    system::{SemiDiscrete, Symmetry},
 };
 
 /// `ε`: the largest eigenvalue is taken to be `1/(1 − ε)` times the largest Ritz value, which costs 2 % of the step.
@@ -112,7 +112,7 @@ pub enum StepError {
 
 /// `M^{-1/2} K M^{-1/2}` on the free dofs: the eigenvalues of `M⁻¹ K`, and symmetric if `K` is.
 pub(super) struct Scaled<'a> {
-    pub(super) system: &'a dyn Dynamic,
+    pub(super) system: &'a dyn SemiDiscrete,
     pub(super) free: FreeDofs,
     /// `1/√m` of every dof.
     root: Vec<f64>,
@@ -121,7 +121,7 @@ pub(super) struct Scaled<'a> {
 }
 
 impl<'a> Scaled<'a> {
-    pub(super) fn new(system: &'a dyn Dynamic, prescribed: &[u32]) -> Result<Self, StepError> {
+    pub(super) fn new(system: &'a dyn SemiDiscrete, prescribed: &[u32]) -> Result<Self, StepError> {
         let d = system.block().max(1);
         let mass = system.mass();
         if let Some((site, &mass)) = mass
@@ -209,7 +209,7 @@ fn normal_numbers(count: usize) -> Vec<f64> {
 ///
 /// # Errors
 /// [`StepError::Row`] for a site without mass or a row that is not finite, [`StepError::Eigenvalues`].
-pub fn stable_step(system: &dyn Dynamic, prescribed: &[u32]) -> Result<StepLimit, StepError> {
+pub fn stable_step(system: &dyn SemiDiscrete, prescribed: &[u32]) -> Result<StepLimit, StepError> {
     // one change of threads instead of several per product
     Ok(rayon::scope(|_| limits(system, prescribed, None))?.0)
 }
@@ -231,7 +231,7 @@ pub struct Held {
 /// # Errors
 /// As [`stable_step`].
 pub fn stable_step_beyond(
-    system: &dyn Dynamic,
+    system: &dyn SemiDiscrete,
     prescribed: &[u32],
     held: Held,
 ) -> Result<(StepLimit, bool), StepError> {
@@ -239,7 +239,7 @@ pub fn stable_step_beyond(
 }
 
 fn limits(
-    system: &dyn Dynamic,
+    system: &dyn SemiDiscrete,
     prescribed: &[u32],
     held: Option<Held>,
 ) -> Result<(StepLimit, bool), StepError> {
@@ -257,7 +257,7 @@ fn limits(
     }
     let certified = 2.0 / largest.sqrt();
     // eigenvalues of a sum are at most the sum of the largest ones
-    let hidden = system.hidden_rate();
+    let hidden = system.contact_frequency_bound();
     let bound = |theta: f64, margin: f64| 2.0 / (theta / (1.0 - margin) + hidden).sqrt();
     let unknowns = operator.free.count();
     let is_symmetric = system.symmetry() == Symmetry::Symmetric;
@@ -291,7 +291,7 @@ fn limits(
 
 /// `2/√θ` after a few products: a little above the limit, where that matters little.
 pub(super) fn rough_limit(
-    system: &dyn Dynamic,
+    system: &dyn SemiDiscrete,
     prescribed: &[u32],
     products: usize,
 ) -> Result<f64, StepError> {
@@ -314,7 +314,7 @@ impl StepLimit {
     pub fn admit(
         &self,
         requested: Option<f64>,
-        system: &dyn Dynamic,
+        system: &dyn SemiDiscrete,
         prescribed: &[u32],
     ) -> Result<f64, StepError> {
         let Some(requested) = requested else {

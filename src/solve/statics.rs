@@ -5,7 +5,7 @@ use crate::solve::FreeDofs;
 use crate::solve::direct_params::DirectError;
 use crate::solve::multigrid::MultigridError;
 use crate::solve::ordering::{Ordering, OrderingError};
-use crate::solve::singular::{self, FreeMotion};
+use crate::solve::singularity_diagnosis::{self, FreeMotion};
 use crate::system::{BlockCsr, Symmetry};
 
 mod methods;
@@ -297,7 +297,7 @@ pub fn well_posed(problem: &StaticProblem<'_>) -> Result<FreeDofs, StaticError> 
     check(problem)?;
     let matrix = problem.stiffness;
     let free = FreeDofs::from_prescribed(problem.prescribed, matrix.block.max(1));
-    match singular::unheld_bodies(matrix, &free, problem.positions) {
+    match singularity_diagnosis::unheld_bodies(matrix, &free, problem.positions) {
         Some(motion) if free.count() > 0 => Err(singular_error(motion, problem.positions)),
         _ => Ok(free),
     }

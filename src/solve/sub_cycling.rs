@@ -15,7 +15,7 @@
 
 use crate::{
     solve::stable_step::{self, StepError, StepLimit},
-    system::{BlockCsr, Breakage, Dissipation, Dynamic, Halfway, Interval, Symmetry},
+    system::{BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
 };
 
 /// `T_p(δ)`: it keeps modes of the fine sites away from the ends of the stability range. With cells a quarter as long in the middle of a bar the step is 1.28, 1.36 and 1.40 times larger with 2, 3 and 4
@@ -83,7 +83,7 @@ pub struct FineSites {
 
 /// A system whose stiff sites are sub-cycled; the step is part of it.
 pub struct SubCycled<'a> {
-    system: Box<dyn Dynamic + 'a>,
+    system: Box<dyn SemiDiscrete + 'a>,
     fine: FineSites,
     step: f64,
 }
@@ -130,12 +130,12 @@ enum Terms {
 impl FineSites {
     /// The sites that limit the step, for `sub_steps` steps of them; `prescribed` lists the dofs that are not free.
     ///
-    /// Fine are sites whose row sum over mass exceeds what the coarse step bears, where nothing breaks ([`Dynamic::unbreakable`]).
+    /// Fine are sites whose row sum over mass exceeds what the coarse step bears, where nothing breaks ([`SemiDiscrete::tangent_is_constant`]).
     ///
     /// # Errors
     /// [`SubCyclingError`].
     pub fn find(
-        system: &dyn Dynamic,
+        system: &dyn SemiDiscrete,
         prescribed: &[u32],
         sub_steps: u32,
     ) -> Result<Self, SubCyclingError> {
@@ -161,7 +161,7 @@ impl FineSites {
             })
             .collect();
         let recurrence = Recurrence::new(sub_steps);
-        let unbreakable = system.unbreakable();
+        let unbreakable = system.tangent_is_constant();
         let stiffest = rates.iter().copied().fold(0.0, f64::max);
         if stiffest == 0.0 {
             let what = "nothing";
@@ -225,7 +225,7 @@ impl FineSites {
 
 impl<'a> SubCycled<'a> {
     /// Sub-cycles the fine sites of a system, with steps of the size `step` \[s\] of all others; the driver must take the same.
-    pub fn new(system: Box<dyn Dynamic + 'a>, fine: FineSites, step: f64) -> Self {
+    pub fn new(system: Box<dyn SemiDiscrete + 'a>, fine: FineSites, step: f64) -> Self {
         Self { system, fine, step }
     }
 
@@ -236,7 +236,7 @@ impl<'a> SubCycled<'a> {
     /// # Errors
     /// [`StepError`] of the rows or the eigenvalues.
     pub fn with_stable_step(
-        system: Box<dyn Dynamic + 'a>,
+        system: Box<dyn SemiDiscrete + 'a>,
         fine: FineSites,
         prescribed: &[u32],
         fraction: f64,
@@ -344,7 +344,7 @@ fn restricted(rows: &BlockCsr, sites: &[u32]) -> BlockCsr {
     kept
 }
 
-impl Dynamic for SubCycled<'_> {
+impl SemiDiscrete for SubCycled<'_> {
     fn block(&self) -> usize {
         self.system.block()
     }
@@ -358,7 +358,7 @@ impl Dynamic for SubCycled<'_> {
         u: &[f64],
         force: &mut [f64],
         interval: Interval,
-        breakage: Breakage,
+        breakage: FailureUpdate,
     ) -> u64 {
         let broken = self
             .system
@@ -388,8 +388,8 @@ impl Dynamic for SubCycled<'_> {
         sums
     }
 
-    fn hidden_rate(&self) -> f64 {
-        self.system.hidden_rate()
+    fn contact_frequency_bound(&self) -> f64 {
+        self.system.contact_frequency_bound()
     }
 
     fn symmetry(&self) -> Symmetry {

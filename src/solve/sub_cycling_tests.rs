@@ -48,14 +48,14 @@ fn cycled(sub_steps: u32, fraction: f64) -> (SubCycled<'static>, StepLimit) {
 }
 
 /// A pulse on its way to the fine cells.
-fn pulse(system: &dyn Dynamic) -> State {
+fn pulse(system: &dyn SemiDiscrete) -> State {
     let n = system.mass().len();
     let shape = |i: usize| (-((i as f64 - 30.0) / 8.0).powi(2)).exp();
     let slope = |i: usize| 2.0 * (i as f64 - 30.0) / 64.0 * shape(i);
     State::start((0..n).map(shape).collect(), (0..n).map(slope).collect())
 }
 
-fn after(system: &mut dyn Dynamic, step: f64, steps: u64) -> State {
+fn after(system: &mut dyn SemiDiscrete, step: f64, steps: u64) -> State {
     let start = pulse(system);
     let params = ExplicitParams::with_step(step);
     let mut motion = Explicit::new(system, &Undriven, params, start).expect("starts");

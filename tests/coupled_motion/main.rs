@@ -1,12 +1,12 @@
 //! A moving model against the assembled one, closed forms and momentum.
 
-use bondline::coupling::motion::{BondBehaviour, Critical};
-use bondline::coupling::motion::{Motion, masses, scale_rows};
+use bondline::coupling::semidiscrete::{BondBehaviour, Critical};
+use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
 use bondline::coupling::{BlendingFunction, SiteKind};
 use bondline::fem;
-use bondline::peridynamics::kernel::Kinematics;
+use bondline::peridynamics::bond_force::Kinematics;
 use bondline::peridynamics::{Influence, Micromodulus};
-use bondline::system::{Breakage, Dynamic, Interval};
+use bondline::system::{FailureUpdate, Interval, SemiDiscrete};
 use bondline::tensor::Vector;
 use bondline_verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
 
@@ -23,7 +23,7 @@ fn behaviour<const D: usize>(
         critical_stretch: critical_stretch.map(Critical::Uniform),
         no_fail: &|_| false,
         contact: None,
-        storage: bondline::peridynamics::kernel::Storage::Double,
+        storage: bondline::peridynamics::bond_force::Storage::Double,
         broken: None,
     }
 }
@@ -71,7 +71,7 @@ fn cases_with_shared_bonds() -> Vec<Case> {
 fn with_motion<const D: usize, T>(
     case: &Case,
     behaviour: &BondBehaviour<'_, D>,
-    visit: impl FnOnce(&Enclosed<D>, &mut Motion<'_, D>) -> T,
+    visit: impl FnOnce(&Enclosed<D>, &mut CoupledSystem<'_, D>) -> T,
 ) -> T {
     let enclosed = Enclosed::<D>::new(case).unwrap();
     with_motion_by(&enclosed, behaviour, visit)
@@ -81,11 +81,11 @@ fn with_motion<const D: usize, T>(
 fn with_motion_by<const D: usize, T>(
     enclosed: &Enclosed<D>,
     behaviour: &BondBehaviour<'_, D>,
-    visit: impl FnOnce(&Enclosed<D>, &mut Motion<'_, D>) -> T,
+    visit: impl FnOnce(&Enclosed<D>, &mut CoupledSystem<'_, D>) -> T,
 ) -> T {
     let coupling = &enclosed.coupling;
     let operator = coupling.operator(&enclosed.model).unwrap();
-    let mut motion = Motion::new(
+    let mut motion = CoupledSystem::new(
         &enclosed.model,
         operator.as_ref(),
         coupling.symmetry(),
@@ -126,7 +126,12 @@ fn linear_bonds_are_the_assembled_stiffness() {
                 let wanted = scaled(enclosed, enclosed.stiffness.multiply(&u));
                 let (mut force, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
                 assert_eq!(
-                    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held),
+                    motion.internal_force_into(
+                        &u,
+                        &mut force,
+                        Interval::AT_ONCE,
+                        FailureUpdate::Frozen
+                    ),
                     0
                 );
                 motion.tangent_into(&u, &mut tangent);
@@ -167,7 +172,12 @@ fn exact_bonds_are_the_stiffness_to_first_order() {
                     let u = wave(enclosed, amplitude);
                     let wanted = scaled(enclosed, enclosed.stiffness.multiply(&u));
                     let mut force = vec![0.0; u.len()];
-                    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
+                    motion.internal_force_into(
+                        &u,
+                        &mut force,
+                        Interval::AT_ONCE,
+                        FailureUpdate::Frozen,
+                    );
                     *off = largest(force.iter().zip(&wanted).map(|(a, b)| a - b))
                         / largest(wanted.iter().copied());
                 }
@@ -270,7 +280,7 @@ fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
                     &u,
                     &mut force,
                     Interval::AT_ONCE,
-                    Breakage::Allowed,
+                    FailureUpdate::Update,
                 );
                 assert!(broken > 0);
                 let damage = motion.damage().unwrap();
@@ -290,7 +300,7 @@ fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
                         &vec![0.0; u.len()],
                         &mut force,
                         Interval::AT_ONCE,
-                        Breakage::Allowed
+                        FailureUpdate::Update
                     ),
                     0
                 );
@@ -314,7 +324,7 @@ fn an_exact_body_turns_without_force() {
             let turned = |x: &Vector<2>| [c * x[0] - s * x[1] - x[0], s * x[0] + c * x[1] - x[1]];
             let u: Vec<f64> = enclosed.positions().flat_map(turned).collect();
             let mut force = vec![0.0; u.len()];
-            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
+            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
             let linear = enclosed.stiffness.multiply(&wave(enclosed, 1e-3));
             let scale = largest(linear);
             for (site, s) in enclosed.model.sites.iter().enumerate() {

@@ -1,13 +1,13 @@
 //! Bonds at a truncated seam that turn, stretch and break: gradients, energies, a crack beside the seam.
 
 use super::{
-    BondBehaviour, Critical, DENSITY, Motion, behaviour, case, largest, wave, with_motion,
+    BondBehaviour, CoupledSystem, Critical, DENSITY, behaviour, case, largest, wave, with_motion,
     with_motion_by,
 };
 use bondline::{
     coupling::SiteKind,
-    peridynamics::{Influence, Micromodulus, kernel::Kinematics},
-    system::{Breakage, Dynamic, Halfway, Interval, Symmetry},
+    peridynamics::{Influence, Micromodulus, bond_force::Kinematics},
+    system::{FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
     tensor::Vector,
 };
 use bondline_verify::{
@@ -29,7 +29,7 @@ fn breaking_states_at_the_seam() -> Case {
 }
 
 /// Asserts that a force is the gradient of the stored energy, at about a hundred of the unknowns, by differences over twice a step.
-fn is_gradient<const D: usize>(motion: &Motion<'_, D>, u: &[f64], force: &[f64], step: f64) {
+fn is_gradient<const D: usize>(motion: &CoupledSystem<'_, D>, u: &[f64], force: &[f64], step: f64) {
     let scale = largest(force.iter().copied());
     for dof in (0..u.len()).step_by(u.len() / 97 + 1) {
         let energy = |by: f64| {
@@ -53,8 +53,12 @@ fn the_force_of_a_seam_that_stretches_is_the_gradient_of_its_energy_and_adds_up_
             let u = wave(enclosed, amplitude);
             let mut force = vec![0.0; u.len()];
             // some bonds break, the seam's among them
-            let broken =
-                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+            let broken = motion.internal_force_into(
+                &u,
+                &mut force,
+                Interval::AT_ONCE,
+                FailureUpdate::Update,
+            );
             assert!(broken > 0);
             let scale = largest(force.iter().copied());
             for k in 0..D {
@@ -104,8 +108,12 @@ fn moments_of_a_seam_that_moves_add_up_to_zero() {
             let u = random(enclosed, 0.4 * SPACING);
             let mut force = vec![0.0; u.len()];
             assert!(
-                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
-                    > 0
+                motion.internal_force_into(
+                    &u,
+                    &mut force,
+                    Interval::AT_ONCE,
+                    FailureUpdate::Update
+                ) > 0
             );
             let (forces, moments) = out_of_balance(&places(enclosed, &vec![0.0; u.len()]), &force);
             assert!(forces.max(moments) < 1e-13, "{D} {forces:e} {moments:e}");
@@ -121,8 +129,12 @@ fn moments_of_a_seam_that_moves_add_up_to_zero() {
             }
             let mut force = vec![0.0; u.len()];
             assert!(
-                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
-                    > 0
+                motion.internal_force_into(
+                    &u,
+                    &mut force,
+                    Interval::AT_ONCE,
+                    FailureUpdate::Update
+                ) > 0
             );
             let (forces, moments) = out_of_balance(&places(enclosed, &u), &force);
             assert!(forces.max(moments) < 1e-13, "{D} {forces:e} {moments:e}");
@@ -149,8 +161,12 @@ fn forces_are_gradients_and_add_up_to_zero_where_cut_bonds_are_linear_and_others
             let u = random(enclosed, 0.4 * SPACING);
             let mut force = vec![0.0; u.len()];
             assert!(
-                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
-                    > 0
+                motion.internal_force_into(
+                    &u,
+                    &mut force,
+                    Interval::AT_ONCE,
+                    FailureUpdate::Update
+                ) > 0
             );
             let places: Vec<Vector<D>> = enclosed.positions().copied().collect();
             let (forces, _) = out_of_balance(&places, &force);
@@ -180,8 +196,12 @@ fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
             assert!(motion.damage_at_edge().is_none());
             // of all bonds those along x, whole ones and pieces, are over the limit
             assert!(
-                motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed)
-                    > 0
+                motion.internal_force_into(
+                    &u,
+                    &mut force,
+                    Interval::AT_ONCE,
+                    FailureUpdate::Update
+                ) > 0
             );
             motion.account_for_breaks(&Halfway::at(&u));
             let after = motion.stored_energy(&u);
@@ -201,7 +221,7 @@ fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
                 &vec![0.0; u.len()],
                 &mut force,
                 Interval::AT_ONCE,
-                Breakage::Allowed,
+                FailureUpdate::Update,
             );
             assert_eq!(motion.damage_state(), state);
             assert!(!motion.restore_damage(&state[1..]));
@@ -228,7 +248,7 @@ fn linear_bonds_that_may_break_are_the_assembled_stiffness_until_they_do() {
             let u = wave(enclosed, 1.0);
             let wanted = enclosed.stiffness.multiply(&u);
             let (mut force, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
-            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
             motion.tangent_into(&u, &mut tangent);
             let sites: Vec<u32> = (0..(u.len() / D) as u32).collect();
             let rows = motion.tangent_rows(&sites).multiply(&u);
@@ -266,7 +286,7 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
         let density = |_| DENSITY;
         let (model, operator) = (&e.model, operator.as_ref());
         let mut motion =
-            Motion::new(model, operator, Symmetry::Symmetric, density, &behaviour).unwrap();
+            CoupledSystem::new(model, operator, Symmetry::Symmetric, density, &behaviour).unwrap();
         let stretched = |strain: f64| -> Vec<f64> {
             let along = |x: &Vector<2>| [strain * (1.0 + 1e-9) * x[0], 0.0];
             e.positions().flat_map(along).collect()
@@ -276,7 +296,7 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
             let u = stretched(strain);
             let taken = motion.dissipated_energy().unwrap();
             let before = motion.stored_energy(&u);
-            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+            motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
             motion.account_for_breaks(&Halfway::at(&u));
             let released = before - motion.stored_energy(&u);
             let taken = motion.dissipated_energy().unwrap() - taken;
@@ -337,10 +357,10 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
         critical_stretch: Some(Critical::Uniform(critical)),
         no_fail: &outside,
         contact: None,
-        storage: bondline::peridynamics::kernel::Storage::Double,
+        storage: bondline::peridynamics::bond_force::Storage::Double,
         broken: None,
     };
-    let mut motion = Motion::new(
+    let mut motion = CoupledSystem::new(
         &e.model,
         operator.as_ref(),
         Symmetry::Symmetric,
@@ -360,10 +380,10 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
         .collect();
     let mut force = vec![0.0; jump.len()];
     assert!(
-        motion.internal_force_into(&jump, &mut force, Interval::AT_ONCE, Breakage::Allowed) > 0
+        motion.internal_force_into(&jump, &mut force, Interval::AT_ONCE, FailureUpdate::Update) > 0
     );
     motion.account_for_breaks(&Halfway::at(&jump));
-    let tip = |motion: &Motion<'_, 2>| {
+    let tip = |motion: &CoupledSystem<'_, 2>| {
         let damage = motion.damage().unwrap();
         let lost = x.iter().zip(&damage).filter(|(_, d)| **d > 0.33);
         lost.map(|(x, _)| x[0]).fold(f64::NEG_INFINITY, f64::max)
@@ -386,11 +406,11 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
             }
         }
     };
-    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
+    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
     for _ in 0..300 {
         kick(&mut v, &force);
         u.iter_mut().zip(&v).for_each(|(u, v)| *u += step * v);
-        motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+        motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
         let back = 0.5 * step;
         motion.account_for_breaks(&Halfway { u: &u, v: &v, back });
         kick(&mut v, &force);

@@ -12,7 +12,7 @@ use bondline::observe::report as tables;
 use bondline::observe::summary::Ended;
 use bondline::run::{AnyScene, RunOptions, StartFrom};
 use bondline::scene::{self, Template};
-use bondline_study::trade::{self, CostBy, Reference, TradeEnd, TradeParams};
+use bondline_study::pareto::{self, CostBy, Reference, TradeEnd, TradeParams};
 use bondline_study::{CheckError, ConvergeError, ConvergeParams, Refinement};
 use bondline_terminal::memory::{self, Allocator};
 use bondline_terminal::{TerminalProgress, print, report, tell};
@@ -172,14 +172,14 @@ struct TradeArguments {
     #[command(flatten)]
     scene: SceneArguments,
     /// Knobs to turn, and no others; all that apply if left out.
-    #[arg(long = "knob", value_name = "NAME", value_delimiter = ',', value_parser = PossibleValuesParser::new(trade::KNOBS))]
+    #[arg(long = "knob", value_name = "NAME", value_delimiter = ',', value_parser = PossibleValuesParser::new(pareto::KNOBS))]
     knobs: Vec<String>,
     /// A key of the scene with other values: 'solver.tolerance=[1e-4, 1e-8]'.
-    #[arg(long, value_name = "KEY=[...]", value_parser = trade::typed)]
-    vary: Vec<trade::Knob>,
+    #[arg(long, value_name = "KEY=[...]", value_parser = pareto::typed)]
+    vary: Vec<pareto::Knob>,
     /// What is compared: displacement, strain, reaction, energy, history.COLUMN, path.TIP, tip-time.TIP; what suits the outputs if left out.
-    #[arg(long = "quantity", value_name = "NAME", value_delimiter = ',', value_parser = trade::Quantity::parse)]
-    quantities: Vec<trade::Quantity>,
+    #[arg(long = "quantity", value_name = "NAME", value_delimiter = ',', value_parser = pareto::Quantity::parse)]
+    quantities: Vec<pareto::Quantity>,
     /// What it is compared with: full peridynamics, or half the horizon and spacing; by default the first where cracks run, else the second.
     #[arg(long, value_enum)]
     reference: Option<ReferenceName>,
@@ -450,7 +450,7 @@ fn traded(arguments: TradeArguments) -> miette::Result<ExitCode> {
         std::env::current_exe().map_err(|e| miette::miette!("cannot find this program: {e}"))?;
     let interrupt = interrupt::listen()?;
     interrupt.heeded.store(true, Ordering::Relaxed);
-    let found = trade::trade(
+    let found = pareto::trade(
         &params,
         &program,
         Some(&interrupt.asked),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::figure::{LinePlot, Scale, Series, Stroke};
+use crate::line_plot::{LinePlot, Scale, Series, Stroke};
 use bondline::run::{RunError, Samples};
 use bondline::scene::spec::{AxisSpec, MeshSpec, PointsSpec};
 use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source};

@@ -7,14 +7,14 @@
 //! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
 //! | `converge.rs` | one scene at several refinements |
 //! | `trade/` | what speed costs in accuracy |
-//! | `figure.rs`, `map.rs` | line plots and coloured fields as SVG |
+//! | `line_plot.rs`, `field_plot.rs` | line plots and coloured fields as SVG |
 
 pub mod accuracy;
 mod converge;
-pub mod figure;
+pub mod field_plot;
+pub mod line_plot;
 mod load;
-pub mod map;
-pub mod trade;
+pub mod pareto;
 pub mod variants;
 
 pub use accuracy::{CheckError, ErrorPrediction, check};

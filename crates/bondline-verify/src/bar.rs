@@ -17,8 +17,8 @@ use bondline::progress::Progress;
 use bondline::run::AnyScene;
 use bondline::run::{RunError, Solved, solve_with};
 use bondline::scene::{Scene, SceneError, Source};
-use bondline_study::figure::{LinePlot, Series, Stroke};
-use bondline_study::map::FieldMap;
+use bondline_study::field_plot::FieldMap;
+use bondline_study::line_plot::{LinePlot, Series, Stroke};
 
 /// The scene of the bar in one dimension.
 pub const SCENE_1D: &str = include_str!("../../../examples/coupled_bar.toml");

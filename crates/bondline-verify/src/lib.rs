@@ -26,12 +26,12 @@
 //! | `extremes` | units, places, laws, shapes and steps at their limits |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is their scene |
 //!
-//! `typed.rs` has what the suites type of laws, couplings and shapes; `enclosed.rs`, `strip.rs` are scenes that several suites share. `page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
+//! `typed.rs` has what the suites type of laws, couplings and shapes; `enclosed.rs`, `strip.rs` are scenes that several suites share. `report_page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 
+pub mod accuracy_control;
 pub mod balance;
 pub mod bar;
 pub mod bobaru;
-pub mod choices;
 pub mod convergence;
 pub mod emmrich_weckner;
 pub mod enclosed;
@@ -41,14 +41,14 @@ pub mod fields;
 pub mod horizons;
 pub mod layers;
 pub mod meshes;
-pub mod page;
 pub mod partial_volumes;
 pub mod patch;
 pub mod reflection;
+pub mod report_page;
 pub mod scale;
-pub mod skin;
 pub mod spectrum;
 pub mod strip;
+pub mod surface_layer;
 pub mod tangents;
 pub mod truncated;
 pub mod typed;
@@ -103,7 +103,7 @@ pub const SUITES: &[Suite] = &[
     Suite {
         name: "skin",
         about: "3D bars with free sides, with a skin of elements and without: affine field, Young's modulus, Poisson's ratio",
-        run: skin::run,
+        run: surface_layer::run,
     },
     Suite {
         name: "layers",
@@ -192,7 +192,7 @@ pub const LONG_SUITES: &[Suite] = &[
     Suite {
         name: "choices",
         about: "what `accuracy` chooses in 25 small scenes: error, cost, and both against their predictions; minutes, only if named",
-        run: choices::run,
+        run: accuracy_control::run,
     },
     Suite {
         name: "convergence-3d",

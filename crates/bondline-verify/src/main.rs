@@ -7,7 +7,7 @@ use std::time::Instant;
 use bondline::observe::report::{Format, Table, exit_code, render};
 use bondline_terminal::memory::{self, Allocator};
 use bondline_terminal::{TerminalProgress, print, tell};
-use bondline_verify::page::{Outcome, page};
+use bondline_verify::report_page::{Outcome, page};
 use bondline_verify::{Effort, LONG_SUITES, SUITES, Suite, suite};
 use clap::Parser;
 use clap::builder::{PossibleValue, PossibleValuesParser};

@@ -13,8 +13,8 @@ use bondline::observe::report::{Columns, Row, Table, Verdict};
 use bondline::peridynamics::influence::{Alpha, Degree};
 use bondline::peridynamics::{Influence, Micromodulus};
 use bondline::progress::Progress;
-use bondline::solve::growth::{self, LARGEST_GAIN};
-use bondline::solve::growth::{REMEDY, REMEDY_SEAM};
+use bondline::solve::instability_growth::{self, LARGEST_GAIN};
+use bondline::solve::instability_growth::{REMEDY, REMEDY_SEAM};
 use bondline::solve::stable_step;
 
 /// Growth exponent per crossing of the strip that is round-off: eigenvalues that are zero or nearly double come out to half of the digits.
@@ -148,7 +148,7 @@ fn partial_stress() -> [Kind; 3] {
 fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row {
     let found = Strip::new::<D>(case).and_then(|strip| {
         let length: f64 = case.lengths.iter().map(|l| f64::from(*l)).sum();
-        growth::growth(&strip.motion, &[], 0.5, 0)
+        instability_growth::growth(&strip.motion, &[], 0.5, 0)
             .map(|g| g.rate * length)
             .map_err(|e| e.to_string())
     });
@@ -343,7 +343,8 @@ fn steps(effort: Effort) -> Table {
 fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
     let measured = || -> Result<Vec<Row>, String> {
         let strip = Strip::new::<1>(case).map_err(|e| e.to_string())?;
-        let values = growth::eigenvalues(&strip.motion, &[]).map_err(|e| e.to_string())?;
+        let values =
+            instability_growth::eigenvalues(&strip.motion, &[]).map_err(|e| e.to_string())?;
         let largest = values
             .iter()
             .fold(0.0_f64, |m, [re, im]| m.max(re.hypot(*im)));
@@ -365,7 +366,7 @@ fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
             },
         ];
         // a mode that grows at any step leaves no limit to bisect
-        let grows = growth::growth(&strip.motion, &[], found.stable, 0)
+        let grows = instability_growth::growth(&strip.motion, &[], found.stable, 0)
             .map_err(|e| e.to_string())?
             .rate
             * 4000.0

@@ -26,7 +26,7 @@ use bondline::{
     progress::Progress,
     tensor::Vector,
 };
-use bondline_study::figure::{LinePlot, Series, Stroke};
+use bondline_study::line_plot::{LinePlot, Series, Stroke};
 
 /// Length of the bar \[m\]; it lies about x = 0.
 pub const LENGTH: f64 = 10.0;

@@ -15,7 +15,7 @@ use bondline::observe::report::{Columns, Row, Table};
 use bondline::peridynamics::Micromodulus;
 use bondline::progress::Progress;
 use bondline::solve::explicit::{Explicit, ExplicitParams, State, Undriven};
-use bondline::solve::growth::{self, REMEDY, REMEDY_SEAM};
+use bondline::solve::instability_growth::{self, REMEDY, REMEDY_SEAM};
 use bondline::solve::krylov::dot;
 use bondline::solve::stable_step::{self, StepLimit};
 use bondline::system::{LinearMotion, Symmetry};
@@ -243,7 +243,8 @@ fn coupled_rows(name: &str, case: &StripCase) -> Vec<Row> {
         let mut strip = Strip::new::<1>(case)?;
         let limit = stable_step::stable_step(&strip.motion, &[]).map_err(|e| e.to_string())?;
         let step = FRACTION * limit.stable;
-        let growth = growth::growth(&strip.motion, &[], step, STEPS).map_err(|e| e.to_string())?;
+        let growth = instability_growth::growth(&strip.motion, &[], step, STEPS)
+            .map_err(|e| e.to_string())?;
         growth
             .admit(step * STEPS as f64, remedy)
             .map_err(|e| e.to_string())?;

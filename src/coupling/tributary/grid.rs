@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use super::simplex::Cells;
 use crate::{
-    coupling::{FitDegree, Model, SiteKind, derivative, fit::Bins},
+    coupling::{FitDegree, Model, SiteKind, interface_interpolation::Bins, least_squares_gradient},
     fem::Locator,
     shape::Barriers,
     tensor::{Tensor, Vector},
@@ -205,7 +205,8 @@ impl<'a, const D: usize> Grid<'a, D> {
                 let seen = self.seen(x, all, bins, reach, with_nodes);
                 let position: Vec<Vector<D>> =
                     seen.iter().map(|&s| sites[s as usize].position).collect();
-                if let Some(weights) = derivative::fit(x, &position, FitDegree::Affine) {
+                if let Some(weights) = least_squares_gradient::fit(x, &position, FitDegree::Affine)
+                {
                     let gradient = gradients(&position);
                     let each = seen.into_iter().zip(weights).zip(gradient);
                     return each.map(|((s, w), g)| (s, w, g)).collect();

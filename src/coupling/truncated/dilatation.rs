@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::segments::{BySite, End, Segment, Segments};
+use super::bond_segments::{BySite, End, Segment, Segments};
 use crate::{
     assembly::Row,
     coupling::ModelError,
@@ -32,14 +32,14 @@ pub(super) enum Carrier {
 pub(super) type Functional<const D: usize> = BTreeMap<u32, Vector<D>>;
 
 /// What all dilatations of a model have in common.
-pub(super) struct Common {
+pub(super) struct LpsConstants {
     /// `D/m` of each lattice.
     over_m: Vec<f64>,
     /// K′ of the material, the same for all lattices.
     pub bulk: f64,
 }
 
-impl Common {
+impl LpsConstants {
     /// That of a model; none of a pairwise law.
     ///
     /// # Errors
@@ -139,7 +139,7 @@ impl<const D: usize> Dilatations<D> {
     /// The dilatations of the elements behind faces, and of all points that `listed` or whose neighbours it names.
     ///
     /// Each piece hands its share, `Segment::hands`, of its elongation to the dilatations at its ends.
-    pub fn new(segments: &Segments<'_, D>, common: &Common, listed: &[bool]) -> Self {
+    pub fn new(segments: &Segments<'_, D>, common: &LpsConstants, listed: &[bool]) -> Self {
         let body = segments.body;
         let volume = &body.cloud.volume;
         let mut functionals: BTreeMap<Carrier, Functional<D>> = BTreeMap::new();

@@ -7,8 +7,8 @@
 use rustc_hash::FxHashMap;
 
 use super::{
-    fit::points_at_seam,
-    segments::{End, Segment, Segments},
+    affine_fit::points_at_seam,
+    bond_segments::{End, Segment, Segments},
 };
 use crate::tensor::Vector;
 

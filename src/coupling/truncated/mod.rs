@@ -3,16 +3,16 @@
 //! | file | what |
 //! |---|---|
 //! | `seam.rs` | the faces of the peridynamic zone, and the pieces of a bond inside of it |
-//! | `segments.rs` | pieces with their ends, and their springs |
-//! | `moving.rs`, `parts.rs` | pieces that turn, stretch and break |
+//! | `bond_segments.rs` | pieces with their ends, and their springs |
+//! | `nonlinear_bonds.rs`, `bond_kinematics.rs` | pieces that turn, stretch and break |
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
-//! | `states.rs` | those dilatations where pieces turn, stretch and break |
-//! | `edges.rs` | strings along the edges of a zone in 3D |
+//! | `dilatation_state.rs` | those dilatations where pieces turn, stretch and break |
+//! | `corner_correction.rs` | strings along the edges of a zone in 3D |
 //! | `factors.rs` | factors of the normal equations of the fit, and what they cost |
 //! | `feet.rs` | other traces at the ends of pieces, where factors alone do not do |
 //! | `squares.rs` | factors of pieces where faces cut the lattice anywhere, and an LPS as a sum of squares |
 //! | `conditions.rs`, `normal.rs` | the conditions of the fit, and their normal equations |
-//! | `fit.rs`, `sparse_change.rs` | the same for an LPS with few bonds, shares of dilatations apart; the smallest change |
+//! | `affine_fit.rs`, `sparse_least_norm.rs` | the same for an LPS with few bonds, shares of dilatations apart; the smallest change |
 //!
 //! The energy is that of the finite elements, of the bonds within the peridynamic zone, and of the pieces of all other bonds of the lattice, continued behind the faces, that lie within the zone:
 //!
@@ -24,29 +24,29 @@
 //! pulls like the whole bond, so the forces on points cancel as far from the seam, and the forces on a face add up to the traction of the lattice. Pieces of bonds with both ends in elements
 //! (through a corner of the zone, or a zone thinner than a horizon) belong to the sum.
 
+mod affine_fit;
+mod bond_kinematics;
+mod bond_segments;
 pub(crate) mod conditions;
+mod corner_correction;
 mod dilatation;
-mod edges;
+mod dilatation_state;
 mod factors;
 mod feet;
-mod fit;
-mod moving;
+mod nonlinear_bonds;
 mod normal;
-mod parts;
 mod seam;
-mod segments;
-mod sparse_change;
+mod sparse_least_norm;
 mod squares;
-mod states;
 
-pub use self::{fit::SeamConditions, moving::SeamBonds};
+pub use self::{affine_fit::SeamConditions, nonlinear_bonds::NonlinearSeam};
 
 use std::sync::Arc;
 
 use self::{
-    dilatation::{Common, Dilatations},
-    edges::Strings,
-    segments::{Segments, Springs, WholeBonds},
+    bond_segments::{Segments, Springs, WholeBonds},
+    corner_correction::EdgeCorrection,
+    dilatation::{Dilatations, LpsConstants},
 };
 use crate::{
     assembly::Row,
@@ -106,9 +106,9 @@ impl<const D: usize> Coupling<D> for Truncated {
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         let (Some(body), Some(passing)) = (model.body(), model.passing()) else {
-            return Ok(Box::new(super::single::OwnModel { model }));
+            return Ok(Box::new(super::uncoupled::OwnModel { model }));
         };
-        let known = model.worked_out.get();
+        let known = model.operator_cache.get();
         if let Some(pieces) = known.and_then(|known| known.downcast_ref::<Arc<Pieces<D>>>()) {
             return Ok(Box::new(TruncatedRows {
                 model,
@@ -118,12 +118,12 @@ impl<const D: usize> Coupling<D> for Truncated {
             }));
         }
         let mut segments = Segments::new(model, body, passing);
-        let mut strings = Strings::new(&segments);
-        if fit::fit(&mut segments, &strings)? {
+        let mut strings = EdgeCorrection::new(&segments);
+        if affine_fit::fit(&mut segments, &strings)? {
             // the fit has balanced the corners too
-            strings = Strings::none();
+            strings = EdgeCorrection::none();
         }
-        let common = Common::new(&segments)?;
+        let common = LpsConstants::new(&segments)?;
         // a state reaches one family farther than a bond
         let listed = match &common {
             Some(_) => segments.with_neighbours(),
@@ -154,7 +154,7 @@ impl<const D: usize> Coupling<D> for Truncated {
         });
         if states.is_none() {
             // one that is there already says the same
-            let _ = model.worked_out.set(Box::new(Arc::clone(&pieces)));
+            let _ = model.operator_cache.set(Box::new(Arc::clone(&pieces)));
         }
         Ok(Box::new(TruncatedRows {
             model,
@@ -171,13 +171,13 @@ impl<const D: usize> Coupling<D> for Truncated {
 pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamConditions> {
     let (body, passing) = (model.body()?, model.passing()?);
     let mut segments = Segments::new(model, body, passing);
-    Some(fit::conditions(&mut segments))
+    Some(affine_fit::conditions(&mut segments))
 }
 
 struct TruncatedRows<'a, const D: usize> {
     model: &'a Model<D>,
     /// The bonds of the points at the seam, of a law whose bonds share dilatations.
-    states: Option<(Segments<'a, D>, Common)>,
+    states: Option<(Segments<'a, D>, LpsConstants)>,
     cut_bonds: CutBonds,
     pieces: Arc<Pieces<D>>,
 }
@@ -188,7 +188,7 @@ struct Pieces<const D: usize> {
     whole: Option<WholeBonds>,
     springs: Springs<D>,
     dilatations: Dilatations<D>,
-    strings: Strings<D>,
+    strings: EdgeCorrection<D>,
     /// Points whose rows are not those of the body alone.
     listed: Vec<bool>,
     /// Whether dilatations have a stiffness that is not negative.
@@ -247,7 +247,7 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         }
     }
 
-    fn seam_bonds(&self) -> Option<SeamBonds<D>> {
+    fn seam_bonds(&self) -> Option<NonlinearSeam<D>> {
         if self.cut_bonds == CutBonds::Linear {
             return None;
         }
@@ -257,7 +257,7 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
             (None, Some((segments, _))) => &segments.broken,
             (None, None) => return None,
         };
-        Some(SeamBonds::new(
+        Some(NonlinearSeam::new(
             self.model,
             self.model.body()?,
             &self.pieces.springs,

@@ -12,12 +12,12 @@
 
 use rustc_hash::FxHashMap;
 
-use super::feet::{Shift, shifts};
-use super::fit::{
+use super::affine_fit::{
     FLOOR, MET, MOST_TRIPLES, Part, cube, finish, loaded_nodes, pair_tensor, parts, points_at_seam,
     rounding, third, triples,
 };
-use super::segments::{End, Segments};
+use super::bond_segments::{End, Segments};
+use super::feet::{Shift, shifts};
 use crate::coupling::truncated::conditions::Conditions;
 use crate::{coupling::ModelError, tensor::Vector};
 
@@ -117,7 +117,7 @@ pub(super) fn fit_factors<const D: usize>(
 }
 
 /// The pairwise stiffness of the whole bond that the end of a part gets, or that of both.
-fn strength<const D: usize>(segments: &Segments<'_, D>, part: &Part, end: Option<usize>) -> f64 {
+fn c1122<const D: usize>(segments: &Segments<'_, D>, part: &Part, end: Option<usize>) -> f64 {
     let (i, j) = part.points(segments);
     let volume = &segments.body.cloud.volume;
     match end {
@@ -136,7 +136,7 @@ fn columns<const D: usize>(
 ) -> Vec<Column> {
     let short = SHORT * segments.model.spacing();
     let mut columns = Vec::with_capacity(2 * parts.len());
-    let all: Vec<f64> = parts.iter().map(|p| strength(segments, p, None)).collect();
+    let all: Vec<f64> = parts.iter().map(|p| c1122(segments, p, None)).collect();
     let least = NOTHING * all.iter().copied().fold(0.0, f64::max);
     for (part, of) in parts.iter().enumerate() {
         let shape = of.shape(segments);
@@ -162,7 +162,7 @@ fn columns<const D: usize>(
             let own = match points {
                 [Some(_), Some(_)] => 1.0,
                 // the only point has all of it
-                _ => all / strength(segments, of, Some(end.0)),
+                _ => all / c1122(segments, of, Some(end.0)),
             };
             columns.push(Column {
                 part,
@@ -211,11 +211,11 @@ fn system<const D: usize>(
         let part = &parts[column.part];
         let shape = part.shape(segments);
         let end = column.end.map(|e| e.0);
-        let own = strength(segments, part, end) * shape.share;
+        let own = c1122(segments, part, end) * shape.share;
         // points keep what their whole bonds had
         let is_first = number == 0 || columns[number - 1].part != column.part;
         let all = match is_first {
-            true => strength(segments, part, None) * shape.share,
+            true => c1122(segments, part, None) * shape.share,
             false => 0.0,
         };
         let cube = cube(&shape.xi, 1.0);
@@ -253,7 +253,7 @@ fn system<const D: usize>(
         let part = Part::Piece(shift.piece);
         let shape = part.shape(segments);
         let sign = [-SHIFTED, SHIFTED][shift.side];
-        let size = sign * strength(segments, &part, None) * shape.share;
+        let size = sign * c1122(segments, &part, None) * shape.share;
         let cube = cube(&shape.xi, size);
         for &(site, w) in &shift.weights {
             let Some(&row) = rows.get(&site) else {
@@ -285,11 +285,11 @@ fn adopt<const D: usize>(
         let part = &parts[of[0].0.part];
         let (i, j) = part.points(segments);
         let shape = part.shape(segments);
-        let all = strength(segments, part, None);
+        let all = c1122(segments, part, None);
         let (mut scale, mut hands) = (0.0, [0.0; 2]);
         for (column, x) in of {
             let factor = column.base * (1.0 + **x);
-            let own = strength(segments, part, column.end.map(|e| e.0));
+            let own = c1122(segments, part, column.end.map(|e| e.0));
             scale += factor * own / all;
             let Some((side, point)) = column.end else {
                 continue;

@@ -4,7 +4,7 @@ use crate::{
     peridynamics::{
         Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
         HistoryLayout, Influence, Law, LinearForceState, Past, PdError, Present, ShellTarget,
-        StatePart, weights,
+        StatePart, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -106,7 +106,7 @@ impl<const D: usize> LinearForceState<D> for LinearPeridynamicSolid<D> {
             .iter()
             .map(|(xi, _)| self.influence.value(xi.norm(), horizon))
             .collect();
-        let m = weights::weighted_volume(bonds, &omega);
+        let m = moment_fitted_weights::weighted_volume(bonds, &omega);
         Some((omega, Conditions::lps(m)))
     }
 

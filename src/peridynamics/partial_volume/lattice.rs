@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{BoxCell, PartialVolume, PartialVolumeError};
 use crate::{
-    peridynamics::shells::{LatticeFamily, Shell},
+    peridynamics::shell_weights::{LatticeFamily, Shell},
     tensor::Vector,
 };
 

@@ -5,13 +5,13 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::RunOptions;
+use super::dynamic_system::{PlaneEnergy, critical_stretch, plane_energy};
 use super::guard::{Balance, Guard};
-use super::laid_out::{Begun, LaidOut, begun, breaks, lay_out, opened};
-use super::ready::{Before, Between, Ready};
-use super::record::{Breaks, EdgeReached, Moment, Saved, Zone as FollowedZone};
-use super::switching::{Leaving, share};
-use super::system::{PlaneEnergy, critical_stretch, plane_energy};
-use super::watch::{Watch, fastest_crack};
+use super::initial_state::{PreStep, RezoneState, StepState};
+use super::rezoning::{Leaving, share};
+use super::setup::{ModelSetup, RunSetup, begun, breaks, lay_out, opened};
+use super::writer::{Breaks, EdgeReached, Moment, Saved, Zone as FollowedZone};
+use super::zone_monitor::{ZoneMonitor, fastest_crack};
 use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
@@ -23,14 +23,14 @@ use crate::observe::summary::{
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::loads;
-use crate::run::setup::Rest;
+use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
 use crate::run::warnings::warnings;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::scene::validated::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams};
-use crate::system::Dynamic;
+use crate::system::SemiDiscrete;
 
 /// How often whoever watches is told.
 const TOLD_EVERY: Duration = Duration::from_millis(200);
@@ -74,15 +74,15 @@ enum From<'a, const D: usize> {
     /// At time zero, or at a checkpoint.
     Start(CheckpointFile, Option<Box<Saved>>),
     /// Where the zones have changed.
-    Switch(Box<Between<'a, D>>),
+    Switch(Box<RezoneState<'a, D>>),
 }
 
 /// How it ends.
-enum Leg<'a, const D: usize> {
+enum RunSegment<'a, const D: usize> {
     /// With the run.
     Ended(Box<RunSummary>),
     /// In a change of the zones.
-    Switch(Begun, Box<Between<'a, D>>),
+    Switch(RunSetup, Box<RezoneState<'a, D>>),
 }
 
 /// Runs a scene in time.
@@ -132,8 +132,8 @@ pub(crate) fn run<const D: usize>(
         };
         problem = back;
         match leg {
-            Leg::Ended(summary) => return Ok(*summary),
-            Leg::Switch(next, between) => {
+            RunSegment::Ended(summary) => return Ok(*summary),
+            RunSegment::Switch(next, between) => {
                 problem.zones = zones_of(&between.nonlocal);
                 begun = next;
                 from = From::Switch(between);
@@ -150,14 +150,14 @@ fn zones_of(nonlocal: &[bool]) -> Vec<Zone> {
 
 /// Steps with one layout of the zones, from the beginning, a checkpoint, or where the last one ended.
 fn leg<'r, const D: usize>(
-    laid_out: LaidOut<'_, D>,
+    laid_out: ModelSetup<'_, D>,
     from: From<'r, D>,
-    rest: &'r Rest<D>,
+    rest: &'r RunSettings<D>,
     spec: &Spec,
     options: &RunOptions<'_>,
     progress: &dyn Progress,
-) -> Result<Leg<'r, D>, RunError> {
-    let LaidOut {
+) -> Result<RunSegment<'r, D>, RunError> {
+    let ModelSetup {
         title,
         joining,
         remedy,
@@ -172,7 +172,7 @@ fn leg<'r, const D: usize>(
         ..
     } = laid_out;
     progress.stage("stable step", None);
-    let before = Before {
+    let before = PreStep {
         model,
         rest,
         spec,
@@ -183,7 +183,7 @@ fn leg<'r, const D: usize>(
         timings: &mut timings,
         watch: &mut watch,
     };
-    let Ready {
+    let StepState {
         mut moving,
         mut recorder,
         state,
@@ -215,7 +215,7 @@ fn leg<'r, const D: usize>(
             .map(|(critical, body)| {
                 let critical = critical.at(body.cloud.horizon[0]);
                 let speed = fastest_crack(model, |m| rest.density[m as usize]);
-                Watch::new(follow, model, critical, speed, pace.step)
+                ZoneMonitor::new(follow, model, critical, speed, pace.step)
             }),
         None => None,
     };
@@ -404,7 +404,7 @@ fn leg<'r, const D: usize>(
         Some(Stop::Switch(nonlocal)) => {
             let state = motion.into_state();
             let system = moving.system.as_ref();
-            let next = Begun {
+            let next = RunSetup {
                 title,
                 joining,
                 remedy,
@@ -412,7 +412,7 @@ fn leg<'r, const D: usize>(
                 timings: Timings::default(),
                 watch: Stopwatch::start(),
             };
-            let between = Between {
+            let between = RezoneState {
                 told,
                 timings,
                 broken: BrokenBonds::of(model, &system.broken_bonds()),
@@ -428,7 +428,7 @@ fn leg<'r, const D: usize>(
                 growth,
                 taken,
             };
-            return Ok(Leg::Switch(next, Box::new(between)));
+            return Ok(RunSegment::Switch(next, Box::new(between)));
         }
         Some(Stop::Ended(why)) => why,
         None => Ended::Finished,
@@ -447,7 +447,7 @@ fn leg<'r, const D: usize>(
     told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
     told.extend(rotation.as_ref().map(Rotation::warning));
     let (switches, shares) = zone.map_or((Vec::new(), [0.0; 2]), |z| (z.switches, z.shares));
-    Ok(Leg::Ended(Box::new(RunSummary {
+    Ok(RunSegment::Ended(Box::new(RunSummary {
         scene: title,
         dimension: D,
         coupling: joining.name.to_owned(),
@@ -494,7 +494,7 @@ fn leg<'r, const D: usize>(
 
 /// What breaking bonds cost so far; none where none can break.
 pub(crate) fn cracks(
-    system: &dyn Dynamic,
+    system: &dyn SemiDiscrete,
     breaks: Breaks,
     plane: Option<PlaneEnergy>,
 ) -> Option<CrackSummary> {
@@ -509,7 +509,7 @@ pub(crate) fn cracks(
 }
 
 /// What a law with memory dissipated; none of any other.
-pub fn inelastic_energy(system: &dyn Dynamic) -> Option<f64> {
+pub fn inelastic_energy(system: &dyn SemiDiscrete) -> Option<f64> {
     let inelastic = system.dissipation().map(|d| d.inelastic);
     inelastic.filter(|energy| *energy != 0.0)
 }

@@ -8,8 +8,8 @@
 //!
 //! Energies are those of the rows of the history, and of every hundredth step where rows are farther apart, so that watching costs less than one per cent.
 
-use super::record::{Moment, Row};
 use super::seen::{Rotated, Seen};
+use super::writer::{Moment, Row};
 use crate::coupling::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::rotation::Rotations;

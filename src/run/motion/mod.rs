@@ -2,31 +2,31 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `laid_out.rs` | what every run begins with |
-//! | `system.rs` | what moves, its masses, its start |
-//! | `drive.rs` | loads and prescribed motion as functions of time |
+//! | `setup.rs` | what every run begins with |
+//! | `dynamic_system.rs` | what moves, its masses, its start |
+//! | `time_dependent_loads.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
-//! | `ready.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
+//! | `initial_state.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
 //! | `quasi_static.rs` | the run under a load that grows |
-//! | `pace.rs` | the time step, with sub-cycling |
+//! | `time_step.rs` | the time step, with sub-cycling |
 //! | `guard.rs`, `seen.rs` | what is watched meanwhile: energy, rotation of elements |
-//! | `watch.rs`, `cells.rs` | where a zone that follows the crack is wanted |
-//! | `switching.rs` | what a change of the zone carries over, and what it costs |
-//! | `record.rs` | history, VTU files, tips of cracks, checkpoints |
+//! | `zone_monitor.rs`, `bounding_boxes.rs` | where a zone that follows the crack is wanted |
+//! | `rezoning.rs` | what a change of the zone carries over, and what it costs |
+//! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
 
-pub(crate) mod cells;
-pub mod drive;
+pub(crate) mod bounding_boxes;
+pub mod dynamic_system;
 pub mod explicit;
 pub(crate) mod guard;
-pub mod laid_out;
-pub mod pace;
+pub(crate) mod initial_state;
 pub mod quasi_static;
-pub(crate) mod ready;
-pub mod record;
+pub(crate) mod rezoning;
 pub(crate) mod seen;
-pub(crate) mod switching;
-pub mod system;
-pub(crate) mod watch;
+pub mod setup;
+pub mod time_dependent_loads;
+pub mod time_step;
+pub mod writer;
+pub(crate) mod zone_monitor;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -5,17 +5,17 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::RunOptions;
-use super::drive::SceneDrive;
+use super::dynamic_system::{plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
-use super::laid_out::{LaidOut, breaks, laid_out, opened, restore};
-use super::record::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
-use super::system::{plane_energy, start};
+use super::setup::{ModelSetup, breaks, laid_out, opened, restore};
+use super::time_dependent_loads::SceneDrive;
+use super::writer::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
 use crate::coupling::{Model, Operator, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
 use crate::observe::summary::{
-    Choice, Ended, MotionSummary, Rotation, RunSummary, peak_memory_bytes,
+    Decision, Ended, MotionSummary, Rotation, RunSummary, peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::run::equilibrium;
@@ -23,7 +23,7 @@ use crate::run::error::RunError;
 use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
-use crate::run::setup::Rest;
+use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
 use crate::run::warnings::warnings;
 use crate::scene::solve::QuasiStatic as Spec;
@@ -54,14 +54,14 @@ pub(crate) fn run<const D: usize>(
 
 /// Load steps from the beginning or a checkpoint.
 fn load_steps<const D: usize>(
-    laid_out: LaidOut<'_, D>,
+    laid_out: ModelSetup<'_, D>,
     file: CheckpointFile,
     saved: Option<Saved>,
     spec: &Spec,
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    let LaidOut {
+    let ModelSetup {
         title,
         joining,
         model,
@@ -92,7 +92,7 @@ fn load_steps<const D: usize>(
         max_iterations: spec.max_iterations,
         ..QuasiStaticParams::default()
     };
-    choices.push(Choice {
+    choices.push(Decision {
         choice: match params.equilibrium {
             Equilibrium::Newton => "Newton's method, without a matrix",
             Equilibrium::Relaxation => "adaptive dynamic relaxation",
@@ -251,7 +251,7 @@ fn load_steps<const D: usize>(
     let stored = moving.system.stored_energy(&state.u);
     let (_, applied) = loads::loads(model, &rest.conditions, state.time)?;
     let plane = plane_energy(model, rest)?;
-    choices.push(Choice {
+    choices.push(Decision {
         choice: format!("{} products or passes", info.iterations),
         why: "of all load steps of this run".to_owned(),
     });
@@ -305,8 +305,8 @@ fn factors<const D: usize>(
     model: &Model<D>,
     operator: &dyn Operator<D>,
     symmetry: Symmetry,
-    rest: &Rest<D>,
-    choices: &mut Vec<Choice>,
+    rest: &RunSettings<D>,
+    choices: &mut Vec<Decision>,
     progress: &dyn Progress,
 ) -> Result<Option<Factor>, RunError> {
     let params = equilibrium::params(&rest.solver);
@@ -327,7 +327,7 @@ fn factors<const D: usize>(
     let Some((factor, info)) = statics::factors(&problem, &params, progress)? else {
         return Ok(None);
     };
-    choices.push(Choice {
+    choices.push(Decision {
         choice: "factors of the stiffness before bonds break lead the iteration".to_owned(),
         why: format!(
             "{:.1} MB, {:.1e} operations once; solver.method = \"krylov\" does without",

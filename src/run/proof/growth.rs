@@ -7,8 +7,10 @@ use crate::progress::Progress;
 use crate::run::definiteness::factorised;
 use crate::run::error::RunError;
 use crate::scene::spec::{CouplingSpec, GrowingModesSpec};
-use crate::solve::growth::{Evidence, Growth, LARGEST_GAIN, REMEDY, REMEDY_SEAM, growth};
-use crate::system::{Dynamic, Symmetry};
+use crate::solve::instability_growth::{
+    Evidence, Growth, LARGEST_GAIN, REMEDY, REMEDY_SEAM, growth,
+};
+use crate::system::{SemiDiscrete, Symmetry};
 
 /// The largest factor by which a mode that is not seen may grow over the run, if the answer is to be that none grows.
 const UNSEEN: f64 = 1.1;
@@ -21,7 +23,7 @@ const TOLD: f64 = 0.005;
 
 /// What is known before a run of a motion that may grow.
 #[derive(Clone, Copy)]
-pub struct Asked<'a> {
+pub struct GrowthQuestion<'a> {
     /// What to do about it.
     pub remedy: &'static str,
     /// What shows that no mode grows, if anything does.
@@ -46,7 +48,7 @@ pub(crate) fn remedy(coupling: &CouplingSpec) -> &'static str {
 pub(crate) fn proved<const D: usize>(
     model: &Model<D>,
     operator: &dyn Operator<D>,
-    system: &dyn Dynamic,
+    system: &dyn SemiDiscrete,
     progress: &dyn Progress,
 ) -> Option<&'static str> {
     if system.symmetry() != Symmetry::Symmetric {
@@ -79,8 +81,8 @@ const MOST_FLOPS: f64 = 1e10;
 /// # Errors
 /// [`RunError::Grows`] for a mode that doubles the energy, unless the scene wants to be told only.
 pub(crate) fn check(
-    asked: &Asked<'_>,
-    system: &dyn Dynamic,
+    asked: &GrowthQuestion<'_>,
+    system: &dyn SemiDiscrete,
     held: &[u32],
     (step, steps): (f64, u64),
 ) -> Result<Part, RunError> {

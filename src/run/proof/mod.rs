@@ -22,13 +22,13 @@ mod quadratic;
 mod surface;
 mod symmetry;
 
-use super::setup::Rest;
+use super::setup::RunSettings;
 use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::proof::{Part, Proof, Severity};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::spec::UnprovenSpec;
-use crate::system::{BlockCsr, Dynamic};
+use crate::system::{BlockCsr, SemiDiscrete};
 
 pub use self::affine::displacements as affine_displacements;
 
@@ -41,11 +41,11 @@ pub struct Subject<'a, const D: usize> {
     /// Rows of the stiffness.
     pub operator: &'a dyn Operator<D>,
     /// What the run keeps of the scene.
-    pub rest: &'a Rest<D>,
+    pub rest: &'a RunSettings<D>,
     /// The assembled stiffness, where the run has one; else rows come from the operator.
     pub stiffness: Option<&'a BlockCsr>,
     /// What moves, in a scene that does; its tangent at rest has the rows.
-    pub system: Option<&'a dyn Dynamic>,
+    pub system: Option<&'a dyn SemiDiscrete>,
     /// Forces of the fields of [`affine_displacements`], where they are known already.
     pub affine_forces: &'a [Vec<f64>],
 }

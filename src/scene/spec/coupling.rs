@@ -1,6 +1,6 @@
 //! The coupling of a scene: what is typed, what a run asks of it, and the method that it makes.
 //!
-//! A coupling enters a scene here and nowhere else: a variant of [`CouplingSpec`], its [`Joining`] and the value that
+//! A coupling enters a scene here and nowhere else: a variant of [`CouplingSpec`], its [`CouplingTraits`] and the value that
 //! [`CouplingSpec::build`] makes of it. Parser, JSON Schema, overrides and messages follow from the variant.
 
 use std::sync::LazyLock;
@@ -61,7 +61,7 @@ pub enum LatticeStart {
 
 /// What is told of a coupling: its name, a line about it, and what it needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Joining {
+pub struct CouplingTraits {
     /// The name, as a scene spells it.
     pub name: &'static str,
     /// What the method does, in one line.
@@ -74,15 +74,15 @@ pub struct Joining {
 
 impl CouplingSpec {
     /// Name, description and needs of the coupling.
-    pub fn joining(&self) -> Joining {
+    pub fn joining(&self) -> CouplingTraits {
         match self {
-            Self::Splice(_) => Joining {
+            Self::Splice(_) => CouplingTraits {
                 name: "splice",
                 about: "each site takes the whole force of its own model",
                 zones: ZonesNeeded::Nonlocal,
                 lattice: LatticeStart::OnCorner,
             },
-            Self::Blending(b) => Joining {
+            Self::Blending(b) => CouplingTraits {
                 name: "blending",
                 about: "forces are blended over the transition zone",
                 zones: match b.beta {
@@ -98,7 +98,7 @@ impl CouplingSpec {
                 },
                 lattice: LatticeStart::OnCorner,
             },
-            Self::Balanced(b) => Joining {
+            Self::Balanced(b) => CouplingTraits {
                 name: "balanced",
                 about: "half of a splice's forces and half of a blending's",
                 zones: match b.beta {
@@ -110,7 +110,7 @@ impl CouplingSpec {
                 },
                 lattice: LatticeStart::OnCorner,
             },
-            Self::PartialStress(_) => Joining {
+            Self::PartialStress(_) => CouplingTraits {
                 name: "partial-stress",
                 about: "the transition zone carries the partial stress",
                 zones: ZonesNeeded::Transition {
@@ -119,19 +119,19 @@ impl CouplingSpec {
                 },
                 lattice: LatticeStart::OnCorner,
             },
-            Self::Truncated(_) => Joining {
+            Self::Truncated(_) => CouplingTraits {
                 name: "truncated",
                 about: "bonds that leave the nonlocal zone end on the faces of elements",
                 zones: ZonesNeeded::Nonlocal,
                 lattice: LatticeStart::Halfway,
             },
-            Self::Local(_) => Joining {
+            Self::Local(_) => CouplingTraits {
                 name: "local",
                 about: "finite elements everywhere",
                 zones: ZonesNeeded::Everywhere(Zone::Local),
                 lattice: LatticeStart::OnCorner,
             },
-            Self::Nonlocal(_) => Joining {
+            Self::Nonlocal(_) => CouplingTraits {
                 name: "nonlocal",
                 about: "peridynamics everywhere",
                 zones: ZonesNeeded::Everywhere(Zone::Nonlocal),

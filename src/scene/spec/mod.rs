@@ -16,7 +16,7 @@ pub use condition::{
 };
 pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec, UnprovenSpec};
 pub use coupling::{
-    BetaSpec, BlendingSpec, CouplingSpec, CutBondsSpec, FormSpec, InterfaceSpec, Joining,
+    BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec, InterfaceSpec,
     LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use material::{

@@ -1,6 +1,6 @@
 //! What an explicit motion is driven by, what it carries from step to step, and why it stops.
 
-use crate::system::Dynamic;
+use crate::system::SemiDiscrete;
 
 /// What drives a motion: external forces and prescribed displacements, as functions of time.
 ///
@@ -42,7 +42,7 @@ impl Drive for Undriven {
     }
 }
 
-/// All that changes in a motion, but for the damage, which the system keeps ([`Dynamic::damage_state`]): both together resume a run bit for bit.
+/// All that changes in a motion, but for the damage, which the system keeps ([`SemiDiscrete::damage_state`]): both together resume a run bit for bit.
 ///
 /// Shapes: one entry per dof. Units: \[s\], \[m\], \[m/s\], \[m/s²\], \[J\].
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -214,7 +214,7 @@ pub enum ExplicitError {
 
 /// Whether state, step, masses and prescribed dofs are those of a motion of this system.
 pub(super) fn check(
-    system: &dyn Dynamic,
+    system: &dyn SemiDiscrete,
     params: &ExplicitParams,
     state: &State,
     prescribed: &[u32],

@@ -14,7 +14,7 @@ use crate::{
         FreeDofs,
         krylov::{KrylovParams, LinearMap, add_scaled, conjugate_gradients, gmres, norm},
     },
-    system::{Breakage, Dynamic, Interval, Symmetry},
+    system::{FailureUpdate, Interval, SemiDiscrete, Symmetry},
 };
 
 /// The residual over that before, beyond which the tangent at rest leads too slowly.
@@ -31,7 +31,7 @@ const SHORTEST: f64 = 1.0 / 1024.0;
 
 /// The tangent at rest on free dofs.
 struct AtRest<'a> {
-    system: &'a dyn Dynamic,
+    system: &'a dyn SemiDiscrete,
     free: &'a FreeDofs,
 }
 
@@ -45,7 +45,7 @@ impl LinearMap for AtRest<'_> {
 /// The tangent at a displacement on free dofs.
 struct Present<'a> {
     /// The system, and room for displacements.
-    system: Mutex<(&'a mut dyn Dynamic, Vec<f64>)>,
+    system: Mutex<(&'a mut dyn SemiDiscrete, Vec<f64>)>,
     free: &'a FreeDofs,
     u: &'a [f64],
     /// `F(u)`.
@@ -67,7 +67,7 @@ impl LinearMap for Present<'_> {
         let (system, moved) = &mut *held;
         moved.clear();
         moved.extend(self.u.iter().zip(x).map(|(u, x)| u + part * x));
-        system.internal_force_into(moved, y, self.interval, Breakage::Held);
+        system.internal_force_into(moved, y, self.interval, FailureUpdate::Frozen);
         for (y, f) in y.iter_mut().zip(self.force) {
             *y = (*y - f) / part;
         }

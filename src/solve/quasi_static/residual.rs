@@ -7,7 +7,7 @@ use crate::{
         FreeDofs,
         krylov::{LinearMap, norm},
     },
-    system::{Breakage, Dynamic, Interval},
+    system::{FailureUpdate, Interval, SemiDiscrete},
 };
 
 /// Round-off of displacements, over them: forces within it of balance cannot come nearer.
@@ -36,7 +36,7 @@ pub(super) enum Tangent {
 
 /// The work space of a run.
 pub(super) struct Run<'a> {
-    pub system: &'a mut dyn Dynamic,
+    pub system: &'a mut dyn SemiDiscrete,
     pub near: Option<&'a dyn LinearMap>,
     pub params: QuasiStaticParams,
     pub free: FreeDofs,
@@ -124,7 +124,7 @@ impl Run<'_> {
     /// `f − F` on free dofs, and its norm.
     pub fn evaluate(&mut self, u: &[f64]) -> Result<Residual, QuasiStaticError> {
         self.system
-            .internal_force_into(u, &mut self.force, self.interval, Breakage::Held);
+            .internal_force_into(u, &mut self.force, self.interval, FailureUpdate::Frozen);
         for ((r, f), k) in self.residual.iter_mut().zip(&self.load).zip(&self.force) {
             *r = f - k;
         }

@@ -5,7 +5,7 @@ use crate::solve::direct::{Analysis, DirectInfo, Factor};
 use crate::solve::direct_params::{DirectError, DirectParams};
 use crate::solve::krylov::{KrylovError, KrylovParams, conjugate_gradients, gmres};
 use crate::solve::multigrid::{Multigrid, MultigridParams};
-use crate::solve::singular;
+use crate::solve::singularity_diagnosis;
 use crate::solve::statics::{
     Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticProblem, singular_error,
 };
@@ -283,8 +283,12 @@ fn direct(
     info.relative_residual = if scale > 0.0 { norm / scale } else { 0.0 };
     info.solve_seconds = start.elapsed().as_secs_f64();
     if info.relative_residual > SUSPECT
-        && let Some(motion) =
-            singular::mechanism(problem.stiffness, free, problem.positions, params.ordering)
+        && let Some(motion) = singularity_diagnosis::mechanism(
+            problem.stiffness,
+            free,
+            problem.positions,
+            params.ordering,
+        )
     {
         return Err(singular_error(motion, problem.positions));
     }
@@ -339,9 +343,13 @@ fn factorise(
         Err(error @ DirectError::TooLarge { .. }) => Err(StaticError::TooLarge(error)),
         Err(DirectError::NotPositive { site } | DirectError::Singular { site, .. }) => {
             // where no null vector is found, the site of the pivot is the answer of last resort
-            let motion =
-                singular::mechanism(problem.stiffness, free, problem.positions, params.ordering)
-                    .unwrap_or_else(|| singular::moving(vec![site]));
+            let motion = singularity_diagnosis::mechanism(
+                problem.stiffness,
+                free,
+                problem.positions,
+                params.ordering,
+            )
+            .unwrap_or_else(|| singularity_diagnosis::moving(vec![site]));
             Err(singular_error(motion, problem.positions))
         }
     }

@@ -1,6 +1,6 @@
 //! Error and order from runs at several spacings (Richardson).
 
-use super::pilot::Pilot;
+use super::sample_run::Pilot;
 use crate::variants::Quantity;
 
 /// Orders below are those of a singularity, orders above do not last: linear elements and the nonlocal operator have two

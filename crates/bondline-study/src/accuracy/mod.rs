@@ -3,37 +3,37 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `open.rs` | what a scene leaves open, and the keys of a candidate |
-//! | `pilot.rs` | small runs of a scene, and how far they are from each other |
+//! | `free_parameters.rs` | what a scene leaves open, and the keys of a candidate |
+//! | `sample_run.rs` | small runs of a scene, and how far they are from each other |
 //! | `estimate.rs` | error and order from the differences of pilots; the constants, and where they come from |
-//! | `coarsest.rs` | the coarsest candidate whose error is small enough, by looking at candidates themselves |
-//! | `ladder.rs` | a family of candidates, with runs of it from coarse to fine |
-//! | `choose.rs` | the cheapest candidate whose predicted error is small enough |
-//! | `versions.rs` | the error of a complete scene, from coarser and finer versions of it |
+//! | `coarsest_admissible.rs` | the coarsest candidate whose error is small enough, by looking at candidates themselves |
+//! | `refinement_sequence.rs` | a family of candidates, with runs of it from coarse to fine |
+//! | `selection.rs` | the cheapest candidate whose predicted error is small enough |
+//! | `scene_refinements.rs` | the error of a complete scene, from coarser and finer versions of it |
 //!
 //! Errors are those of `bondline trade`: relative root mean square of the displacement along the scene's lines and probes, over time
 //! for histories. Where nothing is cut and no bond can break the horizon is numerical, and errors are against elasticity; else it is a
 //! length of the material, and errors are against the same horizon with many more points.
 
-mod choose;
-mod coarsest;
+mod coarsest_admissible;
 mod estimate;
-mod ladder;
-mod open;
-mod pilot;
-mod versions;
+mod free_parameters;
+mod refinement_sequence;
+mod sample_run;
+mod scene_refinements;
+mod selection;
 
 use std::path::Path;
 use std::time::Instant;
 
-pub use choose::{Candidate, Chosen};
-pub use open::Family;
+pub use free_parameters::Family;
+pub use selection::{Candidate, Chosen};
 
-pub use bondline::predict::{Against, ErrorPrediction};
+pub use bondline::predict::{ErrorPrediction, ErrorReference};
 
 pub use estimate::{SPREAD, difference};
-pub use pilot::Bench;
-use versions::predicted_error;
+pub use sample_run::Bench;
+use scene_refinements::predicted_error;
 
 use bondline::predict::Prediction;
 use bondline::predict::counted::{ANSWERS, TENTH};
@@ -141,10 +141,10 @@ pub fn completed(
     source: &Source,
     directory: &Path,
 ) -> Result<Option<(Source, Chosen)>, SceneError> {
-    let Some(asked) = open::Asked::of(source)? else {
+    let Some(asked) = free_parameters::AccuracyRequest::of(source)? else {
         return Ok(None);
     };
-    let chosen = choose::choose(&asked, source, directory)?;
+    let chosen = selection::choose(&asked, source, directory)?;
     let mut complete = source.clone();
     for o in &chosen.overrides {
         complete.push_override(o)?;

@@ -2,19 +2,19 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `knobs.rs` | what can be turned in a scene, and the overrides that it means |
+//! | `parameters.rs` | what can be turned in a scene, and the overrides that it means |
 //! | `generated.rs` | generated meshes as knobs see them |
 //! | `measure.rs` | how far the outputs of a run are from those of the reference |
 
 mod generated;
-mod knobs;
 mod measure;
+mod parameters;
 
-pub use knobs::{KNOBS, Knob, Setting, typed};
 pub use measure::{Quantity, distance_from_path};
+pub use parameters::{KNOBS, Knob, Setting, typed};
 
-pub(crate) use knobs::{Base, coordinates, corners, cutouts};
 pub(crate) use measure::Measured;
+pub(crate) use parameters::{Base, coordinates, corners, cutouts};
 
 use bondline::scene::SceneSpec;
 use bondline::scene::spec::SolveSpec;

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, HashMap};
 use nalgebra::{DMatrix, DVector};
 
 use bondline::{
-    peridynamics::{Bound, least_change::least_change},
+    peridynamics::{Bound, bounded_least_norm::least_change},
     tensor::{Tensor, Vector},
 };
 

@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use bondline::peridynamics::{Bound, least_change::least_change};
+use bondline::peridynamics::{Bound, bounded_least_norm::least_change};
 
 /// Positions agree within this part of a horizon.
 const TIE: f64 = 1e-9;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::bar::{Bar, Layout, RATIO};
-use bondline::peridynamics::{Bound, least_change::least_change};
+use bondline::peridynamics::{Bound, bounded_least_norm::least_change};
 
 /// Rows of directed bonds: `rows[i]` holds `(j, k)`, the force on node `i` is `Σ k (u_j − u_i)`.
 type Rows = Vec<Vec<(usize, f64)>>;

@@ -11,15 +11,15 @@ use super::Material;
 use crate::Effort;
 use crate::enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNGS_MODULUS};
 use crate::typed;
-use bondline::coupling::motion::{BondBehaviour, Critical};
-use bondline::coupling::motion::{Motion, masses, scale_rows};
+use bondline::coupling::semidiscrete::{BondBehaviour, Critical};
+use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
 use bondline::coupling::{BlendingFunction, FitDegree};
 use bondline::observe::report::{Columns, Row, Table};
 use bondline::peridynamics::Micromodulus;
-use bondline::peridynamics::kernel::Kinematics;
+use bondline::peridynamics::bond_force::Kinematics;
 use bondline::progress::{Progress, Silent};
 use bondline::solve::statics::{self, StaticParams, StaticProblem};
-use bondline::system::{Breakage, Dynamic, Halfway, Interval, Symmetry};
+use bondline::system::{FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry};
 use bondline::tensor::{Vector, padded};
 
 const METHODS: [Method; 7] = [
@@ -204,10 +204,10 @@ fn run_crack(
         critical_stretch: Some(Critical::Uniform(CRITICAL)),
         no_fail: &never,
         contact: None,
-        storage: bondline::peridynamics::kernel::Storage::Double,
+        storage: bondline::peridynamics::bond_force::Storage::Double,
         broken: None,
     };
-    let mut motion = Motion::new(
+    let mut motion = CoupledSystem::new(
         &e.model,
         operator.as_ref(),
         symmetry,
@@ -231,7 +231,7 @@ fn run_crack(
             }
         }
     };
-    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Held);
+    motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
     let row = |damage: &[f64], side: f64| -> Vec<(f64, f64)> {
         let beside = x.iter().zip(damage);
         let beside = beside.filter(|(x, _)| (x[1] - y - side * SPACING).abs() < 0.1 * SPACING);
@@ -247,12 +247,12 @@ fn run_crack(
         done += 1;
         kick(&mut v, &force);
         u.iter_mut().zip(&v).for_each(|(u, v)| *u += step * v);
-        motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, Breakage::Allowed);
+        motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
         let back = 0.5 * step;
         motion.account_for_breaks(&Halfway { u: &u, v: &v, back });
         kick(&mut v, &force);
         let arrived =
-            |motion: &Motion<'_, 2>| tip(&motion.damage().unwrap_or_default(), 0.5) >= TIP;
+            |motion: &CoupledSystem<'_, 2>| tip(&motion.damage().unwrap_or_default(), 0.5) >= TIP;
         if steps.is_none() && done % 5 == 0 && arrived(&motion) {
             break;
         }

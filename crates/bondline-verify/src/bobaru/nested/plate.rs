@@ -285,7 +285,7 @@ mod tests {
                 .collect()
         };
         let (u, v) = (field(0.3, 0.2), field(0.5, -0.4));
-        let mut wanted = bondline::system::Dynamic::stored_energy(&body.motion, &u);
+        let mut wanted = bondline::system::SemiDiscrete::stored_energy(&body.motion, &u);
         for (m, v) in body.motion.mass.iter().zip(v.chunks_exact(2)) {
             wanted += 0.5 * m * (v[0] * v[0] + v[1] * v[1]);
         }

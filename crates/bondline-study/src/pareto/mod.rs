@@ -1,0 +1,242 @@
+//! What speed costs in accuracy: a scene run with its knobs turned, each case measured against a reference.
+//!
+//! | file | what |
+//! |---|---|
+//! | `parameters.rs` | what a study is asked, what its cases are, how it ends |
+//! | `trial.rs` | one case in a process of its own: its cost, its outcome |
+//! | `surrogate.rs` | guesses of cost and error for cases that were not run; the Pareto front |
+//! | `study.rs` | which case runs next |
+//! | `record.rs` | what is kept of a study, so that it can go on |
+//! | `report.rs` | table, CSV, JSON, plot, and the scene for a wanted error |
+//!
+//! What can be turned in a scene, and how far outputs are apart, is in `crates/bondline-study/src/variants`.
+//!
+//! First the reference runs, then the scene as it is, then every setting alone. From these, cost and error of every combination are guessed, and the
+//! one that promises the largest gain over the front so far is run, again and again, until none promises any or the time is used up. Every outcome is
+//! written as soon as it is known, and a study that was interrupted goes on from there.
+
+pub(crate) mod parameters;
+mod record;
+mod report;
+mod study;
+mod surrogate;
+mod trial;
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+pub use crate::variants::{KNOBS, Knob, Quantity, Setting, distance_from_path, typed};
+pub use parameters::{
+    Case, Cost, CostBy, Outcome, Reference, Trade, TradeEnd, TradeError, TradeParams,
+};
+pub use surrogate::front;
+
+use crate::accuracy;
+use crate::variants::{Base, measured_keys};
+use bondline::observe::claim::{Claim, Files};
+use bondline::progress::Progress;
+use bondline::regular_file;
+use bondline::scene::{SceneError, SceneSpec, Source};
+use record::{Head, kept, new_record, read_record};
+use study::Study;
+use trial::{Attempt, Runner};
+
+/// A case that takes longer than so many times the reference is of no use to anyone.
+const PATIENCE: f64 = 4.0;
+
+/// Runs a study with `program`, which must be this command line; `interrupt` ends it between and within cases.
+///
+/// # Errors
+/// [`TradeError`]; outcomes known by then are kept in the folder, and a second call goes on from them.
+pub fn trade(
+    params: &TradeParams,
+    program: &Path,
+    interrupt: Option<&AtomicBool>,
+    progress: &dyn Progress,
+) -> Result<Trade, TradeError> {
+    let text = regular_file::read_scene(&params.scene).map_err(|source| TradeError::File {
+        path: params.scene.clone(),
+        source,
+    })?;
+    let scene_error = |e: SceneError| TradeError::Scene(Box::new(e));
+    let plain = Source::new(params.scene.display().to_string(), text.clone());
+    let mut source = plain.clone();
+    for o in &params.overrides {
+        source.push_override(o).map_err(scene_error)?;
+    }
+    let directory = params.scene.parent().unwrap_or(Path::new(""));
+    let chosen = accuracy::completed(&source, directory).map_err(scene_error)?;
+    let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
+    let spec = SceneSpec::parse(complete).map_err(scene_error)?;
+    let base = Base::of(&spec);
+    let knobs = chosen_knobs(&base, params)?;
+    let mut common = params.overrides.clone();
+    common.extend(chosen.into_iter().flat_map(|c| c.1.overrides));
+    common.extend(measured_keys(&spec));
+    let keys = match &params.reference {
+        Reference::Auto if base.breaks && base.moves => vec!["coupling=nonlocal".to_owned()],
+        Reference::FullPd => vec!["coupling=nonlocal".to_owned()],
+        Reference::Auto | Reference::Finer => base.overrides(&base.finer()),
+        Reference::Keys(keys) => keys.clone(),
+    };
+    let runner = Runner {
+        program,
+        scene: &params.scene,
+        interrupt,
+    };
+    let start = Instant::now();
+    let _claim = Claim::take(
+        &params.output,
+        &params.scene.display().to_string(),
+        &files(),
+    )?;
+    let program = record::program(program)?;
+    let with = |keys: &[String]| -> Vec<String> { common.iter().chain(keys).cloned().collect() };
+    let mesh = record::mesh(&plain, directory, &with(&keys));
+    let head_of = |quantities: Vec<Quantity>, cost| Head {
+        program: program.clone(),
+        scene: text.clone(),
+        mesh,
+        overrides: common.clone(),
+        reference: keys.clone(),
+        quantities,
+        cost,
+    };
+    let record_path = params.output.join("cases.jsonl");
+    let folder = params.output.join("reference");
+    let old = read_record(&record_path)?;
+    let (reference, head, cases) = match old {
+        Some((head, cases)) => {
+            let wanted = if params.quantities.is_empty() {
+                head.quantities.clone()
+            } else {
+                params.quantities.clone()
+            };
+            if head != head_of(wanted, head.cost) {
+                return Err(TradeError::Another { path: record_path });
+            }
+            (kept(&folder)?, head, cases)
+        }
+        None => {
+            progress.stage("reference", None);
+            let ran = match runner.run(&with(&keys), &folder, params.budget)? {
+                Attempt::Ran(ran) => ran,
+                Attempt::Refused(why) => {
+                    return Err(TradeError::Base {
+                        what: "the reference",
+                        why,
+                        remedy: "choose another one with --reference",
+                    });
+                }
+                Attempt::OverTime | Attempt::Interrupted => {
+                    return Err(TradeError::Base {
+                        what: "the reference",
+                        why: "it used up the time".to_owned(),
+                        remedy: "give more with --budget, or another one with --reference",
+                    });
+                }
+            };
+            let quantities = if params.quantities.is_empty() {
+                ran.measured.quantities()
+            } else {
+                params.quantities.clone()
+            };
+            for quantity in &quantities {
+                if ran.measured.error(&ran.measured, quantity).is_none() {
+                    return Err(TradeError::Quantity {
+                        quantity: quantity.name(),
+                    });
+                }
+            }
+            let head = head_of(quantities, ran.cost);
+            (ran.measured, head, Vec::new())
+        }
+    };
+    // what was found with another mesh is found again
+    let is_known =
+        |case: &Case| case.mesh == record::mesh(&plain, directory, &with(&case.overrides));
+    let cases: Vec<Case> = cases.into_iter().filter(is_known).collect();
+    // anew, because a killed study may have left half a line at the end
+    let record = new_record(&record_path, &head, &cases).map_err(|source| TradeError::File {
+        path: record_path.clone(),
+        source,
+    })?;
+    let mut study = Study {
+        params,
+        runner,
+        plain,
+        directory,
+        base,
+        settings: knobs
+            .into_iter()
+            .enumerate()
+            .flat_map(|(k, knob)| knob.settings.into_iter().map(move |s| (k, s)))
+            .collect(),
+        common,
+        reference,
+        reference_keys: head.reference.clone(),
+        quantities: head.quantities.clone(),
+        cases,
+        skipped: Vec::new(),
+        record,
+        record_path,
+        deadline: start + params.budget,
+        patience: Duration::from_secs_f64(PATIENCE * head.cost.seconds + 10.0),
+    };
+    let ended = study.all(progress)?;
+    progress.finish();
+    let left = study.combinations().len();
+    Ok(Trade {
+        scene: params.scene.clone(),
+        quantities: head.quantities,
+        reference: (head.reference, head.cost),
+        cases: study.cases,
+        by: params.cost,
+        left,
+        ended,
+    })
+}
+
+/// What a study writes into its folder, and its cases below it.
+fn files() -> Files {
+    Files {
+        name: "trade".to_owned(),
+        files: ["cases.jsonl", "reference", "case"]
+            .map(str::to_owned)
+            .into(),
+        series: false,
+    }
+}
+
+fn chosen_knobs(base: &Base, params: &TradeParams) -> Result<Vec<Knob>, TradeError> {
+    let all = base.knobs();
+    let mut chosen: Vec<Knob> = if params.knobs.is_empty() {
+        // whoever names keys only wants those
+        if params.vary.is_empty() {
+            all
+        } else {
+            Vec::new()
+        }
+    } else {
+        params
+            .knobs
+            .iter()
+            .map(|name| {
+                all.iter()
+                    .find(|k| k.name == *name)
+                    .cloned()
+                    .ok_or_else(|| TradeError::Knob {
+                        knob: name.clone(),
+                        known: all
+                            .iter()
+                            .map(|k| k.name.as_str())
+                            .collect::<Vec<_>>()
+                            .join(", "),
+                    })
+            })
+            .collect::<Result<_, _>>()?
+    };
+    chosen.extend(params.vary.iter().cloned());
+    Ok(chosen)
+}

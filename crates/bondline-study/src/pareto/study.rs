@@ -1,0 +1,240 @@
+//! Which case runs next: each setting alone, then what promises most.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use super::parameters::Outcome;
+use super::record::{self, write_line};
+use super::surrogate::{Effects, most_promising};
+use super::trial::{Attempt, Runner};
+use crate::pareto::parameters::{Case, TradeEnd, TradeError, TradeParams};
+use crate::variants::{Base, Setting};
+use crate::variants::{Measured, Quantity};
+use bondline::progress::Progress;
+use bondline::scene::Source;
+
+/// A combination is worth running if it promises this factor in cost or error over the front.
+const WORTH: f64 = 1.1;
+
+/// A study under way.
+pub(super) struct Study<'a> {
+    pub params: &'a TradeParams,
+    pub runner: Runner<'a>,
+    /// The scene without overrides, and the folder that its paths count from.
+    pub plain: Source,
+    pub directory: &'a Path,
+    pub base: Base,
+    pub settings: Vec<(usize, Setting)>,
+    pub common: Vec<String>,
+    pub reference: Measured,
+    pub reference_keys: Vec<String>,
+    pub quantities: Vec<Quantity>,
+    pub cases: Vec<Case>,
+    /// Combinations that are the reference itself.
+    pub skipped: Vec<Vec<String>>,
+    pub record: std::fs::File,
+    pub record_path: PathBuf,
+    pub deadline: Instant,
+    /// How long a case may take: some times the reference.
+    pub patience: Duration,
+}
+
+/// Combinations beyond this are not looked at.
+const MOST_COMBINATIONS: usize = 20_000;
+
+impl Study<'_> {
+    /// Runs everything; why it ended.
+    pub(super) fn all(&mut self, progress: &dyn Progress) -> Result<TradeEnd, TradeError> {
+        let singles = 1 + self.settings.len();
+        progress.stage("the scene, and each setting alone", Some(singles as u64));
+        if let Some(end) = self.case(&[], None, progress)? {
+            return Ok(end);
+        }
+        if let Outcome::Refused { why } = &self.cases[0].outcome {
+            return Err(TradeError::Base {
+                what: "the scene",
+                why: why.clone(),
+                remedy: "try it with `bondline run`",
+            });
+        }
+        progress.advance(1);
+        for k in 0..self.settings.len() {
+            if let Some(end) = self.case(&[k], None, progress)? {
+                return Ok(end);
+            }
+            progress.advance(1);
+        }
+        progress.stage("combinations", None);
+        while let Some((chosen, guess)) = self.next() {
+            if let Some(end) = self.case(&chosen, Some(guess), progress)? {
+                return Ok(end);
+            }
+        }
+        Ok(TradeEnd::Complete)
+    }
+
+    fn labels(&self, chosen: &[usize]) -> Vec<String> {
+        chosen
+            .iter()
+            .map(|&k| self.settings[k].1.label.clone())
+            .collect()
+    }
+
+    fn chosen(&self, case: &Case) -> Option<Vec<usize>> {
+        case.settings
+            .iter()
+            .map(|label| self.settings.iter().position(|s| s.1.label == *label))
+            .collect()
+    }
+
+    /// Runs a case unless its outcome is known; why the study has to end, if it has.
+    fn case(
+        &mut self,
+        chosen: &[usize],
+        guessed: Option<(f64, f64)>,
+        progress: &dyn Progress,
+    ) -> Result<Option<TradeEnd>, TradeError> {
+        let settings = self.labels(chosen);
+        let overrides = self
+            .base
+            .overrides(chosen.iter().map(|&k| &self.settings[k].1.change));
+        // the reference agrees with itself
+        if overrides == self.reference_keys {
+            self.skipped.push(settings);
+            return Ok(None);
+        }
+        let is_this = |c: &Case| c.settings == settings && c.overrides == overrides;
+        if self.cases.iter().any(is_this) {
+            return Ok(None);
+        }
+        let left = self.deadline.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(Some(TradeEnd::Budget));
+        }
+        if self
+            .runner
+            .interrupt
+            .is_some_and(|f| f.load(Ordering::Relaxed))
+        {
+            return Ok(Some(TradeEnd::Interrupted));
+        }
+        progress.tell(&format!(
+            "{} ({:.0} s left)",
+            if settings.is_empty() {
+                "as it is".to_owned()
+            } else {
+                settings.join(", ")
+            },
+            left.as_secs_f64()
+        ));
+        let all: Vec<String> = self.common.iter().chain(&overrides).cloned().collect();
+        let folder = self.params.output.join("case");
+        let mesh = record::mesh(&self.plain, self.directory, &all);
+        let started = Instant::now();
+        let outcome = match self.runner.run(&all, &folder, left.min(self.patience))? {
+            Attempt::Interrupted => return Ok(Some(TradeEnd::Interrupted)),
+            Attempt::Refused(why) => Outcome::Refused { why },
+            Attempt::OverTime if left < self.patience => return Ok(Some(TradeEnd::Budget)),
+            Attempt::OverTime => Outcome::OverTime {
+                seconds: started.elapsed().as_secs_f64(),
+            },
+            Attempt::Ran(ran) => {
+                let errors: Vec<Option<f64>> = self
+                    .quantities
+                    .iter()
+                    .map(|q| ran.measured.error(&self.reference, q))
+                    .collect();
+                match errors.iter().position(Option::is_none) {
+                    Some(k) => Outcome::Refused {
+                        why: format!("its outputs have no {}", self.quantities[k].name()),
+                    },
+                    None => Outcome::Ran {
+                        cost: ran.cost,
+                        errors: errors.into_iter().flatten().collect(),
+                    },
+                }
+            }
+        };
+        // what a case writes is of no further use
+        let _ = std::fs::remove_dir_all(&folder);
+        let case = Case {
+            settings,
+            overrides,
+            mesh,
+            outcome,
+            guessed,
+        };
+        write_line(&mut self.record, &case).map_err(|source| TradeError::File {
+            path: self.record_path.clone(),
+            source,
+        })?;
+        self.cases.push(case);
+        Ok(None)
+    }
+
+    /// Combinations of settings that ran alone, at most one of each knob, whose outcome is not known.
+    pub(super) fn combinations(&self) -> Vec<Vec<usize>> {
+        let usable: Vec<usize> = (0..self.settings.len())
+            .filter(|&k| {
+                let label = &self.settings[k].1.label;
+                self.cases.iter().any(|c| {
+                    c.settings.as_slice() == std::slice::from_ref(label)
+                        && matches!(c.outcome, Outcome::Ran { .. })
+                })
+            })
+            .collect();
+        let mut all: Vec<Vec<usize>> = vec![vec![]];
+        for &k in &usable {
+            let knob = self.settings[k].0;
+            let with: Vec<Vec<usize>> = all
+                .iter()
+                .filter(|c| c.iter().all(|&o| self.settings[o].0 != knob))
+                .map(|c| c.iter().copied().chain([k]).collect())
+                .take(MOST_COMBINATIONS.saturating_sub(all.len()))
+                .collect();
+            all.extend(with);
+        }
+        all.retain(|c| {
+            let labels = self.labels(c);
+            c.len() > 1
+                && !self.skipped.contains(&labels)
+                && !self.cases.iter().any(|case| case.settings == labels)
+        });
+        all
+    }
+
+    /// The most promising combination, with cost and error as guessed.
+    fn next(&self) -> Option<(Vec<usize>, (f64, f64))> {
+        let ran: Vec<(Vec<usize>, (f64, f64))> = self
+            .cases
+            .iter()
+            .filter_map(|c| Some((self.chosen(c)?, c.point(self.params.cost)?)))
+            .collect();
+        let number = self.settings.len();
+        let of = |f: fn(&(f64, f64)) -> f64| {
+            let values: Vec<_> = ran.iter().map(|(c, p)| (c.clone(), f(p))).collect();
+            Effects::fit(number, &values)
+        };
+        let (cost, error) = (of(|p| p.0), of(|p| p.1));
+        let candidates = self.combinations();
+        let guessed: Vec<(f64, f64)> = candidates
+            .iter()
+            .map(|c| (cost.guess(c), error.guess(c)))
+            .collect();
+        let measured: Vec<(f64, f64)> = ran.iter().map(|r| r.1).collect();
+        let wanted = self.params.wanted.iter().find_map(|&w| {
+            // the cheapest that should meet a wanted error, if it is cheaper than what does
+            let met = measured
+                .iter()
+                .filter(|p| p.1 <= w)
+                .map(|p| p.0)
+                .fold(f64::INFINITY, f64::min);
+            (0..guessed.len())
+                .filter(|&k| guessed[k].1 <= w && WORTH * guessed[k].0 < met)
+                .min_by(|&a, &b| guessed[a].0.total_cmp(&guessed[b].0))
+        });
+        let k = wanted.or_else(|| most_promising(&guessed, &measured, WORTH))?;
+        Some((candidates[k].clone(), guessed[k]))
+    }
+}

@@ -1,0 +1,499 @@
+//! Where the local model would be wrong, and where a bond could break, seen from the displacement at the nodes.
+//!
+//! A peridynamic law with an even kernel sees of a smooth field, to the second order in the horizon,
+//!
+//! ```text
+//!   L_pd u − L_0 u = div τ + O(δ⁴),     τ = C : ℓ² ∇²ε(u),     ℓ² = 5/12 · 1/(D + 4) · ∫ λ r⁶ dV / ∫ λ r⁴ dV
+//! ```
+//!
+//! with λ the micromodulus of a bond, whose force is `λ ξ (ξ·η)`. In one dimension the fourth derivative has the factor
+//! `E ℓ² = ∫ λ ξ⁶/24 dξ`, and the expression is exact up to fields of the fifth degree; in two and three it is that of a plane longitudinal wave, and
+//! for an LPS that of its bonds alone. Where a zone `Ω` stays local, its error `w` obeys `L_0 w = −div τ` in `Ω`: in the norm of energy it is at most
+//! that of τ,
+//!
+//! ```text
+//!   ‖w‖² ≤ Σ_c V_c (ℓ²∇²ε) : C : (ℓ²∇²ε),
+//! ```
+//!
+//! and cells are taken out of `Ω`, the worst first, until the root of the sum is less than `tolerance` times that of `Σ_c V_c ε : C : ε`, the energy of the
+//! finite-element solution. `ℓ²∇²ε` is the difference between the strain of a cell and the mean of the strains around it, scaled by second
+//! moments. No more than the cell's own energy counts: at a corner, where ∇²ε knows no bound, the difference of two mean strains does.
+
+use rayon::prelude::*;
+
+use crate::{
+    fem::{self, Rule},
+    mesh::{CellShape, Mesh},
+    tensor::{Tensor, Tensor4, Vector, strain},
+};
+
+/// Strains are averaged over this many sizes of a cell, or over a horizon where that is less. Wider means cost more and round corners; narrower ones take the noise of the mesh for a gradient.
+const AVERAGED_OVER: f64 = 2.5;
+
+/// And at least over so many, or a cell has no neighbour.
+const AT_LEAST: f64 = 1.5;
+
+/// Cells per task: a number of its own, so that what a task remembers does not depend on the threads.
+const CHUNK: usize = 1024;
+
+/// How far centres may be from where a regular mesh has them, relative to the size of a cell.
+const ALIKE: f64 = 1e-12;
+
+/// No cell.
+const NONE: u32 = u32::MAX;
+
+/// What decides where peridynamics is needed.
+#[derive(Clone, Copy, Debug)]
+pub struct Criteria<'a, const D: usize> {
+    /// The mesh of the whole body.
+    pub mesh: &'a Mesh<D>,
+    /// Local elastic tensor of each material \[Pa\].
+    pub tensors: &'a [Tensor4<D>],
+    /// Material of each cell, an index into `tensors`.
+    pub cell_material: &'a [u16],
+    /// The material that peridynamic points would have; no other cell is marked.
+    pub material: u16,
+    /// Horizon at the centre of each cell \[m\].
+    pub horizon: &'a [f64],
+    /// `ℓ²/δ²`, [`gradient_ratio`].
+    pub gradient_ratio: f64,
+    /// Error of the local model, relative in the norm of energy, that may remain.
+    pub tolerance: f64,
+    /// Stretch from which a cell is marked; none if no bond breaks.
+    pub stretch: Option<f64>,
+    /// Cells without a strain, one entry per cell: cracks and voids pass through them, and no mean passes over them.
+    pub cut: &'a [bool],
+    /// Cells in which no bond can break, one entry per cell.
+    pub unbreakable: &'a [bool],
+    /// Cells whose error does not count, one entry per cell: at the end of a support the strain knows no bound in either model, and points there have bonds to nothing.
+    pub held: &'a [bool],
+}
+
+/// Where peridynamics is needed, one entry per cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Need {
+    /// The local model errs too much.
+    pub error: Vec<bool>,
+    /// A bond may be stretched beyond the limit.
+    pub stretch: Vec<bool>,
+    /// Estimated error of the local model in the whole body, relative in the norm of energy.
+    pub all_local: f64,
+    /// What remains of it outside of the cells of `error`.
+    pub remaining: f64,
+    /// The part of the square of `all_local` that each cell has.
+    pub squares: Vec<f64>,
+    /// The largest principal strain; zero if no bond breaks.
+    pub largest_strain: f64,
+}
+
+/// `ℓ²/δ²` of bonds with the micromodulus `lambda(r)` \[any unit\] and the horizon `horizon` \[m\].
+pub fn gradient_ratio<const D: usize>(lambda: impl Fn(f64) -> f64, horizon: f64) -> f64 {
+    // the midpoint rule: powers of r and kernels that vanish at the horizon, smooth in between
+    const STEPS: usize = 2000;
+    let moment = |power: i32| -> f64 {
+        (0..STEPS)
+            .map(|i| (i as f64 + 0.5) / STEPS as f64)
+            .map(|s| lambda(s * horizon) * s.powi(power + D as i32 - 1))
+            .sum()
+    };
+    5.0 / 12.0 / (D + 4) as f64 * moment(6) / moment(4)
+}
+
+impl Need {
+    /// What remains of the estimated error of the local model outside of a set of cells, one entry per cell, relative in the norm of energy.
+    pub fn remaining_outside(&self, cells: &[bool]) -> f64 {
+        let outside = self
+            .squares
+            .iter()
+            .zip(cells)
+            .filter(|(_, inside)| !**inside);
+        outside.map(|(square, _)| square).sum::<f64>().sqrt()
+    }
+}
+
+impl<const D: usize> Criteria<'_, D> {
+    /// Where peridynamics is needed under a displacement.
+    ///
+    /// Shapes: `displacement` gives that of a node of the mesh \[m\].
+    pub fn need(&self, displacement: impl Fn(usize) -> Vector<D> + Sync) -> Need {
+        let mesh = self.mesh;
+        let count = mesh.cell_count();
+        let node_cells = mesh.node_cells();
+        let strains = self.strains(&node_cells, &displacement);
+        let neighbours = self.neighbours(&node_cells);
+        let centre: Vec<Vector<D>> = (0..count).map(|c| mesh.centroid(c)).collect();
+        let volume: Vec<f64> = (0..count)
+            .into_par_iter()
+            .map(|c| mesh.cell_volume(c).abs())
+            .collect();
+        let energy = |c: usize, e: &Tensor<D>| {
+            let tensor = &self.tensors[self.cell_material[c] as usize];
+            volume[c] * tensor.contract(e).dot(e)
+        };
+        let own: Vec<f64> = (0..count)
+            .into_par_iter()
+            .map(|c| match self.cut[c] {
+                true => 0.0,
+                false => energy(c, &strains[c]),
+            })
+            .collect();
+        let around = Around {
+            criteria: self,
+            kind: kinds(&neighbours, &centre, &volume),
+            neighbours: &neighbours,
+            strains: &strains,
+            centre: &centre,
+            volume: &volume,
+        };
+        let mut wrong = vec![0.0; count];
+        wrong.par_chunks_mut(CHUNK).enumerate().for_each_init(
+            || Reached {
+                from: NONE,
+                radius: 0.0,
+                cells: Vec::new(),
+                weights: Vec::new(),
+                stamp: vec![NONE; count],
+            },
+            |reached, (number, wrong)| {
+                reached.from = NONE;
+                for (i, wrong) in wrong.iter_mut().enumerate() {
+                    let c = number * CHUNK + i;
+                    if self.is_candidate(c) && !self.held[c] {
+                        let gradient = around.second_gradient(c, reached) * self.length_squared(c);
+                        *wrong = energy(c, &gradient).min(own[c]);
+                    }
+                }
+            },
+        );
+        let largest: Vec<f64> = (0..count)
+            .into_par_iter()
+            .map(|c| match self.stretch.is_some() && self.is_candidate(c) {
+                true => largest_strain(mesh, c, &displacement),
+                false => 0.0,
+            })
+            .collect();
+        let whole = own.iter().sum();
+        let (error, all_local, remaining) = worst(&wrong, whole, self.tolerance);
+        let is_known = all_local > 0.0;
+        wrong
+            .iter_mut()
+            .for_each(|w| *w = if is_known { *w / whole } else { 0.0 });
+        Need {
+            error,
+            stretch: (0..count)
+                .map(|c| {
+                    self.stretch
+                        .is_some_and(|s| largest[c] >= s && !self.unbreakable[c])
+                })
+                .collect(),
+            all_local,
+            remaining,
+            squares: wrong,
+            largest_strain: largest.iter().copied().fold(0.0, f64::max),
+        }
+    }
+
+    fn is_candidate(&self, c: usize) -> bool {
+        self.cell_material[c] == self.material && !self.cut[c]
+    }
+
+    fn length_squared(&self, c: usize) -> f64 {
+        self.gradient_ratio * self.horizon[c].powi(2)
+    }
+
+    /// The strain at the centre of each cell; on simplices, where it jumps from cell to cell, that of a plane through those of the neighbours.
+    fn strains(
+        &self,
+        node_cells: &(Vec<u32>, Vec<u32>),
+        displacement: &(impl Fn(usize) -> Vector<D> + Sync),
+    ) -> Vec<Tensor<D>> {
+        let mesh = self.mesh;
+        let raw: Vec<Tensor<D>> = (0..mesh.cell_count())
+            .into_par_iter()
+            .map(|c| strain(&fem::displacement_gradient_at_centre(mesh, c, displacement)))
+            .collect();
+        if !mesh.shapes.iter().any(|s| is_simplex(*s)) {
+            return raw;
+        }
+        (0..mesh.cell_count())
+            .into_par_iter()
+            .map(|c| {
+                if !is_simplex(mesh.shapes[c]) || !self.is_candidate(c) {
+                    return raw[c];
+                }
+                let mut near: Vec<u32> = mesh
+                    .cell(c)
+                    .iter()
+                    .flat_map(|&n| cells_of(node_cells, n))
+                    .copied()
+                    .filter(|&k| self.is_candidate(k as usize))
+                    .collect();
+                near.sort_unstable();
+                near.dedup();
+                let x = mesh.centroid(c);
+                let places = near.iter().map(|&k| {
+                    let k = k as usize;
+                    (mesh.centroid(k) - x, mesh.cell_volume(k).abs())
+                });
+                let mut weights = Vec::new();
+                level(places, &mut weights);
+                if weights.is_empty() {
+                    return raw[c];
+                }
+                let values = near.iter().map(|&k| raw[k as usize]);
+                values.zip(&weights).map(|(e, w)| e * *w).sum()
+            })
+            .collect()
+    }
+
+    /// The candidates that share a facet with each candidate; `NONE` fills the rest.
+    fn neighbours(&self, node_cells: &(Vec<u32>, Vec<u32>)) -> Vec<[u32; 6]> {
+        let mesh = self.mesh;
+        (0..mesh.cell_count())
+            .into_par_iter()
+            .map(|c| {
+                let mut found = [NONE; 6];
+                if !self.is_candidate(c) {
+                    return found;
+                }
+                let nodes = mesh.cell(c);
+                for (slot, facet) in found.iter_mut().zip(mesh.shapes[c].facets()) {
+                    let other = cells_of(node_cells, nodes[facet[0]]).iter().find(|&&k| {
+                        let theirs = mesh.cell(k as usize);
+                        k as usize != c
+                            && self.is_candidate(k as usize)
+                            && facet[1..].iter().all(|&i| theirs.contains(&nodes[i]))
+                    });
+                    *slot = other.copied().unwrap_or(NONE);
+                }
+                found
+            })
+            .collect()
+    }
+}
+
+fn is_simplex(shape: CellShape) -> bool {
+    matches!(shape, CellShape::Tri3 | CellShape::Tet4)
+}
+
+fn cells_of((offsets, cells): &(Vec<u32>, Vec<u32>), node: u32) -> &[u32] {
+    &cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize]
+}
+
+/// Marks the largest entries until the root of the sum of the others is below `tolerance` times that of `whole`; with the ratio of the roots before and after.
+fn worst(wrong: &[f64], whole: f64, tolerance: f64) -> (Vec<bool>, f64, f64) {
+    let mut marked = vec![false; wrong.len()];
+    let all: f64 = wrong.iter().sum();
+    if whole <= 0.0 || !all.is_finite() {
+        return (marked, 0.0, 0.0);
+    }
+    let ratio = |left: f64| (left.max(0.0) / whole).sqrt();
+    let mut order: Vec<u32> = (0..wrong.len() as u32).collect();
+    order.sort_unstable_by(|a, b| {
+        wrong[*a as usize]
+            .total_cmp(&wrong[*b as usize])
+            .then(a.cmp(b))
+    });
+    // summed from the smallest, so that rounding does not hide it
+    let mut left = 0.0;
+    let mut stays = 0;
+    for &c in &order {
+        let with = left + wrong[c as usize];
+        if ratio(with) > tolerance {
+            break;
+        }
+        left = with;
+        stays += 1;
+    }
+    for &c in &order[stays..] {
+        marked[c as usize] = true;
+    }
+    (marked, ratio(all), ratio(left))
+}
+
+/// The largest principal strain at the quadrature points of a cell.
+fn largest_strain<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+    displacement: impl Fn(usize) -> Vector<D>,
+) -> f64 {
+    let mut largest = 0.0f64;
+    fem::for_each_point(mesh, c, Rule::Stiffness, |p| {
+        let g = fem::displacement_gradient(p, |a| displacement(mesh.cell(c)[a] as usize));
+        largest = largest.max(largest_eigenvalue(&strain(&g)));
+    });
+    largest
+}
+
+/// The largest eigenvalue of a symmetric tensor.
+fn largest_eigenvalue<const D: usize>(e: &Tensor<D>) -> f64 {
+    match D {
+        1 => e[(0, 0)],
+        2 => {
+            let mean = 0.5 * (e[(0, 0)] + e[(1, 1)]);
+            mean + (0.5 * (e[(0, 0)] - e[(1, 1)])).hypot(e[(0, 1)])
+        }
+        _ => nalgebra::Matrix3::from_fn(|i, j| e[(i, j)])
+            .symmetric_eigenvalues()
+            .max(),
+    }
+}
+
+/// For each cell a number that it shares with the cell before it if neighbours, their centres and its volume lie alike, the numbers of cells shifted by one.
+fn kinds<const D: usize>(
+    neighbours: &[[u32; 6]],
+    centre: &[Vector<D>],
+    volume: &[f64],
+) -> Vec<u32> {
+    let is_alike = |c: usize| {
+        let size = volume[c].powf(1.0 / D as f64);
+        let of = |n: u32, c: usize| centre[n as usize] - centre[c];
+        (volume[c] - volume[c - 1]).abs() <= ALIKE * volume[c]
+            && neighbours[c]
+                .iter()
+                .zip(&neighbours[c - 1])
+                .all(|(&n, &m)| match (n, m) {
+                    (NONE, NONE) => true,
+                    (NONE, _) | (_, NONE) => false,
+                    (n, m) => n == m + 1 && (of(n, c) - of(m, c - 1)).amax() <= ALIKE * size,
+                })
+    };
+    let new: Vec<bool> = (0..neighbours.len())
+        .into_par_iter()
+        .map(|c| c == 0 || !is_alike(c))
+        .collect();
+    let mut number = 0;
+    let count = |is_new: bool| {
+        number += u32::from(is_new);
+        number
+    };
+    new.into_iter().map(count).collect()
+}
+
+/// The strains around a cell.
+struct Around<'a, const D: usize> {
+    criteria: &'a Criteria<'a, D>,
+    /// What a cell has in common with those before it, [`kinds`].
+    kind: Vec<u32>,
+    neighbours: &'a [[u32; 6]],
+    strains: &'a [Tensor<D>],
+    centre: &'a [Vector<D>],
+    volume: &'a [f64],
+}
+
+/// Cells that have been reached from a cell, with their weights in `∇²ε` there, and for each cell of the mesh from which cell it was reached last.
+struct Reached {
+    /// That cell; `NONE` for none yet.
+    from: u32,
+    radius: f64,
+    cells: Vec<u32>,
+    /// Empty where there is no gradient.
+    weights: Vec<f64>,
+    stamp: Vec<u32>,
+}
+
+impl Reached {
+    /// Whether a cell reaches the same cells, shifted, with the same weights: then all that are reached lie like those reached before.
+    fn serves(&self, c: usize, radius: f64, kind: &[u32]) -> bool {
+        if self.from == NONE || (radius - self.radius).abs() > ALIKE * radius {
+            return false;
+        }
+        let shift = c - self.from as usize;
+        let is_alike = |&k: &u32| kind.get(k as usize + shift) == Some(&kind[k as usize]);
+        self.cells.iter().all(is_alike)
+    }
+}
+
+impl<const D: usize> Around<'_, D> {
+    /// `∇²ε` at the centre of cell `c`, not before those that `reached` has seen.
+    fn second_gradient(&self, c: usize, reached: &mut Reached) -> Tensor<D> {
+        let size = self.volume[c].powf(1.0 / D as f64);
+        let radius = (AVERAGED_OVER * size)
+            .min(self.criteria.horizon[c])
+            .max(AT_LEAST * size)
+            * (1.0 + 1e-9);
+        if !reached.serves(c, radius, &self.kind) {
+            self.reach(c, radius, reached);
+        }
+        let shift = c - reached.from as usize;
+        let own = self.strains[c];
+        let mut sum = Tensor::zeros();
+        for (&k, &weight) in reached.cells.iter().zip(&reached.weights) {
+            sum += (self.strains[k as usize + shift] - own) * weight;
+        }
+        sum
+    }
+
+    /// The cells that a path of candidates within a small ball joins to cell `c`, so that no mean passes over a slit, and their weights.
+    fn reach(&self, c: usize, radius: f64, reached: &mut Reached) {
+        let x = self.centre[c];
+        (reached.from, reached.radius) = (c as u32, radius);
+        reached.cells.clear();
+        reached.cells.push(c as u32);
+        reached.stamp[c] = c as u32;
+        let mut next = 0;
+        while let Some(&at) = reached.cells.get(next) {
+            next += 1;
+            for &k in self.neighbours[at as usize].iter().filter(|k| **k != NONE) {
+                if reached.stamp[k as usize] != c as u32
+                    && (self.centre[k as usize] - x).norm() <= radius
+                {
+                    reached.stamp[k as usize] = c as u32;
+                    reached.cells.push(k);
+                }
+            }
+        }
+        let places = reached
+            .cells
+            .iter()
+            .map(|&k| (self.centre[k as usize] - x, self.volume[k as usize]));
+        let (mut second, mut weight) = (0.0, 0.0);
+        for (x, v) in places.clone() {
+            second += v * x.norm_squared();
+            weight += v;
+        }
+        level(places, &mut reached.weights);
+        // the mean of ½ x·H·x over the ball is ½ ⟨x₁²⟩ tr H
+        let factor = match second > 0.0 {
+            true => 2.0 * D as f64 * weight / second,
+            false => 0.0,
+        };
+        reached.weights.iter_mut().for_each(|w| *w *= factor);
+    }
+}
+
+/// Weights of values in the value at zero of the plane that fits them best; in their mean where they do not determine a plane. None without weight.
+///
+/// Shapes: position and weight of each. A plane loses what a one-sided mean makes of a constant gradient.
+fn level<const D: usize>(
+    data: impl Iterator<Item = (Vector<D>, f64)> + Clone,
+    weights: &mut Vec<f64>,
+) {
+    weights.clear();
+    let (mut weight, mut first) = (0.0, Vector::<D>::zeros());
+    for (x, w) in data.clone() {
+        weight += w;
+        first += x * w;
+    }
+    if weight <= 0.0 {
+        return;
+    }
+    first /= weight;
+    let mut second = Tensor::<D>::zeros();
+    for (x, w) in data.clone() {
+        let x = x - first;
+        second += x * x.transpose() * (w / weight);
+    }
+    let scale = second.trace();
+    let slope = match crate::tensor::inverse(&second) {
+        Some((inverse, determinant)) if determinant > 1e-6 * scale.powi(D as i32) => {
+            inverse * first
+        }
+        _ => Vector::zeros(),
+    };
+    weights.extend(data.map(|(x, w)| w / weight * (1.0 - slope.dot(&(x - first)))));
+}
+
+#[cfg(test)]
+#[path = "error_indicator_tests.rs"]
+mod tests;

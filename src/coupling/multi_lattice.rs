@@ -1,0 +1,310 @@
+//! The lattices of a model: one, or several that elements keep apart, each with its own spacing and horizon.
+
+use crate::{
+    coupling::{
+        CellRole, Interface, Lattice, Model, ModelError, Peridynamics, PointSource, Reach,
+        Surfaces,
+        bond_cutting::{self, LatticeFactors, WholeFamily},
+        point_cloud::PointCloud,
+    },
+    peridynamics::{Families, PartialVolume, TIE_TOLERANCE},
+    tensor::{Tensor4, Vector},
+};
+
+/// What bonds that end on the faces of elements need: the lattices as they go on behind the faces.
+pub(super) struct ContinuedLattice<const D: usize> {
+    /// Families of the points in elements, over the cloud of the body.
+    pub families: Families,
+    /// Each lattice, by the family of any of its points far from surfaces.
+    pub whole: Vec<WholeFamily<D>>,
+    /// The lattice of each point of the cloud.
+    pub of_point: Vec<u16>,
+}
+
+impl<const D: usize> ContinuedLattice<D> {
+    /// The whole family of a point of the cloud.
+    pub fn whole_of(&self, point: u32) -> &WholeFamily<D> {
+        &self.whole[usize::from(self.of_point[point as usize])]
+    }
+}
+
+/// One lattice on its way into the body.
+pub(super) struct CompletedLattice<const D: usize> {
+    pub cloud: PointCloud<D>,
+    pub families: Families,
+    pub passing: Option<Families>,
+    pub factors: LatticeFactors<D>,
+    /// All points before any is dropped, with their new numbers, where elements need them.
+    pub wide: Option<(PointCloud<D>, Vec<u32>)>,
+    pub is_constant: bool,
+}
+
+impl<const D: usize> Model<D> {
+    /// Completes the families of the points of one lattice, and drops the points that nothing needs.
+    pub(super) fn grow(
+        &self,
+        p: &Peridynamics<D>,
+        mut cloud: PointCloud<D>,
+        lattice: usize,
+        reach: Reach,
+    ) -> Result<CompletedLattice<D>, ModelError> {
+        for (x, &horizon) in cloud.position.iter().zip(&cloud.horizon) {
+            if !(horizon.is_finite() && horizon >= cloud.spacing * (1.0 - 1e-9)) {
+                return Err(ModelError::Horizon {
+                    position: x.iter().copied().collect(),
+                    horizon,
+                    spacing: cloud.spacing,
+                });
+            }
+        }
+        if cloud.element.iter().all(Option::is_some) {
+            return Err(ModelError::NoPoints {
+                spacing: cloud.spacing,
+            });
+        }
+        let is_constant = cloud
+            .horizon
+            .iter()
+            .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
+        let reaches: Vec<f64> = cloud.horizon.iter().map(|&d| p.reach(d)).collect();
+        let one = reaches.first().filter(|d| reaches.iter().all(|r| r == *d));
+        let known = one.filter(|_| cloud.is_axis_parallel()).and_then(|reach| {
+            Families::search_lattice(&cloud.position, cloud.spacing, *reach, TIE_TOLERANCE)
+        });
+        let mut families = match known {
+            Some(families) => families,
+            None => Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?,
+        };
+        let factors = LatticeFactors::new(p, &cloud)?;
+        factors.drop_without_share(&cloud, &mut families);
+        let surface = match (self.interface, p.surfaces) {
+            // a bond may leave the body through the elements around, but not through a free surface of the points
+            (Interface::Faces, _) => {
+                let mut facets = self.mesh.outer_facets();
+                facets.retain(|f| self.lattice_in(&p.points, f.cell as usize) == Some(lattice));
+                Some(facets)
+            }
+            (_, Surfaces::Cut) => Some(self.mesh.outer_facets()),
+            (_, Surfaces::Uncut) => None,
+        };
+        let longest = reaches.iter().copied().fold(0.0, f64::max);
+        bond_cutting::cut(
+            p,
+            &self.mesh,
+            surface,
+            longest,
+            &cloud.position,
+            &mut families,
+        );
+        // which points need a family of their own, and which only complete those of others
+        let reach = if is_constant {
+            reach
+        } else {
+            Reach::Neighbours
+        };
+        let (keep, passing) = match self.interface {
+            Interface::Faces => {
+                let (keep, passing) = cloud.prune_through(&families);
+                let families = families.restrict(&keep.renumbered, &passing);
+                (keep, Some(families))
+            }
+            _ => (cloud.prune(&families, reach), None),
+        };
+        let families = families.restrict(&keep.renumbered, &keep.active);
+        let wide = self
+            .roles
+            .contains(&CellRole::StressElement)
+            .then(|| (cloud.clone(), keep.renumbered.clone()));
+        if let Some((wide, _)) = &wide {
+            let near = self.near_stress_elements(wide);
+            self.check_materials(wide, |i| near(&wide.position[i], wide.horizon[i]))?;
+        }
+        cloud.retain(&keep.renumbered);
+        // bonds that are cut where elements begin see nothing of what lies beyond
+        if self.interface != Interface::Faces {
+            self.check_materials(&cloud, |_| true)?;
+        }
+        Ok(CompletedLattice {
+            factors,
+            cloud,
+            families,
+            passing,
+            wide,
+            is_constant,
+        })
+    }
+
+    /// Whether a position may be in the family of a Gauss point of an element that carries the partial stress.
+    fn near_stress_elements(&self, cloud: &PointCloud<D>) -> impl Fn(&Vector<D>, f64) -> bool {
+        let boxes: Vec<(Vector<D>, Vector<D>)> = (0..self.mesh.cell_count())
+            .filter(|&c| self.roles[c] == CellRole::StressElement)
+            .map(|c| self.mesh.bounds_of(self.mesh.cell(c)))
+            .collect();
+        let slack = 1e-9 * cloud.spacing;
+        move |x, horizon| {
+            boxes.iter().any(|(low, high)| {
+                let outside =
+                    Vector::<D>::from_fn(|a, _| (low[a] - x[a]).max(x[a] - high[a]).max(0.0));
+                outside.norm() < horizon - slack
+            })
+        }
+    }
+
+    /// Refuses families that reach into another material: their bonds would take its strain for that of the peridynamic one, and as the elements there
+    /// know nothing of them, forces would not balance by far.
+    fn check_materials(
+        &self,
+        cloud: &PointCloud<D>,
+        counts: impl Fn(usize) -> bool,
+    ) -> Result<(), ModelError> {
+        let (offsets, cells) = self.node_cells();
+        let own = |node: u32| {
+            cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize]
+                .iter()
+                .any(|&c| self.material_of_cell(c as usize) == self.peridynamic_material())
+        };
+        for (i, (x, element)) in cloud.position.iter().zip(&cloud.element).enumerate() {
+            let Some((cell, weights)) = element else {
+                continue;
+            };
+            // a place on the border of the two materials has its weights on nodes of both
+            let beyond = self.material_of_cell(*cell as usize) != self.peridynamic_material()
+                && self
+                    .mesh
+                    .cell(*cell as usize)
+                    .iter()
+                    .zip(weights)
+                    .any(|(&n, w)| w.abs() > 1e-9 && !own(n));
+            if beyond && counts(i) {
+                return Err(ModelError::OtherMaterial {
+                    position: x.iter().copied().collect(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses several lattices where bonds do not end on faces, where two meet, and where bonds of two could not be told apart.
+    pub(super) fn check_lattices(&self, p: &Peridynamics<D>) -> Result<(), ModelError> {
+        let PointSource::Lattices { lattices, .. } = &p.points else {
+            return Ok(());
+        };
+        if self.interface != Interface::Faces {
+            return Err(ModelError::Unsupported {
+                what: "several lattices with a coupling that completes families across the seam",
+                remedy: "use coupling.truncated, or one lattice",
+            });
+        }
+        if p.volumes != PartialVolume::Full {
+            return Err(ModelError::Unsupported {
+                what: "partial volumes on several lattices",
+                remedy: "use full volumes, or one lattice",
+            });
+        }
+        let twins = |a: &Lattice<D>| {
+            let mut rest = lattices.iter();
+            rest.any(|b| a.horizon == b.horizon && a.spacing != b.spacing)
+        };
+        if lattices.iter().any(twins) {
+            return Err(ModelError::Unsupported {
+                what: "two lattices of one horizon and two spacings",
+                remedy: "give them different horizons, or one spacing",
+            });
+        }
+        let of: Vec<Option<usize>> = (0..self.mesh.cell_count())
+            .map(|c| self.lattice_in(&p.points, c))
+            .collect();
+        for a in 0..lattices.len() {
+            for b in a + 1..lattices.len() {
+                if !self
+                    .mesh
+                    .interface_facets(&of, &Some(a), &Some(b))
+                    .is_empty()
+                {
+                    return Err(ModelError::Unsupported {
+                        what: "two lattices that meet at a face",
+                        remedy: "leave a layer of elements between them, one cell thick",
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The horizon of each lattice with what a plane through it costs to open, over the square of the critical stretch ([`crate::peridynamics::plane_energy`]) \[m\], \[J/m²\].
+    /// Points that are no lattice count as one of their spacing.
+    ///
+    /// # Errors
+    /// [`ModelError::Family`] if the law has no coefficients there.
+    pub fn plane_energies(&self) -> Result<Vec<(f64, f64)>, ModelError> {
+        let Some(p) = &self.peridynamics else {
+            return Ok(Vec::new());
+        };
+        let of = |(factors, horizon): &(LatticeFactors<D>, f64)| {
+            let family = factors.regular_family(p, *horizon)?;
+            Ok((*horizon, family.plane_energy()))
+        };
+        self.factors.iter().map(of).collect()
+    }
+
+    /// Spacing of the lattice of a point of the cloud \[m\], of several the point's own.
+    pub fn spacing_at(&self, point: u32) -> f64 {
+        self.passing()
+            .map_or(self.spacing(), |passing| passing.whole_of(point).spacing)
+    }
+
+    /// The lattice whose points a cell holds; none of an element.
+    pub(super) fn lattice_of_cell(&self, cell: usize) -> Option<usize> {
+        let points = self.peridynamics.as_ref().map(|p| &p.points)?;
+        self.lattice_in(points, cell)
+    }
+
+    fn lattice_in(&self, points: &PointSource<D>, cell: usize) -> Option<usize> {
+        match points {
+            _ if self.roles[cell] != CellRole::Points => None,
+            PointSource::Lattices { of_cell, .. } => Some(usize::from(of_cell[cell])),
+            _ => Some(0),
+        }
+    }
+}
+
+/// The whole family of each lattice, where bonds are those of regular lattices.
+///
+/// # Errors
+/// [`ModelError::Unsupported`] where they are not, and where lattices have different tensors.
+pub(super) fn whole_families<const D: usize>(
+    p: &Peridynamics<D>,
+    lattices: &[LatticeFactors<D>],
+    horizons: &[f64],
+    is_regular: bool,
+) -> Result<Vec<WholeFamily<D>>, ModelError> {
+    let whole = lattices
+        .iter()
+        .zip(horizons)
+        .map(|(lattice, &horizon)| lattice.whole_family(p, horizon))
+        .collect::<Result<Option<Vec<_>>, _>>()?;
+    // the faces that cut bonds follow the axes
+    let is_regular = is_regular && lattices.iter().all(LatticeFactors::is_axis_parallel);
+    let (true, Some(whole)) = (is_regular, whole) else {
+        return Err(ModelError::Unsupported {
+            what: "a seam of truncated bonds without a regular lattice of one horizon and one weight per shell of bonds",
+            remedy: "give peridynamics.points a lattice, a constant horizon and isotropic or plain weights, or couple by splice or blending",
+        });
+    };
+    if whole
+        .iter()
+        .any(|w| !same_tensor(&w.tensor, &whole[0].tensor))
+    {
+        return Err(ModelError::Unsupported {
+            what: "plain weights on lattices whose elastic tensors differ, as elements between them can have one only",
+            remedy: "give all bodies the same horizon over spacing, or use isotropic weights",
+        });
+    }
+    Ok(whole)
+}
+
+/// Whether two tensors agree to round-off.
+fn same_tensor<const D: usize>(a: &Tensor4<D>, b: &Tensor4<D>) -> bool {
+    let size = a.get(0, 0, 0, 0).abs();
+    (0..D).all(|i| (0..D).all(|j| (a.0[i][j] - b.0[i][j]).amax() <= 1e-9 * size))
+}

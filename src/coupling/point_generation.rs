@@ -1,0 +1,573 @@
+//! Where peridynamic points lie: in the cells that hold them and, as far as families reach, in the finite elements around.
+
+use rayon::prelude::*;
+
+use crate::{
+    coupling::{
+        CellRole, ModelError, Peridynamics, PointSource, Reach, Zone,
+        interface_interpolation::Bins, lattice_axes::lattice_axes, point_cloud::PointCloud,
+    },
+    fem::{self, Locator},
+    mesh::Mesh,
+    tensor::{Tensor, Vector},
+};
+
+/// How far a lattice goes on where neither its own cells nor an element are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Beyond {
+    /// There are no points.
+    Empty,
+    /// There are points, of which bonds that end on faces need the place only.
+    Continued,
+}
+
+/// Places points in the cells that hold them and, as far as families reach, around; one cloud for each lattice.
+pub(super) fn place<const D: usize>(
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+    roles: &[CellRole],
+    p: &Peridynamics<D>,
+    reach: Reach,
+    beyond: Beyond,
+) -> Result<Vec<PointCloud<D>>, ModelError> {
+    let all: Vec<bool> = roles.iter().map(|&r| r == CellRole::Points).collect();
+    let largest = (0..mesh.cell_count())
+        .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))
+        .fold(0.0, f64::max);
+    let placement = |mine: Vec<bool>, horizon: Option<f64>| {
+        let region = (0..mesh.cell_count())
+            .into_par_iter()
+            .filter(|&c| mine[c])
+            .map(|c| fem::cell_volume(mesh, c))
+            .collect::<Vec<_>>()
+            .iter()
+            .sum();
+        let nodes: Vec<u32> = (0..mesh.cell_count())
+            .filter(|&c| mine[c] || roles[c] == CellRole::StressElement)
+            .flat_map(|c| mesh.cell(c).iter().copied())
+            .collect();
+        let (low, high) = mesh.bounds_of(&nodes);
+        let levels = if reach == Reach::Own { 1.0 } else { 2.0 };
+        let margin = Vector::repeat(levels * horizon.unwrap_or(largest) * (1.0 + 1e-6));
+        Placement {
+            mesh,
+            zones,
+            roles,
+            p,
+            mine,
+            own_horizon: horizon,
+            beyond,
+            margin,
+            low: low - margin,
+            high: high + margin,
+            region,
+        }
+    };
+    match &p.points {
+        PointSource::Cells => Ok(vec![placement(all, None).at_cells()]),
+        &PointSource::Lattice { spacing, origin } if spacing.is_finite() && spacing > 0.0 => {
+            Ok(vec![placement(all, None).on_lattice(spacing, origin)?])
+        }
+        &PointSource::Lattice { spacing, .. } => Err(ModelError::NoPoints { spacing }),
+        PointSource::Lattices { lattices, of_cell } => lattices
+            .iter()
+            .enumerate()
+            .map(|(l, lattice)| {
+                let mine: Vec<bool> = all
+                    .iter()
+                    .zip(of_cell)
+                    .map(|(&points, &of)| points && usize::from(of) == l)
+                    .collect();
+                let h = lattice.spacing;
+                if !(h.is_finite() && h > 0.0 && mine.contains(&true)) {
+                    return Err(ModelError::NoPoints { spacing: h });
+                }
+                placement(mine, Some(lattice.horizon)).on_lattice(h, lattice.origin)
+            })
+            .collect(),
+    }
+}
+
+/// What placing points needs to know.
+struct Placement<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    zones: &'a [Zone],
+    roles: &'a [CellRole],
+    p: &'a Peridynamics<D>,
+    /// Cells whose points are sites.
+    mine: Vec<bool>,
+    /// The horizon of a lattice that has its own.
+    own_horizon: Option<f64>,
+    beyond: Beyond,
+    /// Corners of the box that holds all points.
+    low: Vector<D>,
+    high: Vector<D>,
+    /// How far from the cells points are needed.
+    margin: Vector<D>,
+    /// Volume of the cells that hold points.
+    region: f64,
+}
+
+/// Lattice points per block of work.
+const BLOCK: usize = 1024;
+
+impl<const D: usize> Placement<'_, D> {
+    fn horizon(&self, x: &Vector<D>) -> f64 {
+        self.own_horizon.unwrap_or_else(|| (self.p.horizon)(x))
+    }
+
+    fn in_void(&self, x: &Vector<D>) -> bool {
+        let inside = |d: f64| d < -1e-9 * self.horizon(x);
+        self.p.voids.iter().any(|v| inside(v.signed_distance(x)))
+    }
+
+    fn at_cells(&self) -> PointCloud<D> {
+        let (mesh, zones, roles) = (self.mesh, self.zones, self.roles);
+        let mut cloud = PointCloud::empty(0.0, self.region);
+        for c in 0..mesh.cell_count() {
+            let x = mesh.centroid(c);
+            if (0..D).any(|i| x[i] < self.low[i] || x[i] > self.high[i]) || self.in_void(&x) {
+                continue;
+            }
+            let element = (roles[c] != CellRole::Points).then(|| {
+                let n = mesh.cell(c).len();
+                (c as u32, vec![1.0 / n as f64; n])
+            });
+            let volume = fem::cell_volume(mesh, c);
+            if element.is_none() {
+                cloud.volumes.points += volume;
+                cloud.spacing += volume;
+            }
+            cloud.push(x, volume, self.horizon(&x), zones[c], element);
+        }
+        let sites = cloud.element.iter().filter(|e| e.is_none()).count().max(1);
+        cloud.spacing = (cloud.spacing / sites as f64).powf(1.0 / D as f64);
+        cloud.axes = lattice_axes(&cloud.position, &cloud.volume, cloud.spacing);
+        cloud
+    }
+
+    fn on_lattice(&self, h: f64, origin: Vector<D>) -> Result<PointCloud<D>, ModelError> {
+        let (mesh, zones, roles) = (self.mesh, self.zones, self.roles);
+        let cells = |keep: &dyn Fn(usize) -> bool| {
+            Locator::new(mesh, (0..mesh.cell_count()).filter(|&c| keep(c)))
+        };
+        let elements = cells(&|c| !self.mine[c]);
+        let nearest = Nearest::new(mesh, roles, h);
+        // at a face that zones share, the zone that comes first here has the point
+        let by_zone = [Zone::Nonlocal, Zone::Transition, Zone::Local]
+            .map(|zone| (zone, cells(&|c| self.mine[c] && zones[c] == zone)));
+        let tolerance = 1e-9;
+        let in_region = |x: &Vector<D>| {
+            by_zone
+                .iter()
+                .find(|(_, l)| l.holds(mesh, x, tolerance))
+                .map(|(z, _)| *z)
+        };
+
+        let first: Vector<D> = ((self.low - origin) / h).map(f64::floor);
+        let last: Vector<D> = ((self.high - origin) / h).map(f64::ceil);
+        let points: f64 = (last - first).iter().map(|n| n + 1.0).product();
+        if points > f64::from(u32::MAX) {
+            return Err(ModelError::TooManyPoints { spacing: h, points });
+        }
+        let counts: [usize; D] = std::array::from_fn(|i| (last[i] - first[i]) as usize + 1);
+        let total: usize = counts.iter().product();
+        let position = |index: usize| {
+            let mut rest = index;
+            let mut k = first;
+            for i in (0..D).rev() {
+                k[i] += (rest % counts[i]) as f64;
+                rest /= counts[i];
+            }
+            origin + k * h
+        };
+        // lattice cells that an edge of the region passes: their volume is sampled
+        let mut edge = vec![false; total];
+        let region_cells = (0..mesh.cell_count() as u32).filter(|&c| self.mine[c as usize]);
+        for facet in mesh.boundary_facets(region_cells) {
+            let (lo, hi) = mesh.bounds_of(&facet.nodes);
+            mark_box(&mut edge, &counts, &first, &origin, h, &lo, &hi);
+        }
+        // what lies farther from the region than families reach is not needed
+        let mut near = vec![false; total];
+        let wanted = |c: u32| self.mine[c as usize] || roles[c as usize] == CellRole::StressElement;
+        let cells = (0..mesh.cell_count() as u32).filter(|&c| wanted(c));
+        for c in cells.clone() {
+            let (lo, hi) = mesh.bounds_of(mesh.cell(c as usize));
+            mark_box(&mut near, &counts, &first, &origin, h, &lo, &hi);
+        }
+        for facet in mesh.boundary_facets(cells) {
+            let (lo, hi) = mesh.bounds_of(&facet.nodes);
+            let (lo, hi) = (lo - self.margin, hi + self.margin);
+            mark_box(&mut near, &counts, &first, &origin, h, &lo, &hi);
+        }
+        let samples = if D == 3 { 4 } else { 8 };
+        let whole = h.powi(D as i32);
+        type Found<const D: usize> = (Vector<D>, f64, f64, Zone, Option<(u32, Vec<f64>)>);
+        // points, and the volume of the region that voids take
+        let found: Vec<(Vec<Found<D>>, f64)> = (0..total.div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|block| {
+                let mut list = Vec::new();
+                let mut emptied = 0.0;
+                for index in block * BLOCK..((block + 1) * BLOCK).min(total) {
+                    let x = position(index);
+                    if !near[index] {
+                        continue;
+                    }
+                    if self.in_void(&x) {
+                        let mut inside = 0;
+                        let count = samples_of::<D>(if edge[index] { samples } else { 1 }, |o| {
+                            inside += usize::from(in_region(&(x + o * h)).is_some());
+                        });
+                        emptied += whole * inside as f64 / count as f64;
+                        continue;
+                    }
+                    let located = elements.locate(mesh, &x, tolerance);
+                    let zone = match &located {
+                        Some(l) => Some(zones[l.cell]),
+                        None => in_region(&x),
+                    };
+                    let zone = match (zone, self.beyond) {
+                        (Some(zone), _) => zone,
+                        (None, Beyond::Empty) => continue,
+                        (None, Beyond::Continued) => {
+                            list.push((x, whole, 0.0, Zone::Local, Some(nearest.around(&x))));
+                            continue;
+                        }
+                    };
+                    let (mut volume, mut share) =
+                        (whole, if located.is_none() { whole } else { 0.0 });
+                    if edge[index] {
+                        let (mut body, mut here, mut gone) = (0, 0, 0);
+                        let count = samples_of::<D>(samples, |offset| {
+                            let s = x + offset * h;
+                            let inside = in_region(&s).is_some();
+                            if self.in_void(&s) {
+                                gone += usize::from(inside);
+                                return;
+                            }
+                            here += usize::from(inside);
+                            body += usize::from(inside || elements.holds(mesh, &s, tolerance));
+                        });
+                        volume = whole * body as f64 / count as f64;
+                        share = whole * here as f64 / count as f64;
+                        emptied += whole * gone as f64 / count as f64;
+                    }
+                    if volume > 0.0 {
+                        let element = located.map(|l| match roles[l.cell] {
+                            CellRole::Points => nearest.around(&x),
+                            _ => (l.cell as u32, l.shape[..l.nodes].to_vec()),
+                        });
+                        list.push((x, volume, share, zone, element));
+                    }
+                }
+                (list, emptied)
+            })
+            .collect();
+        let mut cloud = PointCloud::empty(h, self.region);
+        cloud.axes = Some(Tensor::identity());
+        let region = self.region - found.iter().map(|(_, emptied)| emptied).sum::<f64>();
+        let found: Vec<Found<D>> = found.into_iter().flat_map(|(list, _)| list).collect();
+        let points: f64 = found.iter().map(|f| f.2).sum();
+        // what sampling misses on curved edges is spread over the points whose cells the body's surface cuts
+        let cut: f64 = found.iter().filter(|f| f.1 < whole).map(|f| f.2).sum();
+        let scale = if cut > 0.0 {
+            1.0 + (region - points) / cut
+        } else {
+            1.0
+        };
+        let scale = if (0.5..2.0).contains(&scale) && (scale - 1.0).abs() > 1e-12 {
+            scale
+        } else {
+            1.0
+        };
+        for (x, volume, share, zone, element) in found {
+            let factor = if volume < whole { scale } else { 1.0 };
+            cloud.volumes.points += share * factor;
+            cloud.push(x, volume * factor, self.horizon(&x), zone, element);
+        }
+        Ok(cloud)
+    }
+}
+
+/// The elements by their centroids, to extrapolate from the nearest.
+struct Nearest<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    cells: Vec<u32>,
+    centres: Vec<Vector<D>>,
+    bins: Bins<D>,
+    /// Size of a bin, and of the mesh.
+    sizes: [f64; 2],
+}
+
+impl<'a, const D: usize> Nearest<'a, D> {
+    fn new(mesh: &'a Mesh<D>, roles: &[CellRole], spacing: f64) -> Self {
+        let cells: Vec<u32> = (0..mesh.cell_count() as u32)
+            .filter(|&c| roles[c as usize] != CellRole::Points)
+            .collect();
+        let centres: Vec<Vector<D>> = cells.iter().map(|&c| mesh.centroid(c as usize)).collect();
+        let (low, high) = mesh.bounds();
+        Self {
+            mesh,
+            bins: Bins::new(&centres, 4.0 * spacing),
+            cells,
+            centres,
+            sizes: [4.0 * spacing, (high - low).norm()],
+        }
+    }
+
+    /// The element whose centroid is nearest, with shape values that extrapolate affine fields exactly; no shape values if there is none.
+    fn around(&self, x: &Vector<D>) -> (u32, Vec<f64>) {
+        let mut radius = self.sizes[0];
+        while radius < 4.0 * self.sizes[1] {
+            let distance = |k: usize| (self.centres[k] - x).norm();
+            let found = self
+                .bins
+                .around(x, radius)
+                .filter(|&k| distance(k) <= radius)
+                .min_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+            if let Some(k) = found {
+                let c = self.cells[k];
+                let shape = fem::reference_of(self.mesh, c as usize, x).map(|at| {
+                    let (shape, count) = fem::shape_values(self.mesh, c as usize, &at);
+                    shape[..count].to_vec()
+                });
+                return (c, shape.unwrap_or_default());
+            }
+            radius *= 2.0;
+        }
+        (0, Vec::new())
+    }
+}
+
+fn mark_box<const D: usize>(
+    edge: &mut [bool],
+    counts: &[usize; D],
+    first: &Vector<D>,
+    origin: &Vector<D>,
+    h: f64,
+    lo: &Vector<D>,
+    hi: &Vector<D>,
+) {
+    let half = 0.5 * (1.0 - 1e-9);
+    let mut from = [0usize; D];
+    let mut to = [0usize; D];
+    for i in 0..D {
+        let a = ((lo[i] - origin[i]) / h - half - first[i]).ceil().max(0.0);
+        let b = ((hi[i] - origin[i]) / h + half - first[i])
+            .floor()
+            .min(counts[i] as f64 - 1.0);
+        if a > b {
+            return;
+        }
+        (from[i], to[i]) = (a as usize, b as usize);
+    }
+    let mut k = from;
+    loop {
+        let index = (0..D).fold(0, |index, i| index * counts[i] + k[i]);
+        edge[index] = true;
+        let mut axis = D;
+        loop {
+            if axis == 0 {
+                return;
+            }
+            axis -= 1;
+            if k[axis] < to[axis] {
+                k[axis] += 1;
+                break;
+            }
+            k[axis] = from[axis];
+        }
+    }
+}
+
+/// Visits `n^D` equal parts of the unit cell around the origin by their centres; returns their number.
+fn samples_of<const D: usize>(n: usize, mut visit: impl FnMut(Vector<D>)) -> usize {
+    let count = n.pow(D as u32);
+    for index in 0..count {
+        let mut rest = index;
+        visit(Vector::from_fn(|_, _| {
+            let k = rest % n;
+            rest /= n;
+            (k as f64 + 0.5) / n as f64 - 0.5
+        }));
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{path::Path, sync::Arc};
+
+    use super::*;
+    use crate::{
+        coupling::{Model, Nonlocal, Problem, Splice, Surfaces},
+        mesh::{
+            generate::{Axis, CutOut, rectangle},
+            read,
+        },
+        peridynamics::{BondBased, BondWeights, Micromodulus, PartialVolume},
+        progress::Silent,
+        shape::Shape,
+        tensor::Tensor4,
+    };
+
+    fn model(
+        mesh: Mesh<2>,
+        zones: Vec<Zone>,
+        points: PointSource<2>,
+        horizon: f64,
+        voids: Vec<Shape<2>>,
+    ) -> Model<2> {
+        let cells = mesh.cell_count();
+        let coupling: Box<dyn crate::coupling::Coupling<2>> = if zones.contains(&Zone::Local) {
+            Box::new(Splice)
+        } else {
+            Box::new(Nonlocal)
+        };
+        let problem = Problem {
+            mesh,
+            zones,
+            tensors: vec![Tensor4::isotropic(1.0, 1.0)],
+            cell_material: vec![0; cells],
+            peridynamic_material: 0,
+            peridynamics: Some(Peridynamics {
+                law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
+                horizon: Arc::new(move |_| horizon),
+                points,
+                weights: BondWeights::Plain,
+                volumes: PartialVolume::Full,
+                barriers: Vec::new(),
+                voids,
+                surfaces: Surfaces::Uncut,
+            }),
+            coupling,
+        };
+        Model::new(problem, &Silent).expect("a model").0
+    }
+
+    /// Volumes of the region and of its points.
+    fn volumes(mesh: Mesh<2>, zones: Vec<Zone>, points: PointSource<2>, horizon: f64) -> [f64; 2] {
+        let v = model(mesh, zones, points, horizon, Vec::new()).volumes();
+        [v.region, v.points]
+    }
+
+    fn holed_plate() -> Mesh<2> {
+        let axis = || Axis::Uniform {
+            min: -1.0,
+            max: 1.0,
+            cells: 20,
+        };
+        rectangle(axis(), axis())
+            .cut_out(CutOut {
+                name: "hole".into(),
+                min: Vector::<2>::new(-0.3, -0.1),
+                max: Vector::<2>::new(0.3, 0.1),
+            })
+            .mesh()
+            .expect("a mesh")
+    }
+
+    #[test]
+    fn volumes_add_up_to_the_zone() {
+        let exact = 4.0 - 0.12;
+        for points in [
+            PointSource::Cells,
+            PointSource::Lattice {
+                spacing: 0.1,
+                origin: Vector::zeros(),
+            },
+            PointSource::Lattice {
+                spacing: 0.1,
+                origin: Vector::repeat(0.05),
+            },
+        ] {
+            let mesh = holed_plate();
+            let zones = vec![Zone::Nonlocal; mesh.cell_count()];
+            let [region, sum] = volumes(mesh, zones, points.clone(), 0.3);
+            assert!(
+                (region - exact).abs() < 1e-12 && (sum - exact).abs() < 1e-12,
+                "{points:?}: {sum}"
+            );
+            // half of the plate: points on the seam belong to elements, half of their cells to the zone
+            let mesh = holed_plate();
+            let zones = (0..mesh.cell_count())
+                .map(|c| {
+                    if mesh.centroid(c)[0] < 0.0 {
+                        Zone::Nonlocal
+                    } else {
+                        Zone::Local
+                    }
+                })
+                .collect();
+            let [region, sum] = volumes(mesh, zones, points.clone(), 0.3);
+            assert!(
+                (region - exact / 2.0).abs() < 1e-12 && (sum - exact / 2.0).abs() < 1e-12,
+                "{points:?}: {sum}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_void_leaves_the_volumes_of_points_that_stay() {
+        // points on the edges of the mesh have half a cell, with a void in the middle, or at an edge, or without
+        let spacing = 0.1;
+        let of = |voids: Vec<Shape<2>>| {
+            let axis = || Axis::Uniform {
+                min: -1.0,
+                max: 1.0,
+                cells: 20,
+            };
+            let mesh = rectangle(axis(), axis()).mesh().expect("a mesh");
+            let zones = vec![Zone::Nonlocal; mesh.cell_count()];
+            let origin = Vector::zeros();
+            let points = PointSource::Lattice { spacing, origin };
+            model(mesh, zones, points, 0.3, voids)
+        };
+        let whole = of(Vec::new());
+        let key = |x: &Vector<2>| ((x / spacing).map(f64::round)).map(|k| k as i64);
+        let cloud = |m: &Model<2>| {
+            let cloud = &m.body().expect("points").cloud;
+            let each = cloud.position.iter().map(key).zip(cloud.volume.clone());
+            each.collect::<Vec<_>>()
+        };
+        for (low, high) in [([-0.43, -0.23], [0.17, 0.37]), ([0.57, -0.33], [2.0, 0.33])] {
+            let void = Shape::Box {
+                min: low.into(),
+                max: high.into(),
+            };
+            let holed = of(vec![void.clone()]);
+            let before = cloud(&whole);
+            let after = cloud(&holed);
+            assert!(after.len() < before.len());
+            for (at, volume) in after {
+                let x = at.map(|k| k as f64 * spacing);
+                let (_, old) = before.iter().find(|(b, _)| *b == at).expect("stays");
+                // but where the void cuts the half cell of a point at the edge
+                if void.signed_distance(&x) > spacing {
+                    assert!((volume / old - 1.0).abs() < 1e-12, "{at}: {volume} {old}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn volumes_add_up_on_a_mesh_with_curved_edges() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes/lug.msh");
+        let mesh: Mesh<2> = read::read(&path).expect("the lug");
+        let exact: f64 = (0..mesh.cell_count())
+            .map(|c| fem::cell_volume(&mesh, c))
+            .sum();
+        let (low, high) = mesh.bounds();
+        let spacing = (high - low).amax() / 60.0;
+        let zones = vec![Zone::Nonlocal; mesh.cell_count()];
+        let points = PointSource::Lattice {
+            spacing,
+            origin: low,
+        };
+        let [region, sum] = volumes(mesh, zones, points, 3.0 * spacing);
+        assert!((region / exact - 1.0).abs() < 1e-12);
+        assert!((sum / exact - 1.0).abs() < 1e-12, "{}", sum / exact - 1.0);
+    }
+}

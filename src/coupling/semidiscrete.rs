@@ -1,0 +1,579 @@
+//! A coupled model that moves: bonds that stretch, and break, beside the rows of finite elements and of the seam.
+//!
+//! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`]) take their force from a pass over the bonds, which may be geometrically exact
+//! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
+//!
+//! A seam that has bonds of its own ([`Operator::seam_bonds`]) takes those that are exact or break out of the rows too: what is left are finite elements.
+
+use std::sync::PoisonError;
+
+use rayon::prelude::*;
+
+use self::{body::MovingBody, energy::ElementEnergy, rows::SiteRows};
+use crate::{
+    assembly,
+    coupling::{Model, NonlinearSeam, Operator},
+    peridynamics::{
+        Families, PdBody,
+        bond_force::{BondPass, Kinematics},
+    },
+    system::{BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
+    tensor::Vector,
+};
+pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, SystemError};
+use behaviour::{CHUNK, NONE};
+
+pub(crate) mod behaviour;
+mod body;
+mod dissipation;
+mod energy;
+mod force_states;
+mod rows;
+
+/// A coupled model as a system that moves.
+pub struct CoupledSystem<'a, const D: usize> {
+    model: &'a Model<D>,
+    symmetry: Symmetry,
+    mass: Vec<f64>,
+    /// Rows of all sites but those of the body alone; of sites that share the body's bonds, what is left of them.
+    linear: SiteRows,
+    /// Their products, kept between passes.
+    products: Vec<f64>,
+    body: Option<MovingBody<D>>,
+    /// Bonds of the seam, if they are exact or break; the rows are those of the finite elements alone then.
+    seam: Option<NonlinearSeam<D>>,
+    energy: ElementEnergy,
+    /// What breaking bonds has cost so far.
+    spent: Dissipation,
+    /// See [`SemiDiscrete::difference_length`].
+    difference_length: Option<f64>,
+}
+
+/// The displacement over which forces are differenced, over the spacing of the points: differences of the lengths of bonds keep nine digits then, and forces change by no more than
+/// that from what is linear.
+const DIFFERENCED: f64 = 1e-7;
+
+impl<'a, const D: usize> CoupledSystem<'a, D> {
+    /// Lays out masses, rows and bonds.
+    ///
+    /// `density` gives ρ [kg/m^D] of a material's number; `symmetry` is that of the assembled stiffness.
+    ///
+    /// # Errors
+    /// [`SystemError`] if the bonds cannot be passed over: a horizon that varies, fitted weights, a law without a kernel. A model in which nothing breaks moves as
+    /// [`crate::system::LinearMotion`] instead.
+    pub fn new(
+        model: &'a Model<D>,
+        operator: &dyn Operator<D>,
+        symmetry: Symmetry,
+        density: impl Fn(u16) -> f64 + Sync,
+        behaviour: &BondBehaviour<'_, D>,
+    ) -> Result<Self, SystemError> {
+        let sites = model.sites.len();
+        let law = model.peridynamics.as_ref().map(|p| &p.law);
+        let is_linear = behaviour.critical_stretch.is_none()
+            && behaviour.kinematics == Kinematics::Linear
+            && law.is_none_or(|law| law.is_linear());
+        // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear
+        let follows = law.is_some_and(|law| law.accelerator().is_some());
+        let mut seam = if is_linear || !follows {
+            None
+        } else {
+            operator.seam_bonds()
+        };
+        let body = MovingBody::new(model, operator, behaviour, seam.as_ref())?;
+        if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
+            let cloud = &body.cloud;
+            let critical = behaviour.critical_stretch.as_ref();
+            let critical = critical.map(|c| |p: u32| c.at(cloud.horizon[p as usize]));
+            seam.behave(behaviour.kinematics, critical, |p| {
+                (behaviour.no_fail)(&cloud.position[p as usize])
+            });
+        }
+        let linear = SiteRows::assemble(
+            sites,
+            |site| match seam {
+                Some(_) => model.point_of(site).is_none(),
+                None => !operator.is_body_row(site),
+            },
+            |site, row| {
+                if seam.is_some() {
+                    operator.add_row_without_bonds(site, row);
+                } else if operator.has_body_bonds(site) {
+                    // the body's are passed over
+                    operator.add_row_beside_bonds(site, row);
+                } else {
+                    operator.add_row(site, row);
+                }
+            },
+        );
+        let mass = masses(model, density);
+        let energy = ElementEnergy::new(model);
+        let is_linear_unless_broken = behaviour.kinematics == Kinematics::Linear
+            && behaviour.contact.is_none()
+            && law.is_none_or(|law| law.is_linear());
+        Ok(Self {
+            difference_length: (body.is_some() && !is_linear_unless_broken)
+                .then(|| DIFFERENCED * model.spacing()),
+            model,
+            symmetry,
+            mass,
+            linear,
+            products: Vec::new(),
+            body,
+            seam,
+            energy,
+            spent: Dissipation::default(),
+        })
+    }
+
+    /// The pass over the bonds, if there is a peridynamic body.
+    pub fn pass(&self) -> Option<&dyn BondPass<D>> {
+        self.body.as_ref().map(|b| b.pass.as_ref())
+    }
+
+    /// Whether the pass over the bonds knows of that between two points of the cloud, or knew of it before it broke.
+    fn is_passed_over(&self, i: usize, j: u32) -> bool {
+        match (&self.seam, &self.body) {
+            (Some(seam), _) => seam.is_whole(i, j as usize),
+            (None, Some(body)) => body.is_passed_over(i, j),
+            (None, None) => false,
+        }
+    }
+
+    /// Whether the bonds that a seam cuts turn, stretch and break like others.
+    pub fn has_seam_bonds(&self) -> bool {
+        self.seam.is_some()
+    }
+
+    /// Energy of the bonds that the pass knows of, and of contact \[J\].
+    fn bond_energy(&self, u: &[f64]) -> f64 {
+        self.body.as_ref().map_or(0.0, |body| {
+            let mut points = vec![0.0; body.displacement.len()];
+            body.spread(u, &mut points);
+            let contact = body.contact.as_ref().map_or(0.0, |contact| {
+                contact
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .energy(&points, &|i, j| body.pass.bonded(i, j))
+            });
+            body.pass.stored_energy(&points) + contact
+        })
+    }
+
+    /// Whether bonds can break.
+    fn breaks(&self) -> bool {
+        self.body
+            .as_ref()
+            .is_some_and(|b| b.critical_stretch.is_some())
+    }
+
+    /// Whether the law remembers.
+    fn remembers(&self) -> bool {
+        self.body.as_ref().is_some_and(|b| b.pass.remembers())
+    }
+
+    /// Numbers of the account in a checkpoint.
+    fn spends(&self) -> usize {
+        match (self.remembers(), self.breaks()) {
+            (true, _) => 3,
+            (false, true) => 2,
+            (false, false) => 0,
+        }
+    }
+
+    /// Puts the bonds of a state back; false, and nothing changed, if they are those of another model.
+    fn restore_bonds(&mut self, state: &[u64]) -> bool {
+        let Some(body) = &mut self.body else {
+            return state.is_empty();
+        };
+        let Some(seam) = &mut self.seam else {
+            return body.pass.restore_damage(state);
+        };
+        let of_pass = body.pass.damage_state().len();
+        let Some((of_pass, of_seam)) = state.split_at_checked(of_pass) else {
+            return false;
+        };
+        let held = seam.damage_state();
+        if !seam.restore_damage(of_seam) {
+            return false;
+        }
+        let fits = body.pass.restore_damage(of_pass);
+        if !fits {
+            // nothing is changed by a state that does not belong here
+            seam.restore_damage(&held);
+        }
+        fits
+    }
+
+    /// Bytes held by rows and bonds.
+    pub fn memory_bytes(&self) -> usize {
+        self.linear.memory_bytes()
+            + self.body.as_ref().map_or(0, |b| {
+                b.pass.memory_bytes() + (b.displacement.len() + b.force.len()) * 8
+            })
+            + self.seam.as_ref().map_or(0, NonlinearSeam::memory_bytes)
+    }
+}
+
+/// Volume that the bonds of a point reach.
+fn reached<const D: usize>(body: &PdBody<D>, families: &Families, point: u32) -> f64 {
+    let family = families.of(point as usize).iter();
+    family.map(|&j| body.cloud.volume[j as usize]).sum()
+}
+
+/// Lumped mass of every site \[kg\]: that of its part of the body. All masses add up to that of the body, their first moment too.
+pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) -> Vec<f64> {
+    let own = model.peridynamic_material();
+    model.tributary().masses(own, density)
+}
+
+/// Scales what each row gives, where the rows of a model are scaled.
+pub fn scale_rows<const D: usize>(model: &Model<D>, values: &mut [f64]) {
+    let Some(scale) = model.row_scale() else {
+        return;
+    };
+    for (values, &factor) in values.chunks_exact_mut(D).zip(scale) {
+        if factor != 1.0 {
+            values.iter_mut().for_each(|v| *v *= factor);
+        }
+    }
+}
+
+impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
+    fn block(&self) -> usize {
+        D
+    }
+
+    fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    fn internal_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        breakage: FailureUpdate,
+    ) -> u64 {
+        let Some(body) = &mut self.body else {
+            self.linear
+                .multiply_into::<D>(u, None, &mut self.products, force);
+            return 0;
+        };
+        let mut points = std::mem::take(&mut body.displacement);
+        body.spread(u, &mut points);
+        let broken = body
+            .pass
+            .force_into(&points, &mut body.force, interval, breakage);
+        if let Some(contact) = &body.contact {
+            let pass = &body.pass;
+            contact
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .add_force(&points, &|i, j| pass.bonded(i, j), &mut body.force);
+        }
+        body.displacement = points;
+        let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
+        self.linear
+            .multiply_into::<D>(u, bonds, &mut self.products, force);
+        let mut of_seam = 0;
+        if let Some(seam) = &mut self.seam {
+            seam.begin_pass();
+            if broken > 0 {
+                seam.follow(body.pass.as_ref());
+            }
+            of_seam = seam.add_force(u, force, breakage);
+        }
+        scale_rows(self.model, force);
+        broken + of_seam
+    }
+
+    fn commit(&mut self) {
+        if let Some(body) = &mut self.body {
+            self.spent.inelastic += body.pass.commit();
+        }
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        let Some(body) = &self.body else {
+            self.linear.multiply_into::<D>(x, None, &mut Vec::new(), y);
+            return;
+        };
+        let mut points = vec![0.0; body.displacement.len()];
+        let mut force = points.clone();
+        body.spread(x, &mut points);
+        body.pass.tangent_into(&points, &mut force);
+        let bonds = Some((&body.bonds_of_site[..], &force[..]));
+        self.linear.multiply_into::<D>(x, bonds, &mut Vec::new(), y);
+        if let Some(seam) = &self.seam {
+            seam.add_tangent(x, y);
+        }
+        scale_rows(self.model, y);
+    }
+
+    fn difference_length(&self) -> Option<f64> {
+        self.difference_length
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        let mut sums = self.linear.row_sums::<D>();
+        let Some(body) = &self.body else { return sums };
+        let points = body.pass.row_sums();
+        // a point that follows sites spreads its column over them: at most the sum of its weights' sizes
+        let spread = (0..body.site_of_point.len())
+            .map(|p| match &body.transfer {
+                Some(transfer) => transfer.row(p).map(|(_, w)| w.abs()).sum::<f64>(),
+                None => 0.0,
+            })
+            .fold(1.0, f64::max);
+        let contact = body
+            .contact
+            .as_ref()
+            .map(|c| c.lock().unwrap_or_else(PoisonError::into_inner));
+        for (sums, &point) in sums.chunks_exact_mut(D).zip(&body.bonds_of_site) {
+            if point == NONE {
+                continue;
+            }
+            let point = point as usize;
+            let touching = contact.as_ref().map_or(0.0, |c| c.row_sum(point));
+            for (sum, of_bonds) in sums.iter_mut().zip(&points[point * D..]) {
+                *sum += of_bonds * spread + touching;
+            }
+        }
+        if let Some(seam) = &self.seam {
+            seam.add_row_sums(&mut sums);
+        }
+        scale_rows(self.model, &mut sums);
+        sums
+    }
+
+    fn contact_frequency_bound(&self) -> f64 {
+        let Some(body) = &self.body else { return 0.0 };
+        let Some(contact) = &body.contact else {
+            return 0.0;
+        };
+        let contact = contact.lock().unwrap_or_else(PoisonError::into_inner);
+        let scale = self.model.row_scale();
+        let factor = |site: usize| scale.map_or(1.0, |scale| scale[site]);
+        body.bonds_of_site
+            .iter()
+            .zip(&self.mass)
+            .enumerate()
+            .filter(|(_, (point, _))| **point != NONE)
+            .map(|(site, (&point, mass))| factor(site) * contact.stiffest(point as usize) / mass)
+            .fold(0.0, f64::max)
+    }
+
+    fn tangent_is_constant(&self) -> Vec<bool> {
+        let breaks = self.breaks();
+        let at_seam = |site: usize| self.seam.as_ref().is_some_and(|s| s.touches(site));
+        (0..self.mass.len())
+            .map(|site| !breaks || (self.linear.has(site) && !at_seam(site)))
+            .collect()
+    }
+
+    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
+        assembly::assemble_rows(
+            sites.len(),
+            self.mass.len(),
+            |_| (),
+            |r, row| {
+                let site = sites[r] as usize;
+                self.linear.add_row(site, row);
+                if let (Some(moving), Some(body)) = (&self.body, self.model.body())
+                    && moving.bonds_of_site[site] != NONE
+                {
+                    let point = moving.bonds_of_site[site] as usize;
+                    let without_energy = self
+                        .seam
+                        .as_ref()
+                        .map_or(&[][..], NonlinearSeam::without_energy);
+                    if without_energy.is_empty() {
+                        let weight = |j: usize| match self.is_passed_over(point, j as u32) {
+                            true => 1.0,
+                            false => 0.0,
+                        };
+                        body.add_force_row(point, weight, row);
+                    } else {
+                        // a point with an energy in the body's pass has whole bonds only
+                        body.add_force_row_of_energies(
+                            point,
+                            |_| [1.0; 2],
+                            |j| !without_energy[j],
+                            row,
+                        );
+                    }
+                }
+                if let Some(seam) = &self.seam {
+                    seam.add_row(site, row);
+                }
+                if let Some(scale) = self.model.row_scale() {
+                    row.scale(scale[site]);
+                }
+            },
+        )
+    }
+
+    fn seam_sites(&self) -> Vec<u32> {
+        let sites = 0..self.mass.len() as u32;
+        sites
+            .filter(|&s| self.linear.has(s as usize) && !self.energy.is_inner(s))
+            .collect()
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        self.symmetry
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        let of_rows = || {
+            let rows = |site: usize| self.linear.product::<D>(site, u);
+            let sites = (0..self.mass.len()).into_par_iter().with_min_len(CHUNK);
+            let elements: Vec<f64> = sites
+                .map(|s| 0.5 * rows(s).dot(&Vector::from_column_slice(&u[s * D..][..D])))
+                .collect();
+            elements.iter().sum::<f64>()
+        };
+        if let Some(seam) = &self.seam {
+            return of_rows() + self.bond_energy(u) + seam.energy(u);
+        }
+        let is_body_alone = self
+            .body
+            .as_ref()
+            .is_some_and(|b| b.alone == self.mass.len());
+        if self.symmetry == Symmetry::Symmetric && !is_body_alone {
+            // a seam that has an energy
+            if self.body.as_ref().is_some_and(MovingBody::takes_all_points) {
+                // whole bonds are passed over, exact where they turn; rows have what the seam cuts
+                return of_rows() + self.bond_energy(u);
+            }
+            // rows have whole bonds too: the energy of all is known to first order in the stretch of exact bonds
+            let mut force = vec![0.0; u.len()];
+            self.tangent_into(u, &mut force);
+            let products: Vec<f64> = u
+                .par_chunks(CHUNK)
+                .zip(force.par_chunks(CHUNK))
+                .map(|(u, f)| u.iter().zip(f).map(|(u, f)| u * f).sum())
+                .collect();
+            return 0.5 * products.iter().sum::<f64>();
+        }
+        let elements = self
+            .energy
+            .of::<D>(&self.linear, &self.model.node_transfer, u);
+        elements + self.bond_energy(u)
+    }
+
+    fn dissipation(&self) -> Option<Dissipation> {
+        (self.breaks() || self.remembers()).then_some(self.spent)
+    }
+
+    fn set_dissipation(&mut self, dissipation: Dissipation) {
+        self.spent = dissipation;
+    }
+
+    fn account_for_breaks(&mut self, at: &Halfway<'_>) {
+        let spent = self.of_last_breaks(at);
+        self.spent.energy += spent.energy;
+        self.spent.area += spent.area;
+    }
+
+    fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        self.stresses_of_points(u)
+    }
+
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+        self.remembered_by_points()
+    }
+
+    fn damage(&self) -> Option<Vec<f64>> {
+        let body = self.body.as_ref()?;
+        let mut points = vec![0.0; body.site_of_point.len()];
+        body.pass.damage_into(&mut points);
+        if let (Some(seam), Some(pd)) = (&self.seam, self.model.body()) {
+            seam.add_damage(&mut points, |p| reached(pd, seam.families(), p));
+        }
+        let mut damage = vec![0.0; self.mass.len()];
+        for (point, &site) in body.site_of_point.iter().enumerate() {
+            if site != NONE {
+                damage[site as usize] = points[point];
+            }
+        }
+        Some(damage)
+    }
+
+    fn damage_at_edge(&self) -> Option<usize> {
+        let body = self.body.as_ref()?;
+        if let Some(seam) = &self.seam {
+            let point = seam.damaged_at_face(body.pass.as_ref())?;
+            return Some(body.site_of_point[point as usize] as usize);
+        }
+        // asked for after every pass that broke a bond: only the points at the edge are looked at
+        body.edge
+            .iter()
+            .find(|&&p| body.pass.is_damaged(p as usize))
+            .map(|&p| body.site_of_point[p as usize] as usize)
+    }
+
+    fn damaged_sites(&self) -> Vec<u32> {
+        let Some(body) = self.body.as_ref() else {
+            return Vec::new();
+        };
+        let points = body.site_of_point.iter().enumerate();
+        points
+            .filter(|&(p, &site)| site != NONE && body.pass.is_damaged(p))
+            .map(|(_, &site)| site)
+            .collect()
+    }
+
+    fn broken_bonds(&self) -> Vec<(u32, u32)> {
+        let (Some(moving), Some(body)) = (self.body.as_ref(), self.model.body()) else {
+            return Vec::new();
+        };
+        let site = |p: usize| moving.site_of_point[p];
+        (0..moving.site_of_point.len())
+            .into_par_iter()
+            .filter(|&i| site(i) != NONE && moving.pass.is_damaged(i))
+            .flat_map_iter(|i| {
+                let family = body.families.of(i).iter();
+                family
+                    .filter(move |&&j| {
+                        !moving.pass.bonded(i, j as usize)
+                            && site(j as usize) != NONE
+                            && self.is_passed_over(i, j)
+                    })
+                    .map(move |&j| (site(i), site(j as usize)))
+            })
+            .collect()
+    }
+
+    fn damage_state(&self) -> Vec<u64> {
+        let mut state = self
+            .body
+            .as_ref()
+            .map_or_else(Vec::new, |b| b.pass.damage_state());
+        if let Some(seam) = &self.seam {
+            state.extend(seam.damage_state());
+        }
+        if self.spends() > 0 {
+            let spent = [self.spent.energy, self.spent.area, self.spent.inelastic];
+            state.extend(&spent.map(f64::to_bits)[..self.spends()]);
+        }
+        state
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        let Some(bonds) = state.len().checked_sub(self.spends()) else {
+            return false;
+        };
+        let (bonds, spent) = state.split_at(bonds);
+        let fits = self.restore_bonds(bonds);
+        if let (true, &[energy, area, ref rest @ ..]) = (fits, spent) {
+            self.spent = Dissipation {
+                energy: f64::from_bits(energy),
+                area: f64::from_bits(area),
+                inelastic: rest.first().map_or(0.0, |bits| f64::from_bits(*bits)),
+            };
+        }
+        fits
+    }
+}

@@ -1,0 +1,81 @@
+//! How the bonds of a moving model deform and break.
+
+use crate::{
+    coupling::BrokenBonds,
+    peridynamics::{
+        bond_force::{KernelError, Kinematics, Storage},
+        contact::ContactError,
+    },
+    tensor::Vector,
+};
+
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Points per task of the copies between sites and points.
+pub(super) const CHUNK: usize = 4096;
+
+/// How the bonds of a moving model behave.
+pub struct BondBehaviour<'a, const D: usize> {
+    /// Whether bonds turn with the body, or are linear in the displacement.
+    pub kinematics: Kinematics,
+    /// Critical stretch s_c; none if nothing breaks.
+    pub critical_stretch: Option<Critical>,
+    /// Where bonds never break.
+    pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
+    /// Contact of points that no bond joins; none if they may pass through each other.
+    pub contact: Option<ContactBehaviour>,
+    /// How the weights of bonds are kept; in four bytes, they are listed one by one.
+    pub storage: Storage,
+    /// Bonds that are broken from the start, in a motion that goes on from another layout.
+    pub broken: Option<&'a BrokenBonds<D>>,
+}
+
+/// The stretch at which bonds break.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Critical {
+    /// The same everywhere.
+    Uniform(f64),
+    /// One for each horizon of the model, \[m\] and \[1\]: the same fracture energy takes a larger stretch where the horizon is smaller.
+    ByHorizon(Vec<(f64, f64)>),
+}
+
+impl Critical {
+    /// That of bonds of a horizon; infinite for one that is not listed.
+    pub fn at(&self, horizon: f64) -> f64 {
+        match self {
+            Self::Uniform(s) => *s,
+            Self::ByHorizon(list) => {
+                let found = list.iter().find(|(of, _)| *of == horizon);
+                found.map_or(f64::INFINITY, |(_, s)| *s)
+            }
+        }
+    }
+}
+
+/// How points that no bond joins keep their distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactBehaviour {
+    /// Part of their distance at rest to which two points may approach each other.
+    pub approach: f64,
+    /// Stiffness of the repulsion relative to a bond as long as the horizon; 15 in EMU.
+    pub stiffness: f64,
+}
+
+/// Why a model cannot move bond by bond.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SystemError {
+    /// The law has no bonds that could stretch or break one by one.
+    #[error(
+        "bonds of the material {law} are known to first order only: they can neither break nor turn; use bond-based or lps, or leave fracture-energy, critical-stretch and bonds = \"exact\" out"
+    )]
+    Law {
+        /// Its name.
+        law: &'static str,
+    },
+    /// The bonds cannot be passed over.
+    #[error(transparent)]
+    Kernel(#[from] KernelError),
+    /// The contact cannot be set up.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
+}

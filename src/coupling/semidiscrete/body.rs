@@ -1,0 +1,247 @@
+//! The points of a moving model and their bonds.
+
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use crate::coupling::semidiscrete::behaviour::{BondBehaviour, CHUNK, Critical, NONE, SystemError};
+use crate::{
+    assembly::Transfer,
+    coupling::{Model, NonlinearSeam, Operator, SiteKind},
+    peridynamics::{
+        Accelerator, Families, PdBody,
+        bond_force::{
+            BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, Storage, bond_pass,
+        },
+        contact::{Contact, ContactSetup, contact_stiffness},
+    },
+    tensor::Vector,
+};
+
+/// The points and their bonds.
+pub(super) struct MovingBody<const D: usize> {
+    pub pass: Box<dyn BondPass<D>>,
+    pub critical_stretch: Option<Critical>,
+    /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
+    pub contact: Option<Mutex<Contact<D>>>,
+    /// The site of each point; `NONE` for a point that follows sites.
+    pub site_of_point: Vec<u32>,
+    /// All points follow this many sites later, if they do.
+    pub shift: Option<usize>,
+    /// How points that are no sites follow these; none where no bond and no contact asks for them.
+    pub transfer: Option<Transfer>,
+    /// For each site the point whose force from the bonds it takes; `NONE` for a site that takes none.
+    pub bonds_of_site: Vec<u32>,
+    /// The families that are passed over, where rows keep some bonds of their points to themselves; none if all are.
+    passed: Option<Families>,
+    /// Sites whose row is that of the body alone.
+    pub alone: usize,
+    /// Points at the edge of the region where bonds can break, none if nothing can.
+    pub edge: Vec<u32>,
+    pub displacement: Vec<f64>,
+    pub force: Vec<f64>,
+}
+
+impl<const D: usize> MovingBody<D> {
+    pub fn new(
+        model: &Model<D>,
+        operator: &dyn Operator<D>,
+        behaviour: &BondBehaviour<'_, D>,
+        seam: Option<&NonlinearSeam<D>>,
+    ) -> Result<Option<Self>, SystemError> {
+        let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref()) else {
+            return Ok(None);
+        };
+        let points = body.cloud.position.len();
+        let mut site_of_point = vec![NONE; points];
+        let mut bonds_of_site = vec![NONE; model.sites.len()];
+        let mut own_row = vec![false; points];
+        for (site, s) in model.sites.iter().enumerate() {
+            if let SiteKind::Point(point) = s.kind {
+                site_of_point[point as usize] = site as u32;
+                let is_own = seam.is_some() || operator.is_body_row(site);
+                own_row[point as usize] = is_own;
+                if is_own || operator.has_body_bonds(site) {
+                    bonds_of_site[site] = point;
+                }
+            }
+        }
+        let is_site: Vec<bool> = site_of_point.iter().map(|&s| s != NONE).collect();
+        let no_fail: Vec<bool> = (0..points)
+            .into_par_iter()
+            .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
+            .collect();
+        let shares = |site: usize| operator.has_body_bonds(site);
+        let passed = (seam.is_none() && (0..model.sites.len()).any(shares)).then(|| {
+            let mut passed = body.families.clone();
+            passed.retain_of(|i| !own_row[i], |i, j| operator.is_body_bond(i, j as usize));
+            passed
+        });
+        let families = match (seam, &passed) {
+            (Some(seam), _) => seam.families(),
+            (None, Some(passed)) => passed,
+            (None, None) => &body.families,
+        };
+        let all_pass = seam.is_none() && passed.is_none();
+        let edge = if behaviour.critical_stretch.is_some() && seam.is_none() {
+            (0..points as u32)
+                .filter(|&i| {
+                    own_row[i as usize]
+                        && body
+                            .families
+                            .of(i as usize)
+                            .iter()
+                            .any(|&j| !own_row[j as usize])
+                })
+                .collect()
+        } else {
+            Vec::new()
+        };
+        // a seam leaves some of the body's bonds out: those that stay keep their coefficients
+        let is_all_of = |i: usize| all_pass || families.of(i).len() == body.families.of(i).len();
+        let pair = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
+            true => body.kernel(i).0[k],
+            false => coefficient(body, i, families.of(i)[k]),
+        };
+        let omega = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
+            true => body.kernel(i).1[k],
+            false => omega_of(body, i, families.of(i)[k]),
+        };
+        let force = match (p.law.accelerator(), p.law.force_state()) {
+            (Some(Accelerator::Pairwise), _) => BondForce::Pairwise { coefficient: &pair },
+            (Some(Accelerator::Solid { bulk, shear }), _) => BondForce::Solid {
+                omega: &omega,
+                bulk,
+                shear,
+            },
+            (None, Some(_)) => BondForce::Law { law: &p.law, body },
+            (None, None) => return Err(SystemError::Law { law: p.law.name() }),
+        };
+        let by_bond = |i: usize, _: usize, _: &Vector<D>| {
+            let critical = behaviour.critical_stretch.as_ref();
+            critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon[i]))
+        };
+        let broken = behaviour
+            .broken
+            .filter(|b| !b.is_empty())
+            .map(|b| b.among(&body.cloud.position));
+        let pass = bond_pass(&BondSetup {
+            position: &body.cloud.position,
+            volume: &body.cloud.volume,
+            families,
+            rows: &is_site,
+            without_energy: seam.map_or(&[], NonlinearSeam::without_energy),
+            force,
+            kinematics: behaviour.kinematics,
+            failure: behaviour.critical_stretch.as_ref().map(|s| Failure {
+                critical: match s {
+                    Critical::Uniform(s) => CriticalStretch::Uniform(*s),
+                    Critical::ByHorizon(_) => CriticalStretch::PerBond(&by_bond),
+                },
+                no_fail: &no_fail,
+            }),
+            precracked: broken.as_ref().map(|b| b as _),
+            layout: match behaviour.storage {
+                Storage::Double => Layout::Automatic,
+                Storage::Single => Layout::List,
+            },
+            storage: behaviour.storage,
+        })?;
+        let contact = match behaviour.contact {
+            Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {
+                position: &body.cloud.position,
+                volume: &body.cloud.volume,
+                rows: &own_row,
+                spacing: model.spacing(),
+                approach: c.approach,
+                stiffness: c.stiffness / 15.0
+                    * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),
+                skin: 0.25 * model.spacing(),
+            })?)),
+            None => None,
+        };
+        let asks = |i: usize| families.of(i).iter().any(|&j| !is_site[j as usize]);
+        let is_asked = contact.is_some() || (0..points).any(|i| is_site[i] && asks(i));
+        let first = site_of_point.first().copied().unwrap_or(0);
+        let shift = site_of_point
+            .iter()
+            // in 64 bits, since a first point that is no site counts on beyond NONE
+            .zip(u64::from(first)..)
+            .all(|(&site, wanted)| u64::from(site) == wanted && site != NONE)
+            .then_some(first as usize);
+        Ok(Some(Self {
+            pass,
+            critical_stretch: behaviour.critical_stretch.clone(),
+            contact,
+            site_of_point,
+            shift,
+            transfer: is_asked.then(|| body.cloud.transfer.clone()),
+            bonds_of_site,
+            passed,
+            alone: own_row.iter().filter(|own| **own).count(),
+            edge,
+            displacement: vec![0.0; points * D],
+            force: vec![0.0; points * D],
+        }))
+    }
+
+    /// Whether the pass knows of the bond between two points, where no seam has bonds of its own.
+    pub fn is_passed_over(&self, i: usize, j: u32) -> bool {
+        let passed = self.passed.as_ref();
+        passed.is_none_or(|families| families.of(i).binary_search(&j).is_ok())
+    }
+
+    /// Whether every point that is a site takes a force from the bonds that are passed over.
+    pub fn takes_all_points(&self) -> bool {
+        let mut sites = self.site_of_point.iter().filter(|site| **site != NONE);
+        sites.all(|&site| self.bonds_of_site[site as usize] != NONE)
+    }
+
+    /// The displacement of every point, from those of the sites.
+    pub fn spread(&self, u: &[f64], points: &mut [f64]) {
+        if let Some(shift) = self.shift {
+            points.copy_from_slice(&u[shift * D..][..points.len()]);
+            return;
+        }
+        points
+            .par_chunks_mut(CHUNK * D)
+            .enumerate()
+            .for_each(|(chunk, values)| {
+                for (k, value) in values.chunks_exact_mut(D).enumerate() {
+                    let point = chunk * CHUNK + k;
+                    match self.site_of_point[point] {
+                        NONE => {
+                            if let Some(transfer) = &self.transfer {
+                                let x: Vector<D> = transfer.displacement(point, u);
+                                value.copy_from_slice(x.as_slice());
+                            }
+                        }
+                        site => value.copy_from_slice(&u[site as usize * D..][..D]),
+                    }
+                }
+            });
+    }
+}
+
+/// The pairwise coefficient of the bond from point `i` to point `j`; zero if there is none.
+fn coefficient<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
+    let place = body.families.of(i).binary_search(&j);
+    place.map_or(0.0, |k| body.kernel(i).0[k])
+}
+
+/// The influence function of the bond from point `i` to point `j`, factors of the lattice included; zero if there is none.
+fn omega_of<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
+    let place = body.families.of(i).binary_search(&j);
+    place.map_or(0.0, |k| body.kernel(i).1[k])
+}
+
+/// `c` of `f = c s`, the largest of the bonds of the point with the most of them.
+fn bond_constant<const D: usize>(body: &PdBody<D>) -> f64 {
+    let fullest = (0..body.families.len()).max_by_key(|&i| body.families.of(i).len());
+    fullest.map_or(0.0, |i| {
+        let family = body.families.of(i).iter().zip(body.kernel(i).0);
+        family
+            .map(|(&j, p)| 2.0 * p * body.bond(i, j as usize).norm().powi(3))
+            .fold(0.0, f64::max)
+    })
+}

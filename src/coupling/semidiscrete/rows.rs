@@ -1,0 +1,138 @@
+//! Rows of some of the sites, and the force of all of them together with that of the bonds.
+
+use rayon::prelude::*;
+
+use crate::coupling::semidiscrete::behaviour::{CHUNK, NONE};
+use crate::{
+    assembly::{self, Row},
+    system::BlockCsr,
+    tensor::{Tensor, Vector},
+};
+
+/// The sites that have a row, and their rows: sites whose force comes from bonds alone cost nothing.
+pub(super) struct SiteRows {
+    /// The row of each site; `NONE` for a site without one.
+    row_of_site: Vec<u32>,
+    matrix: BlockCsr,
+    /// Whether no row feels a translation, so that a body that drifts far need not lose digits to its drift.
+    is_translation_free: bool,
+}
+
+impl SiteRows {
+    /// Assembles the rows of the sites that are `wanted`.
+    pub fn assemble<const D: usize>(
+        sites: usize,
+        wanted: impl Fn(usize) -> bool,
+        add_row: impl Fn(usize, &mut Row<D>) + Sync,
+    ) -> Self {
+        let listed: Vec<u32> = (0..sites as u32).filter(|&s| wanted(s as usize)).collect();
+        let mut row_of_site = vec![NONE; sites];
+        for (row, &site) in listed.iter().enumerate() {
+            row_of_site[site as usize] = row as u32;
+        }
+        let matrix = assembly::assemble_rows(
+            listed.len(),
+            sites,
+            |_| (),
+            |r, row| add_row(listed[r] as usize, row),
+        );
+        Self {
+            row_of_site,
+            is_translation_free: matrix.rows_add_up_to_zero(),
+            matrix,
+        }
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.matrix.values.len() * 8 + (self.matrix.columns.len() + self.row_of_site.len()) * 4
+    }
+
+    /// Overwrites `force` with the product of the rows and, where a site takes some, the force of the bonds: for each site the number of a point, and
+    /// the forces of the points. `products` is scratch.
+    pub fn multiply_into<const D: usize>(
+        &self,
+        u: &[f64],
+        bonds: Option<(&[u32], &[f64])>,
+        products: &mut Vec<f64>,
+        force: &mut [f64],
+    ) {
+        products.resize(self.matrix.rows() * D, 0.0);
+        if self.is_translation_free {
+            self.matrix.multiply_differences_into(u, products);
+        } else {
+            self.matrix.multiply_into(u, products);
+        }
+        let entry = |from: &[f64], of: u32| -> Vector<D> {
+            match of {
+                NONE => Vector::zeros(),
+                of => Vector::from_column_slice(&from[of as usize * D..][..D]),
+            }
+        };
+        force
+            .par_chunks_mut(CHUNK * D)
+            .enumerate()
+            .for_each(|(chunk, force)| {
+                for (k, force) in force.chunks_exact_mut(D).enumerate() {
+                    let site = chunk * CHUNK + k;
+                    let mut sum = entry(products, self.row_of_site[site]);
+                    if let Some((point_of, points)) = bonds {
+                        sum += entry(points, point_of[site]);
+                    }
+                    force.copy_from_slice(sum.as_slice());
+                }
+            });
+    }
+
+    /// Whether a site has a row.
+    pub fn has(&self, site: usize) -> bool {
+        self.row_of_site[site] != NONE
+    }
+
+    /// Adds the row of a site, if it has one.
+    pub fn add_row<const D: usize>(&self, site: usize, row: &mut Row<D>) {
+        if self.has(site) {
+            let (columns, blocks) = self.matrix.row(self.row_of_site[site] as usize);
+            for (&column, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+                row.add_site(column, &Tensor::from_row_slice(block));
+            }
+        }
+    }
+
+    /// Per unknown `Σ_b |K_ab|` over the rows.
+    pub fn row_sums<const D: usize>(&self) -> Vec<f64> {
+        let sums = self.matrix.row_sums();
+        self.row_of_site
+            .iter()
+            .flat_map(|&row| {
+                let sums = &sums;
+                (0..D).map(move |k| match row {
+                    NONE => 0.0,
+                    row => sums[row as usize * D + k],
+                })
+            })
+            .collect()
+    }
+
+    /// The row of a site times a vector; zero without a row.
+    pub fn product<const D: usize>(&self, site: usize, u: &[f64]) -> Vector<D> {
+        match self.row_of_site[site] {
+            NONE => Vector::zeros(),
+            row => row_product(&self.matrix, row as usize, u),
+        }
+    }
+}
+
+/// One block row times a vector.
+pub(super) fn row_product<const D: usize>(matrix: &BlockCsr, row: usize, u: &[f64]) -> Vector<D> {
+    let (columns, blocks) = matrix.row(row);
+    let mut sum = Vector::zeros();
+    for (&c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+        for a in 0..D {
+            for b in 0..D {
+                sum[a] += block[a * D + b] * u[c as usize * D + b];
+            }
+        }
+    }
+    sum
+}

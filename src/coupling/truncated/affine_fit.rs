@@ -1,0 +1,509 @@
+//! Seams whose faces cut the lattice anywhere: factors for the energies of pieces, and shares of dilatations, that make affine fields exact again.
+//!
+//! A piece keeps its form, `c s w(ξ, D/s)` with a factor `c`, and so do the whole bonds between the points that have pieces. Under `u = G x` it pulls with `c` times the force of the whole bond,
+//! so equilibrium at every site is linear in the factors: the sums of `c k ξ⊗ξ⊗ξ` over the ends at a point vanish, those at a node, weighted with its shape function, equal the traction of the lattice times
+//! the integral of the shape function. These are D (D+1) (D+2)/6 conditions per site (the third-order tensor is symmetric). Of all factors that meet them, and stay above a floor so that every energy is positive, those nearest
+//! to 1 are taken. What a piece hands to the dilatations of an LPS is changed in the same way, without a floor: every point's dilatation is tr G, every element's a multiple of it, and their pressures balance
+//! at every site.
+//!
+//! Where the seam follows the lattice nothing is missing, and nothing is changed.
+
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use super::bond_segments::{End, Segments};
+use super::corner_correction::EdgeCorrection;
+use super::dilatation::state_of;
+use super::squares::fit_factors;
+use crate::coupling::truncated::conditions::Conditions;
+use crate::{
+    coupling::{ModelError, SiteKind},
+    fem,
+    peridynamics::StatePart,
+    tensor::{Tensor4, Vector},
+};
+
+/// Least factor of the energy of a piece; the largest was 4 where this one was asked for.
+pub(super) const FLOOR: f64 = 0.1;
+
+/// Largest factor of an energy for which it is shown that none helps.
+const MOST_FACTOR: f64 = 1e3;
+
+/// What is missing in the force on a node, relative to the largest traction of a face, below which a seam follows the lattice.
+const FOLLOWS: f64 = 1e-10;
+
+/// What may be missing after a fit.
+pub(super) const MET: f64 = 1e-10;
+
+/// What coordinates far from the origin leave of a force that is zero: some ulps of them over the spacing.
+pub(super) fn rounding<const D: usize>(segments: &Segments<'_, D>) -> f64 {
+    let (low, high) = segments.model.mesh.bounds();
+    let farthest = low.abs().max().max(high.abs().max());
+    8.0 * f64::EPSILON * farthest / segments.model.spacing()
+}
+
+const NONE: u32 = u32::MAX;
+
+/// Something whose energy may change: a piece, or a whole bond between points that have pieces.
+pub(super) enum Part {
+    Piece(usize),
+    Bond(u32, u32),
+}
+
+/// What a part is made of.
+pub(super) struct Shape<const D: usize> {
+    pub xi: Vector<D>,
+    /// Its length as a fraction of the bond.
+    pub length: f64,
+    /// How much of the bond it is.
+    pub share: f64,
+    pub difference: Vec<(u32, f64)>,
+}
+
+impl Part {
+    pub fn shape<const D: usize>(&self, segments: &Segments<'_, D>) -> Shape<D> {
+        match *self {
+            Self::Piece(k) => {
+                let s = &segments.cut[k];
+                Shape {
+                    xi: segments.body.bond(s.i as usize, s.j as usize),
+                    length: s.piece.to - s.piece.from,
+                    share: s.piece.share,
+                    difference: segments.difference(s).collect(),
+                }
+            }
+            Self::Bond(i, j) => Shape {
+                xi: segments.body.bond(i as usize, j as usize),
+                length: 1.0,
+                share: 1.0,
+                difference: vec![
+                    (segments.site[i as usize], -1.0),
+                    (segments.site[j as usize], 1.0),
+                ],
+            },
+        }
+    }
+
+    pub fn points<const D: usize>(&self, segments: &Segments<'_, D>) -> (u32, u32) {
+        match *self {
+            Self::Piece(k) => (segments.cut[k].i, segments.cut[k].j),
+            Self::Bond(i, j) => (i, j),
+        }
+    }
+
+    pub fn end<const D: usize>(&self, segments: &Segments<'_, D>, side: usize) -> End {
+        match *self {
+            Self::Piece(k) => segments.cut[k].ends[side].clone(),
+            Self::Bond(i, j) => End::Point([i, j][side]),
+        }
+    }
+
+    /// What it hands to the dilatations at its two ends, as factors of its elongation.
+    fn hands<const D: usize>(&self, segments: &Segments<'_, D>) -> [f64; 2] {
+        match *self {
+            Self::Piece(k) => segments.cut[k].hands,
+            Self::Bond(i, j) => segments.hands(i, j),
+        }
+    }
+
+    fn add_hands<const D: usize>(&self, segments: &mut Segments<'_, D>, change: [f64; 2]) {
+        let hands = match *self {
+            Self::Piece(k) => &mut segments.cut[k].hands,
+            Self::Bond(i, j) => &mut segments.changed.entry((i, j)).or_default().hands,
+        };
+        for (h, c) in hands.iter_mut().zip(change) {
+            *h += c;
+        }
+    }
+}
+
+/// The conditions of a seam whose faces cut the lattice anywhere, for an affine field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeamConditions {
+    /// Number of conditions.
+    pub conditions: usize,
+    /// How many are independent.
+    pub rank: usize,
+    /// Number of energies that may change: pieces, and whole bonds between points at the seam and their neighbours.
+    pub unknowns: usize,
+    /// What no change of them can meet, relative to what is missing: zero if there are factors, of any sign, that meet all conditions.
+    pub unreachable: f64,
+    /// What no factors between 0.1 and 1000 can meet, a bound from below; zero if none is found.
+    pub out_of_reach: f64,
+}
+
+/// Looks at the conditions of the pairwise part.
+pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> SeamConditions {
+    let Missing { missing, .. } = missing(segments);
+    segments.widen();
+    let parts = parts(segments);
+    let (conditions, target) = pair_conditions(segments, &parts, &missing);
+    let (rank, unreachable) = conditions.rank(&target);
+    let out_of_reach = conditions.out_of_reach(&target, FLOOR - 1.0, MOST_FACTOR - 1.0);
+    SeamConditions {
+        conditions: target.len(),
+        rank,
+        unknowns: parts.len(),
+        unreachable,
+        out_of_reach,
+    }
+}
+
+/// What is missing before a fit.
+struct Missing<const D: usize> {
+    /// Integrals of gradients by site, as [`loaded_nodes`] gives them.
+    nodes: FxHashMap<u32, Vector<D>>,
+    /// Conditions by site.
+    missing: FxHashMap<u32, Vec<f64>>,
+    /// The largest traction of a face.
+    scale: f64,
+}
+
+fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
+    let nodes = loaded_nodes(segments);
+    let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
+    let tensor = pair_tensor(segments);
+    let count = triples::<D>().count();
+    let mut row_of_site = vec![NONE; segments.model.sites.len()];
+    let mut rows = Vec::with_capacity(nodes.len() * count);
+    for (row, (&site, b)) in nodes.iter().enumerate() {
+        row_of_site[site as usize] = row as u32;
+        rows.extend(third(b, &tensor).map(|v| -v));
+    }
+    for s in &segments.cut {
+        let xi = segments.body.bond(s.i as usize, s.j as usize);
+        let cube = cube(&xi, s.stiffness * s.piece.share);
+        for (site, w) in segments.difference(s) {
+            let row = row_of_site[site as usize];
+            if row != NONE {
+                let row = &mut rows[row as usize * count..][..count];
+                row.iter_mut().zip(&cube).for_each(|(m, c)| *m -= w * c);
+            }
+        }
+    }
+    let missing = nodes.keys().copied().zip(rows.chunks_exact(count));
+    let missing = missing.map(|(site, row)| (site, row.to_vec())).collect();
+    Missing {
+        nodes,
+        missing,
+        scale: largest * tensor.amax(),
+    }
+}
+
+/// Fits the seam unless it follows the lattice; returns whether it did.
+///
+/// # Errors
+/// [`ModelError::Seam`] with what is left if no positive factors meet the conditions, [`ModelError::SeamTooLarge`] if they are too many.
+pub(super) fn fit<const D: usize>(
+    segments: &mut Segments<'_, D>,
+    strings: &EdgeCorrection<D>,
+) -> Result<bool, ModelError> {
+    let Missing {
+        nodes,
+        missing,
+        scale,
+    } = missing(segments);
+    let rounding = rounding(segments);
+    let follows = |missing: &FxHashMap<u32, Vec<f64>>| {
+        missing.iter().all(|(site, m)| {
+            strings.holds(*site) || m.iter().all(|m| m.abs() <= (FOLLOWS + rounding) * scale)
+        })
+    };
+    let state = state_of(segments)?;
+    let is_negative = state.is_some_and(|s| s.modulus.get(0, 0, 0, 0) < 0.0);
+    let follows = follows(&missing);
+    if follows && (!is_negative || segments.passing.whole.len() > 1) {
+        return Ok(false);
+    }
+    if segments.passing.whole.len() > 1 {
+        return Err(ModelError::Unsupported {
+            what: "several lattices with faces that do not follow them",
+            remedy: "let the faces follow the lattices (element edges a whole number of spacings long), or use one lattice",
+        });
+    }
+    let mut trial = segments.clone();
+    let mut left = fit_factors(&mut trial, state.is_some())?;
+    if left <= MET + rounding {
+        trial.is_squares = state.is_some();
+        *segments = trial;
+        return Ok(true);
+    }
+    if follows {
+        return Ok(false);
+    }
+    let Some(state) = state else {
+        return Err(ModelError::Seam {
+            what: "positive factors",
+            residual: left,
+        });
+    };
+    // the pairwise part by itself, and shares of dilatations for it
+    let mut trial = segments.clone();
+    left = fit_factors(&mut trial, false)?;
+    if left <= MET + rounding {
+        let parts = parts(&trial);
+        let rest = state_change(&mut trial, &parts, &nodes, state);
+        if rest > MET + rounding {
+            return Err(ModelError::Seam {
+                what: "shares of the dilatation",
+                residual: rest,
+            });
+        }
+        *segments = trial;
+        return Ok(true);
+    }
+    Err(ModelError::Seam {
+        what: "positive factors",
+        residual: left,
+    })
+}
+
+/// Integrals of the gradient of the shape functions of the nodes at the seam over the elements around them, without nodes from whose faces bonds are missing.
+pub(super) fn loaded_nodes<const D: usize>(
+    segments: &Segments<'_, D>,
+) -> FxHashMap<u32, Vector<D>> {
+    let model = segments.model;
+    let full = segments.passing.whole[0].bonds().count();
+    let mut at_face = vec![false; model.sites.len()];
+    let mut is_dropped = at_face.clone();
+    for s in &segments.cut {
+        let lacks =
+            |&p: &u32| segments.is_point(p) && segments.body.families.of(p as usize).len() < full;
+        let is_broken = [s.i, s.j].iter().any(lacks);
+        for end in &s.ends {
+            let End::Face(foot) = end else { continue };
+            for &(site, _) in &foot.trace {
+                at_face[site as usize] = true;
+                is_dropped[site as usize] |= is_broken;
+            }
+        }
+    }
+    let integral = |site: usize| {
+        let mut sum = Vector::<D>::zeros();
+        for (c, local) in model.cells_of_site(site) {
+            if model.node_takes(c) {
+                fem::for_each_point(&model.mesh, c, fem::Rule::Stiffness, |p| {
+                    sum += p.gradient[local] * p.weight;
+                });
+            }
+        }
+        sum
+    };
+    let is_loaded = |site: usize| {
+        let is_node = matches!(model.sites[site].kind, SiteKind::Node(_));
+        is_node && at_face[site] && !is_dropped[site]
+    };
+    let sites = (0..model.sites.len()).into_par_iter();
+    sites
+        .filter(|&site| is_loaded(site))
+        .map(|site| (site as u32, integral(site)))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}
+
+/// The fourth moments of the lattice's pairwise part.
+pub(super) fn pair_tensor<const D: usize>(segments: &Segments<'_, D>) -> Tensor4<D> {
+    let h = segments.model.spacing();
+    let mut tensor = Tensor4::zeros();
+    for (offset, (pair, _)) in segments.passing.whole[0].bonds() {
+        let xi = Vector::from_fn(|i, _| f64::from(offset[i]) * h);
+        tensor.add_fourth_power(pair * segments.model.typical_volume(), &xi);
+    }
+    tensor
+}
+
+/// Components of a symmetric tensor of third order in 3D.
+pub(super) const MOST_TRIPLES: usize = 10;
+
+/// The components `i ≤ j ≤ k` of a symmetric tensor of third order.
+pub(super) fn triples<const D: usize>() -> impl Iterator<Item = [usize; 3]> {
+    (0..D).flat_map(|i| (i..D).flat_map(move |j| (j..D).map(move |k| [i, j, k])))
+}
+
+/// The components of `factor ξ⊗ξ⊗ξ`, as many as [`triples`] gives.
+pub(super) fn cube<const D: usize>(xi: &Vector<D>, factor: f64) -> [f64; MOST_TRIPLES] {
+    let mut cube = [0.0; MOST_TRIPLES];
+    for (c, [i, j, k]) in cube.iter_mut().zip(triples::<D>()) {
+        *c = factor * xi[i] * xi[j] * xi[k];
+    }
+    cube
+}
+
+/// `C_ijkl b_l`.
+pub(super) fn third<const D: usize>(
+    b: &Vector<D>,
+    tensor: &Tensor4<D>,
+) -> impl Iterator<Item = f64> {
+    triples::<D>().map(|[i, j, k]| (0..D).map(|l| tensor.get(i, j, k, l) * b[l]).sum())
+}
+
+/// All pieces, and the whole bonds between points at the seam.
+pub(super) fn parts<const D: usize>(segments: &Segments<'_, D>) -> Vec<Part> {
+    let mut parts: Vec<Part> = (0..segments.cut.len()).map(Part::Piece).collect();
+    for i in (0..segments.site.len()).filter(|&i| segments.at_seam[i]) {
+        for &j in segments.body.families.of(i) {
+            let i = i as u32;
+            if j > i && segments.at_seam[j as usize] && segments.is_whole(i, j) {
+                parts.push(Part::Bond(i, j));
+            }
+        }
+    }
+    parts
+}
+
+/// The conditions on changes of the factors, and what is missing.
+fn pair_conditions<const D: usize>(
+    segments: &Segments<'_, D>,
+    parts: &[Part],
+    missing: &FxHashMap<u32, Vec<f64>>,
+) -> (Conditions, Vec<f64>) {
+    let count = triples::<D>().count();
+    let mut rows: FxHashMap<u32, usize> = FxHashMap::default();
+    let mut sites: Vec<u32> = missing.keys().copied().collect();
+    sites.extend(points_at_seam(segments).map(|p| segments.site[p as usize]));
+    sites.sort_unstable();
+    for &site in &sites {
+        let next = rows.len();
+        rows.insert(site, next);
+    }
+    let mut conditions = Conditions::new(rows.len() * count);
+    for part in parts {
+        let (i, j) = part.points(segments);
+        let shape = part.shape(segments);
+        let cube = cube(&shape.xi, segments.stiffness(i, j) * shape.share);
+        for (site, w) in shape.difference {
+            if let Some(&row) = rows.get(&site) {
+                for (c, v) in cube.iter().take(count).enumerate() {
+                    conditions.add(row * count + c, w * v);
+                }
+            }
+        }
+        conditions.close();
+    }
+    let mut target = vec![0.0; rows.len() * count];
+    for (site, m) in missing {
+        target[rows[site] * count..][..count].copy_from_slice(m);
+    }
+    (conditions, target)
+}
+
+/// The smallest change, and the largest component that it leaves.
+pub(super) fn finish(conditions: &Conditions, target: &[f64], floor: f64) -> (Vec<f64>, f64) {
+    let change = conditions.least_change(target, floor);
+    let left = conditions
+        .sum(&change)
+        .iter()
+        .zip(target)
+        .map(|(s, t)| (t - s).abs())
+        .fold(0.0, f64::max);
+    (change, left)
+}
+
+pub(super) fn points_at_seam<'b, const D: usize>(
+    segments: &'b Segments<'_, D>,
+) -> impl Iterator<Item = u32> + 'b {
+    (0..segments.site.len() as u32).filter(|&p| segments.at_seam[p as usize])
+}
+
+/// Changes what parts hand to dilatations; returns what is left, relative.
+///
+/// Conditions: the second moments of what a point is handed stay as they are, those of an element become isotropic; the forces of a uniform pressure on a point stay in balance, those on a node become its share of the
+/// pressure of the zone. Moments are per volume of a cell of the lattice, forces per area of its face, so that all are of the size of 1.
+fn state_change<const D: usize>(
+    segments: &mut Segments<'_, D>,
+    parts: &[Part],
+    nodes: &FxHashMap<u32, Vector<D>>,
+    reference: &StatePart<D>,
+) -> f64 {
+    let volume = segments.model.typical_volume();
+    let area = segments.model.spacing().powi(D as i32 - 1);
+    let over_m = D as f64 / reference.shape.trace();
+    let mut count = 0;
+    let mut rows = |size: usize| {
+        count += size;
+        count - size
+    };
+    let moments = D * (D + 1) / 2;
+    let mut points: FxHashMap<u32, usize> = FxHashMap::default();
+    let mut sites: FxHashMap<u32, usize> = FxHashMap::default();
+    for p in points_at_seam(segments) {
+        points.insert(p, rows(moments));
+        sites.insert(segments.site[p as usize], rows(D));
+    }
+    let closed = rows(0);
+    let mut order: Vec<u32> = nodes.keys().copied().collect();
+    order.sort_unstable();
+    for &site in &order {
+        sites.insert(site, rows(D));
+    }
+    let mut cells: FxHashMap<u32, usize> = FxHashMap::default();
+    for s in &segments.cut {
+        for end in &s.ends {
+            if let End::Face(foot) = end {
+                for &c in &foot.cells {
+                    cells.entry(c).or_insert_with(|| rows(moments - 1));
+                }
+            }
+        }
+    }
+    let mut conditions = Conditions::new(count);
+    let mut hands = Vec::with_capacity(2 * parts.len());
+    for part in parts {
+        let (i, j) = part.points(segments);
+        let shape = part.shape(segments);
+        let xx = shape.xi * shape.xi.transpose();
+        let now = part.hands(segments);
+        for side in 0..2 {
+            let (own, other) = if side == 0 { (i, j) } else { (j, i) };
+            let strength =
+                over_m * segments.coefficients(own, other).1 * volume * volume * shape.share;
+            let per_volume = strength * shape.length / volume;
+            match part.end(segments, side) {
+                End::Point(p) => {
+                    let all = (0..D).flat_map(|a| (a..D).map(move |b| (a, b)));
+                    for (c, (a, b)) in all.enumerate() {
+                        conditions.add(points[&p] + c, per_volume * xx[(a, b)]);
+                    }
+                }
+                End::Face(foot) => {
+                    let per_cell = per_volume / foot.cells.len() as f64;
+                    for cell in &foot.cells {
+                        let mut row = cells[cell];
+                        for a in 0..D {
+                            for b in a.max(1)..D {
+                                // off the diagonal, and the diagonal's deviation from its first
+                                let first = if a == b { xx[(0, 0)] } else { 0.0 };
+                                conditions.add(row, per_cell * (xx[(a, b)] - first));
+                                row += 1;
+                            }
+                        }
+                    }
+                }
+            }
+            for &(site, w) in &shape.difference {
+                if let Some(&row) = sites.get(&site) {
+                    for a in 0..D {
+                        conditions.add(row + a, strength * w * shape.xi[a] / area);
+                    }
+                }
+            }
+            conditions.close();
+            hands.push(now[side]);
+        }
+    }
+    let mut target = vec![0.0; count];
+    for site in &order {
+        for a in 0..D {
+            target[sites[site] + a] = -nodes[site][a] / area;
+        }
+    }
+    for (t, now) in target.iter_mut().zip(conditions.sum(&hands)).skip(closed) {
+        *t -= now;
+    }
+    let (change, left) = finish(&conditions, &target, f64::NEG_INFINITY);
+    for (part, c) in parts.iter().zip(change.chunks_exact(2)) {
+        part.add_hands(segments, [c[0], c[1]]);
+    }
+    left
+}

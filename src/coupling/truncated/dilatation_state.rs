@@ -1,0 +1,189 @@
+//! Dilatations at a seam whose bonds turn, stretch and break.
+//!
+//! A part of the length s hands its elongation over, which to first order is `ξ·D` and in full `q = s |ξ|² ε`, ε its stretch: under any homogeneous deformation s times that of its whole bond. A dilatation is then
+//! `F = Σ b·u + Σ c q` with the energy `½ κ F²`; its first sum is an element's own `∫ div u`, which stays linear.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::{
+    bond_segments::{BySite, Segments},
+    dilatation::{Carrier, Functional, LpsConstants, carried, divergence, stiffness_of_point},
+};
+use crate::tensor::Vector;
+
+/// The dilatations of the points at the seam and of the elements behind it.
+pub(super) struct States<const D: usize> {
+    /// κ.
+    stiffness: Vec<f64>,
+    /// Elements' own parts: site and b, by dilatation.
+    own: Vec<(u32, Vector<D>)>,
+    own_of: Vec<usize>,
+    /// Parts that hand over, and what, by dilatation.
+    shares: Vec<(u32, f64)>,
+    shares_of: Vec<usize>,
+    /// The places in `shares` of each part, as dilatation and factor.
+    of_part: Vec<(u32, f64)>,
+    parts_of: Vec<usize>,
+    /// Dilatations of which each site is an own part.
+    of_site: BySite,
+}
+
+impl<const D: usize> States<D> {
+    /// Those of the points at the seam, whose parts are first all pieces, then the bonds of `whole`.
+    pub fn new(segments: &Segments<'_, D>, common: &LpsConstants, whole: &[[u32; 2]]) -> Self {
+        let body = segments.body;
+        let mut shares: BTreeMap<Carrier, Vec<(u32, f64)>> = BTreeMap::new();
+        let mut volumes: BTreeMap<u32, f64> = BTreeMap::new();
+        for (part, s) in segments.cut.iter().enumerate() {
+            common.shares(segments, s, |carrier, factor| {
+                shares
+                    .entry(carrier)
+                    .or_default()
+                    .push((part as u32, factor));
+                if let Carrier::Cell(cell) = carrier {
+                    *volumes.entry(cell).or_default() += carried(segments, s, factor);
+                }
+            });
+        }
+        for (bond, part) in whole.iter().zip(segments.cut.len() as u32..) {
+            for (own, other) in [(bond[0], bond[1]), (bond[1], bond[0])] {
+                if segments.at_seam[own as usize] {
+                    let omega = segments.coefficients(own, other).1;
+                    let factor =
+                        segments.hands(own, other)[0] * omega * body.cloud.volume[other as usize];
+                    let of = shares.entry(Carrier::Point(own)).or_default();
+                    of.push((part, factor));
+                }
+            }
+        }
+        let parts = segments.cut.len() + whole.len();
+        let mut states = Self {
+            stiffness: Vec::new(),
+            own: Vec::new(),
+            own_of: vec![0],
+            shares: Vec::new(),
+            shares_of: vec![0],
+            of_part: Vec::new(),
+            parts_of: vec![0; parts + 1],
+            of_site: BySite::default(),
+        };
+        for (carrier, of) in shares {
+            match carrier {
+                Carrier::Point(i) => states.stiffness.push(stiffness_of_point(segments, i)),
+                Carrier::Cell(cell) => {
+                    let (own, size) = divergence(segments, cell);
+                    let size = size + volumes.get(&cell).copied().unwrap_or(0.0);
+                    states.stiffness.push(common.bulk / size);
+                    states.own.extend(own);
+                }
+            }
+            states.own_of.push(states.own.len());
+            states.shares.extend(of);
+            states.shares_of.push(states.shares.len());
+        }
+        let mut by_part: Vec<(u32, u32, f64)> = Vec::with_capacity(states.shares.len());
+        for f in 0..states.stiffness.len() {
+            let of = states.shares_of(f).iter();
+            by_part.extend(of.map(|&(part, c)| (part, f as u32, c)));
+        }
+        by_part.sort_unstable_by_key(|e| (e.0, e.1));
+        for &(part, f, c) in &by_part {
+            states.of_part.push((f, c));
+            states.parts_of[part as usize + 1] += 1;
+        }
+        for part in 0..parts {
+            states.parts_of[part + 1] += states.parts_of[part];
+        }
+        let (own, own_of) = (&states.own, &states.own_of);
+        let sites = segments.model.sites.len();
+        states.of_site = BySite::new(sites, states.stiffness.len(), |f, visit| {
+            own[own_of[f]..own_of[f + 1]]
+                .iter()
+                .for_each(|e| visit(e.0));
+        });
+        states
+    }
+
+    fn own_of(&self, f: usize) -> &[(u32, Vector<D>)] {
+        &self.own[self.own_of[f]..self.own_of[f + 1]]
+    }
+
+    fn shares_of(&self, f: usize) -> &[(u32, f64)] {
+        &self.shares[self.shares_of[f]..self.shares_of[f + 1]]
+    }
+
+    /// The dilatations to which a part hands its elongation, and how much of it.
+    pub fn of_part(&self, part: usize) -> &[(u32, f64)] {
+        &self.of_part[self.parts_of[part]..self.parts_of[part + 1]]
+    }
+
+    /// Number of dilatations.
+    pub fn count(&self) -> usize {
+        self.stiffness.len()
+    }
+
+    /// `κ F` of all dilatations, from the elongations of the parts.
+    pub fn pressures(&self, u: &[f64], elongation: &[f64]) -> Vec<f64> {
+        let at = |site: u32| Vector::<D>::from_column_slice(&u[site as usize * D..][..D]);
+        (0..self.count())
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|f| {
+                let own: f64 = self.own_of(f).iter().map(|(s, b)| b.dot(&at(*s))).sum();
+                let handed = self.shares_of(f).iter();
+                let handed: f64 = handed.map(|&(p, c)| c * elongation[p as usize]).sum();
+                self.stiffness[f] * (own + handed)
+            })
+            .collect()
+    }
+
+    /// What the pressures make a part pull with, per elongation.
+    pub fn tension(&self, part: usize, pressures: &[f64]) -> f64 {
+        let of = self.of_part(part).iter();
+        of.map(|&(f, c)| c * pressures[f as usize]).sum()
+    }
+
+    /// Adds the forces of the pressures on the nodes of elements.
+    pub fn add_own_force(&self, pressures: &[f64], force: &mut [f64]) {
+        for (f, pressure) in pressures.iter().enumerate() {
+            for (site, b) in self.own_of(f) {
+                for (to, b) in force[*site as usize * D..].iter_mut().zip(b.iter()) {
+                    *to += pressure * b;
+                }
+            }
+        }
+    }
+
+    /// `½ κ F²` of all.
+    pub fn energy(&self, pressures: &[f64]) -> f64 {
+        let all = pressures.iter().zip(&self.stiffness);
+        all.filter(|(_, k)| **k != 0.0)
+            .map(|(p, k)| 0.5 * p * p / k)
+            .sum()
+    }
+
+    /// κ, and b of all sites at rest: `gradient` adds those of a part times a factor.
+    pub fn at_rest(
+        &self,
+        f: usize,
+        mut gradient: impl FnMut(usize, f64, &mut Functional<D>),
+    ) -> (f64, Functional<D>) {
+        let mut b: Functional<D> = self.own_of(f).iter().copied().collect();
+        for &(part, c) in self.shares_of(f) {
+            gradient(part as usize, c, &mut b);
+        }
+        (self.stiffness[f], b)
+    }
+
+    /// The dilatations of elements to which a site belongs.
+    pub fn of_site(&self, site: usize) -> &[u32] {
+        self.of_site.of(site)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.own.len() * (D + 1) * 8 + self.shares.len() * 32
+    }
+}

@@ -1,0 +1,592 @@
+//! Bonds at a seam that turn, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
+//!
+//! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, D/s)`: it is stretched by `|ξ + D/s|/|ξ| − 1`, like the whole bond would be. The pieces of a bond break together, when one of them passes the critical
+//! stretch, and take `s w` each. The elements behind the face keep their classical energy: a crack cannot go on into them.
+//!
+//! Of an LPS a piece also hands its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
+//! whole bonds break there, and are told here.
+
+use rustc_hash::FxHashSet;
+
+use rayon::prelude::*;
+
+use super::{
+    bond_kinematics::{Part, whole_bonds},
+    bond_segments::{Segments, Springs},
+    dilatation::{Functional, LpsConstants},
+    dilatation_state::States,
+};
+use crate::{
+    assembly::{Row, Transfer},
+    coupling::Model,
+    peridynamics::{
+        Families, PdBody,
+        bond_force::{BondPass, Kinematics, pack, unpack},
+    },
+    system::FailureUpdate,
+    tensor::{Tensor, Vector},
+};
+
+/// Pieces per task.
+const CHUNK: usize = 1024;
+
+/// The bonds of a seam, apart from the whole ones of the body.
+///
+/// Source: none; `docs/truncated.md`. Shapes: displacements and forces have `D` numbers per site.
+pub struct NonlinearSeam<const D: usize> {
+    /// The families of the body without bonds that are not whole, or that a fit has changed.
+    families: Families,
+    /// Points whose energy is here and not in the body's pass; empty for a pairwise law.
+    without_energy: Vec<bool>,
+    states: Option<States<D>>,
+    parts: Vec<Part<D>>,
+    /// Difference of displacement over each part.
+    difference: Transfer,
+    /// The points of each bond, ends or not, and the first of its parts.
+    bonds: Vec<[u32; 2]>,
+    first: Vec<u32>,
+    /// The first bonds break here, the others in the body's pass.
+    own: usize,
+    intact: Vec<u8>,
+    /// Bonds that the last pass broke.
+    last: Vec<u32>,
+    breaks: Option<Breaking>,
+    kinematics: Kinematics,
+    /// Sites at which parts end, and for each the parts with their weights.
+    sites: Vec<u32>,
+    offsets: Vec<usize>,
+    ends: Vec<(u32, f64)>,
+    /// Point, bond and volume of the far point: what a point loses with a bond, by point.
+    lost: Vec<(u32, u32, f64)>,
+    /// Bonds with a part between a face and a point next to it, with that point.
+    next_to_face: Vec<(u32, u32)>,
+    /// Whole bonds between two points next to a face.
+    along_face: Vec<[u32; 2]>,
+    pulls: Vec<[f64; D]>,
+    elongation: Vec<f64>,
+    /// Of each of `sites`, kept between passes.
+    sums: Vec<[f64; D]>,
+    over: Vec<bool>,
+}
+
+/// When bonds break.
+struct Breaking {
+    /// The value of t at the critical stretch of each bond.
+    limit: Vec<f64>,
+    never: Vec<bool>,
+}
+
+impl<const D: usize> NonlinearSeam<D> {
+    /// Of a law with dilatations `states` gives them.
+    pub(super) fn new(
+        model: &Model<D>,
+        body: &PdBody<D>,
+        springs: &Springs<D>,
+        broken: &FxHashSet<(u32, u32)>,
+        states: Option<(&Segments<'_, D>, &LpsConstants)>,
+    ) -> Self {
+        let segments = states.map(|s| s.0);
+        let mut seam = Self {
+            families: body.families.clone(),
+            without_energy: segments.map_or(Vec::new(), |s| s.at_seam.clone()),
+            states: None,
+            parts: Vec::new(),
+            difference: Transfer::new(),
+            bonds: Vec::new(),
+            first: Vec::new(),
+            own: 0,
+            intact: Vec::new(),
+            last: Vec::new(),
+            breaks: None,
+            kinematics: Kinematics::Linear,
+            sites: Vec::new(),
+            offsets: vec![0],
+            ends: Vec::new(),
+            lost: Vec::new(),
+            next_to_face: Vec::new(),
+            along_face: Vec::new(),
+            pulls: Vec::new(),
+            elongation: Vec::new(),
+            sums: Vec::new(),
+            over: Vec::new(),
+        };
+        let mut taken = broken.clone();
+        let mut of_site: Vec<(u32, u32, f64)> = Vec::new();
+        // whole bonds that a fit has changed follow the pieces; with dilatations they are among the whole ones below
+        let pieces = segments.map_or(usize::MAX, |s| s.cut.len());
+        for spring in springs.own().take(pieces) {
+            let (xi, origin) = (spring.direction, spring.origin);
+            let length = origin.piece.to - origin.piece.from;
+            let part = Part {
+                xi: xi.into(),
+                stiffness: spring.stiffness,
+                length,
+                bond: 0,
+            };
+            let bond = seam.push(part, origin.bond, &spring.difference, &mut of_site);
+            for (end, point) in origin.at.into_iter().enumerate() {
+                let Some(point) = point else { continue };
+                let far = body.cloud.volume[origin.bond[1 - end] as usize] * origin.piece.share;
+                seam.lost.push((point, bond, far));
+                let own = model.passing().map(|p| p.whole_of(point).spacing);
+                let spacing = own.unwrap_or(model.spacing());
+                let is_near = length * xi.norm() <= spacing * (1.0 + 1e-6);
+                if origin.at[1 - end].is_none() && is_near {
+                    seam.next_to_face.push((bond, point));
+                }
+            }
+            if let [Some(i), Some(j)] = origin.at {
+                taken.insert((i.min(j), i.max(j)));
+            }
+        }
+        seam.own = seam.bonds.len();
+        if let Some((segments, common)) = states {
+            let whole = whole_bonds(segments);
+            for &[i, j] in &whole {
+                let volume = body.cloud.volume[i as usize] * body.cloud.volume[j as usize];
+                let half = |own: u32, other: u32| match segments.at_seam[own as usize] {
+                    true => segments.coefficients(own, other).0 * volume,
+                    false => 0.0,
+                };
+                let (plain, scale) = (half(i, j) + half(j, i), segments.scale(i, j));
+                let part = Part {
+                    xi: body.bond(i as usize, j as usize).into(),
+                    stiffness: plain * scale,
+                    length: 1.0,
+                    bond: 0,
+                };
+                let site = |p: u32| segments.site[p as usize];
+                let difference = [(site(i), -1.0), (site(j), 1.0)];
+                seam.push(part, [i, j], &difference, &mut of_site);
+            }
+            seam.states = Some(States::new(segments, common, &whole));
+        }
+        seam.first.push(seam.parts.len() as u32);
+        let whole = |i: u32, j: u32| !taken.contains(&(i.min(j), i.max(j)));
+        let is_site = |p: u32| !body.families.of(p as usize).is_empty();
+        seam.families
+            .retain(|i, j| is_site(j) && whole(i as u32, j));
+        let mut near = vec![false; body.cloud.position.len()];
+        for &(_, p) in &seam.next_to_face {
+            near[p as usize] = true;
+        }
+        for i in (0..near.len() as u32).filter(|&i| near[i as usize]) {
+            let family = seam.families.of(i as usize).iter();
+            let along = family.filter(|&&j| j > i && near[j as usize]);
+            seam.along_face.extend(along.map(|&j| [i, j]));
+        }
+        seam.lost.sort_unstable_by_key(|l| (l.0, l.1));
+        of_site.sort_unstable_by_key(|e| (e.0, e.1));
+        for of in of_site.chunk_by(|a, b| a.0 == b.0) {
+            seam.sites.push(of[0].0);
+            seam.ends.extend(of.iter().map(|&(_, part, w)| (part, w)));
+            seam.offsets.push(seam.ends.len());
+        }
+        seam.intact = vec![0xff; seam.bonds.len().div_ceil(8)];
+        seam.pulls = vec![[0.0; D]; seam.parts.len()];
+        seam.elongation = vec![0.0; seam.parts.len()];
+        seam.over = vec![false; seam.parts.len()];
+        seam
+    }
+
+    /// Takes in a part of a bond, the last one or the next; returns the bond.
+    fn push(
+        &mut self,
+        part: Part<D>,
+        bond: [u32; 2],
+        difference: &[(u32, f64)],
+        of_site: &mut Vec<(u32, u32, f64)>,
+    ) -> u32 {
+        let number = self.parts.len() as u32;
+        if self.bonds.last() != Some(&bond) {
+            self.bonds.push(bond);
+            self.first.push(number);
+        }
+        let bond = self.bonds.len() as u32 - 1;
+        of_site.extend(difference.iter().map(|&(site, w)| (site, number, w)));
+        self.difference.push(difference.iter().copied());
+        self.parts.push(Part { bond, ..part });
+        bond
+    }
+
+    /// How bonds follow the motion, and by the number of a point at which stretch its bonds break, if any do, and whether they never do.
+    pub(in crate::coupling) fn behave(
+        &mut self,
+        kinematics: Kinematics,
+        critical: Option<impl Fn(u32) -> f64>,
+        never: impl Fn(u32) -> bool,
+    ) {
+        self.kinematics = kinematics;
+        let critical = critical.map(|of| self.bonds.iter().map(|b| of(b[0])).collect::<Vec<_>>());
+        self.breaks = critical.map(|critical| Breaking {
+            limit: critical.iter().map(|&s| kinematics.limit(s)).collect(),
+            never: self
+                .bonds
+                .iter()
+                .map(|b| b.iter().any(|&p| never(p)))
+                .collect(),
+        });
+    }
+
+    /// The families over which the body's own pass runs.
+    pub(in crate::coupling) fn families(&self) -> &Families {
+        &self.families
+    }
+
+    /// Whether the body's own pass knows of the bond between two points.
+    pub(in crate::coupling) fn is_whole(&self, i: usize, j: usize) -> bool {
+        self.families.of(i).binary_search(&(j as u32)).is_ok()
+    }
+
+    /// Points whose energy is not for the body's pass; empty for none.
+    pub(in crate::coupling) fn without_energy(&self) -> &[bool] {
+        &self.without_energy
+    }
+
+    /// Learns from the body's pass which of its bonds stand.
+    pub(in crate::coupling) fn follow(&mut self, pass: &dyn BondPass<D>) {
+        for (bond, [i, j]) in self.bonds.iter().enumerate().skip(self.own) {
+            let bit = 1 << (bond % 8);
+            if self.intact[bond / 8] & bit != 0 && !pass.bonded(*i as usize, *j as usize) {
+                self.intact[bond / 8] &= !bit;
+                self.last.push(bond as u32);
+            }
+        }
+    }
+
+    fn stands(&self, bond: u32) -> bool {
+        self.intact[bond as usize / 8] >> (bond % 8) & 1 == 1
+    }
+
+    /// Directions in `pulls`, elongations, and which parts that may break here are over the limit; zero for those that do not stand.
+    fn stretch<const EXACT: bool>(
+        &self,
+        u: &[f64],
+        pulls: &mut [[f64; D]],
+        elongation: &mut [f64],
+        over: &mut [bool],
+    ) {
+        let limit = |bond: usize| match &self.breaks {
+            Some(breaks) if bond < self.own => breaks.limit[bond],
+            _ => f64::INFINITY,
+        };
+        pulls
+            .par_chunks_mut(CHUNK)
+            .zip(elongation.par_chunks_mut(CHUNK))
+            .zip(over.par_chunks_mut(CHUNK))
+            .enumerate()
+            .for_each(|(chunk, ((pulls, elongation), over))| {
+                let parts = pulls.iter_mut().zip(elongation).zip(over);
+                for (k, ((pull, elongation), over)) in parts.enumerate() {
+                    let p = chunk * CHUNK + k;
+                    let part = &self.parts[p];
+                    (*pull, *elongation, *over) = ([0.0; D], 0.0, false);
+                    if self.stands(part.bond) {
+                        let s = part.strained::<EXACT>(&self.difference.displacement(p, u));
+                        (*pull, *elongation) = (s.direction, s.elongation);
+                        *over = s.excess > limit(part.bond as usize) * s.square;
+                    }
+                }
+            });
+    }
+
+    /// Makes pulls of directions; returns what the dilatations press with.
+    fn pull(&self, u: &[f64], elongation: &[f64], pulls: &mut [[f64; D]]) -> Vec<f64> {
+        let states = self.states.as_ref();
+        let pressures = states.map_or(Vec::new(), |s| s.pressures(u, elongation));
+        pulls
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(chunk, pulls)| {
+                for (k, pull) in pulls.iter_mut().enumerate() {
+                    let p = chunk * CHUNK + k;
+                    let f = self.parts[p].stiffness * elongation[p]
+                        + states.map_or(0.0, |s| s.tension(p, &pressures));
+                    *pull = pull.map(|x| f * x);
+                }
+            });
+        pressures
+    }
+
+    fn add_forces(
+        &self,
+        pulls: &[[f64; D]],
+        pressures: &[f64],
+        sums: &mut Vec<[f64; D]>,
+        force: &mut [f64],
+    ) {
+        self.scatter(pulls, sums, force);
+        if let Some(states) = &self.states {
+            states.add_own_force(pressures, force);
+        }
+    }
+
+    /// Adds the internal force; returns how many bonds broke, each counted once for each direction.
+    pub(in crate::coupling) fn add_force(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        breakage: FailureUpdate,
+    ) -> u64 {
+        let (mut pulls, mut elongation, mut over, mut sums) = (
+            std::mem::take(&mut self.pulls),
+            std::mem::take(&mut self.elongation),
+            std::mem::take(&mut self.over),
+            std::mem::take(&mut self.sums),
+        );
+        match self.kinematics {
+            Kinematics::Exact => self.stretch::<true>(u, &mut pulls, &mut elongation, &mut over),
+            Kinematics::Linear => self.stretch::<false>(u, &mut pulls, &mut elongation, &mut over),
+        }
+        let broken = match breakage {
+            FailureUpdate::Update => self.break_bonds(&over, &mut pulls, &mut elongation),
+            FailureUpdate::Frozen => 0,
+        };
+        let pressures = self.pull(u, &elongation, &mut pulls);
+        self.add_forces(&pulls, &pressures, &mut sums, force);
+        (self.pulls, self.elongation, self.over, self.sums) = (pulls, elongation, over, sums);
+        broken
+    }
+
+    fn break_bonds(
+        &mut self,
+        over: &[bool],
+        pulls: &mut [[f64; D]],
+        elongation: &mut [f64],
+    ) -> u64 {
+        let Some(breaks) = &self.breaks else { return 0 };
+        if !over.contains(&true) {
+            return 0;
+        }
+        let mut broken = 0;
+        for bond in 0..self.own {
+            let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
+            if over[parts.clone()].contains(&true) && !breaks.never[bond] {
+                self.intact[bond / 8] &= !(1 << (bond % 8));
+                self.last.push(bond as u32);
+                pulls[parts.clone()].fill([0.0; D]);
+                elongation[parts].fill(0.0);
+                broken += 2;
+            }
+        }
+        broken
+    }
+
+    fn scatter(&self, pulls: &[[f64; D]], sums: &mut Vec<[f64; D]>, force: &mut [f64]) {
+        sums.resize(self.sites.len(), [0.0; D]);
+        sums.par_iter_mut()
+            .with_min_len(CHUNK / 8)
+            .enumerate()
+            .for_each(|(s, sum)| {
+                *sum = [0.0; D];
+                for &(part, w) in &self.ends[self.offsets[s]..self.offsets[s + 1]] {
+                    for (sum, pull) in sum.iter_mut().zip(&pulls[part as usize]) {
+                        *sum += w * pull;
+                    }
+                }
+            });
+        for (&site, sum) in self.sites.iter().zip(&*sums) {
+            for (f, sum) in force[site as usize * D..][..D].iter_mut().zip(sum) {
+                *f += sum;
+            }
+        }
+    }
+
+    /// Adds the product with the tangent at rest.
+    pub(in crate::coupling) fn add_tangent(&self, x: &[f64], y: &mut [f64]) {
+        let parts = self.parts.len();
+        let (mut pulls, mut elongation) = (vec![[0.0; D]; parts], vec![0.0; parts]);
+        self.stretch::<false>(x, &mut pulls, &mut elongation, &mut vec![false; parts]);
+        let pressures = self.pull(x, &elongation, &mut pulls);
+        self.add_forces(&pulls, &pressures, &mut Vec::new(), y);
+    }
+
+    /// κ of a dilatation, and its derivative by the displacement of each site, at rest.
+    fn functional(&self, states: &States<D>, f: usize) -> (f64, Functional<D>) {
+        states.at_rest(f, |p, c, b| {
+            let part = &self.parts[p];
+            if self.stands(part.bond) {
+                for (site, w) in self.difference.row(p) {
+                    *b.entry(site).or_insert_with(Vector::zeros) += Vector::from(part.xi) * (c * w);
+                }
+            }
+        })
+    }
+
+    /// Adds per unknown a bound of the sum of the sizes of its row.
+    pub(in crate::coupling) fn add_row_sums(&self, sums: &mut [f64]) {
+        for (s, &site) in self.sites.iter().enumerate() {
+            for &(p, w) in &self.ends[self.offsets[s]..self.offsets[s + 1]] {
+                let part = &self.parts[p as usize];
+                if !self.stands(part.bond) {
+                    continue;
+                }
+                let all: f64 = self.difference.row(p as usize).map(|(_, w)| w.abs()).sum();
+                let size: f64 = part.xi.iter().map(|x| x.abs()).sum();
+                for (sum, x) in sums[site as usize * D..].iter_mut().zip(&part.xi) {
+                    *sum += part.stiffness * w.abs() * all * x.abs() * size;
+                }
+            }
+        }
+        let Some(states) = &self.states else { return };
+        for f in 0..states.count() {
+            let (stiffness, b) = self.functional(states, f);
+            let all: f64 = b.values().map(|b| b.abs().sum()).sum();
+            for (site, b) in b {
+                for (sum, b) in sums[site as usize * D..].iter_mut().zip(b.iter()) {
+                    *sum += stiffness.abs() * all * b.abs();
+                }
+            }
+        }
+    }
+
+    /// The parts that end at a site, with their weights there.
+    fn ends_at(&self, site: usize) -> &[(u32, f64)] {
+        match self.sites.binary_search(&(site as u32)) {
+            Ok(s) => &self.ends[self.offsets[s]..self.offsets[s + 1]],
+            Err(_) => &[],
+        }
+    }
+
+    /// Adds the row of a site in the tangent at rest.
+    pub(in crate::coupling) fn add_row(&self, site: usize, row: &mut Row<D>) {
+        let mut of = Vec::new();
+        for &(p, w) in self.ends_at(site) {
+            let part = &self.parts[p as usize];
+            if self.stands(part.bond) {
+                let xi = Vector::from(part.xi);
+                let block: Tensor<D> = xi * xi.transpose() * (part.stiffness * w);
+                row.add(&self.difference, p as usize, &block);
+                let states = self.states.iter();
+                of.extend(states.flat_map(|s| s.of_part(p as usize).iter().map(|e| e.0)));
+            }
+        }
+        let Some(states) = &self.states else { return };
+        of.extend(states.of_site(site));
+        of.sort_unstable();
+        of.dedup();
+        for f in of {
+            let (stiffness, b) = self.functional(states, f as usize);
+            let Some(own) = b.get(&(site as u32)).map(|b| b * stiffness) else {
+                continue;
+            };
+            for (other, b) in b {
+                row.add_site(other, &(own * b.transpose()));
+            }
+        }
+    }
+
+    /// Whether a bond of the seam ends at a site, or changes a dilatation that knows of it.
+    pub(in crate::coupling) fn touches(&self, site: usize) -> bool {
+        let states = self.states.as_ref();
+        !self.ends_at(site).is_empty() || states.is_some_and(|s| !s.of_site(site).is_empty())
+    }
+
+    /// Energy of the parts that stand, and of the dilatations of the seam \[J\].
+    pub(in crate::coupling) fn energy(&self, u: &[f64]) -> f64 {
+        self.energy_with(&self.intact, u)
+    }
+
+    fn energy_with(&self, intact: &[u8], u: &[f64]) -> f64 {
+        let elongation: Vec<f64> = (0..self.parts.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|p| {
+                let part = &self.parts[p];
+                if intact[part.bond as usize / 8] >> (part.bond % 8) & 1 == 0 {
+                    return 0.0;
+                }
+                let d: Vector<D> = self.difference.displacement(p, u);
+                match self.kinematics {
+                    Kinematics::Exact => part.strained::<true>(&d).elongation,
+                    Kinematics::Linear => part.strained::<false>(&d).elongation,
+                }
+            })
+            .collect();
+        let parts = self.parts.iter().zip(&elongation);
+        let parts: f64 = parts.map(|(part, q)| 0.5 * part.stiffness * q * q).sum();
+        let states = self.states.as_ref();
+        parts + states.map_or(0.0, |s| s.energy(&s.pressures(u, &elongation)))
+    }
+
+    /// Forgets what broke in the last pass.
+    pub(in crate::coupling) fn begin_pass(&mut self) {
+        self.last.clear();
+    }
+
+    /// Whether a bond of the seam broke in the last pass.
+    pub(in crate::coupling) fn has_broken(&self) -> bool {
+        !self.last.is_empty()
+    }
+
+    /// What the seam would store less at a displacement for the bonds that the last pass broke \[J\].
+    pub(in crate::coupling) fn lost_energy(&self, u: &[f64]) -> f64 {
+        let mut before = self.intact.clone();
+        for &bond in &self.last {
+            before[bond as usize / 8] |= 1 << (bond % 8);
+        }
+        self.energy_with(&before, u) - self.energy_with(&self.intact, u)
+    }
+
+    /// Bonds that broke here in the last pass and not in that of the body: their points, and which part of the bond each is.
+    pub(in crate::coupling) fn last_own(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
+        let own = self.last.iter().filter(|bond| (**bond as usize) < self.own);
+        own.map(|&bond| {
+            let bond = bond as usize;
+            let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
+            let share: f64 = self.parts[parts].iter().map(|part| part.length).sum();
+            (self.bonds[bond], share)
+        })
+    }
+
+    /// Adds to the damage of points, so far that of the bonds that the body's pass knows of, what they lost here; `of_bonds` is the volume that a point's whole bonds reach.
+    pub(in crate::coupling) fn add_damage(
+        &self,
+        damage: &mut [f64],
+        of_bonds: impl Fn(u32) -> f64,
+    ) {
+        for of in self.lost.chunk_by(|a, b| a.0 == b.0) {
+            let point = of[0].0;
+            let sum = |all: bool| -> f64 {
+                let counted = of.iter().filter(|l| all || !self.stands(l.1));
+                counted.map(|l| l.2).sum()
+            };
+            let (whole, lost) = (of_bonds(point), sum(false));
+            let damage = &mut damage[point as usize];
+            if lost > 0.0 || *damage > 0.0 {
+                *damage = (*damage * whole + lost) / (whole + sum(true));
+            }
+        }
+    }
+
+    /// A point next to a face up to which damage has come: a bond that ends on the face within a spacing of it, or one along the face between points next to it, is broken.
+    pub(in crate::coupling) fn damaged_at_face(&self, pass: &dyn BondPass<D>) -> Option<u32> {
+        let ends = self.next_to_face.iter();
+        let mut ends = ends.filter(|(bond, _)| !self.stands(*bond));
+        if let Some(&(_, point)) = ends.next() {
+            return Some(point);
+        }
+        let mut along = self.along_face.iter();
+        along
+            .find(|[i, j]| pass.is_damaged(*i as usize) && !pass.bonded(*i as usize, *j as usize))
+            .map(|[i, _]| *i)
+    }
+
+    /// Bits of the bonds that stand.
+    pub(in crate::coupling) fn damage_state(&self) -> Vec<u64> {
+        pack(&self.intact, self.bonds.len() as u64)
+    }
+
+    /// Puts back what [`NonlinearSeam::damage_state`] gave; false if it belongs to another seam.
+    pub(in crate::coupling) fn restore_damage(&mut self, state: &[u64]) -> bool {
+        unpack(state, self.bonds.len() as u64, &mut self.intact)
+    }
+
+    /// Bytes held.
+    pub(in crate::coupling) fn memory_bytes(&self) -> usize {
+        self.parts.len() * (size_of::<Part<D>>() + D * 8 + 9)
+            + self.states.as_ref().map_or(0, States::memory_bytes)
+            + self.difference.weight_count() * 28
+            + self.families.neighbours.len() * 4
+    }
+}

@@ -1,0 +1,45 @@
+//! Bonds as lists, with what their passes read.
+
+use super::{
+    Kinematics,
+    compressed_list::{Neighbours, Weights},
+};
+
+/// When bonds break, as a limit of `t`.
+pub(super) enum Limit {
+    Never,
+    Uniform(f64),
+    PerBond(Vec<f64>),
+}
+
+/// Coefficients of the state-based law, per point.
+pub(super) struct Solid {
+    /// `D/m`.
+    pub dilatation: Vec<f64>,
+    /// `(D k − (D+2) μ)/m`.
+    pub volumetric: Vec<f64>,
+    /// `D (D+2) μ/m`.
+    pub deviatoric: Vec<f64>,
+    /// Dilatation of the pass at hand.
+    pub(super) theta: Vec<f64>,
+}
+
+/// A bond pass over lists: two (or four) bytes of neighbour, eight (or four) of weight and one bit per directed bond.
+pub(super) struct List<const D: usize> {
+    pub position: Vec<[f64; D]>,
+    pub volume: Vec<f64>,
+    pub row: Vec<bool>,
+    pub no_fail: Vec<bool>,
+    pub offsets: Vec<usize>,
+    pub neighbours: Neighbours,
+    pub weights: Weights,
+    pub limit: Limit,
+    pub(super) kinematics: Kinematics,
+    pub solid: Option<Solid>,
+    /// Start of each point's bits, which fill whole bytes.
+    pub bytes: Vec<usize>,
+    pub(super) intact: Vec<u8>,
+    pub(super) reference: u64,
+    /// Points and bonds that the last pass broke, ascending.
+    pub(super) last: Vec<(u32, usize)>,
+}

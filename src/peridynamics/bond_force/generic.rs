@@ -1,0 +1,559 @@
+//! The pass that any law takes: the force state of every family, then the sum over the bonds of every point, [SAND2015-7998] eq. (2.3) and (2.5).
+//!
+//! Nothing is assumed of the law but what [`ForceState`] says, so this is the place where a law is computed as it is written. The lattice and list passes are its accelerators.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::{
+    BondPass, BondSetup, ForceStates, Kinematics,
+    list::{extension, ratio, stretched},
+};
+use crate::{
+    peridynamics::{
+        DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, Law, Past, PdBody,
+        Present, StatePart, body::split_rows,
+    },
+    system::{FailureUpdate, Interval},
+    tensor::{Tensor, Vector},
+};
+
+/// No bond from the other end.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// What points and bonds remember; bonds in the order of the families.
+#[derive(Clone, Default)]
+struct History {
+    point: Vec<f64>,
+    bonds: Vec<f64>,
+}
+
+/// The pass over force states: some hundred bytes per directed bond.
+pub(super) struct Generic<const D: usize> {
+    pub(super) law: Arc<dyn Law<D>>,
+    layout: HistoryLayout,
+    pub(super) position: Vec<Vector<D>>,
+    pub(super) volume: Vec<f64>,
+    pub(super) row: Vec<bool>,
+    no_fail: Vec<bool>,
+    pub(super) families: Families,
+    /// Of each bond, that of its other end, counted over all families; `NONE` if the far point has no family.
+    pub(super) reverse: Vec<u32>,
+    pub(super) pair: Vec<f64>,
+    pub(super) omega: Vec<f64>,
+    pub(super) state: Vec<Option<StatePart<D>>>,
+    /// The value of `t` beyond which each bond breaks; empty for never.
+    limit: Vec<f64>,
+    kinematics: Kinematics,
+    pub(super) intact: Vec<bool>,
+    /// Committed, and at the end of the last force.
+    past: History,
+    present: History,
+    /// Energy that each point dissipated in the last force \[J\].
+    dissipated: Vec<f64>,
+    /// Points and bonds, counted over all families, that the last force broke.
+    last: Vec<(u32, usize)>,
+    /// `T⟨ξ⟩` of every bond, kept between passes.
+    force_state: Vec<Vector<D>>,
+}
+
+/// One deformed family in memory that the next one takes over.
+struct Scratch<const D: usize> {
+    bonds: Vec<Vector<D>>,
+    volumes: Vec<f64>,
+    pair: Vec<f64>,
+    omega: Vec<f64>,
+    difference: Vec<Vector<D>>,
+    extension: Vec<f64>,
+    direction: Vec<Vector<D>>,
+    /// The bond of each entry, counted over all families.
+    of: Vec<usize>,
+    past: Vec<f64>,
+    present: Vec<f64>,
+    point: Vec<f64>,
+    force: Vec<Vector<D>>,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self {
+            bonds: Vec::new(),
+            volumes: Vec::new(),
+            pair: Vec::new(),
+            omega: Vec::new(),
+            difference: Vec::new(),
+            extension: Vec::new(),
+            direction: Vec::new(),
+            of: Vec::new(),
+            past: Vec::new(),
+            present: Vec::new(),
+            point: Vec::new(),
+            force: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> Generic<D> {
+    /// The pass of a law, with the coefficients that `body` has for the bonds of its linearisation.
+    pub(super) fn new(
+        setup: &BondSetup<'_, D>,
+        law: &Arc<dyn Law<D>>,
+        states: &dyn ForceState<D>,
+        body: &PdBody<D>,
+    ) -> Self {
+        let layout = states.history();
+        let points = setup.position.len();
+        let families = setup.families.clone();
+        let bonds = families.neighbours.len();
+        let (mut pair, mut omega) = (Vec::with_capacity(bonds), Vec::new());
+        let mut reverse = Vec::with_capacity(bonds);
+        let mut limit = Vec::new();
+        let mut intact = Vec::with_capacity(bonds);
+        for i in 0..points {
+            for (k, &j) in families.of(i).iter().enumerate() {
+                let place = body.families.of(i).binary_search(&j);
+                let (p, w) = body.kernel(i);
+                pair.push(place.map_or(0.0, |k| p[k]));
+                if !law.linearised().is_pairwise() {
+                    omega.push(place.map_or(0.0, |k| w[k]));
+                }
+                let back = families.of(j as usize).binary_search(&(i as u32));
+                let start = families.offsets[j as usize] as u32;
+                reverse.push(back.map_or(NONE, |k| start + k as u32));
+                if setup.failure.is_some() {
+                    limit.push(setup.limit(i, k, &setup.bond(i, j as usize)));
+                }
+                intact.push(!setup.precracked.is_some_and(|cut| cut(i, j as usize)));
+            }
+        }
+        let past = History {
+            point: vec![0.0; points * layout.point.len()],
+            bonds: vec![0.0; bonds * layout.bond.len()],
+        };
+        Self {
+            law: Arc::clone(law),
+            layout,
+            position: setup.position.to_vec(),
+            volume: setup.volume.to_vec(),
+            row: (0..points).map(|i| setup.row(i)).collect(),
+            no_fail: (0..points).map(|i| setup.no_fail(i)).collect(),
+            state: (0..points).map(|i| body.state(i).cloned()).collect(),
+            reverse,
+            pair,
+            omega,
+            limit,
+            kinematics: setup.kinematics,
+            intact,
+            present: past.clone(),
+            past,
+            dissipated: vec![0.0; points],
+            last: Vec::new(),
+            force_state: vec![Vector::zeros(); bonds],
+            families,
+        }
+    }
+
+    pub(super) fn xi(&self, i: usize, j: usize) -> Vector<D> {
+        self.position[j] - self.position[i]
+    }
+
+    pub(super) fn range(&self, i: usize) -> std::ops::Range<usize> {
+        self.families.offsets[i]..self.families.offsets[i + 1]
+    }
+
+    pub(super) fn neighbour(&self, bond: usize) -> usize {
+        self.families.neighbours[bond] as usize
+    }
+
+    /// `t` and r² of a bond, and the direction `ξ + η`, or ξ of a linear one.
+    fn stretched(&self, i: usize, j: usize, eta: &Vector<D>) -> super::list::Stretched<D> {
+        let (xi, here) = (self.xi(i, j).into(), [0.0; D]);
+        match self.kinematics {
+            Kinematics::Exact => stretched::<D, true>(&xi, &here, eta.as_slice()),
+            Kinematics::Linear => stretched::<D, false>(&xi, &here, eta.as_slice()),
+        }
+    }
+
+    /// Bonds beyond their limit; each end finds its own.
+    fn overstretched(&self, u: &[f64]) -> Vec<(u32, usize)> {
+        (0..self.position.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .flat_map_iter(|i| {
+                let free = self.range(i).filter(move |_| !self.no_fail[i]);
+                free.filter(move |&bond| {
+                    let j = self.neighbour(bond);
+                    if !self.intact[bond] || self.no_fail[j] {
+                        return false;
+                    }
+                    let s = self.stretched(i, j, &(at(u, j) - at(u, i)));
+                    s.excess > self.limit[bond] * s.length
+                })
+                .map(move |bond| (i as u32, bond))
+            })
+            .collect()
+    }
+
+    /// The response of one family, of those of its bonds that count; forces and history lie in the scratch.
+    fn respond(
+        &self,
+        i: usize,
+        displaced: &dyn Fn(usize) -> Vector<D>,
+        counts: impl Fn(usize) -> bool,
+        step: f64,
+        past: &History,
+        s: &mut Scratch<D>,
+    ) -> EnergyDensity {
+        let here = displaced(i);
+        for list in [&mut s.volumes, &mut s.pair, &mut s.omega, &mut s.extension] {
+            list.clear();
+        }
+        for list in [&mut s.bonds, &mut s.difference, &mut s.direction] {
+            list.clear();
+        }
+        s.of.clear();
+        s.past.clear();
+        let kept = self.layout.bond.len();
+        for bond in self.range(i).filter(|&bond| counts(bond)) {
+            let j = self.neighbour(bond);
+            let eta = displaced(j) - here;
+            let stretch = self.stretched(i, j, &eta);
+            let (t, r) = (stretch.t(), stretch.length.sqrt());
+            let (e, shrink) = match self.kinematics {
+                Kinematics::Exact => (extension::<true>(t), ratio::<true>(t)),
+                Kinematics::Linear => (extension::<false>(t), ratio::<false>(t)),
+            };
+            s.of.push(bond);
+            s.bonds.push(self.xi(i, j));
+            s.volumes.push(self.volume[j]);
+            s.pair.push(self.pair[bond]);
+            s.omega.extend(self.omega.get(bond));
+            s.difference.push(eta);
+            s.extension.push(e * r);
+            s.direction
+                .push(Vector::from_column_slice(&stretch.direction) * (shrink / r));
+            s.past.extend(&past.bonds[bond * kept..(bond + 1) * kept]);
+        }
+        s.force.clear();
+        s.force.resize(s.of.len(), Vector::zeros());
+        s.present.clone_from(&s.past);
+        let own = i * self.layout.point.len()..(i + 1) * self.layout.point.len();
+        s.point.clear();
+        s.point.extend(&past.point[own.clone()]);
+        let Some(law) = self.law.force_state() else {
+            return EnergyDensity::default();
+        };
+        let family = DeformedFamily {
+            bonds: &s.bonds,
+            volumes: &s.volumes,
+            pair: &s.pair,
+            omega: &s.omega,
+            state: self.state[i].as_ref(),
+            difference: &s.difference,
+            extension: &s.extension,
+            direction: &s.direction,
+        };
+        law.respond(
+            &family,
+            step,
+            Past {
+                point: &past.point[own],
+                bonds: &s.past,
+            },
+            Present {
+                point: &mut s.point,
+                bonds: &mut s.present,
+            },
+            &mut s.force,
+        )
+    }
+
+    /// Force states of all families at the end of a step, and the history there.
+    fn respond_all(&mut self, u: &[f64], step: f64) {
+        let mut force = std::mem::take(&mut self.force_state);
+        let mut present = std::mem::take(&mut self.present);
+        let mut dissipated = std::mem::take(&mut self.dissipated);
+        let offsets = &self.families.offsets;
+        let scaled = |n: usize| offsets.iter().map(|o| o * n).collect::<Vec<_>>();
+        let kept = [self.layout.point.len(), self.layout.bond.len()];
+        let points: Vec<usize> = (0..offsets.len()).map(|i| i * kept[0]).collect();
+        let forces = split_rows(&mut force, offsets);
+        let of_bonds = split_rows(&mut present.bonds, &scaled(kept[1]));
+        let of_points = split_rows(&mut present.point, &points);
+        forces
+            .into_par_iter()
+            .zip(of_bonds)
+            .zip(of_points)
+            .zip(&mut dissipated)
+            .enumerate()
+            .with_min_len(16)
+            .for_each_init(
+                Scratch::default,
+                |s, (i, (((force, bonds), point), spent))| {
+                    let range = self.range(i);
+                    if range.is_empty() {
+                        return;
+                    }
+                    let displaced = |j: usize| at(u, j);
+                    let intact = |bond: usize| self.intact[bond];
+                    let energy = self.respond(i, &displaced, intact, step, &self.past, s);
+                    *spent = energy.dissipated * self.volume[i];
+                    force.fill(Vector::zeros());
+                    point.copy_from_slice(&s.point);
+                    for (e, &bond) in s.of.iter().enumerate() {
+                        let k = bond - range.start;
+                        force[k] = s.force[e];
+                        bonds[k * kept[1]..(k + 1) * kept[1]]
+                            .copy_from_slice(&s.present[e * kept[1]..(e + 1) * kept[1]]);
+                    }
+                },
+            );
+        self.force_state = force;
+        self.present = present;
+        self.dissipated = dissipated;
+    }
+
+    /// `−V_i Σ V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)` of the points with rows; without a family at the far end a pairwise law has the same bond there, any other no energy.
+    pub(super) fn gather(&self, states: &[Vector<D>], force: &mut [f64]) {
+        force
+            .par_chunks_exact_mut(D)
+            .with_min_len(64)
+            .enumerate()
+            .for_each(|(i, force)| {
+                let mut sum = Vector::<D>::zeros();
+                if self.row[i] {
+                    for bond in self.range(i) {
+                        let back = match self.reverse[bond] {
+                            NONE if self.law.linearised().is_pairwise() => -states[bond],
+                            NONE => Vector::zeros(),
+                            back => states[back as usize],
+                        };
+                        sum += (states[bond] - back) * self.volume[self.neighbour(bond)];
+                    }
+                }
+                force.copy_from_slice((sum * -self.volume[i]).as_slice());
+            });
+    }
+
+    /// Energy of a point \[J\] at once, from a history.
+    fn energy_of(
+        &self,
+        i: usize,
+        displaced: &dyn Fn(usize) -> Vector<D>,
+        counts: impl Fn(usize) -> bool,
+        history: &History,
+        scratch: &mut Scratch<D>,
+    ) -> f64 {
+        let density = self.respond(i, displaced, counts, 0.0, history, scratch);
+        density.stored * self.volume[i]
+    }
+}
+
+/// The displacement of a point.
+pub(super) fn at<const D: usize>(u: &[f64], i: usize) -> Vector<D> {
+    Vector::from_column_slice(&u[i * D..][..D])
+}
+
+impl<const D: usize> BondPass<D> for Generic<D> {
+    fn points(&self) -> usize {
+        self.position.len()
+    }
+
+    fn name(&self) -> &'static str {
+        "force states"
+    }
+
+    fn bonds(&self) -> u64 {
+        self.families.neighbours.len() as u64
+    }
+
+    fn force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        breakage: FailureUpdate,
+    ) -> u64 {
+        self.last.clear();
+        if breakage == FailureUpdate::Update && !self.limit.is_empty() {
+            self.last = self.overstretched(u);
+            for &(_, bond) in &self.last {
+                self.intact[bond] = false;
+            }
+        }
+        self.respond_all(u, interval.length);
+        self.gather(&self.force_state, force);
+        self.last.len() as u64
+    }
+
+    fn commit(&mut self) -> f64 {
+        self.past.clone_from(&self.present);
+        let own = self.dissipated.iter().zip(&self.row);
+        own.filter(|(_, row)| **row).map(|(d, _)| d).sum()
+    }
+
+    fn remembers(&self) -> bool {
+        !self.layout.is_empty()
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        self.tangent_product(x, y);
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        self.tangent_row_sums()
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        let of_point = |s: &mut Scratch<D>, i: usize| {
+            if !self.row[i] {
+                return 0.0;
+            }
+            self.energy_of(i, &|j| at(u, j), |bond| self.intact[bond], &self.past, s)
+        };
+        let energies: Vec<f64> = (0..self.position.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .map_init(Scratch::default, of_point)
+            .collect();
+        energies.iter().sum()
+    }
+
+    fn damage_into(&self, damage: &mut [f64]) {
+        for (i, damage) in damage.iter_mut().enumerate() {
+            let (mut all, mut lost) = (0.0, 0.0);
+            for bond in self.range(i) {
+                let v = self.volume[self.neighbour(bond)];
+                all += v;
+                lost += if self.intact[bond] { 0.0 } else { v };
+            }
+            *damage = if lost > 0.0 { lost / all } else { 0.0 };
+        }
+    }
+
+    fn is_damaged(&self, i: usize) -> bool {
+        self.range(i).any(|bond| !self.intact[bond])
+    }
+
+    fn broken(&self) -> u64 {
+        self.intact.iter().filter(|intact| !**intact).count() as u64
+    }
+
+    fn last_broken(&self) -> Vec<(u32, u32)> {
+        let last = self.last.iter();
+        last.map(|&(i, bond)| (i, self.families.neighbours[bond]))
+            .collect()
+    }
+
+    fn lost_energy(&self, displaced: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        let displaced = |j: usize| Vector::from(displaced(j));
+        let mut scratch = Scratch::default();
+        let mut lost = 0.0;
+        for of_point in self.last.chunk_by(|a, b| a.0 == b.0) {
+            let i = of_point[0].0 as usize;
+            if !self.row[i] {
+                continue;
+            }
+            let broke = |bond: usize| of_point.iter().any(|l| l.1 == bond);
+            let before = |bond: usize| self.intact[bond] || broke(bond);
+            let after = |bond: usize| self.intact[bond];
+            lost += self.energy_of(i, &displaced, before, &self.past, &mut scratch)
+                - self.energy_of(i, &displaced, after, &self.past, &mut scratch);
+        }
+        lost
+    }
+
+    fn bonded(&self, i: usize, j: usize) -> bool {
+        let place = self.families.of(i).binary_search(&(j as u32));
+        place.is_ok_and(|k| self.intact[self.range(i).start + k])
+    }
+
+    fn damage_state(&self) -> Vec<u64> {
+        let mut words = Vec::new();
+        if !self.limit.is_empty() {
+            let bits = self.intact.chunks(8).map(|eight| {
+                let set = eight.iter().enumerate();
+                set.fold(0u8, |byte, (k, intact)| byte | u8::from(*intact) << k)
+            });
+            words = super::pack(&bits.collect::<Vec<u8>>(), self.bonds());
+        }
+        let history = self.past.point.iter().chain(&self.past.bonds);
+        words.extend(history.map(|x| x.to_bits()));
+        words
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        let kept = self.past.point.len() + self.past.bonds.len();
+        let Some(words) = state.len().checked_sub(kept) else {
+            return false;
+        };
+        let (words, history) = state.split_at(words);
+        let mut bits = vec![0u8; self.intact.len().div_ceil(8)];
+        match self.limit.is_empty() {
+            true if !words.is_empty() => return false,
+            true => {}
+            false if !super::unpack(words, self.bonds(), &mut bits) => return false,
+            false => {
+                for (bond, intact) in self.intact.iter_mut().enumerate() {
+                    *intact = bits[bond / 8] >> (bond % 8) & 1 == 1;
+                }
+            }
+        }
+        let own = self.past.point.iter_mut().chain(&mut self.past.bonds);
+        for (number, word) in own.zip(history) {
+            *number = f64::from_bits(*word);
+        }
+        self.present.clone_from(&self.past);
+        true
+    }
+
+    fn force_states(&self) -> Option<&dyn ForceStates<D>> {
+        Some(self)
+    }
+
+    fn memory_bytes(&self) -> usize {
+        let bonds = self.families.neighbours.len();
+        let vectors = self.position.len() + self.force_state.len();
+        let history = 2 * (self.past.point.len() + self.past.bonds.len());
+        vectors * D * 8
+            + (self.volume.len() * 2 + self.pair.len() + self.omega.len() + self.limit.len()) * 8
+            + self.state.len() * std::mem::size_of::<Option<StatePart<D>>>()
+            + self.families.offsets.len() * 8
+            + bonds * 9
+            + self.row.len() * 2
+            + history * 8
+    }
+}
+
+impl<const D: usize> ForceStates<D> for Generic<D> {
+    fn partial_stress(&self, i: usize, u: &[f64]) -> Tensor<D> {
+        let mut s = Scratch::default();
+        self.respond(
+            i,
+            &|j| at(u, j),
+            |bond| self.intact[bond],
+            0.0,
+            &self.past,
+            &mut s,
+        );
+        let bonds = s.force.iter().zip(&s.bonds).zip(&s.volumes);
+        bonds.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
+            sum + force * xi.transpose() * *volume
+        })
+    }
+
+    fn family_size(&self, point: usize) -> usize {
+        self.range(point).len()
+    }
+
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let names = self.layout.point;
+        let column = |k: usize| {
+            let points = self.past.point.chunks_exact(names.len());
+            points.map(|numbers| numbers[k]).collect()
+        };
+        let named = names.iter().enumerate();
+        named.map(|(k, name)| (*name, column(k))).collect()
+    }
+}

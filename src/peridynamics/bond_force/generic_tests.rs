@@ -1,0 +1,314 @@
+//! What holds of every law: nothing here names one, but where an accelerator is compared.
+
+use std::sync::Arc;
+
+use super::{reference_force::*, *};
+use crate::{
+    assembly::Transfer,
+    peridynamics::{Cloud, Ends, Factors, Law, PdBody, laws},
+    tensor::{Tensor, Vector},
+};
+
+const INTERVAL: f64 = 0.3;
+
+/// A pass of a law over a case; with `accelerated`, the fast one that it names.
+fn with_law<const D: usize, T>(
+    case: &Case<D>,
+    law: &Arc<dyn Law<D>>,
+    kinematics: Kinematics,
+    failure: Option<Failure<'_, D>>,
+    accelerated: bool,
+    run: impl FnOnce(Box<dyn BondPass<D>>) -> T,
+) -> T {
+    let points = case.position.len();
+    let cloud = Cloud {
+        position: case.position.clone(),
+        volume: case.volume.clone(),
+        horizon: vec![3.0 * H; points],
+        transfer: Transfer::new(),
+    };
+    let families = case.families.clone();
+    let linear = law.linearised();
+    let body = PdBody::new(cloud, families, linear, &Factors::Plain, Ends::Differ).unwrap();
+    let pair = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).0[k];
+    let omega = |i: usize, k: usize, _: &Vector<D>| body.kernel(i).1[k];
+    let force = match law.accelerator().filter(|_| accelerated) {
+        None => BondForce::Law { law, body: &body },
+        Some(crate::peridynamics::Accelerator::Pairwise) => {
+            BondForce::Pairwise { coefficient: &pair }
+        }
+        Some(crate::peridynamics::Accelerator::Solid { bulk, shear }) => BondForce::Solid {
+            omega: &omega,
+            bulk,
+            shear,
+        },
+    };
+    let setup = BondSetup {
+        position: &case.position,
+        volume: &case.volume,
+        families: &case.families,
+        rows: &case.rows,
+        without_energy: &[],
+        force,
+        kinematics,
+        failure,
+        precracked: None,
+        layout: Layout::List,
+        storage: Storage::Double,
+    };
+    run(bond_pass(&setup).unwrap())
+}
+
+/// Laws with a nonlinear response.
+fn laws_with_states<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
+    let all = laws::every().into_iter();
+    all.filter(|law| law.force_state().is_some()).collect()
+}
+
+fn ways<const D: usize>(law: &Arc<dyn Law<D>>) -> &'static [Kinematics] {
+    match law.force_state().is_some_and(|f| f.is_objective()) {
+        true => &[Kinematics::Exact, Kinematics::Linear],
+        false => &[Kinematics::Linear],
+    }
+}
+
+const LATER: Interval = Interval {
+    end: INTERVAL,
+    length: INTERVAL,
+};
+
+fn against_accelerators<const D: usize>(counts: [usize; D], ghosts: bool) {
+    let case = case(counts, 0.2, ghosts);
+    let points = case.position.len();
+    let n = points * D;
+    let u = noise(n, 0.1 * H, 3);
+    let no_fail: Vec<bool> = case
+        .position
+        .iter()
+        .map(|x| x[0] < 0.37 + 1.5 * H)
+        .collect();
+    for law in laws_with_states()
+        .iter()
+        .filter(|law| law.accelerator().is_some())
+    {
+        for &kinematics in ways(law) {
+            let run = |accelerated: bool| {
+                let failure = Failure {
+                    critical: CriticalStretch::Uniform(0.1),
+                    no_fail: &no_fail,
+                };
+                with_law(
+                    &case,
+                    law,
+                    kinematics,
+                    Some(failure),
+                    accelerated,
+                    |mut pass| {
+                        let mut force = vec![f64::NAN; n];
+                        pass.force_into(&u, &mut force, LATER, FailureUpdate::Frozen);
+                        let mut all = force.clone();
+                        let lost = pass.force_into(&u, &mut force, LATER, FailureUpdate::Update);
+                        all.extend(&force);
+                        let x = noise(n, H, 6);
+                        pass.tangent_into(&x, &mut force);
+                        all.extend(&force);
+                        all.extend(pass.row_sums());
+                        let mut damage = vec![0.0; points];
+                        pass.damage_into(&mut damage);
+                        let at = |i: usize| std::array::from_fn(|a| u[i * D + a]);
+                        let energies = [pass.stored_energy(&u), pass.lost_energy(&at)];
+                        (
+                            all,
+                            damage,
+                            energies,
+                            (lost, pass.broken(), pass.last_broken()),
+                        )
+                    },
+                )
+            };
+            let (found, fast) = (run(false), run(true));
+            let name = format!("{D}D {} {kinematics:?}", law.name());
+            let error = difference(&found.0, &fast.0) / largest(&fast.0);
+            assert!(error < 1e-13, "{name}: {error:e}");
+            assert!(difference(&found.1, &fast.1) < 1e-14, "{name}");
+            for (a, b) in found.2.iter().zip(&fast.2) {
+                assert!((a - b).abs() < 1e-11 * fast.2[0].abs(), "{name}: {a} {b}");
+            }
+            assert!(found.3.0 > 0, "{name}");
+            assert_eq!(found.3, fast.3, "{name}");
+        }
+    }
+}
+
+#[test]
+fn accelerators_compute_what_the_laws_say() {
+    for ghosts in [false, true] {
+        against_accelerators([40], ghosts);
+        against_accelerators([19, 11], ghosts);
+        against_accelerators([14, 7, 8], ghosts);
+    }
+}
+
+fn consistent<const D: usize>(counts: [usize; D]) {
+    let case = case(counts, 0.2, false);
+    let n = case.position.len() * D;
+    let direction = noise(n, H, 5);
+    let scaled = |s: f64| -> Vec<f64> { direction.iter().map(|x| s * x).collect() };
+    for law in laws_with_states() {
+        for &kinematics in ways(&law) {
+            with_law(&case, &law, kinematics, None, false, |mut pass| {
+                let name = format!("{D}D {} {kinematics:?}", law.name());
+                let (mut plus, mut minus, mut tangent) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+                let now = Interval::AT_ONCE;
+                pass.force_into(&scaled(1e-5), &mut plus, now, FailureUpdate::Frozen);
+                pass.force_into(&scaled(-1e-5), &mut minus, now, FailureUpdate::Frozen);
+                pass.tangent_into(&direction, &mut tangent);
+                let slope: Vec<f64> = plus
+                    .iter()
+                    .zip(&minus)
+                    .map(|(p, m)| (p - m) / 2e-5)
+                    .collect();
+                let error = difference(&slope, &tangent) / largest(&tangent);
+                assert!(error < 1e-8, "{name}: tangent at rest {error:e}");
+
+                // a strained state that is remembered
+                let u = noise(n, 0.1 * H, 8);
+                pass.force_into(&u, &mut plus, LATER, FailureUpdate::Frozen);
+                pass.commit();
+                let at = |s: f64| -> Vec<f64> {
+                    u.iter().zip(&direction).map(|(u, d)| u + s * d).collect()
+                };
+                // what is stored, and what is dissipated on the way there
+                let state = pass.damage_state();
+                let mut spent = |s: f64| {
+                    pass.force_into(&at(s), &mut minus, now, FailureUpdate::Frozen);
+                    let dissipated = pass.commit();
+                    let sum = pass.stored_energy(&at(s)) + dissipated;
+                    assert!(pass.restore_damage(&state), "{name}");
+                    sum
+                };
+                let slope = (spent(1e-5) - spent(-1e-5)) / 2e-5;
+                pass.force_into(&u, &mut plus, now, FailureUpdate::Frozen);
+                let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
+                assert!(
+                    (slope - work).abs() < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
+                    "{name}: force is no derivative of the energy, {slope} {work}"
+                );
+                balances(&case, &u, &plus, kinematics, &name);
+                row_sums_bound_rows(pass.as_ref(), n, &name);
+            });
+        }
+    }
+}
+
+#[test]
+fn tangents_forces_and_energies_of_every_law_belong_together() {
+    consistent([40]);
+    consistent([9, 8]);
+    consistent([6, 5, 6]);
+}
+
+/// Energy stored, dissipated and supplied by a load that comes, goes and turns round, in so many steps.
+fn cycle<const D: usize>(case: &Case<D>, law: &Arc<dyn Law<D>>, steps: usize) -> [f64; 3] {
+    let n = case.position.len() * D;
+    let shape = noise(n, 0.02 * H, 8);
+    with_law(case, law, Kinematics::Linear, None, false, |mut pass| {
+        let mut force = vec![0.0; n];
+        let (mut before, mut last) = (vec![0.0; n], vec![0.0; n]);
+        let (mut work, mut dissipated) = (0.0, 0.0);
+        for k in 1..=steps {
+            let time = 1.5 * k as f64 / steps as f64;
+            let size = (std::f64::consts::PI * time).sin();
+            let u: Vec<f64> = shape.iter().map(|x| x * size).collect();
+            let interval = Interval {
+                end: time,
+                length: 1.5 / steps as f64,
+            };
+            // a trial leaves no trace
+            let trial: Vec<f64> = u.iter().map(|u| 3.0 * u).collect();
+            pass.force_into(&trial, &mut force, interval, FailureUpdate::Frozen);
+            pass.force_into(&u, &mut force, interval, FailureUpdate::Frozen);
+            dissipated += pass.commit();
+            for k in 0..n {
+                work += 0.5 * (force[k] + last[k]) * (u[k] - before[k]);
+            }
+            last.copy_from_slice(&force);
+            before = u;
+        }
+        [pass.stored_energy(&before), dissipated, work]
+    })
+}
+
+#[test]
+fn work_is_stored_or_dissipated() {
+    let case = case([9, 8], 0.2, false);
+    for law in laws_with_states() {
+        let off = |steps: usize| {
+            let [stored, dissipated, work] = cycle(&case, &law, steps);
+            assert!(dissipated >= 0.0, "{}", law.name());
+            (stored + dissipated - work).abs()
+        };
+        let scale = cycle(&case, &law, 50)
+            .iter()
+            .fold(0.0f64, |m, x| m.max(x.abs()));
+        // the trapezoidal rule that adds the work up is of second order
+        let (coarse, fine) = (off(100), off(200));
+        let name = law.name();
+        assert!(fine < 1e-3 * scale, "{name}: {fine:e} of {scale:e}");
+        assert!(
+            fine < 0.3 * coarse || coarse < 1e-12 * scale,
+            "{name}: {coarse:e} {fine:e}"
+        );
+    }
+}
+
+#[test]
+fn rotations_turn_the_forces_and_histories_go_on_from_a_checkpoint() {
+    let case = case([7, 6, 8], 0.2, false);
+    let n = case.position.len() * 3;
+    let rotation = {
+        let (s, c) = 2.1f64.sin_cos();
+        Tensor::<3>::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
+            * Tensor::<3>::new(1.0, 0.0, 0.0, 0.0, 0.6, -0.8, 0.0, 0.8, 0.6)
+    };
+    let (first, u) = (noise(n, 0.1 * H, 4), noise(n, 0.1 * H, 9));
+    let mut turned = vec![0.0; n];
+    for (i, x) in case.position.iter().enumerate() {
+        let y = rotation * (x + Vector::<3>::from_column_slice(&u[3 * i..3 * i + 3])) - x;
+        turned[3 * i..3 * i + 3].copy_from_slice(y.as_slice());
+    }
+    for law in laws_with_states() {
+        if ways(&law).len() == 1 {
+            continue;
+        }
+        let begun = |state: Option<&[u64]>, u: &[f64]| {
+            with_law(&case, &law, Kinematics::Exact, None, false, |mut pass| {
+                let mut force = vec![0.0; n];
+                match state {
+                    Some(state) => assert!(pass.restore_damage(state), "{}", law.name()),
+                    None => {
+                        pass.force_into(&first, &mut force, LATER, FailureUpdate::Frozen);
+                        pass.commit();
+                    }
+                }
+                let state = pass.damage_state();
+                pass.force_into(u, &mut force, LATER, FailureUpdate::Frozen);
+                (force, state)
+            })
+        };
+        let (force, state) = begun(None, &u);
+        let (other, _) = begun(None, &turned);
+        let expected: Vec<f64> = force
+            .chunks(3)
+            .flat_map(|f| {
+                let f = rotation * Vector::<3>::from_column_slice(f);
+                [f.x, f.y, f.z]
+            })
+            .collect();
+        let error = difference(&other, &expected) / largest(&expected);
+        assert!(error < 1e-13, "{}: {error:e}", law.name());
+        assert_eq!(begun(Some(&state), &u).0, force, "{}", law.name());
+        let kept = law.force_state().is_some_and(|f| !f.history().is_empty());
+        assert_eq!(!state.is_empty(), kept, "{}", law.name());
+    }
+}

@@ -1,0 +1,574 @@
+//! The pass over a lattice: families are one stencil, and all that a bond needs of its own is its bit.
+
+use rayon::prelude::*;
+
+use super::{
+    BondPass, Kinematics,
+    lattice_simd::{Bits, Broken, CARE, FULL, Field, Task, job},
+    simd::{LANES, Source, dispatch},
+    stencil::{NONE, Stencil},
+};
+use crate::system::{FailureUpdate, Interval};
+
+/// Groups of eight points per task; a constant, so that no result depends on the number of threads.
+pub(super) const TASK: usize = 64;
+/// Cells or points per task of copying.
+const COPY: usize = 4096;
+
+/// Coefficients of the state-based law.
+pub(super) struct Solid {
+    /// `D/m` and `(D k − (D+2) μ)/m`, eight per group.
+    pub(super) dilatation: Vec<[f64; LANES]>,
+    pub(super) volumetric: Vec<[f64; LANES]>,
+    /// `D (D+2) μ/m` and `(D k − (D+2) μ) θ/m` by cell.
+    pub(super) deviatoric: Vec<f64>,
+    pub(super) pull: Vec<f64>,
+    /// Group of each eight cells.
+    pub(super) group_of: Vec<u32>,
+}
+
+/// A bond pass over a lattice: one bit per directed bond, the rest per point.
+pub(super) struct Lattice<const D: usize> {
+    pub(super) stencil: Stencil<D>,
+    /// Volume of most points.
+    pub(super) unit: f64,
+    /// Volumes by cell in parts of `unit`.
+    pub(super) volume: Vec<f64>,
+    /// Points whose bonds never fail, by cell; empty for none.
+    pub(super) no_fail: Vec<bool>,
+    pub(super) flags: Vec<u8>,
+    /// Volume of each point that wants a force, 0 for the others; empty if all do and are alike.
+    pub(super) scale: Vec<f64>,
+    /// Group times eight plus lane of each point, [`NONE`] for those without a family.
+    pub(super) place: Vec<u32>,
+    pub(super) kinematics: Kinematics,
+    pub(super) limit: f64,
+    pub(super) solid: Option<Solid>,
+    pub(super) u: [Vec<f64>; D],
+    pub(super) sums: Vec<[f64; LANES]>,
+    pub(super) reference: u64,
+    /// What the last pass broke.
+    pub(super) broken: Vec<Broken>,
+}
+
+impl<const D: usize> Lattice<D> {
+    /// Sets the flag of groups whose bits are all set.
+    pub(super) fn mark_full(&mut self) {
+        let stencil = self.stencil.offsets.len().max(1);
+        let bits = self.stencil.intact.chunks_exact(stencil);
+        for (flag, bits) in self.flags.iter_mut().zip(bits) {
+            *flag &= !FULL;
+            if bits.iter().all(|&b| b == u8::MAX) {
+                *flag |= FULL;
+            }
+        }
+    }
+
+    /// Displacements by cell.
+    fn spread(point_of: &[u32], u: &[f64], to: &mut [Vec<f64>; D]) {
+        // one component after another: each is a plain stream
+        for (a, to) in to.iter_mut().enumerate() {
+            to.par_chunks_mut(COPY)
+                .zip(point_of.par_chunks(COPY))
+                .for_each(|(to, points)| {
+                    for (to, &p) in to.iter_mut().zip(points) {
+                        if p != NONE {
+                            *to = u[p as usize * D + a];
+                        }
+                    }
+                });
+        }
+    }
+
+    fn field<'a>(&'a self, u: &'a [Vec<f64>; D], pull: &'a [f64], limit: f64) -> Field<'a, D> {
+        let groups = &self.stencil.groups;
+        let starts = (
+            groups.iter().min().map_or(0, |c| *c as usize),
+            groups.iter().max().map_or(0, |c| *c as usize),
+        );
+        let deltas = || self.stencil.offsets.iter().map(|o| o.delta).chain([0]);
+        let offsets = (deltas().min().unwrap_or(0), deltas().max().unwrap_or(0));
+        // what a law does without is never read, but any array will do
+        let source =
+            |x: &'a [f64]| Source::new(if x.is_empty() { &u[0] } else { x }, starts, offsets);
+        Field {
+            offsets: &self.stencil.offsets,
+            u: std::array::from_fn(|a| source(&u[a])),
+            volume: source(&self.volume),
+            deviatoric: source(self.solid.as_ref().map_or(&[], |s| &s.deviatoric)),
+            pull: source(pull),
+            limit,
+            no_fail: &self.no_fail,
+        }
+    }
+
+    /// One sweep over all groups with bits as they stand.
+    fn sweep<const EXACT: bool, const JOB: u8>(
+        &self,
+        field: &Field<'_, D>,
+        flags: &mut [u8],
+        sums: &mut [[f64; LANES]],
+    ) {
+        let stencil = self.stencil.offsets.len().max(1);
+        let vectors = if JOB == job::MOMENTS { 2 } else { D };
+        self.stencil
+            .groups
+            .par_chunks(TASK)
+            .zip(self.stencil.intact.par_chunks(TASK * stencil))
+            .zip(flags.par_chunks_mut(TASK))
+            .zip(sums.par_chunks_mut(TASK * vectors))
+            .for_each(|(((groups, bits), flags), sums)| {
+                dispatch(Task::<D, EXACT, JOB> {
+                    field,
+                    first: 0,
+                    groups,
+                    bits: Bits::Held(bits),
+                    flags,
+                    sums,
+                });
+            });
+    }
+
+    /// One sweep that may break bonds; returns which.
+    fn breaking_sweep<const EXACT: bool, const JOB: u8>(
+        &self,
+        field: &Field<'_, D>,
+        intact: &mut [u8],
+        flags: &mut [u8],
+        sums: &mut [[f64; LANES]],
+    ) -> Vec<Broken> {
+        let stencil = self.stencil.offsets.len().max(1);
+        let vectors = if JOB == job::MOMENTS { 2 } else { D };
+        self.stencil
+            .groups
+            .par_chunks(TASK)
+            .zip(intact.par_chunks_mut(TASK * stencil))
+            .zip(flags.par_chunks_mut(TASK))
+            .zip(sums.par_chunks_mut(TASK * vectors))
+            .enumerate()
+            .map(|(task, (((groups, bits), flags), sums))| {
+                dispatch(Task::<D, EXACT, JOB> {
+                    field,
+                    first: task * TASK,
+                    groups,
+                    bits: Bits::Breaking(bits),
+                    flags,
+                    sums,
+                })
+            })
+            // in the order of the tasks; lists without an entry take no memory
+            .reduce(Vec::new, |mut all, more| {
+                all.extend(more);
+                all
+            })
+    }
+
+    /// What the dilatations of a sweep make of `pull`.
+    fn pull_from(&self, solid: &Solid, sums: &[[f64; LANES]], pull: &mut [f64]) {
+        pull.par_chunks_mut(LANES)
+            .with_min_len(COPY / LANES)
+            .zip(&solid.group_of)
+            .filter(|(_, g)| **g != NONE)
+            .for_each(|(pull, &g)| {
+                let g = g as usize;
+                for lane in 0..LANES {
+                    let theta = solid.dilatation[g][lane] * sums[2 * g][lane];
+                    pull[lane] = solid.volumetric[g][lane] * theta;
+                }
+            });
+    }
+
+    /// Forces by point.
+    fn collect(&self, sums: &[[f64; LANES]], force: &mut [f64]) {
+        force
+            .par_chunks_mut(COPY * D)
+            .enumerate()
+            .for_each(|(chunk, force)| {
+                for (k, force) in force.chunks_exact_mut(D).enumerate() {
+                    let p = chunk * COPY + k;
+                    let scale = self.scale.get(p).copied().unwrap_or(self.unit);
+                    let place = self.place[p] as usize;
+                    for a in 0..D {
+                        force[a] = if scale == 0.0 || place == NONE as usize {
+                            0.0
+                        } else {
+                            -scale * sums[place / LANES * D + a][place % LANES]
+                        };
+                    }
+                }
+            });
+    }
+
+    fn pass<const EXACT: bool>(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        breakage: FailureUpdate,
+    ) -> u64 {
+        let mut field_u = std::mem::replace(&mut self.u, std::array::from_fn(|_| Vec::new()));
+        Self::spread(&self.stencil.point_of, u, &mut field_u);
+        let mut flags = std::mem::take(&mut self.flags);
+        let mut sums = std::mem::take(&mut self.sums);
+        let mut intact = std::mem::take(&mut self.stencil.intact);
+        let mut pull = self
+            .solid
+            .as_mut()
+            .map_or(Vec::new(), |s| std::mem::take(&mut s.pull));
+        let may_break = breakage == FailureUpdate::Update && self.limit < f64::INFINITY;
+        let limit = if may_break { self.limit } else { f64::INFINITY };
+        self.broken = {
+            let field = self.field(&field_u, &[], limit);
+            let (i, f, s) = (&mut intact, &mut flags, &mut sums);
+            match self.solid {
+                None => self.breaking_sweep::<EXACT, { job::PAIR }>(&field, i, f, s),
+                Some(_) => self.breaking_sweep::<EXACT, { job::MOMENTS }>(&field, i, f, s),
+            }
+        };
+        self.stencil.intact = intact;
+        if let Some(solid) = &self.solid {
+            self.pull_from(solid, &sums, &mut pull);
+            let field = self.field(&field_u, &pull, f64::INFINITY);
+            self.sweep::<EXACT, { job::SOLID }>(&field, &mut flags, &mut sums);
+        }
+        self.collect(&sums, force);
+        self.u = field_u;
+        self.flags = flags;
+        self.sums = sums;
+        if let Some(solid) = &mut self.solid {
+            solid.pull = pull;
+        }
+        let lanes = self.broken.iter().map(|b| u64::from(b.lanes.count_ones()));
+        lanes.sum()
+    }
+
+    fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
+        let mut field_u = std::array::from_fn(|_| vec![0.0; self.stencil.point_of.len()]);
+        Self::spread(&self.stencil.point_of, u, &mut field_u);
+        let mut flags = self.flags.clone();
+        let mut sums = vec![[0.0; LANES]; self.stencil.groups.len() * 2];
+        let field = self.field(&field_u, &[], f64::INFINITY);
+        self.sweep::<EXACT, { job::MOMENTS }>(&field, &mut flags, &mut sums);
+        let mut energy = 0.0;
+        for (p, &place) in self.place.iter().enumerate() {
+            let volume = self.scale.get(p).copied().unwrap_or(self.unit);
+            if place == NONE || volume == 0.0 {
+                continue;
+            }
+            let (g, lane) = (place as usize / LANES, place as usize % LANES);
+            let (first, second) = (sums[2 * g][lane], sums[2 * g + 1][lane]);
+            energy += volume
+                * match &self.solid {
+                    // half of ½ (2 p r²) e² V_i V_j
+                    None => 0.25 * second,
+                    Some(s) => {
+                        let d = s.dilatation[g][lane];
+                        let theta = d * first;
+                        let bulk = if d == 0.0 {
+                            0.0
+                        } else {
+                            s.volumetric[g][lane] / d
+                        };
+                        let cell = self.stencil.groups[g] as usize + lane;
+                        0.5 * (bulk * theta * theta + s.deviatoric[cell] * second)
+                    }
+                };
+        }
+        energy
+    }
+
+    /// The cell of a point in a group.
+    fn cell(&self, p: usize) -> Option<usize> {
+        let place = self.place[p];
+        (place != NONE).then(|| {
+            let place = place as usize;
+            self.stencil.groups[place / LANES] as usize + place % LANES
+        })
+    }
+
+    /// Calls `f(offset, neighbour's cell)` for the standing bonds of lane `lane` of group `g`.
+    #[inline(always)]
+    pub(super) fn each(&self, bits: &[u8], g: usize, lane: usize, mut f: impl FnMut(usize, usize)) {
+        let stencil = self.stencil.offsets.len();
+        let cell = self.stencil.groups[g] as usize + lane;
+        for (o, bits) in bits[g * stencil..(g + 1) * stencil].iter().enumerate() {
+            if bits >> lane & 1 == 1 {
+                f(o, (cell as isize + self.stencil.offsets[o].delta) as usize);
+            }
+        }
+    }
+}
+
+pub(super) fn ones(bits: &[u8]) -> u64 {
+    bits.par_chunks(COPY)
+        .map(|c| c.iter().map(|b| u64::from(b.count_ones())).sum::<u64>())
+        .sum()
+}
+
+impl<const D: usize> BondPass<D> for Lattice<D> {
+    fn points(&self) -> usize {
+        self.place.len()
+    }
+
+    fn name(&self) -> &'static str {
+        "lattice"
+    }
+
+    fn bonds(&self) -> u64 {
+        self.reference
+    }
+
+    fn force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        _interval: Interval,
+        breakage: FailureUpdate,
+    ) -> u64 {
+        match self.kinematics {
+            Kinematics::Exact => self.pass::<true>(u, force, breakage),
+            Kinematics::Linear => self.pass::<false>(u, force, breakage),
+        }
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        let mut field_x = std::array::from_fn(|_| vec![0.0; self.stencil.point_of.len()]);
+        Self::spread(&self.stencil.point_of, x, &mut field_x);
+        // linear bonds need no care
+        let mut flags: Vec<u8> = self.flags.iter().map(|f| f & !CARE).collect();
+        let mut sums = vec![[0.0; LANES]; self.sums.len()];
+        match &self.solid {
+            None => {
+                let field = self.field(&field_x, &[], f64::INFINITY);
+                self.sweep::<false, { job::PAIR }>(&field, &mut flags, &mut sums);
+            }
+            Some(solid) => {
+                let field = self.field(&field_x, &[], f64::INFINITY);
+                self.sweep::<false, { job::MOMENTS }>(&field, &mut flags, &mut sums);
+                let mut pull = vec![0.0; self.stencil.point_of.len()];
+                self.pull_from(solid, &sums, &mut pull);
+                let field = self.field(&field_x, &pull, f64::INFINITY);
+                self.sweep::<false, { job::SOLID }>(&field, &mut flags, &mut sums);
+            }
+        }
+        self.collect(&sums, y);
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        let bits = &self.stencil.intact;
+        let offsets = &self.stencil.offsets;
+        // by cell: Σ_l |∂θ/∂u_l|
+        let mut dilatations = vec![
+            0.0;
+            if self.solid.is_some() {
+                self.u[0].len()
+            } else {
+                0
+            }
+        ];
+        if let Some(solid) = &self.solid {
+            dilatations
+                .par_chunks_mut(LANES)
+                .zip(&solid.group_of)
+                .filter(|(_, g)| **g != NONE)
+                .for_each(|(to, &g)| {
+                    for lane in 0..LANES {
+                        let (mut own, mut others) = ([0.0; D], 0.0);
+                        self.each(bits, g as usize, lane, |o, there| {
+                            let w = offsets[o].weight * self.volume[there];
+                            for (own, x) in own.iter_mut().zip(offsets[o].xi) {
+                                *own += w * x;
+                                others += (w * x).abs();
+                            }
+                        });
+                        to[lane] = (others + own.iter().map(|x| x.abs()).sum::<f64>())
+                            * solid.dilatation[g as usize][lane];
+                    }
+                });
+        }
+        let mut result = vec![0.0; self.points() * D];
+        result
+            .par_chunks_exact_mut(D)
+            .with_min_len(TASK)
+            .enumerate()
+            .for_each(|(p, row)| {
+                let volume = self.scale.get(p).copied().unwrap_or(self.unit);
+                if self.place[p] == NONE || volume == 0.0 {
+                    return;
+                }
+                let (g, lane) = (
+                    self.place[p] as usize / LANES,
+                    self.place[p] as usize % LANES,
+                );
+                let here = self.stencil.groups[g] as usize + lane;
+                let (mut own, mut first) = ([[0.0; D]; D], [0.0; D]);
+                self.each(bits, g, lane, |o, there| {
+                    let o = &offsets[o];
+                    let w = o.weight * self.volume[there] * volume;
+                    let mut stiffness = w / o.square;
+                    if let Some(s) = &self.solid {
+                        stiffness *= s.deviatoric[here] + s.deviatoric[there];
+                    }
+                    for a in 0..D {
+                        for b in 0..D {
+                            let k = stiffness * o.xi[a] * o.xi[b];
+                            own[a][b] += k;
+                            row[a] += k.abs();
+                        }
+                        if let Some(s) = &self.solid {
+                            first[a] += w * o.xi[a];
+                            let g = s.group_of[there / LANES];
+                            if g != NONE {
+                                let modulus = s.volumetric[g as usize][there % LANES];
+                                row[a] += (w * o.xi[a] * modulus).abs() * dilatations[there];
+                            }
+                        }
+                    }
+                });
+                for a in 0..D {
+                    row[a] += own[a].iter().map(|k| k.abs()).sum::<f64>();
+                    if let Some(s) = &self.solid {
+                        row[a] += (first[a] * s.volumetric[g][lane]).abs() * dilatations[here];
+                    }
+                }
+            });
+        result
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        match self.kinematics {
+            Kinematics::Exact => self.energy::<true>(u),
+            Kinematics::Linear => self.energy::<false>(u),
+        }
+    }
+
+    fn damage_into(&self, damage: &mut [f64]) {
+        damage
+            .par_iter_mut()
+            .with_min_len(TASK)
+            .enumerate()
+            .for_each(|(p, damage)| {
+                *damage = 0.0;
+                // most points are whole, which their group's words say at once
+                if !self.is_damaged(p) {
+                    return;
+                }
+                let (g, lane) = (
+                    self.place[p] as usize / LANES,
+                    self.place[p] as usize % LANES,
+                );
+                let (mut all, mut left) = (0.0, 0.0);
+                self.each(&self.stencil.reference, g, lane, |_, there| {
+                    all += self.volume[there]
+                });
+                self.each(&self.stencil.intact, g, lane, |_, there| {
+                    left += self.volume[there]
+                });
+                if left != all {
+                    *damage = 1.0 - left / all;
+                }
+            });
+    }
+
+    fn is_damaged(&self, i: usize) -> bool {
+        let place = self.place[i];
+        if place == NONE {
+            return false;
+        }
+        let (group, lane) = (place as usize / LANES, place as usize % LANES);
+        let count = self.stencil.offsets.len();
+        let of_group = group * count..(group + 1) * count;
+        let now = &self.stencil.intact[of_group.clone()];
+        let then = &self.stencil.reference[of_group];
+        now != then && now.iter().zip(then).any(|(a, b)| (a ^ b) >> lane & 1 == 1)
+    }
+
+    fn broken(&self) -> u64 {
+        self.reference - ones(&self.stencil.intact)
+    }
+
+    fn last_broken(&self) -> Vec<(u32, u32)> {
+        let point = |cell: usize| self.stencil.point_of[cell];
+        let last = self.last().into_iter();
+        last.map(|(g, lane, offset)| {
+            let cell = self.stencil.groups[g] as usize + lane;
+            let there = cell as isize + self.stencil.offsets[offset].delta;
+            (point(cell), point(there as usize))
+        })
+        .collect()
+    }
+
+    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        match self.kinematics {
+            Kinematics::Exact => self.lost::<true>(at),
+            Kinematics::Linear => self.lost::<false>(at),
+        }
+    }
+
+    fn bonded(&self, i: usize, j: usize) -> bool {
+        let Some(here) = self.cell(i) else {
+            return false;
+        };
+        let offsets = &self.stencil.offsets;
+        let g = self.place[i] as usize / LANES;
+        let Some(there) = self.cell(j) else {
+            // a point without a family, in elements: it has a cell, but no place
+            let mut is_bonded = false;
+            self.each(&self.stencil.intact, g, here % LANES, |_, cell| {
+                is_bonded |= self.stencil.point_of[cell] == j as u32;
+            });
+            return is_bonded;
+        };
+        let delta = there as isize - here as isize;
+        // a flat distance is that of one step only: rows are padded by the reach of the stencil
+        offsets
+            .iter()
+            .position(|o| o.delta == delta)
+            .is_some_and(|o| self.stencil.intact[g * offsets.len() + o] >> (here % LANES) & 1 == 1)
+    }
+
+    fn damage_state(&self) -> Vec<u64> {
+        if self.limit == f64::INFINITY {
+            return Vec::new();
+        }
+        super::pack(&self.stencil.intact, self.reference)
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        if self.limit == f64::INFINITY {
+            return state.is_empty();
+        }
+        let whole = super::unpack(state, self.reference, &mut self.stencil.intact);
+        self.mark_full();
+        whole
+    }
+
+    fn commit(&mut self) -> f64 {
+        0.0
+    }
+
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    fn force_states(&self) -> Option<&dyn super::ForceStates<D>> {
+        None
+    }
+
+    fn memory_bytes(&self) -> usize {
+        let numbers = self.u.iter().map(Vec::len).sum::<usize>()
+            + self.volume.len()
+            + self.scale.len()
+            + self.sums.len() * LANES;
+        let s = &self.stencil;
+        let solid = self.solid.as_ref().map_or(0, |s| {
+            16 * LANES * s.dilatation.len() + 16 * s.pull.len() + 4 * s.group_of.len()
+        });
+        8 * numbers
+            + solid
+            + 4 * (s.point_of.len() + s.groups.len() + self.place.len())
+            + s.reference.len()
+            + s.intact.len()
+            + self.no_fail.len()
+            + self.flags.len()
+    }
+}

@@ -1,0 +1,207 @@
+//! Bond passes: the internal force of a peridynamic body as one threaded sweep over its bonds, with damage at one bit per directed bond.
+//!
+//! | file | what |
+//! |---|---|
+//! | `force_problem.rs` | what a pass is made from, and the errors |
+//! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
+//! | `breaks.rs` | energy of the bonds that a pass broke |
+//! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
+//! | `bond_list.rs` | neighbour lists with what their pass reads |
+//! | `list.rs`, `list_simd.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
+//! | `compressed_list.rs` | neighbours and weights of a list in few bytes |
+//! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
+//! | `lattice_setup.rs` | how that one is made |
+//! | `stencil.rs` | the lattice's padded box, its offsets and bits |
+//! | `lattice_simd.rs` | the inner loops of the lattice pass |
+//! | `simd.rs` | eight numbers at a time, by the machine's widest instructions |
+//! | `reference_force.rs`, `tests.rs` | passes against a plain double loop |
+//!
+//! A bond is seen through `t = (2 ξ·η + η·η)/r²`, so that `|ξ + η| = r √(1 + t)`: no length is ever the difference of two long ones, and the stretch
+//! `s = √(1 + t) − 1` exceeds `s_c` exactly where `t > s_c (2 + s_c)`, without a root. Both ends of a bond compute the same `t` from the same numbers,
+//! hence break together without telling each other. Every method gives the same bits for any number of threads.
+
+pub(crate) mod bond_list;
+mod breaks;
+mod compressed_list;
+mod force_problem;
+mod generic;
+mod generic_tangent;
+#[cfg(test)]
+mod generic_tests;
+mod lattice;
+mod lattice_setup;
+mod lattice_simd;
+mod list;
+mod list_simd;
+#[cfg(test)]
+mod reference_force;
+mod simd;
+mod stencil;
+mod stretch;
+#[cfg(test)]
+mod tests;
+
+pub use force_problem::{
+    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Kinematics, Layout,
+    Storage,
+};
+
+pub use stencil::BlockSetup;
+
+pub(crate) use list::{extension, ratio, stretched};
+
+use crate::system::{FailureUpdate, Interval};
+use crate::tensor::Tensor;
+
+/// One sweep over the bonds of a cloud.
+///
+/// Shapes: `u`, `force`, `x`, `y` and the row sums have `D` numbers per point of the cloud, `damage` one. Units: \[m\], \[N\] (per area of a bar of unit
+/// section in 1D, per thickness in 2D).
+pub trait BondPass<const D: usize>: Send + Sync {
+    /// Number of points of the cloud.
+    fn points(&self) -> usize;
+
+    /// Which pass this is, in a word: `list` or `lattice`.
+    fn name(&self) -> &'static str;
+
+    /// Directed bonds of the reference families.
+    fn bonds(&self) -> u64;
+
+    /// Overwrites `force` with the internal force `F(u, t, Δt)` (`K u` of a linear body, so minus the force that acts on the point), volume included; zero for points without a row.
+    /// Returns how many directed bonds this pass broke.
+    fn force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        breakage: FailureUpdate,
+    ) -> u64;
+
+    /// Ends the interval of the last call of [`BondPass::force_into`]: its history is the past of the next. Returns the energy that points with rows dissipated in it \[J\].
+    fn commit(&mut self) -> f64;
+
+    /// Whether there is a history.
+    fn remembers(&self) -> bool;
+
+    /// `y = K x` with the tangent `K` at rest and bonds as they stand; zero for points without a row.
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]);
+
+    /// Per unknown an upper bound of `Σ |K_ab|` over the points of the cloud, with bonds as they stand; zero for points without a row.
+    fn row_sums(&self) -> Vec<f64>;
+
+    /// Energy stored at the points with rows \[J\]; of each bond, half belongs to each end.
+    fn stored_energy(&self, u: &[f64]) -> f64;
+
+    /// Overwrites `damage` with `1 − Σ_intact V / Σ V` of every point; zero where there is no family.
+    fn damage_into(&self, damage: &mut [f64]);
+
+    /// Whether a bond of point `i` is broken.
+    fn is_damaged(&self, i: usize) -> bool;
+
+    /// Directed bonds of the reference families that are broken.
+    fn broken(&self) -> u64;
+
+    /// Directed bonds that the last pass broke, as a point and its neighbour, in a fixed order.
+    fn last_broken(&self) -> Vec<(u32, u32)>;
+
+    /// What the points with rows would store less at the displacement `at` of each point, for the bonds that the last pass broke:
+    /// their energy before less that after, all of these bonds removed at once \[J\]. Of a state-based law that is the change of dilatations too.
+    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64;
+
+    /// Whether a bond of the reference families joins points `i` and `j`, both with a family, and stands; contact leaves such pairs to their bond.
+    fn bonded(&self, i: usize, j: usize) -> bool;
+
+    /// The bits that say which bonds stand.
+    fn damage_state(&self) -> Vec<u64>;
+
+    /// Puts back what [`BondPass::damage_state`] gave; false, and nothing changed, if it belongs to another pass.
+    fn restore_damage(&mut self, state: &[u64]) -> bool;
+
+    /// The force states that it computes one by one, for what is told of them; none of an accelerator.
+    fn force_states(&self) -> Option<&dyn ForceStates<D>>;
+
+    /// Bytes that the pass holds.
+    fn memory_bytes(&self) -> usize;
+}
+
+/// What force states tell of a body.
+pub trait ForceStates<const D: usize> {
+    /// The partial stress `Σ T⟨ξ⟩ ⊗ ξ V` of a point at the displacements `u` \[Pa\], [SAND2015-7998] eq. (2.19), by its intact bonds; `u` has `D` numbers per point.
+    fn partial_stress(&self, point: usize, u: &[f64]) -> Tensor<D>;
+
+    /// Number of bonds of a point's family.
+    fn family_size(&self, point: usize) -> usize;
+
+    /// What points remember, by name: one number per point.
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)>;
+}
+
+/// The pass that suits the setup: over the lattice where the points fill one, over lists otherwise.
+///
+/// # Errors
+/// [`KernelError`] if lists do not belong together, if a bond does not weigh the same from both ends, or if the lattice pass was asked for where there is no lattice.
+pub fn bond_pass<const D: usize>(
+    setup: &BondSetup<'_, D>,
+) -> Result<Box<dyn BondPass<D>>, KernelError> {
+    setup.check_lists()?;
+    if let BondForce::Law { law, body } = setup.force {
+        setup.check_bonds()?;
+        let states = law
+            .force_state()
+            .ok_or(KernelError::FirstOrder { law: law.name() })?;
+        return Ok(Box::new(generic::Generic::new(setup, law, states, body)));
+    }
+    let mut why = None;
+    if setup.layout != Layout::List {
+        match lattice::Lattice::new(setup) {
+            Ok(pass) => return Ok(Box::new(pass)),
+            Err(reason) => why = Some(reason),
+        }
+    }
+    // a lattice has looked at its bonds by offsets; what stands against one may be a fault
+    setup.check_bonds()?;
+    match why {
+        Some(why) if setup.layout == Layout::Lattice => Err(KernelError::NoLattice { why }),
+        _ => Ok(Box::new(bond_list::List::new(setup))),
+    }
+}
+
+/// The pass of a full block of a lattice, without lists on the way.
+///
+/// # Errors
+/// [`KernelError::NoLattice`] if its box is too large to be numbered.
+pub fn block_pass<const D: usize>(
+    setup: &BlockSetup<'_, D>,
+) -> Result<Box<dyn BondPass<D>>, KernelError> {
+    match lattice::Lattice::block(setup) {
+        Ok(pass) => Ok(Box::new(pass)),
+        Err(why) => Err(KernelError::NoLattice { why }),
+    }
+}
+
+/// The instruction set that passes run with on this machine; results do not depend on it.
+pub fn instructions() -> &'static str {
+    simd::instructions()
+}
+
+/// Bits as words, with a last word by which [`unpack`] knows them.
+pub(crate) fn pack(bits: &[u8], reference: u64) -> Vec<u64> {
+    let word = |c: &[u8]| {
+        let mut word = [0; 8];
+        word[..c.len()].copy_from_slice(c);
+        u64::from_le_bytes(word)
+    };
+    bits.chunks(8).map(word).chain([reference]).collect()
+}
+
+/// Bits from words; false, and nothing changed, if they are not what [`pack`] gave for as many bits and bonds.
+pub(crate) fn unpack(state: &[u64], reference: u64, bits: &mut [u8]) -> bool {
+    let words = bits.len().div_ceil(8);
+    if state.len() != words + 1 || state[words] != reference {
+        return false;
+    }
+    for (bits, word) in bits.chunks_mut(8).zip(state) {
+        bits.copy_from_slice(&word.to_le_bytes()[..bits.len()]);
+    }
+    true
+}

@@ -1,0 +1,544 @@
+//! A lattice of points in a padded box, and its families as one stencil.
+
+use super::{BondSetup, force_problem::ENDS, simd::LANES};
+use crate::{peridynamics::offset_table::OffsetTable, tensor::Vector};
+use rayon::prelude::*;
+
+/// Largest distance of a point from its lattice site, and of a weight from that of its offset, in parts of the spacing and of the weight.
+const TOLERANCE: f64 = 1e-9;
+
+/// Cells of the box per point, and lanes per point with a family, above which lists are better.
+const SPARSEST_BOX: usize = 12;
+const SPARSEST_LANES: usize = 3;
+
+/// Steps of the box around the longest bond above which lists are better.
+const MOST_STEPS: f64 = 1e6;
+
+/// Rows and groups of eight of a tile: two to three tiles' width of 2m + 1 planes stay in the second-level cache.
+const TILE_ROWS: usize = 16;
+const TILE_GROUPS: usize = 32;
+
+/// No cell, point or group.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// One bond of the stencil.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Offset<const D: usize> {
+    /// From a cell to its neighbour in the flat box.
+    pub delta: isize,
+    /// ξ.
+    pub xi: [f64; D],
+    /// 2 ξ, and 2 ξ/r².
+    pub twice: [f64; D],
+    pub slope: [f64; D],
+    /// r², 1/r².
+    pub square: f64,
+    pub inverse: f64,
+    /// `2 p r² V` or `ω V` with the lattice's own V, and that times r².
+    pub weight: f64,
+    pub moment: f64,
+    /// Value of `t` beyond which the bond breaks.
+    pub limit: f64,
+}
+
+impl<const D: usize> Offset<D> {
+    /// The bond to the neighbour `steps` away.
+    pub(super) fn new(
+        steps: [i32; D],
+        spacing: [f64; D],
+        delta: isize,
+        weight: f64,
+        limit: f64,
+    ) -> Self {
+        let xi: [f64; D] = std::array::from_fn(|a| f64::from(steps[a]) * spacing[a]);
+        let square: f64 = xi.iter().map(|x| x * x).sum();
+        Self {
+            delta,
+            xi,
+            twice: xi.map(|x| 2.0 * x),
+            slope: xi.map(|x| 2.0 * x / square),
+            square,
+            inverse: 1.0 / square,
+            weight,
+            moment: weight * square,
+            limit,
+        }
+    }
+}
+
+/// The box: cells in rows along x, each padded to whole groups of eight and to the reach of the stencil.
+#[derive(Clone, Debug)]
+pub(super) struct Box3 {
+    pub counts: [usize; 3],
+    /// Cells from row to row and from plane to plane.
+    pub row: usize,
+    pub plane: usize,
+    /// Cell of site (0, 0, 0), a multiple of eight.
+    pub first: usize,
+    /// Cells in all.
+    pub cells: usize,
+}
+
+impl Box3 {
+    pub(super) fn new(counts: [usize; 3], reach: [usize; 3]) -> Self {
+        // the padding of one row is that of the next one, too; odd multiples of eight cells keep rows and planes from falling on the same cache sets
+        let odd = |n: usize| n.div_ceil(LANES) | 1;
+        let row = odd(counts[0].next_multiple_of(LANES) + reach[0]) * LANES;
+        let rows = (counts[1] + reach[1]) | 1;
+        let plane = row * rows;
+        let before = reach[2] * plane + reach[1] * row + reach[0].next_multiple_of(LANES);
+        Self {
+            counts,
+            row,
+            plane,
+            first: before,
+            cells: before + counts[2] * plane + reach[2] * plane + reach[1] * row + row,
+        }
+    }
+
+    pub(super) fn cell(&self, site: [usize; 3]) -> usize {
+        self.first + site[2] * self.plane + site[1] * self.row + site[0]
+    }
+
+    /// The aligned cells of eight sites along x each, tile by tile, along the slowest axis first within a tile.
+    fn groups(&self) -> impl Iterator<Item = usize> + '_ {
+        let across = self.counts[0].div_ceil(LANES);
+        // in the plane, y is the slowest axis and tiles are columns
+        let tile_rows = if self.counts[2] > 1 {
+            TILE_ROWS
+        } else {
+            self.counts[1]
+        };
+        (0..self.counts[1])
+            .step_by(tile_rows.max(1))
+            .flat_map(move |y0| {
+                (0..across).step_by(TILE_GROUPS).flat_map(move |g0| {
+                    (0..self.counts[2]).flat_map(move |z| {
+                        (y0..(y0 + tile_rows).min(self.counts[1])).flat_map(move |y| {
+                            (g0..(g0 + TILE_GROUPS).min(across))
+                                .map(move |g| self.cell([g * LANES, y, z]))
+                        })
+                    })
+                })
+            })
+    }
+}
+
+/// Points in a box, groups of eight of those with families, and the stencil.
+pub(super) struct Stencil<const D: usize> {
+    pub offsets: Vec<Offset<D>>,
+    /// Point in each cell, [`NONE`] if none.
+    pub point_of: Vec<u32>,
+    /// First cell of each group, in the order of the sweep.
+    pub groups: Vec<u32>,
+    /// Eight per group and offset: bonds of the reference families.
+    pub reference: Vec<u8>,
+    /// Those that stand.
+    pub intact: Vec<u8>,
+}
+
+/// Sites of points on a lattice found from bond vectors.
+struct Sites<const D: usize> {
+    spacing: [f64; D],
+    site: Vec<[i32; D]>,
+    counts: [usize; 3],
+}
+
+fn sites<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Sites<D>, String> {
+    let points = setup.position.len();
+    let mut spacing = [f64::INFINITY; D];
+    let Some(longest) = (0..points).max_by_key(|&i| setup.families.of(i).len()) else {
+        return Err("there are no points".into());
+    };
+    for &j in setup.families.of(longest) {
+        let xi = setup.bond(longest, j as usize);
+        for a in 0..D {
+            if xi[a].abs() > 1e-6 * xi.norm() {
+                spacing[a] = spacing[a].min(xi[a].abs());
+            }
+        }
+    }
+    if spacing.iter().any(|h| !h.is_finite()) {
+        return Err("no family spans all directions".into());
+    }
+    let mut low = Vector::<D>::repeat(f64::INFINITY);
+    let mut high = -low;
+    for x in setup.position {
+        low = low.inf(x);
+        high = high.sup(x);
+    }
+    // the spacing from the whole extent: its digits are better than those of one bond
+    let mut counts = [1usize; 3];
+    for a in 0..D {
+        let steps = ((high[a] - low[a]) / spacing[a]).round();
+        if steps > 1e6 {
+            return Err("it would have more than a million sites along an axis".into());
+        }
+        counts[a] = steps as usize + 1;
+        if steps > 0.0 {
+            spacing[a] = (high[a] - low[a]) / steps;
+        }
+    }
+    let mut site = Vec::with_capacity(points);
+    for (i, x) in setup.position.iter().enumerate() {
+        let mut s = [0i32; D];
+        for a in 0..D {
+            let steps = (x[a] - low[a]) / spacing[a];
+            s[a] = steps.round() as i32;
+            // what the coordinate's own digits allow is enough, too
+            let digits = 4.0 * f64::EPSILON * (x[a].abs() + low[a].abs()) / spacing[a];
+            if (steps - steps.round()).abs() > TOLERANCE.max(digits) {
+                return Err(format!("point {i} lies off it"));
+            }
+        }
+        site.push(s);
+    }
+    Ok(Sites {
+        spacing,
+        site,
+        counts,
+    })
+}
+
+/// Points of which a task looks at the bonds, at least, and tasks at most: each has a table.
+const POINTS: usize = 1024;
+const TASKS: usize = 64;
+
+/// Part of [`ENDS`] by which like bonds may differ for their ends to be known alike without a look at each: a bond and its reverse are five comparisons apart.
+const ALIKE: f64 = 0.2 * ENDS;
+
+/// Whether weights and limits of two bonds differ by more than a part of them.
+fn differs((w, l): (f64, f64), (weight, limit): (f64, f64), part: f64) -> bool {
+    (w - weight).abs() > part * w.abs() || (l != limit && (l - limit).abs() > part * l.abs())
+}
+
+/// Weights and limits of the bonds of a lattice.
+struct Numbers<const D: usize> {
+    by_steps: OffsetTable<(f64, f64), D>,
+    /// Whether all of them differ so little that no bond differs between its ends.
+    are_alike: bool,
+}
+
+/// Weight and limit of each bond that occurs, by its steps; or why bonds of the same steps differ.
+fn numbers<const D: usize>(
+    setup: &BondSetup<'_, D>,
+    points: usize,
+    step: impl Fn(usize, u32) -> [i32; D] + Sync,
+) -> Result<Numbers<D>, String> {
+    let reach = (0..points)
+        .into_par_iter()
+        .with_min_len(POINTS)
+        .map(|i| {
+            let family = setup.families.of(i).iter();
+            let farthest = |&j: &u32| step(i, j).into_iter().map(i32::abs).max();
+            family.filter_map(farthest).max().unwrap_or(0)
+        })
+        .max()
+        .unwrap_or(0);
+    if f64::from(2 * reach + 1).powi(D as i32) > MOST_STEPS {
+        return Err(format!("a bond takes {reach} steps of it"));
+    }
+    let fault = |i: usize, j: u32| {
+        format!("the bond of points {i} and {j} weighs other than its like elsewhere")
+    };
+    // tasks of fixed size, joined in order: the first point with a bond gives its numbers, for any number of threads
+    let size = POINTS.max(points.div_ceil(TASKS));
+    let parts: Vec<_> = (0..points.div_ceil(size))
+        .into_par_iter()
+        .map(|task| {
+            let (mut found, mut are_alike) = (OffsetTable::empty(reach), true);
+            for i in task * size..((task + 1) * size).min(points) {
+                for (k, &j) in setup.families.of(i).iter().enumerate() {
+                    let xi = setup.bond(i, j as usize);
+                    let own = (setup.weight(i, k, &xi), setup.limit(i, k, &xi));
+                    let Some(known) = found.slot(&step(i, j)) else {
+                        continue;
+                    };
+                    let (known, ..) = *known.get_or_insert((own, i, j));
+                    if differs(known, own, TOLERANCE) {
+                        return Err(fault(i, j));
+                    }
+                    are_alike &= !differs(known, own, ALIKE);
+                }
+            }
+            Ok((found, are_alike))
+        })
+        .collect::<Result<_, _>>()?;
+    let (mut all, mut are_alike) = (OffsetTable::empty(reach), true);
+    for (part, are) in parts {
+        are_alike &= are;
+        for (steps, (own, i, j)) in part.known() {
+            let Some(known) = all.slot(&steps) else {
+                continue;
+            };
+            let known = *known.get_or_insert(own);
+            if differs(known, own, TOLERANCE) {
+                return Err(fault(i, j));
+            }
+            are_alike &= !differs(known, own, ALIKE);
+        }
+    }
+    let back = |steps: &[i32; D]| all.of(&steps.map(|s| -s));
+    are_alike &= all
+        .known()
+        .all(|(steps, own)| back(&steps).is_none_or(|other| !differs(other, own, ALIKE)));
+    Ok(Numbers {
+        by_steps: all,
+        are_alike,
+    })
+}
+
+impl<const D: usize> Stencil<D> {
+    /// The stencil of a cloud, or why it has none.
+    pub(super) fn new(setup: &BondSetup<'_, D>, volume: f64) -> Result<Self, String> {
+        let Sites {
+            spacing,
+            site,
+            counts,
+        } = sites(setup)?;
+        let step = |i: usize, j: u32| -> [i32; D] {
+            std::array::from_fn(|a| site[j as usize][a] - site[i][a])
+        };
+        let Numbers {
+            by_steps: found,
+            are_alike,
+        } = numbers(setup, site.len(), step)?;
+        if !are_alike {
+            setup.check_bonds().map_err(|fault| fault.to_string())?;
+        }
+        let mut steps: Vec<[i32; D]> = found.known().map(|(s, _)| s).collect();
+        // by the flat offset; the numbers of an offset and its opposite are one
+        steps.sort_unstable_by_key(|s| {
+            let mut reversed = *s;
+            reversed.reverse();
+            reversed
+        });
+        let mut reach = [0usize; 3];
+        for s in &steps {
+            for a in 0..D {
+                reach[a] = reach[a].max(s[a].unsigned_abs() as usize);
+            }
+        }
+        let cells = Box3::new(counts, reach);
+        let points = site.len();
+        if cells.cells > SPARSEST_BOX * points + 100_000 || cells.cells >= NONE as usize {
+            return Err(format!(
+                "its box has {} cells for {points} points",
+                cells.cells
+            ));
+        }
+        let offsets: Vec<Offset<D>> = steps
+            .iter()
+            .map(|s| {
+                let mirror = s.map(|s| -s);
+                let key = if *s < mirror { *s } else { mirror };
+                let (weight, limit) = found.of(&key).or(found.of(s)).unwrap_or_default();
+                Offset::new(*s, spacing, cells.delta(s), weight * volume, limit)
+            })
+            .collect();
+        let number = |(o, s): (usize, &[i32; D])| (*s, o);
+        let position = OffsetTable::new(&steps.iter().enumerate().map(number).collect::<Vec<_>>());
+        let mut point_of = vec![NONE; cells.cells];
+        for (i, s) in site.iter().enumerate() {
+            let cell = cells.cell(std::array::from_fn(
+                |a| if a < D { s[a] as usize } else { 0 },
+            ));
+            if point_of[cell] != NONE {
+                return Err(format!("points {} and {i} lie on one site", point_of[cell]));
+            }
+            point_of[cell] = i as u32;
+        }
+        let with_family = |p: u32| p != NONE && !setup.families.of(p as usize).is_empty();
+        let groups: Vec<u32> = cells
+            .groups()
+            .filter(|&c| point_of[c..c + LANES].iter().any(|&p| with_family(p)))
+            .map(|c| c as u32)
+            .collect();
+        let rows = (0..points as u32).filter(|&p| with_family(p)).count();
+        if groups.len() * LANES > SPARSEST_LANES * rows + 10_000 {
+            return Err(format!(
+                "{rows} points with families would take {} places",
+                groups.len() * LANES
+            ));
+        }
+        let stencil = offsets.len();
+        let mut reference = vec![0u8; groups.len() * stencil];
+        let mut intact = reference.clone();
+        reference
+            .par_chunks_mut(stencil.max(1))
+            .zip(intact.par_chunks_mut(stencil.max(1)))
+            .zip(&groups)
+            .for_each(|((reference, intact), &cell)| {
+                for lane in 0..LANES {
+                    let i = point_of[cell as usize + lane];
+                    if !with_family(i) {
+                        continue;
+                    }
+                    let i = i as usize;
+                    for &j in setup.families.of(i) {
+                        let Some(o) = position.of(&step(i, j)) else {
+                            continue;
+                        };
+                        reference[o] |= 1 << lane;
+                        if !setup.precracked.is_some_and(|cut| cut(i, j as usize)) {
+                            intact[o] |= 1 << lane;
+                        }
+                    }
+                }
+            });
+        let stencil = Self {
+            offsets,
+            point_of,
+            groups,
+            reference,
+            intact,
+        };
+        let mirror: Vec<Option<usize>> =
+            steps.iter().map(|s| position.of(&s.map(|s| -s))).collect();
+        match stencil.has_one_sided(&mirror, with_family) {
+            true => Err("a bond stands in one family only".into()),
+            false => Ok(stencil),
+        }
+    }
+
+    /// Whether a bond lacks its reverse, where the point at its other end has a family; `mirror` is the offset opposite to each.
+    fn has_one_sided(
+        &self,
+        mirror: &[Option<usize>],
+        with_family: impl Fn(u32) -> bool + Sync,
+    ) -> bool {
+        let count = self.offsets.len();
+        let mut group_of = vec![NONE; self.point_of.len().div_ceil(LANES)];
+        for (g, &cell) in self.groups.iter().enumerate() {
+            group_of[cell as usize / LANES] = g as u32;
+        }
+        let stands = |cell: usize, offset: usize| match group_of[cell / LANES] {
+            NONE => false,
+            g => self.reference[g as usize * count + offset] >> (cell % LANES) & 1 == 1,
+        };
+        let is_one_sided = |here: usize, bits: &[u8]| {
+            let offsets = bits.iter().zip(&self.offsets).zip(mirror);
+            offsets.into_iter().any(|((&bits, offset), mirror)| {
+                (0..LANES).filter(|l| bits >> l & 1 == 1).any(|lane| {
+                    let there = ((here + lane) as isize + offset.delta) as usize;
+                    with_family(self.point_of[there])
+                        && !mirror.is_some_and(|back| stands(there, back))
+                })
+            })
+        };
+        self.reference
+            .par_chunks(count.max(1))
+            .zip(&self.groups)
+            .any(|(bits, &cell)| is_one_sided(cell as usize, bits))
+    }
+}
+
+impl Box3 {
+    /// The flat distance of a step.
+    pub(super) fn delta<const D: usize>(&self, s: &[i32; D]) -> isize {
+        let along = [1, self.row, self.plane];
+        (0..D).map(|a| s[a] as isize * along[a] as isize).sum()
+    }
+}
+
+/// A full block of points, families and all, without lists: `counts` sites of equal volume.
+#[derive(Clone, Copy)]
+pub struct BlockSetup<'a, const D: usize> {
+    /// Points along each axis; point numbers run along x first.
+    pub counts: [usize; D],
+    /// Distance of neighbours along each axis \[m\].
+    pub spacing: [f64; D],
+    /// Horizon \[m\].
+    pub horizon: f64,
+    /// The law; its function is asked for point 0 and bond 0 only.
+    pub force: super::BondForce<'a, D>,
+    /// How bonds follow the motion.
+    pub kinematics: super::Kinematics,
+    /// Critical stretch \[1\]; `None` for never.
+    pub critical: Option<f64>,
+}
+
+impl<const D: usize> BlockSetup<'_, D> {
+    /// Steps to all neighbours within the horizon.
+    pub(super) fn steps(&self) -> Vec<[i32; D]> {
+        let reach: [i32; D] =
+            std::array::from_fn(|a| (self.horizon / self.spacing[a] * (1.0 + 1e-6)) as i32);
+        let mut steps = vec![[0i32; D]];
+        for a in 0..D {
+            steps = (-reach[a]..=reach[a])
+                .flat_map(|k| {
+                    steps.iter().map(move |s| {
+                        let mut s = *s;
+                        s[a] = k;
+                        s
+                    })
+                })
+                .collect();
+        }
+        steps.retain(|s| {
+            let square: f64 = (0..D)
+                .map(|a| (f64::from(s[a]) * self.spacing[a]).powi(2))
+                .sum();
+            square > 0.0
+                && square.sqrt() <= self.horizon * (1.0 + crate::peridynamics::TIE_TOLERANCE)
+        });
+        steps
+    }
+
+    /// The stencil of the block.
+    pub(super) fn stencil(
+        &self,
+        number: impl Fn(&Vector<D>) -> (f64, f64),
+        volume: f64,
+    ) -> Stencil<D> {
+        let steps = self.steps();
+        let mut reach = [0usize; 3];
+        for s in &steps {
+            for a in 0..D {
+                reach[a] = reach[a].max(s[a].unsigned_abs() as usize);
+            }
+        }
+        let counts: [usize; 3] = std::array::from_fn(|a| if a < D { self.counts[a] } else { 1 });
+        let cells = Box3::new(counts, reach);
+        let offsets: Vec<Offset<D>> = steps
+            .iter()
+            .map(|s| {
+                let xi = Vector::<D>::from_fn(|a, _| f64::from(s[a]) * self.spacing[a]);
+                let (weight, limit) = number(&xi);
+                Offset::new(*s, self.spacing, cells.delta(s), weight * volume, limit)
+            })
+            .collect();
+        let mut point_of = vec![NONE; cells.cells];
+        let mut point = 0;
+        for z in 0..counts[2] {
+            for y in 0..counts[1] {
+                for x in 0..counts[0] {
+                    point_of[cells.cell([x, y, z])] = point;
+                    point += 1;
+                }
+            }
+        }
+        let groups: Vec<u32> = cells.groups().map(|c| c as u32).collect();
+        let mut reference = vec![0u8; groups.len() * offsets.len()];
+        reference
+            .par_chunks_mut(offsets.len().max(1))
+            .zip(&groups)
+            .for_each(|(bits, &cell)| {
+                for (bits, o) in bits.iter_mut().zip(&offsets) {
+                    for lane in 0..LANES {
+                        let here = cell as usize + lane;
+                        let there = (here as isize + o.delta) as usize;
+                        let stands = point_of[here] != NONE && point_of[there] != NONE;
+                        *bits |= u8::from(stands) << lane;
+                    }
+                }
+            });
+        Stencil {
+            offsets,
+            point_of,
+            groups,
+            intact: reference.clone(),
+            reference,
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! The moving system of a scene: what moves, with what mass, from where.
+
+use crate::coupling::semidiscrete::behaviour::{
+    BondBehaviour, ContactBehaviour, Critical, SystemError,
+};
+use crate::coupling::semidiscrete::{CoupledSystem, masses};
+use crate::coupling::{BrokenBonds, Coupling, Definiteness, Interface, Model, Operator};
+use crate::observe::summary::Decision;
+use crate::peridynamics::bond_force::{Kinematics, Storage};
+use crate::peridynamics::critical_stretch as failure_stretch;
+use crate::progress::Progress;
+use crate::run::definiteness;
+use crate::run::equilibrium;
+use crate::run::error::RunError;
+use crate::run::setup::RunSettings;
+use crate::scene::initial::{Initial, InitialKind};
+use crate::scene::materials::Fracture;
+use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
+use crate::solve::explicit::State;
+use crate::system::{LinearMotion, SemiDiscrete};
+
+/// What moves, and what it holds.
+pub struct DynamicSystem<'a> {
+    /// The system.
+    pub system: Box<dyn SemiDiscrete + 'a>,
+    /// Bytes of rows and bonds.
+    pub bytes: usize,
+    /// Whether its force is linear in the displacement.
+    pub is_linear: bool,
+}
+
+/// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks; `broken` bonds are broken from the start.
+///
+/// # Errors
+/// [`RunError::System`] for bonds that cannot stretch or break, [`RunError::Fracture`].
+pub(crate) fn dynamic<'a, const D: usize>(
+    model: &'a Model<D>,
+    coupling: &dyn Coupling<D>,
+    operator: &dyn Operator<D>,
+    rest: &RunSettings<D>,
+    broken: Option<&BrokenBonds<D>>,
+    choices: &mut Vec<Decision>,
+    progress: &dyn Progress,
+) -> Result<DynamicSystem<'a>, RunError> {
+    let breaking = &rest.breaking;
+    let critical_stretch = critical_stretch(model, rest)?;
+    let kinematics = kinematics(rest);
+    let bonds = match kinematics {
+        Kinematics::Exact => "geometrically exact bonds",
+        Kinematics::Linear => "bonds linear in the displacement",
+    };
+    let storage = match breaking.precision {
+        PrecisionSpec::Double => Storage::Double,
+        PrecisionSpec::Single => Storage::Single,
+    };
+    let stretches = critical_stretch.as_ref().map(|critical| match critical {
+        Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
+        Critical::ByHorizon(list) => {
+            let each = list.iter().map(|(d, s)| format!("{s:.3e} (horizon {d})"));
+            let each: Vec<String> = each.collect();
+            format!("bonds break at the stretch {}", each.join(", "))
+        }
+    });
+    let breaks = match (stretches, breaking.fracture) {
+        (Some(s), Some(Fracture::Energy(g))) => {
+            let takes = match breaking.calibration {
+                CalibrationSpec::Lattice => "a plane of the lattice takes it",
+                CalibrationSpec::Continuum => "a continuous family takes it",
+            };
+            format!("{s}, the fracture energy is {g:e}: {takes}")
+        }
+        (Some(s), _) => s,
+        (None, _) => "no bond breaks: no fracture-energy, no critical-stretch".to_owned(),
+    };
+    let density = |material: u16| rest.density[material as usize];
+    let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
+    let is_linear = critical_stretch.is_none()
+        && breaking.contact.is_none()
+        && breaking.bonds == BondsSpec::Linear
+        && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear());
+    definiteness::check(model, operator, rest.ratio, choices, progress)?;
+    let moving = CoupledSystem::new(
+        model,
+        operator,
+        coupling.symmetry(),
+        density,
+        &BondBehaviour {
+            kinematics,
+            critical_stretch: critical_stretch.clone(),
+            no_fail: &can_fail_nowhere,
+            contact: breaking.contact.map(|c| ContactBehaviour {
+                approach: c.radius_factor,
+                stiffness: c.stiffness_factor,
+            }),
+            storage,
+            broken,
+        },
+    );
+    match moving {
+        Ok(motion) => {
+            if critical_stretch.is_some()
+                && motion.has_seam_bonds()
+                && operator.definiteness() == Definiteness::NegativeTerms
+            {
+                return Err(RunError::Indefinite {
+                    what: "bonds that break at the seam may bring that forth at any time; cut-bonds = \"linear\" in [coupling.truncated] keeps them whole".to_owned(),
+                    typed: rest.ratio.typed,
+                    pairwise: rest.ratio.pairwise,
+                });
+            }
+            if model.body().is_some() {
+                let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
+                    _ if is_linear => "",
+                    (Interface::Faces, true) => "; those cut at the seam likewise",
+                    (Interface::Faces, false) => {
+                        "; within two horizons of the seam they are linear and do not break"
+                    }
+                    _ => "",
+                };
+                choices.push(Decision {
+                    choice: bonds.to_owned(),
+                    why: breaks + at_seam,
+                });
+            }
+            if storage == Storage::Single {
+                let (choice, why) = match model.body() {
+                    Some(_) => (
+                        "weights of bonds in four bytes",
+                        "precision = \"single\": each bond is listed, also where the points fill a lattice, which needs no list",
+                    ),
+                    None => (
+                        "precision = \"single\" changes nothing",
+                        "there are no bonds",
+                    ),
+                };
+                choices.push(Decision {
+                    choice: choice.to_owned(),
+                    why: why.to_owned(),
+                });
+            }
+            Ok(DynamicSystem {
+                bytes: motion.memory_bytes(),
+                system: Box::new(motion),
+                is_linear,
+            })
+        }
+        Err(error) if is_linear => {
+            let stiffness = model.assemble(operator, progress);
+            let symmetry = equilibrium::symmetry(coupling, || stiffness.asymmetry(), choices);
+            choices.push(Decision {
+                choice: "assembled stiffness instead of bonds".to_owned(),
+                why: reason(&error),
+            });
+            Ok(DynamicSystem {
+                bytes: stiffness.values.len() * 8 + stiffness.columns.len() * 4,
+                system: Box::new(LinearMotion {
+                    mass: masses(model, density),
+                    stiffness,
+                    symmetry,
+                }),
+                is_linear,
+            })
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The system of a static scene whose forces are not linear, by its law or its exact bonds; none where they are.
+///
+/// # Errors
+/// [`RunError::System`] for bonds that cannot stretch.
+pub(crate) fn still<'a, const D: usize>(
+    model: &'a Model<D>,
+    coupling: &dyn Coupling<D>,
+    operator: &dyn Operator<D>,
+    rest: &RunSettings<D>,
+) -> Result<Option<CoupledSystem<'a, D>>, RunError> {
+    let kinematics = kinematics(rest);
+    if rest.nonlinear(model).is_none() {
+        return Ok(None);
+    }
+    let behaviour = BondBehaviour {
+        kinematics,
+        critical_stretch: None,
+        no_fail: &|_| false,
+        contact: None,
+        storage: Storage::Double,
+        broken: None,
+    };
+    let density = |material: u16| rest.density[material as usize];
+    let symmetry = coupling.symmetry();
+    Ok(Some(CoupledSystem::new(
+        model, operator, symmetry, density, &behaviour,
+    )?))
+}
+
+/// How bonds deform.
+fn kinematics<const D: usize>(rest: &RunSettings<D>) -> Kinematics {
+    match rest.breaking.bonds {
+        BondsSpec::Exact => Kinematics::Exact,
+        BondsSpec::Linear => Kinematics::Linear,
+    }
+}
+
+/// Why bonds are not passed over, without the remedy: nothing is wrong.
+fn reason(error: &SystemError) -> String {
+    let text = error.to_string();
+    let end = text.find(';').unwrap_or(text.len());
+    text[..end].to_owned()
+}
+
+/// The stretch at which bonds break, if any do.
+pub(crate) fn critical_stretch<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+) -> Result<Option<Critical>, RunError> {
+    let (Some(fracture), Some(_), Some(p)) =
+        (rest.breaking.fracture, model.body(), &model.peridynamics)
+    else {
+        return Ok(None);
+    };
+    let energy = match fracture {
+        Fracture::Stretch(s) => return Ok(Some(Critical::Uniform(s))),
+        Fracture::Energy(energy) => energy,
+    };
+    let mut list = Vec::new();
+    for (horizon, per_square) in model.plane_energies()? {
+        let Some(bonds) = p.law.bond_energy(horizon) else {
+            return Err(SystemError::Law { law: p.law.name() }.into());
+        };
+        let linear = match rest.breaking.calibration {
+            CalibrationSpec::Lattice => failure_stretch::critical_stretch(energy, per_square)?,
+            CalibrationSpec::Continuum => bonds.critical_stretch::<D>(energy, horizon)?,
+        };
+        list.push((
+            horizon,
+            failure_stretch::stretch_of_equal_energy(linear, |s| {
+                p.law.force_state().map_or(1.0, |law| law.energy_ratio(s))
+            })?,
+        ));
+    }
+    Ok(Some(match list[..] {
+        [(_, s)] => Critical::Uniform(s),
+        _ => Critical::ByHorizon(list),
+    }))
+}
+
+/// What a plane of the lattice costs to open at the stretch at which bonds break, per area, and the energy that was typed; none where nothing breaks, or where lattices differ.
+pub(crate) fn plane_energy<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+) -> Result<Option<PlaneEnergy>, RunError> {
+    let Some(critical) = critical_stretch(model, rest)? else {
+        return Ok(None);
+    };
+    let planes = model.plane_energies()?;
+    let [(horizon, per_square)] = planes[..] else {
+        return Ok(None);
+    };
+    let stretch = critical.at(horizon);
+    let law = model
+        .peridynamics
+        .as_ref()
+        .and_then(|p| p.law.force_state());
+    Ok(Some(PlaneEnergy {
+        of_plane: stretch.powi(2) * per_square * law.map_or(1.0, |law| law.energy_ratio(stretch)),
+        typed: match rest.breaking.fracture {
+            Some(Fracture::Energy(energy)) => Some(energy),
+            _ => None,
+        },
+    }))
+}
+
+/// What opening a plane costs \[J/m²\].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlaneEnergy {
+    /// By the bonds of the lattice.
+    pub of_plane: f64,
+    /// As the scene has it.
+    pub typed: Option<f64>,
+}
+
+/// Displacement and velocity at time zero.
+pub fn start<const D: usize>(model: &Model<D>, initial: &[Initial<D>]) -> State {
+    let mut state = State::at_rest(model.sites.len() * D);
+    for field in initial {
+        let values = match field.kind {
+            InitialKind::Displacement => &mut state.u,
+            InitialKind::Velocity => &mut state.v,
+        };
+        for (site, s) in model.sites.iter().enumerate() {
+            if !field.region.contains(&s.position, 0.0) {
+                continue;
+            }
+            for k in 0..D {
+                if let Some(value) = field.components.at(k, &s.position) {
+                    values[site * D + k] = value;
+                }
+            }
+        }
+    }
+    state
+}

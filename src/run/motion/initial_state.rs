@@ -1,0 +1,225 @@
+//! What the steps with one layout of the zones begin with: at time zero, at a checkpoint, or where the zones have changed.
+
+use super::dynamic_system::{DynamicSystem, start};
+use super::rezoning::Leaving;
+use super::setup::{breaks, restore};
+use super::time_dependent_loads::SceneDrive;
+use super::time_step::{held, paced, repaced};
+use super::writer::{EdgeReached, Recorder, Saved, StepChoice, Zone};
+use crate::coupling::{BrokenBonds, Model, Sampler};
+use crate::observe::checkpoint::{CheckpointFile, Pace};
+use crate::observe::proof::Part;
+use crate::observe::summary::{Decision, Stopwatch, Timings, bytes_text};
+use crate::run::error::RunError;
+use crate::run::motion::seen::Seen;
+use crate::run::proof::growth::GrowthQuestion;
+use crate::run::setup::RunSettings;
+use crate::scene::solve::Explicit as Spec;
+use crate::solve::explicit::State;
+use crate::system::Dissipation;
+
+/// A run between two layouts of its zones.
+pub(crate) struct RezoneState<'a, const D: usize> {
+    /// Choices before the change: all but those that every layout makes anew.
+    pub told: usize,
+    /// Stages before the change.
+    pub timings: Timings,
+    pub leaving: Leaving<D>,
+    pub broken: BrokenBonds<D>,
+    /// What breaking them has cost.
+    pub spent: Option<Dissipation>,
+    /// The cells that become nonlocal.
+    pub nonlocal: Vec<bool>,
+    pub recorder: Recorder<'a, D>,
+    /// Whether a checkpoint was due with the change.
+    pub due: bool,
+    pub pace: StepChoice,
+    pub edge: Option<EdgeReached>,
+    pub zone: Option<Zone>,
+    pub seen: Seen,
+    pub growth: Option<Part>,
+    /// Steps taken by this program, and their seconds.
+    pub taken: (u64, f64),
+}
+
+/// What a run with one layout needs before its first step.
+pub(crate) struct StepState<'r, 'm, const D: usize> {
+    pub moving: DynamicSystem<'m>,
+    pub recorder: Recorder<'r, D>,
+    pub state: State,
+    pub pace: StepChoice,
+    pub drive: SceneDrive<'m, D>,
+    pub edge: Option<EdgeReached>,
+    pub zone: Option<Zone>,
+    pub seen: Seen,
+    /// What is known of modes that grow; none of a run that goes on from a checkpoint.
+    pub growth: Option<Part>,
+    pub told: usize,
+    pub taken: (u64, f64),
+    pub resumed: bool,
+    /// Whether a checkpoint is due before the first step.
+    pub due: bool,
+}
+
+/// A layout before its first step, and what is told of it.
+pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
+    pub model: &'m Model<D>,
+    pub rest: &'r RunSettings<D>,
+    pub spec: &'a Spec,
+    pub moving: DynamicSystem<'m>,
+    /// What to do about modes that grow.
+    pub remedy: &'static str,
+    /// What shows that none does, if anything does.
+    pub proved: Option<&'static str>,
+    pub choices: &'a mut Vec<Decision>,
+    pub timings: &'a mut Timings,
+    pub watch: &'a mut Stopwatch,
+}
+
+impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
+    /// At time zero, or where a checkpoint was `saved`; `every` is how often the command line wants one.
+    ///
+    /// # Errors
+    /// [`RunError`] if no stable step is found, or the checkpoint is that of another model.
+    pub fn at_start(
+        self,
+        every: Option<Pace>,
+        file: CheckpointFile,
+        saved: Option<Saved>,
+    ) -> Result<StepState<'r, 'm, D>, RunError> {
+        let (model, rest, spec) = (self.model, self.rest, self.spec);
+        let held = held(model, &rest.conditions)?;
+        let begin = start(model, &rest.initial);
+        self.choices.push(Decision {
+            choice: format!("{} in rows and bonds", bytes_text(self.moving.bytes as u64)),
+            why: "read once per step".to_owned(),
+        });
+        let known = saved.as_ref().map(|saved| saved.pace);
+        let asked = GrowthQuestion {
+            remedy: self.remedy,
+            proved: self.proved,
+            policy: spec.growing_modes,
+            place: &|site| model.sites[site].position.iter().copied().collect(),
+        };
+        let (mut moving, pace, growth) =
+            paced(spec, &asked, self.moving, &held, known, self.choices)?;
+        self.watch.lap(self.timings, "stable step");
+        let drive = driven(model, rest, &begin.u, &pace, spec)?;
+        if drive.evaluates_everywhere() {
+            self.choices.push(Decision {
+                choice: "loads evaluated at every place and step".to_owned(),
+                why: "an expression holds both t and a coordinate; written as two conditions, each with one, it would cost nothing"
+                    .to_owned(),
+            });
+        }
+        restore(moving.system.as_mut(), saved.as_ref(), &file)?;
+        let mut recorder = Recorder::new(
+            &rest.output,
+            &rest.conditions,
+            &Sampler::new(model),
+            breaks(moving.system.as_ref(), rest),
+            moving.is_linear,
+            file,
+            every.or(spec.checkpoint_every),
+            saved.as_ref().map(|s| &s.written),
+        )?;
+        recorder.hold(drive.holders());
+        let resumed = saved.is_some();
+        let edge = saved.as_ref().and_then(|s| s.edge);
+        let (state, zone, seen) = match saved {
+            Some(saved) => (saved.state, saved.zone, saved.seen),
+            None => (begin, None, Seen::default()),
+        };
+        Ok(StepState {
+            moving,
+            recorder,
+            state,
+            pace,
+            drive,
+            edge,
+            zone: zone.or_else(|| rest.follow.as_ref().map(|_| Zone::first(model))),
+            seen,
+            growth,
+            told: self.choices.len(),
+            taken: (0, 0.0),
+            resumed,
+            due: false,
+        })
+    }
+
+    /// Where the zones have changed.
+    ///
+    /// # Errors
+    /// [`RunError`] if no stable step is found, or nothing is there that new sites could follow.
+    pub fn after_switch(
+        mut self,
+        between: RezoneState<'r, D>,
+    ) -> Result<StepState<'r, 'm, D>, RunError> {
+        let (model, rest, spec) = (self.model, self.rest, self.spec);
+        let RezoneState {
+            told,
+            timings: before,
+            leaving,
+            mut recorder,
+            due,
+            pace,
+            edge,
+            zone,
+            seen,
+            growth,
+            taken,
+            spent,
+            ..
+        } = between;
+        if let Some(spent) = spent {
+            self.moving.system.set_dissipation(spent);
+        }
+        self.choices.truncate(told);
+        let held = held(model, &rest.conditions)?;
+        let system = self.moving.system.as_ref();
+        let pace = repaced(spec, system, &held, pace, leaving.state())?;
+        self.watch.lap(self.timings, "stable step");
+        let begin = start(model, &rest.initial);
+        let drive = driven(model, rest, &begin.u, &pace, spec)?;
+        let (state, switch) = leaving.arrive(model, system, &drive)?;
+        recorder.move_to(&Sampler::new(model));
+        recorder.hold(drive.holders());
+        recorder.energy_at_start += switch.left();
+        self.watch.lap(self.timings, "state carried over");
+        let own = std::mem::replace(self.timings, before);
+        for stage in &own.stages {
+            self.timings
+                .add(&format!("zone changes: {}", stage.name), stage.seconds);
+        }
+        Ok(StepState {
+            moving: self.moving,
+            recorder,
+            state,
+            pace,
+            drive,
+            edge,
+            zone: zone.map(|z| z.after(switch, model)),
+            seen,
+            growth,
+            told,
+            taken,
+            resumed: true,
+            due,
+        })
+    }
+}
+
+/// The conditions of a scene, from time zero to its end.
+fn driven<'m, const D: usize>(
+    model: &'m Model<D>,
+    rest: &'m RunSettings<D>,
+    start: &[f64],
+    pace: &StepChoice,
+    spec: &Spec,
+) -> Result<SceneDrive<'m, D>, RunError> {
+    let steps = match pace.since {
+        (0, _) => pace.steps,
+        _ => (spec.duration / pace.step).ceil() as u64,
+    };
+    SceneDrive::new(model, &rest.conditions, start, pace.step, steps)
+}

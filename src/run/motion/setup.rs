@@ -1,0 +1,236 @@
+//! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
+
+use super::dynamic_system::{DynamicSystem, dynamic};
+use super::writer::{Breaks, Saved};
+use super::{RunOptions, StartFrom};
+use crate::coupling::{BrokenBonds, Model, Operator, Problem};
+use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
+use crate::observe::proof::Proof;
+use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
+use crate::progress::Progress;
+use crate::run::error::RunError;
+use crate::run::proof::{self, Subject, growth};
+use crate::run::setup::{self, RunSettings};
+use crate::scene::spec::CouplingTraits;
+use crate::scene::validated::Scene;
+use crate::system::SemiDiscrete;
+
+/// A scene with all that it computes before its first step.
+pub struct ModelSetup<'a, const D: usize> {
+    /// The title of the scene.
+    pub title: String,
+    /// How its bodies are coupled.
+    pub joining: CouplingTraits,
+    /// What to change in the scene where a mode may grow.
+    pub remedy: &'static str,
+    /// What shows that no mode grows, if anything does.
+    pub proved: Option<&'static str>,
+    /// Sites, families and zones.
+    pub model: &'a Model<D>,
+    /// Rows of the stiffness.
+    pub operator: &'a dyn Operator<D>,
+    /// What the run keeps of the scene.
+    pub rest: &'a RunSettings<D>,
+    /// The system that solvers see.
+    pub moving: DynamicSystem<'a>,
+    /// What the program chose where the scene leaves it open.
+    pub choices: Vec<Decision>,
+    /// What was shown about the model.
+    pub proof: Proof,
+    /// Memory that the program held when sites and bonds were there.
+    pub bytes: u64,
+    /// Seconds of each stage so far.
+    pub timings: Timings,
+    /// The clock of the stages.
+    pub watch: Stopwatch,
+}
+
+/// A run before its zones are laid out: what stays when they change.
+pub(crate) struct RunSetup {
+    pub title: String,
+    pub joining: CouplingTraits,
+    pub remedy: &'static str,
+    pub choices: Vec<Decision>,
+    pub timings: Timings,
+    pub watch: Stopwatch,
+}
+
+/// Takes a scene apart.
+pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, RunSettings<D>) {
+    let watch = Stopwatch::start();
+    let title = scene.title.clone();
+    let joining = scene.coupling.joining();
+    let remedy = growth::remedy(&scene.coupling);
+    let mut timings = Timings::default();
+    if let Some(placement) = &scene.placement {
+        timings.add("placing the zone", placement.seconds);
+    }
+    let (problem, rest) = setup::problem(scene);
+    let begun = RunSetup {
+        title,
+        joining,
+        remedy,
+        choices: rest.made().cloned().collect(),
+        timings,
+        watch,
+    };
+    (begun, problem, rest)
+}
+
+/// Lays a problem out and hands it on, and gives it back afterwards; `broken` bonds are broken from the start.
+pub(crate) fn lay_out<const D: usize, T>(
+    begun: RunSetup,
+    problem: Problem<D>,
+    rest: &RunSettings<D>,
+    broken: Option<&BrokenBonds<D>>,
+    progress: &dyn Progress,
+    then: impl FnOnce(ModelSetup<'_, D>) -> Result<T, RunError>,
+) -> Result<(T, Problem<D>), RunError> {
+    let RunSetup {
+        title,
+        joining,
+        remedy,
+        mut choices,
+        mut timings,
+        mut watch,
+    } = begun;
+    let (model, coupling) = Model::new(problem, progress)?;
+    choices.extend(setup::volumes_choice(&model));
+    watch.lap(&mut timings, "sites and bonds");
+    let bytes = resident_memory_bytes().unwrap_or(0);
+    let operator = coupling.operator(&model)?;
+    let moving = dynamic(
+        &model,
+        coupling.as_ref(),
+        operator.as_ref(),
+        rest,
+        broken,
+        &mut choices,
+        progress,
+    )?;
+    let proved = growth::proved(&model, operator.as_ref(), moving.system.as_ref(), progress);
+    watch.lap(&mut timings, "rows and bonds");
+    let proof = proof::prove(
+        &Subject {
+            model: &model,
+            coupling: coupling.as_ref(),
+            operator: operator.as_ref(),
+            rest,
+            stiffness: None,
+            system: Some(moving.system.as_ref()),
+            affine_forces: &[],
+        },
+        progress,
+    )?;
+    proof::hold(&proof)?;
+    watch.lap(&mut timings, "proof");
+    let done = then(ModelSetup {
+        title,
+        joining,
+        remedy,
+        proved,
+        model: &model,
+        operator: operator.as_ref(),
+        rest,
+        moving,
+        choices,
+        proof,
+        bytes,
+        timings,
+        watch,
+    })?;
+    drop(operator);
+    Ok((done, model.into_problem(coupling)))
+}
+
+/// Lays a scene out and hands it on; `first` has a say before anything is computed.
+pub fn laid_out<const D: usize, S, T>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+    first: impl FnOnce(&RunSettings<D>, &mut Vec<Decision>) -> Result<S, RunError>,
+    then: impl FnOnce(ModelSetup<'_, D>, S) -> Result<T, RunError>,
+) -> Result<T, RunError> {
+    let (mut begun, problem, rest) = begun(scene);
+    let ready = first(&rest, &mut begun.choices)?;
+    let done = lay_out(begun, problem, &rest, None, progress, |laid_out| {
+        then(laid_out, ready)
+    })?;
+    Ok(done.0)
+}
+
+/// The checkpoint file of a run, and what it holds if the run goes on from it.
+///
+/// # Errors
+/// [`RunError::Checkpoint`] for one that cannot be used: at once, not after the model is there.
+pub(crate) fn opened<const D: usize>(
+    rest: &RunSettings<D>,
+    options: &RunOptions<'_>,
+    choices: &mut Vec<Decision>,
+) -> Result<(CheckpointFile, Option<Saved>), RunError> {
+    let name = format!("{}.checkpoint", rest.output.name);
+    let path = rest.output.directory.join(name);
+    let file = CheckpointFile::new(path, rest.fingerprint.value());
+    let saved = match options.start {
+        StartFrom::Beginning => None,
+        StartFrom::Checkpoint => read(&file, choices)?,
+    };
+    Ok((file, saved))
+}
+
+/// Puts the damage of a checkpoint back.
+///
+/// # Errors
+/// [`CheckpointError::Content`] if it is that of another model.
+pub(crate) fn restore(
+    system: &mut dyn SemiDiscrete,
+    saved: Option<&Saved>,
+    file: &CheckpointFile,
+) -> Result<(), CheckpointError> {
+    match saved {
+        Some(saved) if !system.restore_damage(&saved.damage) => Err(CheckpointError::Content {
+            path: file.path().to_path_buf(),
+            message: "its bonds are not those of this model".to_owned(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Whether bonds may break.
+pub fn breaks<const D: usize>(system: &dyn SemiDiscrete, rest: &RunSettings<D>) -> Breaks {
+    match system.damage() {
+        Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
+        _ if system.dissipation().is_some() => Breaks::Dissipating,
+        _ => Breaks::Never,
+    }
+}
+
+/// The last checkpoint, if there is one.
+///
+/// # Errors
+/// [`CheckpointError`] for one that cannot be used.
+fn read(
+    file: &CheckpointFile,
+    choices: &mut Vec<Decision>,
+) -> Result<Option<Saved>, CheckpointError> {
+    let (saved, found): (Saved, Found) = match file.read() {
+        Err(CheckpointError::None { path }) => {
+            choices.push(Decision {
+                choice: "from the beginning".to_owned(),
+                why: format!("there is no checkpoint {} yet", path.display()),
+            });
+            return Ok(None);
+        }
+        other => other?,
+    };
+    choices.push(Decision {
+        choice: format!(
+            "resumed after step {} of {}",
+            saved.state.step, saved.pace.steps
+        ),
+        why: match found {
+            Found::Current => "the last checkpoint".to_owned(),
+            Found::Previous(why) => format!("the last checkpoint but one, for {why}"),
+        },
+    });
+    Ok(Some(saved))
+}

@@ -1,0 +1,579 @@
+//! What a run writes while it goes on: history, VTU files, tips of cracks, checkpoints.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::rezoning::{nonlocal, share};
+use crate::coupling::{Model, Sampler};
+use crate::observe::ObserveError;
+use crate::observe::checkpoint::{CheckpointFile, Pace};
+use crate::observe::csv::Entry;
+use crate::observe::history::History;
+use crate::observe::rezoning_event::Switch;
+use crate::observe::series::Series;
+use crate::run::motion::seen::Seen;
+use crate::run::solution::Solved;
+use crate::run::write::{OverSites, Shown, snapshot};
+use crate::scene::conditions::Condition;
+use crate::scene::validated::{Output, Tip};
+use crate::solve::explicit::State;
+use crate::system::SemiDiscrete;
+use crate::tensor::Vector;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// All that a run needs to go on; the same bytes for the same scene and step, whenever it was stopped before.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Saved {
+    /// Fields, time, step, work, broken bonds.
+    pub state: State,
+    /// What the system keeps of its damage.
+    pub damage: Vec<u64>,
+    /// The time step and what it was chosen by.
+    pub pace: StepChoice,
+    /// What was written so far.
+    pub written: Written,
+    /// When damage reached the edge of the nonlocal zone, if it did.
+    pub edge: Option<EdgeReached>,
+    /// Where a zone that follows the crack stands; none of one that does not.
+    pub zone: Option<Zone>,
+    /// What was seen of energy and rotation.
+    pub seen: Seen,
+}
+
+/// Where a zone that follows the crack stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Zone {
+    /// Whether each cell is nonlocal.
+    pub nonlocal: Vec<bool>,
+    /// When each was wanted last \[s\], or became nonlocal; minus infinity if never.
+    pub wanted: Vec<f64>,
+    /// Whether the state was looked at for a change already, where one is due.
+    pub looked: bool,
+    /// The changes so far.
+    pub switches: Vec<Switch>,
+    /// Its share of the volume at the start, and the most so far.
+    pub shares: [f64; 2],
+}
+
+impl Zone {
+    /// Of the layout that a run begins with.
+    pub fn first<const D: usize>(model: &Model<D>) -> Self {
+        let share = share(model);
+        let nonlocal = nonlocal(model);
+        let never = f64::NEG_INFINITY;
+        Self {
+            wanted: nonlocal
+                .iter()
+                .map(|n| if *n { 0.0 } else { never })
+                .collect(),
+            nonlocal,
+            looked: true,
+            switches: Vec::new(),
+            shares: [share; 2],
+        }
+    }
+
+    /// After a change to another layout.
+    pub fn after<const D: usize>(mut self, switch: Switch, model: &Model<D>) -> Self {
+        let now = nonlocal(model);
+        let was = std::mem::replace(&mut self.nonlocal, now);
+        for ((wanted, was), now) in self.wanted.iter_mut().zip(was).zip(&self.nonlocal) {
+            if *now && !was {
+                *wanted = switch.time;
+            }
+        }
+        self.looked = true;
+        self.shares[1] = self.shares[1].max(switch.share);
+        self.switches.push(switch);
+        self
+    }
+}
+
+/// A time step, and the limits that it keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepChoice {
+    /// The step.
+    pub step: f64,
+    /// Steps to the end.
+    pub steps: u64,
+    /// The largest step that is taken to be stable.
+    pub stable: f64,
+    /// What row sums guarantee.
+    pub certified: f64,
+    /// The site of the row that says so.
+    pub site: u64,
+    /// The step and the time since when steps are of this size.
+    pub since: (u64, f64),
+}
+
+impl StepChoice {
+    /// The time after a step.
+    pub fn time(&self, step: u64) -> f64 {
+        self.since.1 + (step - self.since.0) as f64 * self.step
+    }
+}
+
+/// Damage at the edge of the nonlocal zone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EdgeReached {
+    /// After this step.
+    pub step: u64,
+    /// At this time.
+    pub time: f64,
+    /// At this site.
+    pub site: u64,
+}
+
+/// What of a run's files belongs to a state.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Written {
+    /// Lengths of the history and of the tables of tips.
+    pub bytes: Vec<u64>,
+    /// Times of the VTU files.
+    pub times: Vec<f64>,
+    /// Kinetic and stored energy at the start.
+    pub energy_at_start: f64,
+}
+
+/// Whether bonds may break.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Breaks {
+    /// They may.
+    Possibly,
+    /// None does.
+    Never,
+    /// None does, but the law dissipates energy.
+    Dissipating,
+}
+
+/// A state to tell of.
+pub struct Moment<'a> {
+    /// Fields, time, step, work, broken bonds.
+    pub state: &'a State,
+    /// What moves.
+    pub system: &'a dyn SemiDiscrete,
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// The energy that the scheme keeps, of linear systems.
+    pub discrete: Option<f64>,
+    /// Forces of supports and loads together by dof, and of loads alone on each prescribed dof.
+    pub supports: (&'a [f64], &'a [f64]),
+}
+
+impl<'a> Moment<'a> {
+    /// A state of equilibrium.
+    pub fn at_rest(
+        state: &'a State,
+        system: &'a dyn SemiDiscrete,
+        supports: (&'a [f64], &'a [f64]),
+    ) -> Self {
+        Self {
+            state,
+            system,
+            kinetic: 0.0,
+            discrete: None,
+            supports,
+        }
+    }
+}
+
+impl Moment<'_> {
+    /// Broken bonds by the sites of their ends, each once for each direction.
+    pub fn broken_bonds(&self) -> Vec<(u32, u32)> {
+        match self.state.broken {
+            0 => Vec::new(),
+            _ => self.system.broken_bonds(),
+        }
+    }
+}
+
+/// The energies of a row of the history.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Row {
+    /// `½ vᵀ M v`.
+    pub kinetic: f64,
+    /// Of all bodies.
+    pub stored: f64,
+    /// Of loads and supports.
+    pub work: f64,
+    /// Of broken bonds.
+    pub dissipated: f64,
+    /// What the three leave over: energy of broken bonds, and what the seam takes.
+    pub missing: f64,
+}
+
+/// What a run writes.
+pub struct Recorder<'a, const D: usize> {
+    output: &'a Output<D>,
+    /// Sites and weights of each probe.
+    probes: Vec<Vec<(u32, f64)>>,
+    /// Prescribed dofs with the condition that holds each, and which conditions hold any.
+    holders: Vec<(u32, u32)>,
+    holding: Vec<u32>,
+    breaks: Breaks,
+    history: History,
+    tips: Vec<History>,
+    series: Series,
+    checkpoint: CheckpointFile,
+    pace: Option<Pace>,
+    last_checkpoint: Instant,
+    /// Kinetic and stored energy at the start.
+    pub energy_at_start: f64,
+    /// Energies of the last row.
+    pub last: Row,
+    /// Seconds that writing took.
+    pub seconds: f64,
+}
+
+impl<'a, const D: usize> Recorder<'a, D> {
+    /// Makes the files, or cuts them back to what was `written` at a checkpoint.
+    ///
+    /// # Errors
+    /// [`ObserveError`] for files that cannot be made or cut.
+    #[expect(clippy::too_many_arguments, reason = "each is another part of the run")]
+    pub fn new(
+        output: &'a Output<D>,
+        conditions: &[Condition<D>],
+        sampler: &Sampler<'_, D>,
+        breaks: Breaks,
+        is_linear: bool,
+        checkpoint: CheckpointFile,
+        pace: Option<Pace>,
+        written: Option<&Written>,
+    ) -> Result<Self, ObserveError> {
+        let probes = probes(output, sampler);
+        let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
+        let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
+        let history = History::resumed(
+            &path("history"),
+            history_header(output, conditions, breaks, is_linear),
+            bytes(0),
+        )?;
+        let tips = output
+            .tips
+            .iter()
+            .enumerate()
+            .map(|(i, tip)| {
+                let header = ["step", "time"].iter().chain(&AXES[..D]).chain(&["damage"]);
+                let header = header.map(|&h| h.to_owned()).collect();
+                History::resumed(&path(&format!("tip_{}", tip.name)), header, bytes(i + 1))
+            })
+            .collect::<Result<_, _>>()?;
+        let series = match written {
+            Some(w) => Series::resumed(&output.directory, &output.name, w.times.clone()),
+            None => {
+                checkpoint.remove()?;
+                let series = Series::new(&output.directory, &output.name);
+                series.remove_old();
+                series
+            }
+        };
+        series.write_collection()?;
+        Ok(Self {
+            output,
+            probes,
+            holders: Vec::new(),
+            holding: holding(conditions).map(|(number, _)| number).collect(),
+            breaks,
+            history,
+            tips,
+            series,
+            checkpoint,
+            pace,
+            last_checkpoint: Instant::now(),
+            energy_at_start: written.map_or(0.0, |w| w.energy_at_start),
+            last: Row::default(),
+            seconds: 0.0,
+        })
+    }
+
+    /// Finds the probes in another layout of the same body.
+    pub fn move_to(&mut self, sampler: &Sampler<'_, D>) {
+        self.probes = probes(self.output, sampler);
+    }
+
+    /// Learns which condition holds each prescribed dof.
+    pub fn hold(&mut self, holders: impl Iterator<Item = (u32, u32)>) {
+        self.holders = holders.collect();
+    }
+
+    /// Forces of the conditions that hold, by their components.
+    fn reactions(&self, (forces, loads): (&[f64], &[f64])) -> Vec<f64> {
+        let mut reactions = vec![0.0; self.holding.len() * D];
+        for (&(dof, holder), load) in self.holders.iter().zip(loads) {
+            if let Ok(place) = self.holding.binary_search(&holder) {
+                reactions[place * D + dof as usize % D] += forces[dof as usize] - load;
+            }
+        }
+        reactions
+    }
+
+    /// Begins the account of energy.
+    pub fn begin(&mut self, moment: &Moment<'_>) {
+        self.energy_at_start = moment.kinetic + moment.system.stored_energy(&moment.state.u);
+    }
+
+    /// The energies of a state.
+    pub fn energies(&self, moment: &Moment<'_>) -> Row {
+        let Moment { state, system, .. } = moment;
+        let stored = system.stored_energy(&state.u);
+        Row {
+            kinetic: moment.kinetic,
+            stored,
+            work: state.work,
+            dissipated: match self.breaks {
+                Breaks::Possibly | Breaks::Dissipating => system.dissipated_energy().unwrap_or(0.0),
+                Breaks::Never => 0.0,
+            },
+            missing: self.energy_at_start + state.work - moment.kinetic - stored,
+        }
+    }
+
+    /// Appends to the history and to the tables of tips.
+    ///
+    /// # Errors
+    /// [`ObserveError`] if a row cannot be written.
+    pub fn row(
+        &mut self,
+        moment: &Moment<'_>,
+        energies: Row,
+        positions: impl Fn(usize) -> Vector<D>,
+    ) -> Result<(), ObserveError> {
+        let begun = Instant::now();
+        let Moment { state, system, .. } = moment;
+        self.last = energies;
+        let mut row: Vec<Entry> = vec![
+            (state.step as i64).into(),
+            state.time.into(),
+            energies.kinetic.into(),
+            energies.stored.into(),
+            state.work.into(),
+        ];
+        row.extend(moment.discrete.map(Entry::from));
+        if self.breaks != Breaks::Never {
+            row.push(energies.dissipated.into());
+            row.push(energies.missing.into());
+        }
+        if self.breaks == Breaks::Possibly {
+            row.push((state.broken as i64).into());
+            row.push(system.dissipation().map_or(0.0, |d| d.area).into());
+        }
+        let mut momentum = [0.0; D];
+        for (v, m) in state.v.chunks_exact(D).zip(system.mass()) {
+            momentum.iter_mut().zip(v).for_each(|(p, v)| *p += m * v);
+        }
+        row.extend(momentum.map(Entry::from));
+        for probe in &self.probes {
+            for field in [&state.u, &state.v] {
+                row.extend((0..D).map(|k| -> Entry {
+                    let of_site = |&(s, w): &(u32, f64)| w * field[s as usize * D + k];
+                    probe.iter().map(of_site).sum::<f64>().into()
+                }));
+            }
+        }
+        let reactions = self.reactions(moment.supports);
+        row.extend(reactions.into_iter().map(Entry::from));
+        self.history.row(&row)?;
+        if state.broken > 0 && !self.tips.is_empty() {
+            self.tips(moment, positions)?;
+        }
+        self.seconds += begun.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    fn tips(
+        &mut self,
+        moment: &Moment<'_>,
+        positions: impl Fn(usize) -> Vector<D>,
+    ) -> Result<(), ObserveError> {
+        let Some(damage) = moment.system.damage() else {
+            return Ok(());
+        };
+        for (tip, table) in self.output.tips.iter().zip(&mut self.tips) {
+            let Some(site) = farthest(tip, &damage, &positions) else {
+                continue;
+            };
+            let mut row: Vec<Entry> =
+                vec![(moment.state.step as i64).into(), moment.state.time.into()];
+            row.extend(positions(site).iter().map(|&x| Entry::from(x)));
+            row.push(damage[site].into());
+            table.row(&row)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a VTU file, if the scene wants any.
+    ///
+    /// # Errors
+    /// [`ObserveError`] if it cannot be written.
+    pub fn output(
+        &mut self,
+        moment: &Moment<'_>,
+        solved: &Solved<'_, D>,
+    ) -> Result<(), ObserveError> {
+        if !self.output.vtu {
+            return Ok(());
+        }
+        let begun = Instant::now();
+        let mut more = vec![OverSites::Vector("velocity", &moment.state.v)];
+        let damage = match self.breaks {
+            Breaks::Possibly => moment.system.damage(),
+            Breaks::Never | Breaks::Dissipating => None,
+        };
+        if let Some(damage) = &damage {
+            more.push(OverSites::Scalar("damage", damage));
+        }
+        let remembered = moment.system.remembered();
+        for (name, values) in &remembered {
+            more.push(OverSites::Scalar(name, values));
+        }
+        self.series
+            .push(moment.state.time, snapshot(solved, &more, Shown::All))?;
+        self.seconds += begun.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Whether a checkpoint is due after `step` steps.
+    pub fn is_checkpoint_due(&self, step: u64) -> bool {
+        match self.pace {
+            None => false,
+            Some(Pace::Steps(n)) => step.is_multiple_of(n),
+            Some(Pace::Clock(time)) => self.last_checkpoint.elapsed() >= time,
+        }
+    }
+
+    /// Whether the end of the run leaves a checkpoint: one is asked for, or an older one would be left behind.
+    pub fn keeps_state(&self) -> bool {
+        self.pace.is_some() || self.checkpoint.path().exists()
+    }
+
+    /// Writes a checkpoint.
+    ///
+    /// # Errors
+    /// [`ObserveError`] if it cannot be written.
+    pub fn checkpoint(
+        &mut self,
+        moment: &Moment<'_>,
+        pace: StepChoice,
+        edge: Option<EdgeReached>,
+        zone: Option<Zone>,
+        seen: &Seen,
+    ) -> Result<(), ObserveError> {
+        let begun = Instant::now();
+        let mut bytes = vec![self.history.mark()?];
+        for table in &self.tips {
+            bytes.push(table.mark()?);
+        }
+        self.checkpoint.write(&Saved {
+            state: moment.state.clone(),
+            damage: moment.system.damage_state(),
+            pace,
+            written: Written {
+                bytes,
+                times: self.series.times().to_vec(),
+                energy_at_start: self.energy_at_start,
+            },
+            edge,
+            zone,
+            seen: seen.clone(),
+        })?;
+        self.last_checkpoint = Instant::now();
+        self.seconds += begun.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// The files that are there.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        let times = self.series.times().len();
+        if times > 0 {
+            files.push(self.series.collection());
+        }
+        let tables = std::iter::once(&self.history).chain(&self.tips);
+        files.extend(
+            tables
+                .filter(|t| t.is_begun())
+                .map(|t| t.path().to_path_buf()),
+        );
+        if self.checkpoint.path().exists() {
+            files.push(self.checkpoint.path().to_path_buf());
+        }
+        files
+    }
+}
+
+/// Sites and weights of each probe.
+fn probes<const D: usize>(output: &Output<D>, sampler: &Sampler<'_, D>) -> Vec<Vec<(u32, f64)>> {
+    let probes = output.probes.iter();
+    probes
+        .map(|(_, x)| sampler.weights(x).unwrap_or_default())
+        .collect()
+}
+
+/// The conditions that hold something, with their numbers.
+fn holding<const D: usize>(
+    conditions: &[Condition<D>],
+) -> impl Iterator<Item = (u32, &Condition<D>)> {
+    let all = conditions.iter().enumerate();
+    all.filter(|(_, c)| c.holds()).map(|(n, c)| (n as u32, c))
+}
+
+fn history_header<const D: usize>(
+    output: &Output<D>,
+    conditions: &[Condition<D>],
+    breaks: Breaks,
+    is_linear: bool,
+) -> Vec<String> {
+    let mut header = vec![
+        "step",
+        "time",
+        "kinetic_energy",
+        "stored_energy",
+        "external_work",
+    ];
+    if is_linear {
+        header.push("discrete_energy");
+    }
+    if breaks != Breaks::Never {
+        header.extend(["dissipated_energy", "missing_energy"]);
+    }
+    if breaks == Breaks::Possibly {
+        header.extend(["broken_bonds", "crack_area"]);
+    }
+    let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();
+    header.extend(AXES[..D].iter().map(|a| format!("momentum_{a}")));
+    for (name, _) in &output.probes {
+        for field in ["u", "v"] {
+            header.extend(AXES[..D].iter().map(|a| format!("{name}_{field}{a}")));
+        }
+    }
+    for (_, condition) in holding(conditions) {
+        let name = &condition.name;
+        header.extend(AXES[..D].iter().map(|a| format!("{name}_reaction_{a}")));
+    }
+    header
+}
+
+/// The damaged site that lies farthest along the direction of a tip; of several, the first.
+fn farthest<const D: usize>(
+    tip: &Tip<D>,
+    damage: &[f64],
+    positions: impl Fn(usize) -> Vector<D>,
+) -> Option<usize> {
+    let mut best: Option<(f64, usize)> = None;
+    for (site, _) in damage
+        .iter()
+        .enumerate()
+        .filter(|(_, d)| **d >= tip.threshold)
+    {
+        let x = positions(site);
+        let reach = tip.direction.dot(&x);
+        if best.is_none_or(|(b, _)| reach > b) && tip.inside.contains(&x, 0.0) {
+            best = Some((reach, site));
+        }
+    }
+    best.map(|(_, site)| site)
+}

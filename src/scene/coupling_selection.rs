@@ -1,0 +1,267 @@
+//! The coupling of a scene: the one that is typed, or the one that suits it.
+//!
+//! Left to the program, it is `truncated` wherever that holds, for it alone is symmetric, in exact equilibrium and bounded in time. Where the scene shows that it
+//! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere or an LPS has a low
+//! Poisson's ratio, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
+
+use super::error::{SceneError, SceneErrorKind};
+use super::materials::Material;
+use super::peridynamics;
+use super::selected_coupling::SelectedCoupling;
+use super::source::Span;
+use super::spec::{
+    CouplingSpec, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, TruncatedSpec,
+    WeightsSpec,
+};
+use super::zones::{self, Placed};
+use crate::coupling::Zone;
+use crate::mesh::Mesh;
+use crate::scene::points::Points;
+use crate::tensor::Vector;
+
+/// How exactly, in spacings, faces have to follow the lattice.
+const FOLLOWS: f64 = 1e-6;
+
+/// What keeps `truncated` from a scene that names no coupling.
+enum Obstacle {
+    /// It cannot hold.
+    Certain(String),
+    /// The seam or the proof has to tell.
+    Possible(String),
+}
+
+/// The coupling that the scene names; without a name `truncated` where it is exact, or else `splice`. One model alone where a zone that was placed holds no cell, or every one.
+///
+/// # Errors
+/// Those of the zones and of the lattice, which the choice looks at.
+pub(crate) fn joined<const D: usize>(
+    spec: &SceneSpec,
+    found: &[Material<D>],
+    mesh: &Mesh<D>,
+    placed: Option<&Placed>,
+    instead: Option<&CouplingSpec>,
+) -> Result<SelectedCoupling, SceneError> {
+    let of = |coupling: CouplingSpec, span: Span, why: Option<String>| SelectedCoupling {
+        joining: coupling.joining(),
+        otherwise: None,
+        coupling,
+        span,
+        why,
+    };
+    if let Some(placed) = placed {
+        let only = |coupling, why: &str| of(coupling, placed.span.clone(), Some(why.to_owned()));
+        if !placed.nonlocal.contains(&true) {
+            let coupling = CouplingSpec::Local(NoOptionsSpec {});
+            return Ok(only(coupling, "the zone that was placed is empty"));
+        }
+        if !placed.nonlocal.contains(&false) && spec.coupling.is_none() {
+            let coupling = CouplingSpec::Nonlocal(NoOptionsSpec {});
+            return Ok(only(coupling, "the zone that was placed holds every cell"));
+        }
+    }
+    if let Some(coupling) = instead {
+        let why = "the scene names none".to_owned();
+        return Ok(of(coupling.clone(), spec.kinematics.span(), Some(why)));
+    }
+    if let Some(typed) = &spec.coupling {
+        return Ok(of(typed.get_ref().clone(), typed.span(), None));
+    }
+    let span = spec.kinematics.span();
+    let Some(p) = &spec.peridynamics else {
+        without_peridynamics(spec)?;
+        let why = "the scene has no [peridynamics]".to_owned();
+        return Ok(of(CouplingSpec::Local(NoOptionsSpec {}), span, Some(why)));
+    };
+    let truncated = of(
+        CouplingSpec::Truncated(TruncatedSpec::default()),
+        span.clone(),
+        Some(
+            "the scene names none; symmetric and in exact equilibrium, and its faces follow the lattice"
+                .to_owned(),
+        ),
+    );
+    if !spec.zones.bodies.is_empty() {
+        // only bonds that end on faces join bodies of different horizons
+        return Ok(truncated);
+    }
+    let splice = CouplingSpec::Splice(NoOptionsSpec {});
+    let is_placed = spec.zones.auto.is_some();
+    Ok(match obstacle(spec, p, found, mesh, &truncated, placed)? {
+        None => truncated,
+        Some(Obstacle::Possible(reason)) if !is_placed => SelectedCoupling {
+            otherwise: Some(splice),
+            why: Some(format!(
+                "the scene names none; symmetric and in exact equilibrium, though {reason}"
+            )),
+            ..truncated
+        },
+        Some(Obstacle::Certain(reason) | Obstacle::Possible(reason)) => of(
+            splice,
+            span,
+            Some(format!(
+                "the scene names none, and `truncated` is not for {reason}"
+            )),
+        ),
+    })
+}
+
+/// Refuses a scene that draws a nonlocal zone and has no peridynamics to fill it with.
+fn without_peridynamics(spec: &SceneSpec) -> Result<(), SceneError> {
+    let (span, what) = match (&spec.zones.nonlocal, spec.zones.bodies.keys().next()) {
+        (Some(zone), _) => (zone.span(), "zones.nonlocal".to_owned()),
+        (None, Some(name)) => (name.span.clone(), format!("zones.bodies.{name}")),
+        (None, None) => return Ok(()),
+    };
+    Err(SceneError::new(
+        SceneErrorKind::Missing,
+        format!("the scene draws `{what}` and has no [peridynamics] to fill it with"),
+    )
+    .label(span, "would be finite elements")
+    .help(
+        "add [peridynamics] with horizon = ..., or take the zone out, or type coupling = \"local\"",
+    ))
+}
+
+/// What keeps truncated bonds from being exact, if anything does.
+fn obstacle<const D: usize>(
+    spec: &SceneSpec,
+    p: &PeridynamicsSpec,
+    found: &[Material<D>],
+    mesh: &Mesh<D>,
+    truncated: &SelectedCoupling,
+    placed: Option<&Placed>,
+) -> Result<Option<Obstacle>, SceneError> {
+    let certain = |reason: &str| Ok(Some(Obstacle::Certain(reason.to_owned())));
+    let mut negative = None;
+    for m in found {
+        let (lambda, mu) = m.lame;
+        let law = m.law.linearised();
+        if !law.is_ordinary() {
+            return certain(&format!("the {} material `{}`", m.law.name(), m.name));
+        }
+        if !law.is_pairwise() && lambda < mu * (1.0 - 1e-9) {
+            negative = Some(&m.name);
+        }
+    }
+    if matches!(p.points, Some(PointsSpec::Cells)) {
+        return certain("points that are no lattice");
+    }
+    if p.weights == WeightsSpec::Fitted {
+        return certain("weights that are fitted family by family");
+    }
+    if p.horizon.as_constant().is_none() {
+        return certain("a horizon that varies");
+    }
+    let zones = zones::zones(spec, truncated, mesh, placed)?;
+    let lattice = peridynamics::peridynamics(p, truncated.joining.lattice, mesh, &zones)?;
+    let Points::Lattice { spacing, origin } = lattice.points else {
+        return certain("points that are no lattice");
+    };
+    if let Some(name) = negative {
+        return Ok(Some(Obstacle::Possible(format!(
+            "the lps material `{name}` has a Poisson's ratio below that of a bond-based one"
+        ))));
+    }
+    Ok((!follows(mesh, &zones, spacing, &origin))
+        .then(|| Obstacle::Possible("the faces of the zone do not follow the lattice".to_owned())))
+}
+
+/// Whether the faces of the zone are planes of the lattice, or halfway between them, and their nodes too.
+fn follows<const D: usize>(
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+    spacing: f64,
+    origin: &Vector<D>,
+) -> bool {
+    let nonlocal: Vec<bool> = zones.iter().map(|&z| z == Zone::Nonlocal).collect();
+    let facets = mesh.interface_facets(&nonlocal, &true, &false);
+    let at = |n: u32| (mesh.nodes[n as usize] - origin) / spacing;
+    let near = |x: f64| (x - x.round()).abs() <= FOLLOWS;
+    let shifted = |shift: f64| {
+        facets.iter().all(|f| {
+            f.first
+                .nodes
+                .iter()
+                .all(|&n| at(n).iter().all(|&x| near(x + shift)))
+        })
+    };
+    let upright = facets.iter().all(|f| {
+        let n = mesh.facet_normal_area(&f.first);
+        D == 1 || n.norm() - n.amax() <= FOLLOWS * n.norm()
+    });
+    upright && (shifted(0.5) || shifted(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::run::AnyScene;
+    use crate::scene::Source;
+
+    const PLATE: &str = r#"
+kinematics = "plane-strain"
+[mesh.rectangle]
+min = [0, 0]
+max = [2, 1]
+x = { cells = 20 }
+y = { cells = 10 }
+[materials.plate.lps]
+youngs-modulus = 200
+poisson-ratio = 0.3
+[peridynamics]
+horizon = 0.3
+points.lattice = { spacing = 0.1 }
+[zones.nonlocal]
+box = { min = [0.6, 0], max = [1.4, 1] }
+[conditions.bottom.displacement]
+on = "bottom"
+x = 0
+y = 0
+"#;
+
+    /// The coupling of the plate with overrides, and why.
+    fn coupling(overrides: &[&str]) -> (&'static str, Option<String>) {
+        let mut source = Source::new("plate.toml", PLATE);
+        for o in overrides {
+            source.push_override(o).expect("an override");
+        }
+        match AnyScene::from_source(&source, Path::new("."), "plate").expect("a scene") {
+            AnyScene::Plane(s) => (s.coupling.joining().name, s.scene.coupling_why),
+            other => panic!("a plate is plane: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_scene_without_a_coupling_gets_the_one_that_suits_it() {
+        assert_eq!(coupling(&["coupling=splice"]), ("splice", None));
+        let (name, why) = coupling(&[]);
+        assert_eq!(name, "truncated");
+        assert!(why.is_some());
+        for (change, first, reason) in [
+            // the seam has to tell: tried first
+            (
+                "materials.plate.lps.poisson-ratio=0.1",
+                "truncated",
+                "below that of a bond-based",
+            ),
+            // a zone of cells of 0.1 beside a lattice of 0.08
+            (
+                "peridynamics.points.lattice.spacing=0.08",
+                "truncated",
+                "do not follow",
+            ),
+            (
+                "peridynamics.horizon=0.3 + 0.01*x",
+                "splice",
+                "a horizon that varies",
+            ),
+            ("peridynamics.weights=fitted", "splice", "fitted"),
+            ("peridynamics.points=cells", "splice", "no lattice"),
+        ] {
+            let (name, why) = coupling(&[change]);
+            assert_eq!(name, first, "{change}");
+            assert!(why.is_some_and(|w| w.contains(reason)), "{change}");
+        }
+    }
+}
