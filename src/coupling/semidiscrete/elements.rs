@@ -1,0 +1,105 @@
+//! Finite elements of a coupled model whose laws are not linear.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::behaviour::CHUNK;
+use crate::{
+    coupling::{CellRole, Model, SiteKind},
+    fem::NonlinearElements,
+    material::LocalLaw,
+    tensor::{Tensor, Vector},
+};
+
+/// The elements around the nodes that are sites, as their rows have them.
+pub(super) struct LocalElements<const D: usize> {
+    elements: NonlinearElements<D>,
+}
+
+impl<const D: usize> LocalElements<D> {
+    /// The elements among the rows of nodes whose material has a law that is not linear; none if there are none.
+    pub fn new(model: &Model<D>, laws: &[Option<Arc<dyn LocalLaw<D>>>]) -> Option<Self> {
+        if laws.iter().all(Option::is_none) {
+            return None;
+        }
+        let mut in_rows = vec![false; model.mesh.cell_count()];
+        for site in 0..model.sites.len() {
+            for (cell, _) in model.cells_of_site(site) {
+                in_rows[cell] |=
+                    model.roles[cell] != CellRole::StressElement && model.node_takes(cell);
+            }
+        }
+        let cells = (0..in_rows.len()).filter(|&c| in_rows[c]);
+        NonlinearElements::new(&model.mesh, cells.map(|c| (c, model.is_element(c))), |c| {
+            laws[model.material_of_cell(c) as usize].clone()
+        })
+        .map(|elements| Self { elements })
+    }
+
+    /// Adds to the force of each site what its elements have beyond the linear ones.
+    pub fn add_force(&mut self, model: &Model<D>, u: &[f64], step: f64, force: &mut [f64]) {
+        let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
+        self.elements.respond(&model.mesh, nodes, step);
+        let chunks = force.par_chunks_mut(CHUNK * D).enumerate();
+        chunks.for_each(|(chunk, force)| {
+            for (k, force) in force.chunks_exact_mut(D).enumerate() {
+                if let SiteKind::Node(n) = model.sites[chunk * CHUNK + k].kind {
+                    let own: Vector<D> = self.elements.force(n);
+                    force.iter_mut().zip(own.iter()).for_each(|(f, x)| *f += x);
+                }
+            }
+        });
+    }
+
+    /// Whether a site is a node of such an element, so that its tangent changes.
+    pub fn touches(&self, model: &Model<D>, site: usize) -> bool {
+        matches!(model.sites[site].kind, SiteKind::Node(n) if self.elements.is_around(n))
+    }
+
+    /// See [`NonlinearElements::stored`].
+    pub fn stored(&self, model: &Model<D>, u: &[f64]) -> f64 {
+        let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
+        self.elements.stored(&model.mesh, nodes)
+    }
+
+    /// The mean stress \[Pa\] of each cell, padded with zeros.
+    pub fn stresses(&self, model: &Model<D>, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
+        let padded = |s: Tensor<D>| {
+            let entry = |i: usize, j: usize| if i < D && j < D { s[(i, j)] } else { 0.0 };
+            std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+        };
+        let found = self.elements.stresses(&model.mesh, nodes).into_iter();
+        found.map(|(cell, s)| (cell, padded(s))).collect()
+    }
+
+    /// See [`NonlinearElements::remembered`].
+    pub fn remembered(&self, model: &Model<D>) -> Vec<(&'static str, Vec<(u32, f64)>)> {
+        self.elements.remembered(&model.mesh)
+    }
+
+    pub fn remembers(&self) -> bool {
+        self.elements.remembers()
+    }
+
+    pub fn commit(&mut self) -> f64 {
+        self.elements.commit()
+    }
+
+    pub fn memory_bytes(&self) -> usize {
+        self.elements.memory_bytes()
+    }
+
+    pub fn words(&self) -> usize {
+        self.elements.words()
+    }
+
+    pub fn state(&self) -> impl Iterator<Item = u64> + '_ {
+        self.elements.state()
+    }
+
+    pub fn restore(&mut self, state: &[u64]) {
+        self.elements.restore(state);
+    }
+}

@@ -1,0 +1,434 @@
+//! Finite elements whose stress is not linear in the displacement gradient, as what they add to the elements of the tangent at rest.
+//!
+//! ```text
+//!   f_a = Σ_b K_ab u_b + ∫ (σ(∇u, history) − C : ∇u) · ∂N_a/∂x dV
+//! ```
+//!
+//! The first term is that of the rows, as if all elements were linear; the integral is a sum over the quadrature points of the stiffness, each with what its law remembers. Elements that are linear do not appear here.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::cell::Rule;
+use super::element::{displacement_gradient, for_each_point};
+use crate::{
+    material::LocalLaw,
+    mesh::Mesh,
+    tensor::{Tensor, Vector},
+};
+
+/// An element of a law that is not linear.
+#[derive(Clone, Copy, Debug)]
+struct Element {
+    /// Its cell.
+    cell: u32,
+    /// The number of its law.
+    law: u32,
+    /// The first of its numbers of history.
+    first: usize,
+    /// Numbers of history of each of its quadrature points.
+    each: usize,
+    /// Whether its energy is part of the body's: an element that only overlaps has none.
+    counts: bool,
+}
+
+/// The excess of one element: nodal forces, energies.
+#[derive(Clone, Copy, Debug)]
+struct Excess<const D: usize> {
+    /// Of each node \[N\].
+    force: [Vector<D>; 8],
+    /// Stored energy less that of the linear element \[J\].
+    stored: f64,
+    /// Energy dissipated within the interval \[J\].
+    dissipated: f64,
+    /// ∫ σ dV.
+    stress: Tensor<D>,
+    /// Its volume.
+    volume: f64,
+}
+
+/// Elements of laws that are not linear, with what their quadrature points remember.
+#[derive(Clone, Debug)]
+pub struct NonlinearElements<const D: usize> {
+    laws: Vec<Arc<dyn LocalLaw<D>>>,
+    /// By ascending cell.
+    elements: Vec<Element>,
+    /// What was committed last, and what the last force found.
+    past: Vec<f64>,
+    present: Vec<f64>,
+    excess: Vec<Excess<D>>,
+    /// For each node of the mesh where its elements begin in `of_node`.
+    offsets: Vec<u32>,
+    /// Elements around the nodes, with the node's number within each.
+    of_node: Vec<(u32, u8)>,
+}
+
+impl<const D: usize> NonlinearElements<D> {
+    /// The elements among `cells` (ascending, with whether their energy counts) whose law `law_of` is not linear; none if there are none.
+    pub fn new(
+        mesh: &Mesh<D>,
+        cells: impl Iterator<Item = (usize, bool)>,
+        law_of: impl Fn(usize) -> Option<Arc<dyn LocalLaw<D>>>,
+    ) -> Option<Self> {
+        let mut laws: Vec<Arc<dyn LocalLaw<D>>> = Vec::new();
+        let (mut elements, mut numbers) = (Vec::new(), 0);
+        let mut count = vec![0u32; mesh.nodes.len() + 1];
+        for (cell, counts) in cells {
+            let Some(law) = law_of(cell).filter(|law| !law.is_linear()) else {
+                continue;
+            };
+            let known = laws.iter().position(|l| Arc::ptr_eq(l, &law));
+            let number = known.unwrap_or_else(|| {
+                laws.push(law);
+                laws.len() - 1
+            });
+            let each = laws[number].history().len();
+            let mut points = 0;
+            for_each_point(mesh, cell, Rule::Stiffness, |_| points += 1);
+            elements.push(Element {
+                cell: cell as u32,
+                law: number as u32,
+                first: numbers,
+                each,
+                counts,
+            });
+            numbers += points * each;
+            for &n in mesh.cell(cell) {
+                count[n as usize + 1] += 1;
+            }
+        }
+        if elements.is_empty() {
+            return None;
+        }
+        for n in 1..count.len() {
+            count[n] += count[n - 1];
+        }
+        let offsets = count.clone();
+        let mut of_node = vec![(0, 0); offsets[mesh.nodes.len()] as usize];
+        for (e, element) in elements.iter().enumerate() {
+            for (a, &n) in mesh.cell(element.cell as usize).iter().enumerate() {
+                let next = &mut count[n as usize];
+                of_node[*next as usize] = (e as u32, a as u8);
+                *next += 1;
+            }
+        }
+        Some(Self {
+            laws,
+            excess: Vec::new(),
+            elements,
+            past: vec![0.0; numbers],
+            present: vec![0.0; numbers],
+            offsets,
+            of_node,
+        })
+    }
+
+    /// Whether points remember anything.
+    pub fn remembers(&self) -> bool {
+        !self.past.is_empty()
+    }
+
+    /// Whether any of them lies around a node.
+    pub fn is_around(&self, node: u32) -> bool {
+        self.offsets[node as usize] < self.offsets[node as usize + 1]
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.elements.len() * (size_of::<Element>() + size_of::<Excess<D>>())
+            + 16 * self.past.len()
+            + 4 * self.offsets.len()
+            + 8 * self.of_node.len()
+    }
+
+    /// The cells, ascending.
+    pub fn cells(&self) -> impl Iterator<Item = usize> + '_ {
+        self.elements.iter().map(|e| e.cell as usize)
+    }
+
+    /// Responds to the displacement of the nodes \[m\] at the end of an interval of the length `step` \[s\] that began with the last [`NonlinearElements::commit`].
+    pub fn respond(
+        &mut self,
+        mesh: &Mesh<D>,
+        displacement: impl Fn(u32) -> Vector<D> + Sync,
+        step: f64,
+    ) {
+        let (laws, past) = (&self.laws, &self.past);
+        let mut present = std::mem::take(&mut self.present);
+        let mut slices = Vec::with_capacity(self.elements.len());
+        let mut rest = present.as_mut_slice();
+        for (e, element) in self.elements.iter().enumerate() {
+            let end = self.elements.get(e + 1).map_or(past.len(), |e| e.first);
+            let (own, others) = rest.split_at_mut(end - element.first);
+            slices.push(own);
+            rest = others;
+        }
+        self.elements
+            .par_iter()
+            .zip(slices)
+            .map(|(element, present)| {
+                let law = laws[element.law as usize].as_ref();
+                excess(mesh, element, law, &displacement, step, past, present)
+            })
+            .collect_into_vec(&mut self.excess);
+        self.present = present;
+    }
+
+    /// What the elements around a node add to its force \[N\], of the last response.
+    pub fn force(&self, node: u32) -> Vector<D> {
+        let n = node as usize;
+        let around = &self.of_node[self.offsets[n] as usize..self.offsets[n + 1] as usize];
+        let forces = around.iter();
+        forces
+            .map(|&(e, a)| self.excess[e as usize].force[a as usize])
+            .sum()
+    }
+
+    /// The end of an interval: what the last response found is remembered from now on. Returns the energy dissipated \[J\].
+    pub fn commit(&mut self) -> f64 {
+        self.past.clone_from(&self.present);
+        let own = self.elements.iter().zip(&self.excess);
+        own.filter(|(element, _)| element.counts)
+            .map(|(_, excess)| excess.dissipated)
+            .sum()
+    }
+
+    /// What is stored beyond the energy of the linear elements \[J\], at a displacement of the nodes \[m\] and with what was committed last.
+    pub fn stored(&self, mesh: &Mesh<D>, displacement: impl Fn(u32) -> Vector<D> + Sync) -> f64 {
+        let counted = self.at(mesh, &displacement, |element| element.counts);
+        counted.iter().map(|(_, excess)| excess.stored).sum()
+    }
+
+    /// The mean stress of each cell \[Pa\], likewise.
+    pub fn stresses(
+        &self,
+        mesh: &Mesh<D>,
+        displacement: impl Fn(u32) -> Vector<D> + Sync,
+    ) -> Vec<(u32, Tensor<D>)> {
+        let found = self.at(mesh, &displacement, |_| true).into_iter();
+        found
+            .map(|(cell, excess)| (cell, excess.stress / excess.volume))
+            .collect()
+    }
+
+    fn at(
+        &self,
+        mesh: &Mesh<D>,
+        displacement: &(impl Fn(u32) -> Vector<D> + Sync),
+        wanted: impl Fn(&Element) -> bool + Sync,
+    ) -> Vec<(u32, Excess<D>)> {
+        self.elements
+            .par_iter()
+            .filter(|element| wanted(element))
+            .map(|element| {
+                let law = self.laws[element.law as usize].as_ref();
+                let mut points = 0;
+                let cell = element.cell as usize;
+                for_each_point(mesh, cell, Rule::Stiffness, |_| points += 1);
+                let mut present = vec![0.0; points * element.each];
+                let past = &self.past;
+                let found = excess(mesh, element, law, displacement, 0.0, past, &mut present);
+                (element.cell, found)
+            })
+            .collect()
+    }
+
+    /// What was remembered of each cell, by name: means over its volume, the names in the order of the laws.
+    pub fn remembered(&self, mesh: &Mesh<D>) -> Vec<(&'static str, Vec<(u32, f64)>)> {
+        let mut found: Vec<(&'static str, Vec<(u32, f64)>)> = Vec::new();
+        for element in &self.elements {
+            let names = self.laws[element.law as usize].history();
+            for (k, name) in names.iter().enumerate() {
+                let (mut sum, mut volume, mut point) = (0.0, 0.0, 0);
+                for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
+                    sum += p.weight * self.past[element.first + point * element.each + k];
+                    volume += p.weight;
+                    point += 1;
+                });
+                let entry = (element.cell, sum / volume);
+                match found.iter_mut().find(|(n, _)| n == name) {
+                    Some((_, values)) => values.push(entry),
+                    None => found.push((name, vec![entry])),
+                }
+            }
+        }
+        found
+    }
+
+    /// All that was committed last, for a checkpoint.
+    pub fn state(&self) -> impl Iterator<Item = u64> + '_ {
+        self.past.iter().map(|x| x.to_bits())
+    }
+
+    /// Number of words of [`NonlinearElements::state`].
+    pub fn words(&self) -> usize {
+        self.past.len()
+    }
+
+    /// Puts back what [`NonlinearElements::state`] gave, of the same length.
+    pub fn restore(&mut self, state: &[u64]) {
+        for (number, word) in self.past.iter_mut().zip(state) {
+            *number = f64::from_bits(*word);
+        }
+        self.present.clone_from(&self.past);
+    }
+}
+
+/// What an element has beyond the linear one; overwrites what its points remember at present.
+fn excess<const D: usize>(
+    mesh: &Mesh<D>,
+    element: &Element,
+    law: &dyn LocalLaw<D>,
+    displacement: &impl Fn(u32) -> Vector<D>,
+    step: f64,
+    past: &[f64],
+    present: &mut [f64],
+) -> Excess<D> {
+    let nodes = mesh.cell(element.cell as usize);
+    let mut u = [Vector::zeros(); 8];
+    for (u, &n) in u.iter_mut().zip(nodes) {
+        *u = displacement(n);
+    }
+    let mut sum = Excess {
+        force: [Vector::zeros(); 8],
+        stored: 0.0,
+        dissipated: 0.0,
+        stress: Tensor::zeros(),
+        volume: 0.0,
+    };
+    let each = element.each;
+    let mut point = 0;
+    for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
+        let gradient = displacement_gradient(p, |a| u[a]);
+        let own = point * each..(point + 1) * each;
+        let past = &past[element.first..][own.clone()];
+        let found = law.respond(&gradient, step, past, &mut present[own]);
+        let linear = law.tangent().contract(&gradient);
+        let beyond = (found.stress - linear) * p.weight;
+        for (force, g) in sum.force.iter_mut().zip(&p.gradient).take(p.nodes) {
+            *force += beyond * g;
+        }
+        sum.stored += p.weight * (found.stored - 0.5 * linear.dot(&gradient));
+        sum.dissipated += p.weight * found.dissipated;
+        sum.stress += found.stress * p.weight;
+        sum.volume += p.weight;
+        point += 1;
+    });
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::element::{cell_volume, stiffness};
+    use super::super::sample::{boxes, noise};
+    use super::*;
+    use crate::material::J2;
+    use crate::tensor::Tensor4;
+
+    const LAME: (f64, f64) = (600.0, 400.0);
+
+    /// Forces of all nodes, and the energy stored and dissipated, after one interval from rest.
+    fn responded<const D: usize>(
+        mesh: &Mesh<D>,
+        elements: &mut NonlinearElements<D>,
+        u: &[Vector<D>],
+    ) -> (Vec<Vector<D>>, f64) {
+        let at = |n: u32| u[n as usize];
+        elements.respond(mesh, at, 1.0);
+        let tangent = Tensor4::isotropic(LAME.0, LAME.1);
+        let nodes = 0..mesh.nodes.len() as u32;
+        let mut force: Vec<Vector<D>> = nodes.map(|n| elements.force(n)).collect();
+        let mut energy: f64 = elements
+            .excess
+            .iter()
+            .map(|e| e.stored + e.dissipated)
+            .sum();
+        for c in 0..mesh.cell_count() {
+            let rows = stiffness(mesh, c, &tangent);
+            for (a, &n) in mesh.cell(c).iter().enumerate() {
+                let pull: Vector<D> = (mesh.cell(c).iter().enumerate())
+                    .map(|(b, &m)| rows[a][b] * u[m as usize])
+                    .sum();
+                energy += 0.5 * pull.dot(&u[n as usize]);
+                force[n as usize] += pull;
+            }
+        }
+        (force, energy)
+    }
+
+    fn yields<const D: usize>() {
+        for mesh in boxes::<D>(3, 0.3) {
+            let law: Arc<dyn LocalLaw<D>> = Arc::new(J2::<D>::new(LAME.0, LAME.1, 2.0, 50.0));
+            let cells = || (0..mesh.cell_count()).map(|c| (c, true));
+            let mut elements =
+                NonlinearElements::new(&mesh, cells(), |_| Some(Arc::clone(&law))).unwrap();
+            let name = format!("{:?}", mesh.shapes[0]);
+
+            // a uniform gradient: nodes within are in equilibrium, and the virial is the stress of the law times the volume
+            let g =
+                Tensor::<D>::from_fn(|i, j| 0.02 * noise(i, j) + if i == j { 0.01 } else { 0.0 });
+            let affine: Vec<Vector<D>> = mesh.nodes.iter().map(|x| g * x).collect();
+            let (force, _) = responded(&mesh, &mut elements, &affine);
+            let numbers = law.history().len();
+            let (past, mut present) = (vec![0.0; numbers], vec![0.0; numbers]);
+            let found = law.respond(&g, 1.0, &past, &mut present);
+            assert!(present[numbers - 1] > 1e-3, "{name}: does not yield");
+            let volume: f64 = (0..mesh.cell_count()).map(|c| cell_volume(&mesh, c)).sum();
+            let virial: Tensor<D> = force
+                .iter()
+                .zip(&mesh.nodes)
+                .map(|(f, x)| f * x.transpose())
+                .sum();
+            assert!((virial - found.stress * volume).amax() < 1e-12, "{name}");
+            for (f, x) in force.iter().zip(&mesh.nodes) {
+                let inside = x.iter().all(|x| *x > 1e-9 && *x < 1.0 - 1e-9);
+                assert!(!inside || f.amax() < 1e-13, "{name}: {f:?} at {x:?}");
+            }
+            // what flowed is kept once it is committed, and only then
+            assert!(elements.past.iter().all(|x| *x == 0.0));
+            let stress = elements.stresses(&mesh, |n| affine[n as usize]);
+            assert!(
+                stress
+                    .iter()
+                    .all(|(_, s)| (s - found.stress).amax() < 1e-12)
+            );
+            let lost = elements.commit();
+            assert!((lost - found.dissipated * volume).abs() < 1e-13, "{name}");
+            let (_, kept) = elements.remembered(&mesh).pop().unwrap();
+            assert!(
+                kept.iter()
+                    .all(|(_, a)| (a - present[numbers - 1]).abs() < 1e-15)
+            );
+
+            // the stress is the derivative of the energy stored and dissipated over an interval
+            let mut fresh =
+                NonlinearElements::new(&mesh, cells(), |_| Some(Arc::clone(&law))).unwrap();
+            let bent: Vec<Vector<D>> = (affine.iter().enumerate())
+                .map(|(n, u)| u + Vector::from_fn(|i, _| 2e-3 * noise(n, i)))
+                .collect();
+            let along: Vec<Vector<D>> = (0..bent.len())
+                .map(|n| Vector::from_fn(|i, _| noise(n + 7, i)))
+                .collect();
+            let moved = |by: f64| -> Vec<Vector<D>> {
+                bent.iter().zip(&along).map(|(u, d)| u + d * by).collect()
+            };
+            let (force, _) = responded(&mesh, &mut fresh, &bent);
+            let work: f64 = force.iter().zip(&along).map(|(f, d)| f.dot(d)).sum();
+            let step = 1e-6;
+            let mut energy = |by: f64| responded(&mesh, &mut fresh, &moved(by)).1;
+            let slope = (energy(step) - energy(-step)) / (2.0 * step);
+            assert!(
+                (slope - work).abs() < 1e-6 * work.abs().max(1.0),
+                "{name}: {slope} {work}"
+            );
+        }
+    }
+
+    #[test]
+    fn elements_that_yield_have_the_stress_of_their_law_and_remember() {
+        yields::<1>();
+        yields::<2>();
+        yields::<3>();
+    }
+}

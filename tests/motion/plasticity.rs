@@ -1,0 +1,221 @@
+//! J2 plasticity of points and of finite elements, through scenes.
+
+use crate::laws::{STEPS, history, refused, scene};
+use crate::{column, run, same, write};
+
+const YIELD: f64 = 5.0;
+const HARDENING: f64 = 250.0;
+const YOUNG: f64 = 1000.0;
+
+fn law() -> String {
+    format!(
+        "plastic-correspondence]\npoisson-ratio = 0.3\nyield-stress = {YIELD}\nhardening-modulus = {HARDENING}"
+    )
+}
+
+#[test]
+fn a_plastic_bar_follows_its_bilinear_curve_and_keeps_what_flowed() {
+    for coupling in ["nonlocal", "local", "splice"] {
+        let folder = tempfile::tempdir().unwrap();
+        // up to a mean strain of 1 %, and back beyond where it came from
+        let steps = STEPS.replace("steps = 5", "steps = 20");
+        let typed = scene(coupling, &law(), &steps).replace("0.1*t", "0.2*min(t, 1.2 - 1.4*t)");
+        let found = history(folder.path(), &typed, &["a_ux", "b_ux", "right_reaction_x"]);
+        let strain = |k: usize| (found[1][k] - found[0][k]) / 0.9;
+        let tangent = YOUNG * HARDENING / (YOUNG + HARDENING);
+        let up = |e: f64| (YOUNG * e).min(YIELD + tangent * (e - YIELD / YOUNG));
+        let is_near = |k: usize, expected: f64| {
+            let reaction = found[2][k];
+            assert!(
+                (expected - reaction).abs() < 1e-6 * YIELD,
+                "{coupling} {k}: {expected} {reaction}"
+            );
+        };
+        (1..11).for_each(|k| is_near(k, up(strain(k))));
+        assert!(found[2][10] > 1.05 * YIELD && found[2][4] < 0.99 * YIELD);
+        // elastic on the way back, until the other side of the grown yield surface is reached
+        let (top, top_strain) = (found[2][10], strain(10));
+        let mut turned = 0;
+        for k in 11..21 {
+            let back = top - YOUNG * (top_strain - strain(k));
+            if back > -top {
+                is_near(k, back);
+            } else {
+                turned += 1;
+                is_near(
+                    k,
+                    -top - tangent * (top_strain - 2.0 * top / YOUNG - strain(k)),
+                );
+            }
+        }
+        assert!(turned > 0);
+        // what was worked is stored or gone
+        let path = folder.path().join("out/bar_history.csv");
+        let [stored, work, gone] = ["stored_energy", "external_work", "dissipated_energy"]
+            .map(|name| *column(&path, name).last().unwrap());
+        assert!(
+            (stored + gone - work).abs() < 2e-2 * work,
+            "{coupling}: {stored} {gone} {work}"
+        );
+    }
+}
+
+/// A square, or a cube, in simple shear: all of its boundary is prescribed.
+const SHEAR: &str = r#"
+kinematics = "{kinematics}"
+coupling = "{coupling}"
+{mesh}
+[materials.m.plastic-correspondence]
+youngs-modulus = 1000
+poisson-ratio = 0.3
+yield-stress = 5
+hardening-modulus = 250
+{zone}
+[conditions.sheared.displacement]
+inside.without = { from = { box = { min = {min}, max = {max} } }, removed = { box = { min = {low}, max = {high} } } }
+x = "0.02*t*y"
+y = 0
+{z}
+[output]
+probes.a = { at = {inside} }
+probes.b = { at = {aside} }
+[solve.quasi-static]
+duration = 1
+steps = 8
+tolerance = 1e-11
+"#;
+
+fn sheared(coupling: &str, dimension: usize) -> String {
+    let all = |x: f64| format!("{:?}", vec![x; dimension]);
+    let (kinematics, mesh, z) = match dimension {
+        2 => (
+            "plane-strain",
+            "[mesh.rectangle]\nmin = [0, 0]\nmax = [10, 10]\nx = { cells = 20 }\ny = { cells = 20 }",
+            "",
+        ),
+        _ => (
+            "solid",
+            "[mesh.box]\nmin = [0, 0, 0]\nmax = [10, 10, 10]\nx = { cells = 4 }\ny = { cells = 4 }\nz = { cells = 4 }",
+            "z = 0",
+        ),
+    };
+    let zone = match coupling {
+        "local" => String::new(),
+        _ => format!(
+            "[zones.nonlocal]\nbox = {{ min = {}, max = {} }}\n[peridynamics]\nhorizon = 1.5\npoints.lattice = {{ spacing = 0.5 }}",
+            all(4.0),
+            all(6.0)
+        ),
+    };
+    SHEAR
+        .replace("{kinematics}", kinematics)
+        .replace("{coupling}", coupling)
+        .replace("{mesh}", mesh)
+        .replace("{zone}", &zone)
+        .replace("{min}", &all(-1.0))
+        .replace("{max}", &all(11.0))
+        .replace("{low}", &all(0.1))
+        .replace("{high}", &all(9.9))
+        .replace("{inside}", &all(5.25))
+        .replace("{aside}", &all(2.5))
+        .replace("{z}", z)
+}
+
+#[test]
+fn points_and_elements_flow_alike_in_simple_shear() {
+    let shear = YOUNG / 2.6;
+    for (coupling, dimension) in [("local", 2), ("splice", 2), ("local", 3)] {
+        let folder = tempfile::tempdir().unwrap();
+        let typed = sheared(coupling, dimension);
+        let columns = ["stored_energy", "dissipated_energy", "a_ux", "b_ux", "a_uy"];
+        let found = history(folder.path(), &typed, &columns);
+        let volume = 10f64.powi(dimension as i32);
+        for k in 0..=8 {
+            let gamma = 0.02 * k as f64 / 8.0;
+            // √3 τ = σ_y + H α beyond the yield stress, γ = τ/μ + √3 α
+            let root = 3f64.sqrt();
+            let alpha = ((root * shear * gamma - YIELD) / (HARDENING + 3.0 * shear)).max(0.0);
+            let tau = shear * (gamma - root * alpha);
+            let stored = 0.5 * (tau * tau / shear + HARDENING * alpha * alpha);
+            let expected = [stored * volume, YIELD * alpha * volume];
+            for (column, expected) in found.iter().zip(expected) {
+                assert!(
+                    (column[k] - expected).abs() < 1e-9 * 0.05 * volume,
+                    "{coupling} {dimension} {k}: {} {expected}",
+                    column[k]
+                );
+            }
+            for (column, expected) in found[2..].iter().zip([gamma * 5.25, gamma * 2.5, 0.0]) {
+                assert!(
+                    (column[k] - expected).abs() < 1e-9,
+                    "{coupling} {dimension} {k}: {} {expected}",
+                    column[k]
+                );
+            }
+        }
+        assert!(*found[1].last().unwrap() > 0.02 * volume);
+        // elements and points tell what they remember, and their stress
+        let vtu = std::fs::read_dir(folder.path().join("out")).unwrap();
+        let vtu = vtu.map(|e| e.unwrap().path()).find(|p| {
+            p.extension().is_some_and(|e| e == "vtu") && p.to_string_lossy().contains('8')
+        });
+        let text = String::from_utf8_lossy(&std::fs::read(vtu.unwrap()).unwrap()).into_owned();
+        let (_, of_cells) = text.split_once("<CellData").unwrap();
+        let (of_cells, _) = of_cells.split_once("</CellData").unwrap();
+        assert!(of_cells.contains("equivalent plastic strain"));
+    }
+}
+
+#[test]
+fn a_bar_of_elements_goes_on_from_its_checkpoint_with_what_flowed() {
+    let rest = "[initial.u.velocity]\nx = \"0.5*sin(pi*x/10)\"\n[solve.explicit]\nduration = 1\noutputs = 4\ncheckpoint-every = 50\n";
+    let law = law().replacen(']', "]\ndensity = 1", 1);
+    let typed = scene("local", &law, rest)
+        .replace("x = \"0.1*t\"", "x = 0")
+        .replacen("density = 1\nyoungs", "youngs", 1);
+    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for folder in [whole.path(), parts.path()] {
+        write(folder, "bar.toml", &typed);
+        run(folder, &["bar.toml"]);
+    }
+    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
+    let mut files = files.map(|e| e.unwrap().path());
+    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
+    let previous = previous.expect("two checkpoints");
+    std::fs::rename(&previous, previous.with_extension("")).unwrap();
+    let said = run(parts.path(), &["bar.toml", "--resume"]);
+    assert!(said.contains("resumed after step"), "{said}");
+    same(&whole.path().join("out"), &parts.path().join("out"));
+    let path = whole.path().join("out/bar_history.csv");
+    let [kinetic, stored, lost] =
+        ["kinetic_energy", "stored_energy", "dissipated_energy"].map(|name| column(&path, name));
+    let last = kinetic.len() - 1;
+    assert!(
+        lost[last] > 0.05 * kinetic[0],
+        "{} {}",
+        lost[last],
+        kinetic[0]
+    );
+    let balance = kinetic[last] + stored[last] + lost[last] - kinetic[0];
+    assert!(
+        balance.abs() < 5e-3 * kinetic[0],
+        "{balance} {}",
+        kinetic[0]
+    );
+}
+
+#[test]
+fn what_cannot_yield_on_both_sides_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |typed: &str, part: &str| refused(folder.path(), typed, part);
+    // its bonds do not break: what that costs is not known
+    let breaking = format!("{}\ncritical-stretch = 0.02", law());
+    refused(
+        &scene("nonlocal", &breaking, STEPS),
+        "`critical-stretch` is not known",
+    );
+    let still = |coupling: &str| scene(coupling, &law(), "").replace("\"0.1*t\"", "0.1");
+    refused(&still("local"), "a static scene has no time");
+    refused(&still("nonlocal"), "a static scene has no time");
+    refused(&scene("balanced", &law(), STEPS), "does not balance");
+}
