@@ -201,6 +201,16 @@ pub trait SemiDiscrete: Send + Sync {
         Vec::new()
     }
 
+    /// Stress \[Pa\] of the cells whose law is not linear, as tensors padded with zeros.
+    fn cell_stresses(&self, _u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        Vec::new()
+    }
+
+    /// What the local laws of finite elements remember, by name and cell.
+    fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
+        Vec::new()
+    }
+
     /// Damage of each site, `1 − Σ V of intact bonds / Σ V of all`; none if nothing can break.
     fn damage(&self) -> Option<Vec<f64>> {
         None

@@ -5,30 +5,32 @@
 //!
 //! A seam that has bonds of its own ([`Operator::seam_bonds`]) takes those that are exact or break out of the rows too: what is left are finite elements.
 
-use std::sync::PoisonError;
+use std::sync::{Arc, PoisonError};
 
 use rayon::prelude::*;
 
-use self::{body::MovingBody, energy::ElementEnergy, rows::SiteRows};
+use self::{body::MovingBody, elements::LocalElements, energy::ElementEnergy, rows::SiteRows};
 use crate::{
     assembly,
     coupling::{Model, NonlinearSeam, Operator},
+    material::LocalLaw,
     peridynamics::{
         Families, PdBody,
         bond_force::{BondPass, Kinematics},
     },
     system::{BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
-    tensor::Vector,
 };
+use behaviour::NONE;
 pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, SystemError};
-use behaviour::{CHUNK, NONE};
 
 pub(crate) mod behaviour;
 mod body;
 mod dissipation;
+mod elements;
 mod energy;
 mod force_states;
 mod rows;
+mod stored_energy;
 
 /// A coupled model as a system that moves.
 pub struct CoupledSystem<'a, const D: usize> {
@@ -43,6 +45,8 @@ pub struct CoupledSystem<'a, const D: usize> {
     /// Bonds of the seam, if they are exact or break; the rows are those of the finite elements alone then.
     seam: Option<NonlinearSeam<D>>,
     energy: ElementEnergy,
+    /// Elements whose law is not linear, if there are any.
+    elements: Option<LocalElements<D>>,
     /// What breaking bonds has cost so far.
     spent: Dissipation,
     /// See [`SemiDiscrete::difference_length`].
@@ -122,8 +126,20 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             body,
             seam,
             energy,
+            elements: None,
             spent: Dissipation::default(),
         })
+    }
+
+    /// Lets finite elements follow the local laws of their materials, by the number of a material; those that are linear, or that only other rows hold, stay as they are.
+    #[must_use]
+    pub fn with_local_laws(mut self, laws: &[Option<Arc<dyn LocalLaw<D>>>]) -> Self {
+        self.elements = LocalElements::new(self.model, laws);
+        if self.elements.is_some() && self.difference_length.is_none() {
+            self.difference_length =
+                Some(DIFFERENCED * self.model.typical_volume().powf(1.0 / D as f64));
+        }
+        self
     }
 
     /// The pass over the bonds, if there is a peridynamic body.
@@ -145,21 +161,6 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self.seam.is_some()
     }
 
-    /// Energy of the bonds that the pass knows of, and of contact \[J\].
-    fn bond_energy(&self, u: &[f64]) -> f64 {
-        self.body.as_ref().map_or(0.0, |body| {
-            let mut points = vec![0.0; body.displacement.len()];
-            body.spread(u, &mut points);
-            let contact = body.contact.as_ref().map_or(0.0, |contact| {
-                contact
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .energy(&points, &|i, j| body.pass.bonded(i, j))
-            });
-            body.pass.stored_energy(&points) + contact
-        })
-    }
-
     /// Whether bonds can break.
     fn breaks(&self) -> bool {
         self.body
@@ -169,7 +170,9 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
 
     /// Whether the law remembers.
     fn remembers(&self) -> bool {
+        let elements = self.elements.as_ref();
         self.body.as_ref().is_some_and(|b| b.pass.remembers())
+            || elements.is_some_and(|e| e.remembers())
     }
 
     /// Numbers of the account in a checkpoint.
@@ -212,6 +215,10 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                 b.pass.memory_bytes() + (b.displacement.len() + b.force.len()) * 8
             })
             + self.seam.as_ref().map_or(0, NonlinearSeam::memory_bytes)
+            + self
+                .elements
+                .as_ref()
+                .map_or(0, LocalElements::memory_bytes)
     }
 }
 
@@ -253,44 +260,37 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         u: &[f64],
         force: &mut [f64],
         interval: Interval,
-        breakage: FailureUpdate,
+        update: FailureUpdate,
     ) -> u64 {
-        let Some(body) = &mut self.body else {
-            self.linear
-                .multiply_into::<D>(u, None, &mut self.products, force);
-            return 0;
-        };
-        let mut points = std::mem::take(&mut body.displacement);
-        body.spread(u, &mut points);
-        let broken = body
-            .pass
-            .force_into(&points, &mut body.force, interval, breakage);
-        if let Some(contact) = &body.contact {
-            let pass = &body.pass;
-            contact
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .add_force(&points, &|i, j| pass.bonded(i, j), &mut body.force);
-        }
-        body.displacement = points;
-        let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
-        self.linear
-            .multiply_into::<D>(u, bonds, &mut self.products, force);
-        let mut of_seam = 0;
-        if let Some(seam) = &mut self.seam {
-            seam.begin_pass();
-            if broken > 0 {
-                seam.follow(body.pass.as_ref());
+        let mut broken = 0;
+        match &mut self.body {
+            None => (self.linear).multiply_into::<D>(u, None, &mut self.products, force),
+            Some(body) => {
+                broken = body.respond(u, interval, update);
+                let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
+                (self.linear).multiply_into::<D>(u, bonds, &mut self.products, force);
+                if let Some(seam) = &mut self.seam {
+                    seam.begin_pass();
+                    if broken > 0 {
+                        seam.follow(body.pass.as_ref());
+                    }
+                    broken += seam.add_force(u, force, update);
+                }
             }
-            of_seam = seam.add_force(u, force, breakage);
+        }
+        if let Some(elements) = &mut self.elements {
+            elements.add_force(self.model, u, interval.length, force);
         }
         scale_rows(self.model, force);
-        broken + of_seam
+        broken
     }
 
     fn commit(&mut self) {
         if let Some(body) = &mut self.body {
             self.spent.inelastic += body.pass.commit();
+        }
+        if let Some(elements) = &mut self.elements {
+            self.spent.inelastic += elements.commit();
         }
     }
 
@@ -367,8 +367,12 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     fn tangent_is_constant(&self) -> Vec<bool> {
         let breaks = self.breaks();
         let at_seam = |site: usize| self.seam.as_ref().is_some_and(|s| s.touches(site));
+        let bends = |site: usize| {
+            let elements = self.elements.as_ref();
+            elements.is_some_and(|e| e.touches(self.model, site))
+        };
         (0..self.mass.len())
-            .map(|site| !breaks || (self.linear.has(site) && !at_seam(site)))
+            .map(|site| (!breaks || (self.linear.has(site) && !at_seam(site))) && !bends(site))
             .collect()
     }
 
@@ -426,41 +430,8 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     }
 
     fn stored_energy(&self, u: &[f64]) -> f64 {
-        let of_rows = || {
-            let rows = |site: usize| self.linear.product::<D>(site, u);
-            let sites = (0..self.mass.len()).into_par_iter().with_min_len(CHUNK);
-            let elements: Vec<f64> = sites
-                .map(|s| 0.5 * rows(s).dot(&Vector::from_column_slice(&u[s * D..][..D])))
-                .collect();
-            elements.iter().sum::<f64>()
-        };
-        if let Some(seam) = &self.seam {
-            return of_rows() + self.bond_energy(u) + seam.energy(u);
-        }
-        let is_body_alone = self
-            .body
-            .as_ref()
-            .is_some_and(|b| b.alone == self.mass.len());
-        if self.symmetry == Symmetry::Symmetric && !is_body_alone {
-            // a seam that has an energy
-            if self.body.as_ref().is_some_and(MovingBody::takes_all_points) {
-                // whole bonds are passed over, exact where they turn; rows have what the seam cuts
-                return of_rows() + self.bond_energy(u);
-            }
-            // rows have whole bonds too: the energy of all is known to first order in the stretch of exact bonds
-            let mut force = vec![0.0; u.len()];
-            self.tangent_into(u, &mut force);
-            let products: Vec<f64> = u
-                .par_chunks(CHUNK)
-                .zip(force.par_chunks(CHUNK))
-                .map(|(u, f)| u.iter().zip(f).map(|(u, f)| u * f).sum())
-                .collect();
-            return 0.5 * products.iter().sum::<f64>();
-        }
-        let elements = self
-            .energy
-            .of::<D>(&self.linear, &self.model.node_transfer, u);
-        elements + self.bond_energy(u)
+        let beyond = self.elements.as_ref().map(|e| e.stored(self.model, u));
+        self.energy_of_linear_elements_and_bonds(u) + beyond.unwrap_or(0.0)
     }
 
     fn dissipation(&self) -> Option<Dissipation> {
@@ -483,6 +454,16 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
 
     fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
         self.remembered_by_points()
+    }
+
+    fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        let elements = self.elements.as_ref();
+        elements.map_or(Vec::new(), |e| e.stresses(self.model, u))
+    }
+
+    fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
+        let elements = self.elements.as_ref();
+        elements.map_or(Vec::new(), |e| e.remembered(self.model))
     }
 
     fn damage(&self) -> Option<Vec<f64>> {
@@ -554,6 +535,9 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         if let Some(seam) = &self.seam {
             state.extend(seam.damage_state());
         }
+        if let Some(elements) = &self.elements {
+            state.extend(elements.state());
+        }
         if self.spends() > 0 {
             let spent = [self.spent.energy, self.spent.area, self.spent.inelastic];
             state.extend(&spent.map(f64::to_bits)[..self.spends()]);
@@ -566,7 +550,15 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
             return false;
         };
         let (bonds, spent) = state.split_at(bonds);
+        let words = self.elements.as_ref().map_or(0, LocalElements::words);
+        let Some(of_bonds) = bonds.len().checked_sub(words) else {
+            return false;
+        };
+        let (bonds, of_elements) = bonds.split_at(of_bonds);
         let fits = self.restore_bonds(bonds);
+        if let (true, Some(elements)) = (fits, &mut self.elements) {
+            elements.restore(of_elements);
+        }
         if let (true, &[energy, area, ref rest @ ..]) = (fits, spent) {
             self.spent = Dissipation {
                 energy: f64::from_bits(energy),

@@ -37,6 +37,7 @@
 //! | `cell.rs` | what a cell tells of itself |
 //! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one cell each |
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
+//! | `nonlinear.rs` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
 //! | `locate.rs` | from a point in space to a cell and its shape functions |
 //! | `body.rs` | a whole body: checks, stiffness, lumped volumes and masses |
@@ -50,6 +51,7 @@ mod hex8;
 mod line2;
 mod load;
 mod locate;
+mod nonlinear;
 mod quad4;
 mod tet4;
 mod tri3;
@@ -65,6 +67,7 @@ pub use element::{
 };
 pub use load::{FacetPoint, body_force_vector, facet_area, facet_points, traction_vector};
 pub use locate::{Located, Locator, reference_of};
+pub use nonlinear::NonlinearElements;
 
 use crate::mesh::CellShape;
 

@@ -4,6 +4,9 @@
 //!   f_a = Σ_b K_ab u_b + ∫ (σ(∇u, history) − C : ∇u) · ∂N_a/∂x dV
 //! ```
 //!
+//! Where a law flows at constant volume, cells with several quadrature points take the mean of their dilatation, `∇u + (θ̄ − θ)/D I`, in stress and virtual work alike (the B̄ method, \[Hughes1987\] section 4.5):
+//! with the dilatation of each point they would resist the flow. Under affine fields the two are the same.
+//!
 //! The first term is that of the rows, as if all elements were linear; the integral is a sum over the quadrature points of the stiffness, each with what its law remembers. Elements that are linear do not appear here.
 
 use std::sync::Arc;
@@ -299,15 +302,41 @@ fn excess<const D: usize>(
     };
     let each = element.each;
     let mut point = 0;
+    // means of the gradients of the shape functions
+    let mut mean = [Vector::<D>::zeros(); 8];
+    let has_mean_dilatation = law.flows_at_constant_volume();
+    if has_mean_dilatation {
+        let mut volume = 0.0;
+        for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
+            for (mean, g) in mean.iter_mut().zip(&p.gradient).take(p.nodes) {
+                *mean += g * p.weight;
+            }
+            volume += p.weight;
+        });
+        mean.iter_mut().for_each(|mean| *mean /= volume);
+    }
+    let mean_dilatation: f64 = mean.iter().zip(&u).map(|(g, u)| g.dot(u)).sum();
     for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
         let gradient = displacement_gradient(p, |a| u[a]);
         let own = point * each..(point + 1) * each;
         let past = &past[element.first..][own.clone()];
-        let found = law.respond(&gradient, step, past, &mut present[own]);
         let linear = law.tangent().contract(&gradient);
+        let shift = match has_mean_dilatation {
+            true => (mean_dilatation - gradient.trace()) / D as f64,
+            false => 0.0,
+        };
+        let taken = gradient + Tensor::identity() * shift;
+        let found = law.respond(&taken, step, past, &mut present[own]);
         let beyond = (found.stress - linear) * p.weight;
         for (force, g) in sum.force.iter_mut().zip(&p.gradient).take(p.nodes) {
             *force += beyond * g;
+        }
+        if has_mean_dilatation {
+            let pressure = found.stress.trace() / D as f64 * p.weight;
+            let gradients = mean.iter().zip(&p.gradient).take(p.nodes);
+            for (force, (mean, g)) in sum.force.iter_mut().zip(gradients) {
+                *force += (mean - g) * pressure;
+            }
         }
         sum.stored += p.weight * (found.stored - 0.5 * linear.dot(&gradient));
         sum.dissipated += p.weight * found.dissipated;
@@ -423,6 +452,23 @@ mod tests {
                 "{name}: {slope} {work}"
             );
         }
+    }
+
+    #[test]
+    fn flow_at_constant_volume_meets_the_mean_dilatation_of_a_cell() {
+        use super::super::sample::unit_box;
+        use crate::mesh::CellShape;
+        // u = (x − ½)(y − ½) e_x within one cell, far below yield: θ = y − ½, its mean zero, and what is left is ε̄ = [y', x'; x', −y']/2
+        let mesh = unit_box::<2>(CellShape::Quad4, 1, 0.0);
+        let law: Arc<dyn LocalLaw<2>> = Arc::new(J2::<2>::new(LAME.0, LAME.1, 1e9, 0.0));
+        let mut elements =
+            NonlinearElements::new(&mesh, [(0, true)].into_iter(), |_| Some(Arc::clone(&law)))
+                .unwrap();
+        let u: Vec<Vector<2>> = (mesh.nodes.iter())
+            .map(|x| Vector::<2>::new((x[0] - 0.5) * (x[1] - 0.5), 0.0))
+            .collect();
+        let (_, energy) = responded(&mesh, &mut elements, &u);
+        assert!((energy - LAME.1 / 12.0).abs() < 1e-13, "{energy}");
     }
 
     #[test]

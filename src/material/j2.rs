@@ -59,6 +59,11 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         false
     }
 
+    fn flows_at_constant_volume(&self) -> bool {
+        // a bar is in uniaxial stress: its sides are free
+        D > 1
+    }
+
     fn history(&self) -> &'static [&'static str] {
         match D {
             1 => &["plastic strain xx", "equivalent plastic strain"],

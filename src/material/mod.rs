@@ -6,7 +6,7 @@
 //! | `j2.rs` | von Mises plasticity with linear isotropic hardening |
 //!
 //! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] at the end of a step and what it remembers, and gives the stress σ \[Pa\], the energies stored and dissipated \[J/m^D\], and the tangent at rest
-//! `C = ∂σ/∂G` \[Pa\]. It serves the points of a correspondence material. A new law is one file and one line in the table of the conformance tests, which check for every law that these
+//! `C = ∂σ/∂G` \[Pa\]. It serves the points of a correspondence material and the quadrature points of finite elements. A new law is one file and one line in the table of the conformance tests, which check for every law that these
 //! belong together, that nothing is stressed at rest, and that a (linearised) rotation stresses nothing.
 
 mod elastic;
@@ -124,6 +124,11 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
 
     /// The names of the numbers that it remembers; all are zero at the start.
     fn history(&self) -> &'static [&'static str];
+
+    /// Whether it flows without a change of volume, so that cells with a dilatation at each quadrature point would resist it.
+    fn flows_at_constant_volume(&self) -> bool {
+        false
+    }
 
     /// The response at the end of a step of the length `step` \[s\]; `gradient` is `G_ij = ∂u_i/∂x_j`. Overwrites `present` with what is remembered then; `past` is what was at its beginning.
     fn respond(

@@ -1,5 +1,8 @@
 //! What a peridynamic law is to the rest of the code: a linearisation, a nonlinear response, and what breaking costs.
 
+use std::sync::Arc;
+
+use crate::material::LocalLaw;
 use crate::peridynamics::{BondEnergy, ForceState, LinearForceState};
 
 /// A fast pass over all bonds that computes what a law's [`ForceState`] says.
@@ -29,6 +32,11 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
 
     /// A fast pass for [`Law::force_state`], if there is one.
     fn accelerator(&self) -> Option<Accelerator>;
+
+    /// The local law that finite elements of this material have; none if they are linear, with the collapsed tensor of the bonds.
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
 
     /// Whether the force with linear kinematics is that of [`Law::linearised`], whatever the displacement and the time.
     fn is_linear(&self) -> bool;

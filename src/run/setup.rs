@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::coupling::{self, Model, PointSource, Problem, Surfaces, Zone};
+use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
 use crate::peridynamics::{BondWeights, PartialVolume};
@@ -10,7 +11,7 @@ use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
 use crate::scene::failure::Breaking;
 use crate::scene::initial::Initial;
-use crate::scene::materials::Ratio;
+use crate::scene::materials::{Material, Ratio};
 use crate::scene::points::Points;
 use crate::scene::spec::{BondsSpec, CouplingTraits, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
@@ -34,6 +35,8 @@ pub struct RunSettings<const D: usize> {
     pub follow: Option<Follow>,
     /// A number for all that determines the results.
     pub fingerprint: Fingerprint,
+    /// The local law of each material's elements, of those whose elements are not linear.
+    pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
     /// Density of each material.
     pub density: Vec<f64>,
     /// The coupling, where the scene names none.
@@ -50,18 +53,31 @@ impl<const D: usize> RunSettings<D> {
         self.choices.iter().chain(&self.placed).chain(&self.chosen)
     }
 
-    /// What makes the forces of bonds that are intact depend on the displacement otherwise than linearly, as a choice; none where they do not.
+    /// Whether elements of the model follow a law that is not linear.
+    pub fn has_nonlinear_elements(&self, model: &Model<D>) -> bool {
+        let bends = |c: usize| self.local_laws[model.material_of_cell(c) as usize].is_some();
+        self.local_laws.iter().any(Option::is_some)
+            && (0..model.mesh.cell_count()).any(|c| model.is_element(c) && bends(c))
+    }
+
+    /// What makes the forces of bonds that are intact, or of elements, depend on the displacement otherwise than linearly, as a choice; none where they do not.
     pub fn nonlinear(&self, model: &Model<D>) -> Option<Decision> {
-        let law = &model
+        let body = model
             .peridynamics
             .as_ref()
-            .filter(|_| model.body().is_some())?
-            .law;
-        let (choice, why) = match (self.breaking.bonds, law.is_linear()) {
-            (BondsSpec::Linear, true) => return None,
-            (BondsSpec::Exact, _) => ("geometrically exact bonds", "bonds = \"exact\""),
-            (BondsSpec::Linear, false) => ("bonds that are not linear", "as their law says"),
+            .filter(|_| model.body().is_some());
+        let bonds = body.and_then(|p| match (self.breaking.bonds, p.law.is_linear()) {
+            (BondsSpec::Linear, true) => None,
+            (BondsSpec::Exact, _) => Some(("geometrically exact bonds", "bonds = \"exact\"")),
+            (BondsSpec::Linear, false) => Some(("bonds that are not linear", "as their law says")),
+        });
+        let elements = || {
+            self.has_nonlinear_elements(model).then_some((
+                "elements that are not linear",
+                "as the local law of their material says",
+            ))
         };
+        let (choice, why) = bonds.or_else(elements)?;
         Some(Decision {
             choice: choice.to_owned(),
             why: why.to_owned(),
@@ -94,6 +110,8 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
         why,
     });
     let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
+    let local = |m: &Material<D>| m.law.local_law().filter(|law| !law.is_linear());
+    let local_laws = scene.materials.iter().map(local).collect();
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
     let peridynamics = scene.peridynamics.map(|p| {
@@ -141,6 +159,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             ratio,
             follow: scene.follow,
             fingerprint: scene.fingerprint,
+            local_laws,
             density,
             chosen,
             placed: scene.placement.map(|p| p.choice),

@@ -1,6 +1,10 @@
 //! What of a model makes its results doubtful, and is told by `check` and by `run`.
 
+use std::sync::Arc;
+
 use crate::coupling::{CellRole, Model, Zone};
+use crate::material::LocalLaw;
+use crate::mesh::CellShape;
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::report::number;
 use crate::scene::spec::CouplingTraits;
@@ -54,6 +58,26 @@ pub(crate) fn indefinite(symmetry: Symmetry, method: MethodUsed) -> Option<Strin
     (symmetry == Symmetry::Symmetric && method == MethodUsed::Lu).then(|| {
         "the stiffness is symmetric and not positive definite: the solution is an equilibrium, and not one of least energy, so that a motion would leave it; leave peridynamics.points out, whose lattice follows the mesh, or draw the zone wider than its families"
             .to_owned()
+    })
+}
+
+/// Elements of one quadrature point whose material flows at constant volume.
+pub(crate) fn locking<const D: usize>(
+    model: &Model<D>,
+    laws: &[Option<Arc<dyn LocalLaw<D>>>],
+) -> Option<String> {
+    let flows = |c: usize| {
+        let law = laws[model.material_of_cell(c) as usize].as_ref();
+        law.is_some_and(|law| law.flows_at_constant_volume())
+    };
+    let is_simplex = |c: usize| matches!(model.mesh.shapes[c], CellShape::Tri3 | CellShape::Tet4);
+    let count = (0..model.mesh.cell_count())
+        .filter(|&c| model.is_element(c) && is_simplex(c) && flows(c))
+        .count();
+    (count > 0).then(|| {
+        format!(
+            "{count} tri3 or tet4 elements flow at constant volume, which such cells resist: beyond yield they are too stiff; mesh them with quad4 or hex8 cells"
+        )
     })
 }
 

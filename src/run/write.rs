@@ -264,6 +264,12 @@ pub fn snapshot<const D: usize>(
     let mut displacement: Vec<Vector<D>> = Vec::new();
     let mut zones = Vec::new();
     let (mut strains, mut stresses) = (Vec::new(), Vec::new());
+    let of_cells: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
+        .map(|system| system.cell_stresses(solved.displacement))
+        .unwrap_or_default()
+        .into_iter()
+        .collect();
+    let mut shown_cells = Vec::new();
     let mut site_of_node = vec![None; mesh.nodes.len()];
     for (site, s) in model.sites.iter().enumerate() {
         if let SiteKind::Node(n) = s.kind {
@@ -287,12 +293,13 @@ pub fn snapshot<const D: usize>(
         zones.push(label(model.zones[c]));
         let gradient = solved.element_gradient(c);
         strains.push(strain(&gradient));
-        stresses.push(
-            solved
-                .operator
+        stresses.push(match of_cells.get(&(c as u32)) {
+            Some(rows) => Tensor::from_fn(|i, j| rows[i][j]),
+            None => (solved.operator)
                 .cell_stress(c, solved.displacement)
                 .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
-        );
+        });
+        shown_cells.push(c as u32);
     }
     let intact = Intact::of(solved);
     // of force states that are not linear; the others follow from the displacements
@@ -366,10 +373,20 @@ pub fn snapshot<const D: usize>(
             }
         });
     }
+    let shown = zones.len();
     snapshot.cell_fields = vec![
         Field::labels("model", zones),
         Field::tensor("strain", &strains),
         Field::tensor("stress", &stresses),
     ];
+    let remembered = solved.system.map(|system| system.remembered_by_cells());
+    for (name, values) in remembered.into_iter().flatten() {
+        let values: FxHashMap<u32, f64> = values.into_iter().collect();
+        let mut field = vec![0.0; shown];
+        for (value, c) in field.iter_mut().zip(&shown_cells) {
+            *value = values.get(c).copied().unwrap_or(0.0);
+        }
+        snapshot.cell_fields.push(Field::scalar(name, field));
+    }
     snapshot
 }

@@ -108,18 +108,6 @@ pub(crate) fn follow<const D: usize>(
         }
         truncated.cut_bonds = Some(CutBondsSpec::Linear);
     }
-    if let Some(states) = law.force_state()
-        && !states.history().is_empty()
-    {
-        return Err(refused(
-            format!(
-                "`zones.follow` is set, and the law of the points, {}, remembers",
-                law.name()
-            ),
-            "lays points out anew, and their history would be lost",
-            "draw a zone that is wide enough, or remove it",
-        ));
-    }
     if matches!(p.points, Points::Lattices { .. }) {
         return Err(refused(
             "`zones.follow` and `zones.bodies` are set".to_owned(),

@@ -4,7 +4,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::source::Span;
-use super::spec::{CouplingSpec, SceneSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, SceneSpec, SolveSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
@@ -47,12 +47,20 @@ pub(crate) fn one_peridynamic_material<const D: usize>(
 pub(crate) fn balanced_seam<const D: usize>(
     spec: &SceneSpec,
     coupling: &CouplingSpec,
-    material: &Material<D>,
+    materials: &[Material<D>],
+    cell_material: &[u16],
+    peridynamic: u16,
 ) -> Result<(), SceneError> {
     let joining = coupling.joining();
+    let material = &materials[peridynamic as usize];
     let balances = matches!(coupling, CouplingSpec::Truncated(_))
         || matches!(joining.zones, ZonesNeeded::Everywhere(_));
-    if balances || material.law.is_linear() {
+    // a splice gives both sides the stress of one local law
+    let is_same = |m: &u16| std::ptr::eq(material, &raw const materials[*m as usize]);
+    let agrees = matches!(coupling, CouplingSpec::Splice(_))
+        && material.law.local_law().is_some()
+        && cell_material.iter().all(is_same);
+    if balances || agrees || material.law.is_linear() {
         return Ok(());
     }
     let name = spec.materials.get_key_value(material.name.as_str());
@@ -76,7 +84,10 @@ pub(crate) fn elastic_elements<const D: usize>(
     cell_material: &[u16],
     zones: &[Zone],
 ) -> Result<(), SceneError> {
-    let bends = |m: &Material<D>| !m.law.is_linear() && !m.law.linearised().is_ordinary();
+    let bends = |m: &Material<D>| {
+        let law = &m.law;
+        !law.is_linear() && !law.linearised().is_ordinary() && law.local_law().is_none()
+    };
     let cells = zones.iter().zip(cell_material);
     let local = cells.filter(|(zone, _)| **zone == Zone::Local);
     let mut of_local = local.map(|(_, &m)| &materials[m as usize]);
@@ -97,6 +108,69 @@ pub(crate) fn elastic_elements<const D: usize>(
         "of this material",
     )
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
+}
+
+/// The materials that are used and remember, by their points or by their elements.
+fn remembering<'a, const D: usize>(
+    materials: &'a [Material<D>],
+    cell_material: &[u16],
+    zones: &[Zone],
+) -> Option<&'a Material<D>> {
+    let by_points = |m: &Material<D>| {
+        let states = m.law.force_state();
+        states.is_some_and(|states| !states.history().is_empty())
+    };
+    let by_elements = |m: &Material<D>| {
+        let law = m.law.local_law();
+        law.is_some_and(|law| !law.history().is_empty())
+    };
+    let mut used = zones.iter().zip(cell_material);
+    let remembers = |(zone, m): &(&Zone, &u16)| match zone {
+        Zone::Local => by_elements(&materials[**m as usize]),
+        Zone::Transition | Zone::Nonlocal => by_points(&materials[**m as usize]),
+    };
+    used.find(remembers).map(|(_, m)| &materials[*m as usize])
+}
+
+/// Refuses a material that remembers where there is no time, or where zones are laid out anew.
+pub(crate) fn memory<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    cell_material: &[u16],
+    zones: &[Zone],
+) -> Result<(), SceneError> {
+    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
+    let follows = spec.zones.follow.as_ref();
+    if !is_static && follows.is_none() {
+        return Ok(());
+    }
+    let Some(material) = remembering(materials, cell_material, zones) else {
+        return Ok(());
+    };
+    let of = format!(
+        "the law of the material `{}`, {}, remembers",
+        material.name,
+        material.law.name()
+    );
+    let refused = |message: String| SceneError::new(SceneErrorKind::Conflict, message);
+    Err(match (is_static, follows) {
+        (false, Some(follow)) => refused(format!("`zones.follow` is set, and {of}"))
+            .label(
+                follow.span(),
+                "lays points and elements out anew, and their history would be lost",
+            )
+            .help("draw a zone that is wide enough, or remove it"),
+        _ => {
+            let name = spec.materials.get_key_value(material.name.as_str());
+            refused(format!("{of}, and a static scene has no time"))
+                .label(
+                    name.map_or(0..0, |(k, _)| k.span.clone()),
+                    "its forces depend on how the load came",
+                )
+                .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]")
+        }
+    })
 }
 
 /// Refuses a horizon below the spacing of the points.

@@ -156,18 +156,13 @@ impl<'a, const D: usize> Draft<'a, D> {
         agreement::balanced_seam(
             spec,
             &joined.coupling,
-            &self.materials[peridynamic as usize],
+            &self.materials,
+            &self.cell_material,
+            peridynamic,
         )?;
         agreement::elastic_elements(spec, &self.materials, &self.cell_material, &zones)?;
-        let breaking = {
-            let has_points = zones.iter().any(|zone| *zone != Zone::Local);
-            failure::breaking(
-                spec,
-                &self.materials[peridynamic as usize],
-                has_points,
-                mesh,
-            )?
-        };
+        agreement::memory(spec, &self.materials, &self.cell_material, &zones)?;
+        let breaking = failure::breaking(spec, &self.materials[peridynamic as usize], mesh)?;
         let follow = adaptive_zone::follow(
             spec,
             &mut joined,

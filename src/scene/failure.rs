@@ -41,7 +41,6 @@ pub struct Contact {
 pub(crate) fn breaking<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
-    has_points: bool,
     mesh: &Mesh<D>,
 ) -> Result<Breaking<D>, SceneError> {
     let fracture = material.fracture;
@@ -120,27 +119,6 @@ pub(crate) fn breaking<const D: usize>(
         }
         None => BondsSpec::Linear,
     };
-    let remembers = || {
-        let states = material.law.force_state();
-        states.is_some_and(|states| !states.history().is_empty())
-    };
-    if let (true, true, Some((name, _))) = (
-        is_static,
-        has_points && remembers(),
-        spec.materials
-            .iter()
-            .find(|(name, _)| name.value == material.name),
-    ) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "the law of the material `{name}`, {}, remembers, and a static scene has no time",
-                material.law.name()
-            ),
-        )
-        .label(name.span.clone(), "its forces depend on how the load came")
-        .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]"));
-    }
     let mut no_fail = Vec::with_capacity(spec.no_fail.len());
     for (name, shape) in &spec.no_fail {
         no_fail.push(region(&format!("no-fail.{name}"), shape, mesh)?);

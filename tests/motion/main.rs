@@ -14,6 +14,7 @@ mod keys;
 mod laws;
 mod load_steps;
 mod neighbours;
+mod plasticity;
 mod restarts;
 mod sub_steps;
 

@@ -101,10 +101,12 @@ fn sheared(coupling: &str, dimension: usize) -> String {
     };
     let zone = match coupling {
         "local" => String::new(),
+        // the cells of the lattice fill the zone, so that the energies of points and elements make up the body's
         _ => format!(
-            "[zones.nonlocal]\nbox = {{ min = {}, max = {} }}\n[peridynamics]\nhorizon = 1.5\npoints.lattice = {{ spacing = 0.5 }}",
+            "[zones.nonlocal]\nbox = {{ min = {}, max = {} }}\n[peridynamics]\nhorizon = 1.5\npoints.lattice = {{ spacing = 0.5, origin = {} }}",
             all(4.0),
-            all(6.0)
+            all(6.0),
+            all(0.25)
         ),
     };
     SHEAR

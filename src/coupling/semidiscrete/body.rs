@@ -1,6 +1,6 @@
 //! The points of a moving model and their bonds.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -15,6 +15,7 @@ use crate::{
         },
         contact::{Contact, ContactSetup, contact_stiffness},
     },
+    system::{FailureUpdate, Interval},
     tensor::Vector,
 };
 
@@ -195,6 +196,22 @@ impl<const D: usize> MovingBody<D> {
     pub fn takes_all_points(&self) -> bool {
         let mut sites = self.site_of_point.iter().filter(|site| **site != NONE);
         sites.all(|&site| self.bonds_of_site[site as usize] != NONE)
+    }
+
+    /// Overwrites the forces of the points with those of bonds and contact at the displacement `u` of the sites; returns how many bonds broke.
+    pub fn respond(&mut self, u: &[f64], interval: Interval, update: FailureUpdate) -> u64 {
+        let mut points = std::mem::take(&mut self.displacement);
+        self.spread(u, &mut points);
+        let broken = (self.pass).force_into(&points, &mut self.force, interval, update);
+        if let Some(contact) = &self.contact {
+            let pass = &self.pass;
+            contact
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .add_force(&points, &|i, j| pass.bonded(i, j), &mut self.force);
+        }
+        self.displacement = points;
+        broken
     }
 
     /// The displacement of every point, from those of the sites.

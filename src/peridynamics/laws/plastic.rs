@@ -18,7 +18,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct PlasticCorrespondence<const D: usize> {
     linear: Correspondence<D>,
-    local: J2<D>,
+    local: Arc<J2<D>>,
 }
 
 impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
@@ -61,7 +61,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
         } = constants;
         Arc::new(Self {
             linear: Correspondence::new(influence, lambda, shear, values[2]),
-            local: J2::new(lambda, shear, values[0], values[1]),
+            local: Arc::new(J2::new(lambda, shear, values[0], values[1])),
         })
     }
 }
@@ -77,6 +77,10 @@ impl<const D: usize> Law<D> for PlasticCorrespondence<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
+    }
+
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        Some(Arc::clone(&self.local) as _)
     }
 
     fn accelerator(&self) -> Option<Accelerator> {

@@ -77,7 +77,8 @@ pub(crate) fn dynamic<'a, const D: usize>(
     let is_linear = critical_stretch.is_none()
         && breaking.contact.is_none()
         && breaking.bonds == BondsSpec::Linear
-        && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear());
+        && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
+        && !rest.has_nonlinear_elements(model);
     definiteness::check(model, operator, rest.ratio, choices, progress)?;
     let moving = CoupledSystem::new(
         model,
@@ -98,6 +99,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     );
     match moving {
         Ok(motion) => {
+            let motion = motion.with_local_laws(&rest.local_laws);
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms
@@ -189,9 +191,8 @@ pub(crate) fn still<'a, const D: usize>(
     };
     let density = |material: u16| rest.density[material as usize];
     let symmetry = coupling.symmetry();
-    Ok(Some(CoupledSystem::new(
-        model, operator, symmetry, density, &behaviour,
-    )?))
+    let system = CoupledSystem::new(model, operator, symmetry, density, &behaviour)?;
+    Ok(Some(system.with_local_laws(&rest.local_laws)))
 }
 
 /// How bonds deform.

@@ -25,7 +25,7 @@ use crate::run::error::RunError;
 use crate::run::loads;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
-use crate::run::warnings::warnings;
+use crate::run::warnings::{locking, warnings};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::scene::validated::Scene;
@@ -444,6 +444,7 @@ fn leg<'r, const D: usize>(
     let rotation = guard.rotation();
     proof.parts.extend(growth);
     let mut told = warnings(model, joining, &proof);
+    told.extend(locking(model, &rest.local_laws));
     told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
     told.extend(rotation.as_ref().map(Rotation::warning));
     let (switches, shares) = zone.map_or((Vec::new(), [0.0; 2]), |z| (z.switches, z.shares));

@@ -25,7 +25,7 @@ use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
-use crate::run::warnings::warnings;
+use crate::run::warnings::{locking, warnings};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
 use crate::scene::validated::Scene;
@@ -256,6 +256,7 @@ fn load_steps<const D: usize>(
         why: "of all load steps of this run".to_owned(),
     });
     let mut told = warnings(model, joining, &proof);
+    told.extend(locking(model, &rest.local_laws));
     told.extend(rotation.as_ref().map(Rotation::warning));
     Ok(RunSummary {
         scene: title,
