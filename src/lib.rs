@@ -80,7 +80,7 @@
 //! | [`run`] | one run of a scene: laid out, proved, solved, written |
 //!
 //! Other crates of the workspace stand on this one: `bondline-study` (many runs, `accuracy`, plots), `bondline-cli` (the program), `bondline-verify` (the suites that
-//! `bondline verify` prints) and `bondline-terminal` (what programs share).
+//! `bondline verify` prints), `bondline-python` (the Python package) and `bondline-terminal` (what programs share).
 //!
 //! # From a scene
 //!

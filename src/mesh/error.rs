@@ -11,6 +11,8 @@ pub enum Place {
     Line(usize),
     /// Byte of a binary file, counted from 0.
     Byte(usize),
+    /// Node, element or set of a mesh in memory, counted from 0.
+    Entry(usize),
     /// Nowhere in particular.
     File,
 }
@@ -20,6 +22,7 @@ impl std::fmt::Display for Place {
         match self {
             Self::Line(n) => write!(f, "line {n}"),
             Self::Byte(n) => write!(f, "byte {n}"),
+            Self::Entry(n) => write!(f, "entry {n}"),
             Self::File => write!(f, "whole file"),
         }
     }

@@ -5,6 +5,7 @@
 //! | `generate.rs` | line, rectangle and box with cut-outs and grading |
 //! | `read.rs` | one entry for all files |
 //! | `raw.rs` | what a file holds before it is a mesh |
+//! | `parts.rs` | a mesh in memory, as another program hands it over |
 //! | `gmsh.rs`, `gmsh_kinds.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
 //! | `vtk.rs`, `vtk_grid.rs` | VTK files: cells, and groups of them by integers |
 //! | `vtu.rs`, `vtk_legacy.rs` | their two formats, `.vtu` and `.vtk` |
@@ -23,6 +24,7 @@ mod error;
 pub mod generate;
 pub mod gmsh;
 mod gmsh_kinds;
+mod parts;
 pub mod quality;
 pub(crate) mod raw;
 pub mod read;
@@ -35,6 +37,7 @@ mod vtu_data;
 mod xml;
 
 pub use error::{MeshError, Place};
+pub use parts::MeshParts;
 
 use crate::tensor::Vector;
 

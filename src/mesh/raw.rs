@@ -24,6 +24,8 @@ pub(super) enum Encoding {
     Text,
     /// By bytes.
     Binary,
+    /// By numbers of nodes or elements; there is no file.
+    Memory,
 }
 
 impl<'a> Source<'a> {
@@ -76,6 +78,7 @@ impl<'a> Source<'a> {
                 Place::Line(1 + before.iter().filter(|&&b| b == b'\n').count())
             }
             Encoding::Binary => Place::Byte(at),
+            Encoding::Memory => Place::Entry(at),
         }
     }
 }

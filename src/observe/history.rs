@@ -49,6 +49,20 @@ impl History {
         })
     }
 
+    /// A table of these columns without a file, which takes no rows.
+    pub fn unwritten(header: Vec<String>) -> Self {
+        Self {
+            path: PathBuf::new(),
+            header,
+            table: None,
+        }
+    }
+
+    /// The columns.
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
     /// Where the table is, once it has a row.
     pub fn path(&self) -> &Path {
         &self.path

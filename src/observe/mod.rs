@@ -13,6 +13,7 @@
 //! | `summary.rs`, `motion_summary.rs` | what one run did: sizes, choices, timings, balance; energies over time |
 //! | `proof.rs` | what was shown about a model before it was solved |
 //! | `rezoning_event.rs` | changes of the nonlocal zone during a run |
+//! | `observer.rs` | results handed to the program that started a run |
 //! | `atomic_file.rs` | whole files or none: written beside, then renamed |
 
 pub mod atomic_file;
@@ -23,12 +24,15 @@ pub mod csv;
 mod data_array;
 pub mod history;
 mod motion_summary;
+mod observer;
 pub mod proof;
 pub mod report;
 pub mod rezoning_event;
 pub mod series;
 pub mod summary;
 pub mod vtu;
+
+pub use observer::Observer;
 
 use std::path::PathBuf;
 

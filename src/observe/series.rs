@@ -56,11 +56,11 @@ impl Series {
         }
     }
 
-    /// Writes the next file and the collection over all.
+    /// Writes the next file and the collection over all; gives the snapshot back.
     ///
     /// # Errors
     /// As [`write_vtu`] and [`write_pvd`].
-    pub fn push(&mut self, time: f64, mut snapshot: Snapshot) -> Result<(), ObserveError> {
+    pub fn push(&mut self, time: f64, mut snapshot: Snapshot) -> Result<Snapshot, ObserveError> {
         snapshot.time = Some(time);
         write_vtu(
             &self.file(self.times.len()),
@@ -68,7 +68,8 @@ impl Series {
             Compression::default(),
         )?;
         self.times.push(time);
-        self.write_collection()
+        self.write_collection()?;
+        Ok(snapshot)
     }
 
     /// Writes the collection over the files so far, if there are any.

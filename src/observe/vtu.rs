@@ -161,7 +161,11 @@ impl Snapshot {
         first
     }
 
-    fn check(&self, path: &Path) -> Result<(), ObserveError> {
+    /// Refuses what no reader could use; errors name the file at `path`, whether or not it is written.
+    ///
+    /// # Errors
+    /// [`ObserveError`]: no cells, cells or fields that do not fit, a value that is not finite.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), ObserveError> {
         if self.shapes.is_empty() {
             return Err(ObserveError::Empty {
                 path: path.to_path_buf(),

@@ -11,7 +11,6 @@ use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::series::Series;
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
-use crate::run::RunError;
 use crate::run::budget::Share;
 use crate::run::equilibrium::may_factorise;
 use crate::run::motion::STILL;
@@ -24,6 +23,7 @@ use crate::run::motion::writer::Recorder;
 use crate::run::proof::growth::GrowthQuestion;
 use crate::run::solution::{self, Solved};
 use crate::run::write::OverSites;
+use crate::run::{RunError, RunOptions};
 use crate::scene::spec::LoadStepSpec;
 use crate::scene::{Explicit as Spec, QuasiStatic, Solve};
 use crate::scene::{Output, Scene};
@@ -195,7 +195,7 @@ fn steps<const D: usize>(
         breaks,
         is_linear,
         CheckpointFile::new(folder.path().join("trial.checkpoint"), 0),
-        None,
+        RunOptions::default(),
         None,
     )?;
     let shown = moment(&motion, is_linear);
@@ -224,7 +224,7 @@ fn steps<const D: usize>(
         };
         let mut series = Series::new(folder.path(), "trial");
         let more = [OverSites::Vector("velocity", &u)];
-        file_seconds(&solved, &more, count, |s| series.push(0.0, s))?
+        file_seconds(&solved, &more, count, |s| series.push(0.0, s).map(drop))?
     } else {
         0.0
     };

@@ -17,7 +17,7 @@
 //! | `rotation.rs`, `warnings.rs` | how far elements rotate; what of a model makes its results doubtful |
 //! | `write.rs` | the files of a run |
 //! | `error.rs` | what cannot be run, with place and remedy |
-//! | `block.rs` | a block from a scene, for unit tests |
+//! | `block.rs`, `observed_tests.rs` | a block from a scene, for unit tests; what an observer sees |
 
 mod any_scene;
 #[cfg(test)]
@@ -30,6 +30,8 @@ pub(crate) mod error;
 mod linear;
 pub mod loads;
 pub mod motion;
+#[cfg(test)]
+mod observed_tests;
 pub(crate) mod placed_scene;
 pub mod proof;
 mod rotation;

@@ -36,12 +36,13 @@ pub(crate) fn run<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
     let moves = scene.solve != Solve::Static;
-    let _claim = scene.output.claim(&scene.title, moves)?;
+    let claim = || scene.output.claim(&scene.title, moves);
+    let _claim = options.writes().then(claim).transpose()?;
     if moves {
         return with_choice(scene.scene, |scene| motion::run(scene, options, progress));
     }
     solve_with(scene, progress, |output, solved| {
-        super::write::write(output, solved)
+        super::write::write_for(output, solved, options)
     })
 }
 

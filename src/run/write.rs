@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::RunOptions;
 use super::solution::Solved;
 use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
 use crate::fem::{self, Locator};
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
-use crate::observe::csv::write_table;
+use crate::observe::csv::{Entry, write_table};
 use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
 use crate::scene::output::PROBES;
 use crate::scene::validated::Output;
@@ -25,43 +26,67 @@ pub fn write<const D: usize>(
     output: &Output<D>,
     solved: &Solved<'_, D>,
 ) -> Result<Vec<PathBuf>, ObserveError> {
+    write_for(output, solved, &RunOptions::default())
+}
+
+/// As [`write`], for a run with an observer: it sees the same, and says whether there are files.
+pub(super) fn write_for<const D: usize>(
+    output: &Output<D>,
+    solved: &Solved<'_, D>,
+    options: &RunOptions<'_>,
+) -> Result<Vec<PathBuf>, ObserveError> {
     let mut files = Vec::new();
     let solution = Solution::new(solved);
-    if output.vtu {
-        let path = output.directory.join(format!("{}.vtu", output.name));
-        write_vtu(&path, &snapshot(solved, &[], Shown::All), Compression::Zlib)?;
-        files.push(path);
+    let path = |end: &str| output.directory.join(format!("{}{end}", output.name));
+    let writes = output.vtu && options.writes();
+    if writes || options.observer.is_some() {
+        let shown = snapshot(solved, &[], Shown::All);
+        if writes {
+            files.push(path(".vtu"));
+            write_vtu(&files[0], &shown, Compression::Zlib)?;
+        }
+        if let Some(observer) = options.observer {
+            shown.check(&path(".vtu"))?;
+            observer.snapshot(shown);
+        }
     }
-    for (name, positions) in &output.lines {
-        let path = output.directory.join(format!("{}_{name}.csv", output.name));
-        table(&path, positions, &solution)?;
-        files.push(path);
-    }
+    let mut tables: Vec<(&str, Vec<Vector<D>>)> = Vec::new();
+    let lines = output.lines.iter();
+    tables.extend(lines.map(|(name, positions)| (name.as_str(), positions.clone())));
     if !output.probes.is_empty() {
-        let path = output
-            .directory
-            .join(format!("{}_{PROBES}.csv", output.name));
-        let positions: Vec<Vector<D>> = output.probes.iter().map(|(_, x)| *x).collect();
-        table(&path, &positions, &solution)?;
-        files.push(path);
+        let positions = output.probes.iter().map(|(_, x)| *x).collect();
+        tables.push((PROBES, positions));
+    }
+    for (name, positions) in tables {
+        let (header, rows) = table(&positions, &solution);
+        if let Some(observer) = options.observer {
+            for row in &rows {
+                let row: Vec<Entry> = row.iter().map(|&x| Entry::Real(x)).collect();
+                observer.row(name, &header, &row);
+            }
+        }
+        if options.writes() {
+            let header: Vec<&str> = header.iter().map(String::as_str).collect();
+            files.push(path(&format!("_{name}.csv")));
+            write_table(&files[files.len() - 1], &header, rows.into_iter())?;
+        }
     }
     Ok(files)
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
+/// Columns and rows of a table along positions.
 fn table<const D: usize>(
-    path: &std::path::Path,
     positions: &[Vector<D>],
     solution: &Solution<'_, D>,
-) -> Result<(), ObserveError> {
+) -> (Vec<String>, Vec<Vec<f64>>) {
     let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
     header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
     for (i, first) in AXES[..D].iter().enumerate() {
         header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
     }
     header.push("model".to_owned());
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| solution.at(x)).collect();
     let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
         // a line may cross a slit: there is nothing to tell in it
@@ -78,7 +103,8 @@ fn table<const D: usize>(
         row.push(f64::from(label(sample.zone)));
         Some(row)
     });
-    write_table(path, &header, told)
+    let rows = told.collect();
+    (header, rows)
 }
 
 /// 0 local, 1 transition, 2 nonlocal.

@@ -81,9 +81,17 @@ pub(crate) fn build<const D: usize>(
                     .label(file.path.span.clone(), "this mesh")
                     .help("the path is relative to the scene file")
             };
-            let mesh = read::read(&path).map_err(failed)?;
-            quality::check(&mesh).map_err(failed)?;
-            mesh
+            match &file.held {
+                Some(parts) => parts.mesh().map_err(|error| {
+                    SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
+                        .help("the scene was given this mesh in memory")
+                })?,
+                None => {
+                    let mesh = read::read(&path).map_err(failed)?;
+                    quality::check(&mesh).map_err(failed)?;
+                    mesh
+                }
+            }
         }
     };
     can_be_computed_with(&mesh)?;

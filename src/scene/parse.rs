@@ -6,7 +6,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use super::error::{SceneError, SceneErrorKind};
 use super::source::{Source, Span};
-use super::spec::SceneSpec;
+use super::spec::{MeshSpec, SceneSpec};
 use super::tagged_table;
 
 impl SceneSpec {
@@ -18,8 +18,12 @@ impl SceneSpec {
         let table = source.merged()?;
         let places = table.get_ref().clone();
         let root = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
-        Self::deserialize(ValueDeserializer::from(root))
-            .map_err(|error| translate(&error, &places).shown_in(source))
+        let mut spec = Self::deserialize(ValueDeserializer::from(root))
+            .map_err(|error| translate(&error, &places).shown_in(source))?;
+        if let MeshSpec::File(file) = &mut spec.mesh {
+            file.held = source.mesh().cloned();
+        }
+        Ok(spec)
     }
 }
 

@@ -4,12 +4,14 @@
 //! underlined in the override and one in the file in the file.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, SceneErrorKind};
 use super::tagged_table;
+use crate::mesh::MeshParts;
 use crate::observe::checkpoint::Fingerprint;
 use crate::regular_file;
 
@@ -20,6 +22,7 @@ pub type Span = std::ops::Range<usize>;
 #[derive(Clone, Debug)]
 pub struct Source {
     pieces: Vec<Piece>,
+    mesh: Option<Arc<MeshParts>>,
 }
 
 #[derive(Clone, Debug)]
@@ -41,7 +44,19 @@ impl Source {
                 text: text.into(),
                 toml: String::new(),
             }],
+            mesh: None,
         }
+    }
+
+    /// The scene with a mesh in memory, instead of a `mesh` of its own.
+    pub fn with_mesh(mut self, mesh: Arc<MeshParts>) -> Self {
+        self.mesh = Some(mesh);
+        self
+    }
+
+    /// The mesh in memory, if there is one.
+    pub fn mesh(&self) -> Option<&Arc<MeshParts>> {
+        self.mesh.as_ref()
     }
 
     /// Appends an override `key=value`, as typed after `--set`. A value that is no TOML is taken as text.
@@ -122,6 +137,9 @@ impl Source {
                 &mut Vec::new(),
             );
         }
+        if let Some(mesh) = &self.mesh {
+            stand_in(root.get_mut(), &mesh.name).map_err(|e| e.shown_in(self))?;
+        }
         tagged_table::normalise(root.get_mut(), &mut Vec::new()).map_err(|e| e.shown_in(self))?;
         Ok(root)
     }
@@ -178,6 +196,28 @@ impl Source {
             .shown_in(self)
         })
     }
+}
+
+/// Writes `mesh.file.path = name` for a mesh in memory.
+fn stand_in(root: &mut DeTable<'_>, name: &str) -> Result<(), SceneError> {
+    if let Some((key, _)) = root.get_key_value("mesh") {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            "the scene has a `mesh` of its own and one in memory",
+        )
+        .label(key.span(), "one too many")
+        .help("leave out one of the two"));
+    }
+    let entry = |key: &'static str, value| {
+        let key = Spanned::new(0..0, key.into());
+        (key, Spanned::new(0..0, value))
+    };
+    let mut value = DeValue::String(name.to_owned().into());
+    for key in ["path", "file"] {
+        value = DeValue::Table([entry(key, value)].into_iter().collect());
+    }
+    root.extend([entry("mesh", value)]);
+    Ok(())
 }
 
 /// How many keys stand before the `=` of an override, `a."b.c".d=1` has three.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use imports::{Imports, ItemPath};
 
 /// Modules of the library and, above them, the other crates, the lowest first.
-const FLOORS: [&str; 20] = [
+const FLOORS: [&str; 21] = [
     "tensor",
     "progress",
     "regular_file",
@@ -29,13 +29,14 @@ const FLOORS: [&str; 20] = [
     "study",
     "verify",
     "cli",
+    "python",
 ];
 
 /// Crates that stand on the library.
-const CRATES: [&str; 4] = ["terminal", "study", "verify", "cli"];
+const CRATES: [&str; 5] = ["terminal", "study", "verify", "cli", "python"];
 
 /// Crates of one floor that may not take from each other.
-const APART: [&str; 2] = ["verify", "cli"];
+const APART: [&str; 3] = ["verify", "cli", "python"];
 
 /// The most lines that a file has.
 const MOST_LINES: usize = 600;

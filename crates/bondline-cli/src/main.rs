@@ -314,6 +314,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
                 checkpoint_every,
                 interrupt: interrupt.map(|i| &i.asked),
                 heeds: interrupt.map(|i| &i.heeded),
+                observer: None,
             };
             let summary = scene
                 .run_with(&options, &TerminalProgress::on_stderr())

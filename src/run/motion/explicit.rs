@@ -154,7 +154,7 @@ fn leg<'r, const D: usize>(
     from: From<'r, D>,
     rest: &'r RunSettings<D>,
     spec: &Spec,
-    options: &RunOptions<'_>,
+    options: &RunOptions<'r>,
     progress: &dyn Progress,
 ) -> Result<RunSegment<'r, D>, RunError> {
     let ModelSetup {
@@ -200,7 +200,7 @@ fn leg<'r, const D: usize>(
     } = match from {
         From::Start(file, saved) => {
             let saved = saved.map(|saved| *saved);
-            before.at_start(options.checkpoint_every, file, saved)?
+            before.at_start(*options, file, saved)?
         }
         From::Switch(between) => before.after_switch(*between)?,
     };

@@ -1,5 +1,6 @@
 //! What the steps with one layout of the zones begin with: at time zero, at a checkpoint, or where the zones have changed.
 
+use super::RunOptions;
 use super::dynamic_system::{DynamicSystem, start};
 use super::rezoning::Leaving;
 use super::setup::{breaks, restore};
@@ -7,7 +8,7 @@ use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::{EdgeReached, Recorder, Saved, StepChoice, Zone};
 use crate::coupling::{BrokenBonds, Model, Sampler};
-use crate::observe::checkpoint::{CheckpointFile, Pace};
+use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
 use crate::observe::summary::{Decision, Stopwatch, Timings, bytes_text};
 use crate::run::error::RunError;
@@ -77,13 +78,13 @@ pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
 }
 
 impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
-    /// At time zero, or where a checkpoint was `saved`; `every` is how often the command line wants one.
+    /// At time zero, or where a checkpoint was `saved`; `options` are those of the run.
     ///
     /// # Errors
     /// [`RunError`] if no stable step is found, or the checkpoint is that of another model.
     pub fn at_start(
         self,
-        every: Option<Pace>,
+        options: RunOptions<'r>,
         file: CheckpointFile,
         saved: Option<Saved>,
     ) -> Result<StepState<'r, 'm, D>, RunError> {
@@ -120,7 +121,10 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             breaks(moving.system.as_ref(), rest),
             moving.is_linear,
             file,
-            every.or(spec.checkpoint_every),
+            RunOptions {
+                checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
+                ..options
+            },
             saved.as_ref().map(|s| &s.written),
         )?;
         recorder.hold(drive.holders());

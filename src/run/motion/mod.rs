@@ -31,7 +31,10 @@ pub(crate) mod zone_monitor;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::observe::checkpoint::Pace;
+use crate::observe::csv::Entry;
+use crate::observe::history::History;
 use crate::observe::summary::RunSummary;
+use crate::observe::{ObserveError, Observer};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::solve::Solve;
@@ -58,9 +61,27 @@ pub struct RunOptions<'a> {
     pub interrupt: Option<&'a AtomicBool>,
     /// Set by the run from its first step on, when it looks at `interrupt` after every step; before, ending the process loses nothing.
     pub heeds: Option<&'a AtomicBool>,
+    /// Takes the results, and says whether they are written to files as well.
+    pub observer: Option<&'a dyn Observer>,
 }
 
 impl RunOptions<'_> {
+    /// Whether the run writes files.
+    pub(crate) fn writes(&self) -> bool {
+        self.observer.is_none_or(Observer::wants_files)
+    }
+
+    /// Appends a row to a table, and shows it to the observer.
+    fn keep(&self, name: &str, table: &mut History, row: &[Entry]) -> Result<(), ObserveError> {
+        if let Some(observer) = self.observer {
+            observer.row(name, table.header(), row);
+        }
+        match self.writes() {
+            true => table.row(row),
+            false => Ok(()),
+        }
+    }
+
     /// Says that steps begin.
     fn begin_steps(&self) {
         if let Some(heeds) = self.heeds {

@@ -120,7 +120,10 @@ fn load_steps<const D: usize>(
         breaks,
         false,
         file,
-        options.checkpoint_every.or(spec.checkpoint_every),
+        RunOptions {
+            checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
+            ..*options
+        },
         saved.as_ref().map(|s| &s.written),
     )?;
     recorder.hold(drive.holders());

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
+use super::RunOptions;
 use super::rezoning::{nonlocal, share};
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
@@ -218,7 +219,7 @@ pub struct Recorder<'a, const D: usize> {
     tips: Vec<History>,
     series: Series,
     checkpoint: CheckpointFile,
-    pace: Option<Pace>,
+    options: RunOptions<'a>,
     last_checkpoint: Instant,
     /// Kinetic and stored energy at the start.
     pub energy_at_start: f64,
@@ -229,7 +230,7 @@ pub struct Recorder<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Recorder<'a, D> {
-    /// Makes the files, or cuts them back to what was `written` at a checkpoint.
+    /// Makes the files, or cuts them back to what was `written` at a checkpoint; none where the `options` want none.
     ///
     /// # Errors
     /// [`ObserveError`] for files that cannot be made or cut.
@@ -241,17 +242,18 @@ impl<'a, const D: usize> Recorder<'a, D> {
         breaks: Breaks,
         is_linear: bool,
         checkpoint: CheckpointFile,
-        pace: Option<Pace>,
+        options: RunOptions<'a>,
         written: Option<&Written>,
     ) -> Result<Self, ObserveError> {
         let probes = probes(output, sampler);
         let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
         let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
-        let history = History::resumed(
-            &path("history"),
-            history_header(output, conditions, breaks, is_linear),
-            bytes(0),
-        )?;
+        let table = |name: &str, header, file| match options.writes() {
+            true => History::resumed(&path(name), header, bytes(file)),
+            false => Ok(History::unwritten(header)),
+        };
+        let header = history_header(output, conditions, breaks, is_linear);
+        let history = table("history", header, 0)?;
         let tips = output
             .tips
             .iter()
@@ -259,10 +261,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
             .map(|(i, tip)| {
                 let header = ["step", "time"].iter().chain(&AXES[..D]).chain(&["damage"]);
                 let header = header.map(|&h| h.to_owned()).collect();
-                History::resumed(&path(&format!("tip_{}", tip.name)), header, bytes(i + 1))
+                table(&format!("tip_{}", tip.name), header, i + 1)
             })
             .collect::<Result<_, _>>()?;
         let series = match written {
+            _ if !options.writes() => Series::new(&output.directory, &output.name),
             Some(w) => Series::resumed(&output.directory, &output.name, w.times.clone()),
             None => {
                 checkpoint.remove()?;
@@ -282,7 +285,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             tips,
             series,
             checkpoint,
-            pace,
+            options,
             last_checkpoint: Instant::now(),
             energy_at_start: written.map_or(0.0, |w| w.energy_at_start),
             last: Row::default(),
@@ -376,7 +379,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         let reactions = self.reactions(moment.supports);
         row.extend(reactions.into_iter().map(Entry::from));
-        self.history.row(&row)?;
+        self.options.keep("history", &mut self.history, &row)?;
         if state.broken > 0 && !self.tips.is_empty() {
             self.tips(moment, positions)?;
         }
@@ -400,12 +403,13 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 vec![(moment.state.step as i64).into(), moment.state.time.into()];
             row.extend(positions(site).iter().map(|&x| Entry::from(x)));
             row.push(damage[site].into());
-            table.row(&row)?;
+            self.options
+                .keep(&format!("tip_{}", tip.name), table, &row)?;
         }
         Ok(())
     }
 
-    /// Writes a VTU file, if the scene wants any.
+    /// Writes a VTU file, if the scene wants any, and shows the same to the observer.
     ///
     /// # Errors
     /// [`ObserveError`] if it cannot be written.
@@ -414,7 +418,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         moment: &Moment<'_>,
         solved: &Solved<'_, D>,
     ) -> Result<(), ObserveError> {
-        if !self.output.vtu {
+        let writes = self.output.vtu && self.options.writes();
+        if !writes && self.options.observer.is_none() {
             return Ok(());
         }
         let begun = Instant::now();
@@ -430,15 +435,23 @@ impl<'a, const D: usize> Recorder<'a, D> {
         for (name, values) in &remembered {
             more.push(OverSites::Scalar(name, values));
         }
-        self.series
-            .push(moment.state.time, snapshot(solved, &more, Shown::All))?;
+        let mut shown = snapshot(solved, &more, Shown::All);
+        if writes {
+            shown = self.series.push(moment.state.time, shown)?;
+        }
+        if let Some(observer) = self.options.observer {
+            shown.time = Some(moment.state.time);
+            shown.check(&self.series.collection())?;
+            observer.snapshot(shown);
+        }
         self.seconds += begun.elapsed().as_secs_f64();
         Ok(())
     }
 
     /// Whether a checkpoint is due after `step` steps.
     pub fn is_checkpoint_due(&self, step: u64) -> bool {
-        match self.pace {
+        match self.options.checkpoint_every {
+            _ if !self.options.writes() => false,
             None => false,
             Some(Pace::Steps(n)) => step.is_multiple_of(n),
             Some(Pace::Clock(time)) => self.last_checkpoint.elapsed() >= time,
@@ -447,10 +460,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// Whether the end of the run leaves a checkpoint: one is asked for, or an older one would be left behind.
     pub fn keeps_state(&self) -> bool {
-        self.pace.is_some() || self.checkpoint.path().exists()
+        let asked = self.options.checkpoint_every.is_some();
+        self.options.writes() && (asked || self.checkpoint.path().exists())
     }
 
-    /// Writes a checkpoint.
+    /// Writes a checkpoint, unless the run writes no files.
     ///
     /// # Errors
     /// [`ObserveError`] if it cannot be written.
@@ -462,6 +476,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         zone: Option<Zone>,
         seen: &Seen,
     ) -> Result<(), ObserveError> {
+        if !self.options.writes() {
+            return Ok(());
+        }
         let begun = Instant::now();
         let mut bytes = vec![self.history.mark()?];
         for table in &self.tips {
@@ -498,7 +515,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 .filter(|t| t.is_begun())
                 .map(|t| t.path().to_path_buf()),
         );
-        if self.checkpoint.path().exists() {
+        if self.options.writes() && self.checkpoint.path().exists() {
             files.push(self.checkpoint.path().to_path_buf());
         }
         files

@@ -1,11 +1,13 @@
 //! The mesh of a scene.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::mesh::MeshParts;
 use crate::scene::value::{Coordinates, Count, Number, Text};
 
 /// A generated mesh or one from a file.
@@ -93,6 +95,9 @@ pub struct BoxMeshSpec {
 pub struct FileMeshSpec {
     /// The file, relative to the scene.
     pub path: Text,
+    /// A mesh in memory that stands for the file; the source of the scene has it.
+    #[serde(skip)]
+    pub held: Option<Arc<MeshParts>>,
 }
 
 /// A box that a generated mesh leaves out.

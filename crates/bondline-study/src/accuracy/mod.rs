@@ -82,9 +82,23 @@ pub fn check(
     progress: &dyn Progress,
 ) -> Result<Prediction, CheckError> {
     let (source, directory, name) = read(path, overrides)?;
-    let chosen = completed(&source, directory)?;
-    let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
-    let mut scene = AnyScene::complete(complete, directory, &name)?;
+    check_source(&source, directory, &name, pilots, progress)
+}
+
+/// As [`check`], of a scene whose relative paths start in `directory` and whose files are named `name` by default.
+///
+/// # Errors
+/// [`CheckError`], each with place and remedy.
+pub fn check_source(
+    source: &Source,
+    directory: &Path,
+    name: &str,
+    pilots: Option<f64>,
+    progress: &dyn Progress,
+) -> Result<Prediction, CheckError> {
+    let chosen = completed(source, directory)?;
+    let complete = chosen.as_ref().map_or(source, |(complete, _)| complete);
+    let mut scene = AnyScene::complete(complete, directory, name)?;
     if let Some((_, chosen)) = &chosen {
         scene.chose(chosen.choices.clone());
     }

@@ -1,0 +1,144 @@
+"""Meshes in memory give the results of the same meshes from files."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+
+import bondline
+from conftest import ROOT
+
+EXAMPLE = ROOT / "examples" / "slit_plate_gmsh.toml"
+
+
+def by_place(frame: bondline.Frame) -> np.ndarray[Any, Any]:
+    """Points and displacements in the order of their positions; a node and a peridynamic point may share one."""
+    rows = np.hstack([np.round(frame.points, 12), frame.point_data["horizon"][:, None], frame.displacement])
+    return rows[np.lexsort(rows.T[::-1])]
+
+
+def test_a_mesh_from_meshio_with_its_groups() -> None:
+    keys = {
+        "kinematics": "plane-stress",
+        "materials": {"plate": {"bond-based": {"youngs-modulus": 1.0, "micromodulus": "inverse-distance"}}},
+        "peridynamics": {"horizon": 0.05, "points": {"lattice": {"spacing": "1/120", "origin": [-0.5, -0.5]}}},
+        "zones": {
+            "nonlocal": {"box": {"min": [-0.2, "-1/120-0.1"], "max": [0.2, "1/120+0.1"]}},
+            "transition": {"box": {"min": [-0.25, "-1/120-0.15"], "max": [0.25, "1/120+0.15"]}},
+        },
+        "coupling": {"blending": {"beta": "constant"}},
+        "conditions": {
+            "bottom": {"displacement": {"on": "bottom", "x": 0, "y": 0}},
+            "top": {"displacement": {"on": "top", "x": 0.05, "y": 0.05}},
+        },
+    }
+    wanted = bondline.run(EXAMPLE, progress=False)
+    read = meshio.read(ROOT / "meshes" / "slit_plate.msh")
+    mesh = bondline.Mesh.from_meshio(read)
+    found = bondline.Scene.from_dict(keys, mesh=mesh).run(progress=False)
+    assert found.summary["sizes"] == wanted.summary["sizes"]
+    assert np.abs(by_place(found) - by_place(wanted)).max() < 1e-10
+
+
+def square(n: int = 8) -> meshio.Mesh:
+    """A square of triangles with an edge set, a cell set and a point set."""
+    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="xy")
+    points = np.column_stack([x.ravel(), y.ravel()])
+    corner = np.arange(n * (n + 1)).reshape(n, n + 1)[:, :-1].ravel()
+    a, b, c, d = corner, corner + 1, corner + n + 2, corner + n + 1
+    triangles = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    bottom = np.column_stack([np.arange(n), np.arange(1, n + 1)])
+    top = bottom + n * (n + 1)
+    return meshio.Mesh(
+        points,
+        [("line", np.vstack([bottom, top])), ("triangle", triangles)],
+        cell_sets={
+            "foot": [np.arange(n), np.array([], dtype=int)],
+            "head": [np.arange(n, 2 * n), np.array([], dtype=int)],
+            "soft": [np.array([], dtype=int), np.flatnonzero(points[triangles].mean(axis=1)[:, 1] > 0.5)],
+        },
+        point_sets={"pin": np.array([0])},
+    )
+
+
+def keys() -> dict[str, Any]:
+    return {
+        "kinematics": "plane-stress",
+        "materials": {
+            "lower": {"lps": {"youngs-modulus": 2, "poisson-ratio": 0}},
+            "upper": {"lps": {"youngs-modulus": 1, "poisson-ratio": 0, "cells": "soft"}},
+        },
+        "coupling": "local",
+        "conditions": {
+            "foot": {"displacement": {"on": "foot", "y": 0}},
+            "pin": {"displacement": {"on": "pin", "x": 0}},
+            "head": {"traction": {"on": "head", "y": 1e-3}},
+        },
+    }
+
+
+def test_sets_of_edges_cells_and_points_are_known() -> None:
+    scene = bondline.Scene.from_dict(keys(), mesh=bondline.Mesh.from_meshio(square()))
+    result = scene.run(progress=False)
+    assert scene.check()["sizes"] == result.summary["sizes"]
+    # two bars of E = 2 and 1, each half as long, one behind the other
+    y = result.points[:, 1]
+    exact = 1e-3 * np.where(y < 0.5, y / 2, 0.25 + (y - 0.5))
+    assert result.displacement[:, 1] == pytest.approx(exact, abs=1e-14)
+    assert np.abs(result.displacement[:, 0]).max() < 1e-14
+
+
+def test_a_mesh_of_ones_own() -> None:
+    plain = square()
+    offset = len(plain.cells[0].data)
+    mesh = bondline.Mesh(
+        plain.points,
+        {block.type: block.data for block in plain.cells},
+        cell_sets={"foot": range(8), "head": range(8, 16), "soft": offset + plain.cell_sets["soft"][1]},
+        point_sets={"pin": [0]},
+    )
+    own = bondline.Scene.from_dict(keys(), mesh=mesh).run(progress=False)
+    other = bondline.Scene.from_dict(keys(), mesh=bondline.Mesh.from_meshio(plain)).run(progress=False)
+    assert np.array_equal(own.displacement, other.displacement)
+
+
+def test_an_unknown_set_is_named() -> None:
+    wrong = keys()
+    wrong["conditions"]["foot"]["displacement"]["on"] = "feet"
+    with pytest.raises(bondline.SceneError, match="feet") as caught:
+        bondline.Scene.from_dict(wrong, mesh=bondline.Mesh.from_meshio(square()))
+    assert caught.value.help is not None and "foot" in caught.value.help
+
+
+def test_two_meshes_are_one_too_many() -> None:
+    wrong = keys() | {"mesh": {"file": {"path": "plate.msh"}}}
+    with pytest.raises(bondline.SceneError, match="one in memory"):
+        bondline.Scene.from_dict(wrong, mesh=bondline.Mesh.from_meshio(square()))
+
+
+@pytest.mark.parametrize(
+    ("points", "cells", "words"),
+    [
+        (np.zeros((3, 4)), {"triangle": [[0, 1, 2]]}, "shape"),
+        ([[0, 0], [1, 0], [0, 1]], {"triangle6": [[0, 1, 2, 3, 4, 5]]}, "triangle6"),
+        ([[0, 0], [1, 0], [0, 1]], {"triangle": [[0, 1, -1]]}, "no numbers"),
+        ([[0, 0], [1, 0], [0, 1]], {"triangle": [[0, 1, 7]]}, "node 7"),
+        ([[0, 0], [1, 0], [0, float("nan")]], {"triangle": [[0, 1, 2]]}, "NaN"),
+        ([[0, 0], [1, 0], [2, 0]], {"triangle": [[0, 1, 2]]}, "mesh in memory"),
+    ],
+)
+def test_meshes_that_are_wrong(points: Any, cells: Any, words: str) -> None:
+    plain = keys()
+    del plain["conditions"], plain["materials"]["upper"]
+    with pytest.raises(bondline.SceneError, match=words):
+        bondline.Scene.from_dict(plain, mesh=bondline.Mesh(points, cells))
+
+
+def test_an_accuracy_is_chosen_on_a_mesh_in_memory() -> None:
+    wanted = keys() | {"accuracy": 0.05}
+    del wanted["coupling"]
+    scene = bondline.Scene.from_dict(wanted, mesh=bondline.Mesh.from_meshio(square()))
+    assert scene.run(progress=False).summary["coupling"] == "local"
