@@ -4,6 +4,9 @@
 //!
 //! Times of one thread are CPU times, so that other programs on the machine do not count; times of two threads are wall-clock times, the least of many. Markdown comes out.
 
+// the clock of the process, and loops of vector instructions against which passes are measured
+#![allow(unsafe_code)]
+
 use bondline::peridynamics::bond_force::{
     BlockSetup, BondForce, BondPass, BondSetup, CriticalStretch, Failure, Kinematics, Layout,
     Storage, block_pass, bond_pass, instructions,

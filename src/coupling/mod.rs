@@ -162,9 +162,7 @@ pub trait Operator<const D: usize>: Sync {
     fn beta(&self, site: usize) -> f64;
 
     /// Whether the row of a site is that of the peridynamic body alone, all of its bonds whole: only there may bonds be geometrically exact, and break.
-    fn is_body_row(&self, _site: usize) -> bool {
-        false
-    }
+    fn is_body_row(&self, site: usize) -> bool;
 
     /// Whether the row of a site, not that of the body alone, holds the bonds of the body among its other terms: a motion then passes over them, and the rest stays a row.
     fn has_body_bonds(&self, _site: usize) -> bool {

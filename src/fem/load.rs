@@ -34,8 +34,10 @@ pub struct FacetPoint<const D: usize> {
 
 /// Calls `visit` with each quadrature point of a facet, given by its nodes in order.
 ///
-/// Point in 1D; edge in 2D with 3 Gauss points; triangle with 6 and quadrilateral with 3 × 3 points in 3D. A facet
-/// of another number of nodes has no points.
+/// Point in 1D; edge in 2D with 3 Gauss points; triangle with 6 and quadrilateral with 3 × 3 points in 3D.
+///
+/// # Panics
+/// For a facet of another number of nodes, which no cell of [`super::CELLS`] has: a traction on it would be no force.
 pub fn facet_points<const D: usize>(
     mesh: &Mesh<D>,
     facet: &[u32],
@@ -72,7 +74,7 @@ pub fn facet_points<const D: usize>(
                 }
             }
         }
-        _ => {}
+        (_, nodes) => panic!("a facet of {nodes} nodes in {D} dimensions has no quadrature"),
     }
 }
 

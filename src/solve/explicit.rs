@@ -213,7 +213,7 @@ impl<'a> Explicit<'a> {
         0.5 * sums.iter().sum::<f64>()
     }
 
-    /// Takes one step; allocates nothing.
+    /// Takes one step, in buffers that the solver and the system keep.
     ///
     /// # Errors
     /// [`ExplicitError::NotFinite`] or [`ExplicitError::Runaway`], with step, time and site.

@@ -228,7 +228,9 @@ impl<const D: usize, const EXACT: bool> Work for Points<'_, D, EXACT> {
                     (Sum::Extension, _) => {
                         l.mul(weighted, l.mul(length, extension::<L, EXACT>(l, t)))
                     }
-                    _ => l.mul(weighted, shortening::<L, EXACT>(l, t)),
+                    (Sum::Pairwise, _) | (Sum::State(_), None) => {
+                        l.mul(weighted, shortening::<L, EXACT>(l, t))
+                    }
                 };
                 // where there is no bond, 0/0
                 let f = l.keep(f, mask);

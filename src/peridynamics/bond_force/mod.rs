@@ -30,11 +30,14 @@ mod generic_tangent;
 mod generic_tests;
 mod lattice;
 mod lattice_setup;
+// vector instructions: the other modules of the crate have no unsafe code
+#[allow(unsafe_code)]
 mod lattice_simd;
 mod list;
 mod list_simd;
 #[cfg(test)]
 mod reference_force;
+#[allow(unsafe_code)]
 mod simd;
 mod stencil;
 mod stretch;

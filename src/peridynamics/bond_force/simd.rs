@@ -1,7 +1,7 @@
 //! Eight numbers at a time: AVX-512, twice AVX2, or plain code, chosen at run time.
 //!
 //! All three do the same operations lane by lane, with fused multiplication and addition everywhere, so results do not depend on which one runs.
-//! The only file of the crate with `unsafe` code: intrinsics, and loads that [`Source`] has checked.
+//! With `lattice_simd.rs` the only file of the library with `unsafe` code: intrinsics, and loads that [`Source`] has checked.
 
 /// Numbers per vector.
 pub(super) const LANES: usize = 8;
