@@ -50,6 +50,14 @@ pub(crate) struct Equilibrium {
     pub timings: Timings,
 }
 
+impl Equilibrium {
+    /// Internal less external force \[N\] by dof.
+    pub fn residual(&self) -> Vec<f64> {
+        let forces = self.internal.iter().zip(&self.load);
+        forces.map(|(k, f)| k - f).collect()
+    }
+}
+
 /// Assembles, hands the stiffness to `prove`, which tells the seconds that it took, and solves; `system` is what has forces that are not linear, if they are not.
 ///
 /// # Errors

@@ -5,13 +5,13 @@ use super::equilibrium::{Equilibrium, StaticInput, equilibrium};
 use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
-use super::setup::{problem, volumes_choice};
+use super::setup::{RunSettings, problem, volumes_choice};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
 use std::sync::Arc;
 
-use crate::coupling::{Model, SiteKind};
+use crate::coupling::{Coupling, Model, Operator, SiteKind};
 use crate::observe::ObserveError;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
@@ -22,6 +22,7 @@ use crate::run::definiteness;
 use crate::run::error::RunError;
 use crate::run::warnings::{indefinite, out_of_balance, warnings};
 use crate::scene::solve::Solve;
+use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::{Output, Scene};
 use crate::system::{BlockCsr, SemiDiscrete};
 use crate::tensor::Vector;
@@ -68,6 +69,7 @@ pub fn solve_with<const D: usize>(
     })
 }
 
+/// Lays out, proves, solves and tells of a static scene whose mesh and zones are known.
 fn solve_chosen<const D: usize>(
     scene: Scene<D>,
     kept: Option<Arc<CachedSolution<D>>>,
@@ -96,104 +98,37 @@ fn solve_chosen<const D: usize>(
     let mut choices: Vec<Decision> = rest.made().cloned().collect();
     definiteness::check(model, operator.as_ref(), rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
-    let mut proof = Proof::default();
-    let mut prove = |stiffness: &BlockCsr| -> Result<f64, RunError> {
-        let mut clock = Stopwatch::start();
-        let mut taken = Timings::default();
-        proof = proof::prove(
-            &Subject {
-                model,
-                coupling,
-                operator: operator.as_ref(),
-                rest: &rest,
-                stiffness: Some(stiffness),
-                system: None,
-                affine_forces: &[],
-            },
-            progress,
-        )?;
-        proof::hold(&proof)?;
-        clock.lap(&mut taken, "proof");
-        Ok(taken.total())
-    };
     let mut system = motion::dynamic_system::still(model, coupling, operator.as_ref(), &rest)?;
     let is_linear = system.is_none();
-    let computed;
+    let body = StaticBody {
+        model,
+        coupling,
+        operator: operator.as_ref(),
+        rest: &rest,
+    };
     // what placed the zone was solved with linear forces
-    let equilibrium = match kept.as_ref().filter(|_| is_linear) {
-        Some(k) => {
-            let seconds = prove(&k.equilibrium.stiffness)?;
-            k.equilibrium.timings.add_to(&mut timings);
-            timings.add("proof", seconds);
-            &k.equilibrium
-        }
+    let cached = kept.as_ref().filter(|_| is_linear).map(|k| &k.equilibrium);
+    let moving = system.as_mut().map(|s| s as &mut dyn SemiDiscrete);
+    let computed;
+    let (equilibrium, proof) = match cached {
+        Some(equilibrium) => (
+            equilibrium,
+            body.prove_cached(equilibrium, &mut timings, progress)?,
+        ),
         None => {
-            computed = equilibrium(
-                &StaticInput {
-                    model,
-                    coupling,
-                    operator: operator.as_ref(),
-                    conditions: &rest.conditions,
-                    solver: &rest.solver,
-                    time: 0.0,
-                },
-                system.as_mut().map(|s| s as &mut dyn SemiDiscrete),
-                Timings::default(),
-                prove,
-                progress,
-            )?;
-            computed.timings.add_to(&mut timings);
-            &computed
+            let (solved, proof) = body.solve(moving, &mut timings, progress)?;
+            computed = solved;
+            (&computed, proof)
         }
     };
-    let Equilibrium {
-        stiffness,
-        symmetry,
-        load,
-        applied,
-        holder,
-        solution,
-        internal,
-        energy,
-        ..
-    } = equilibrium;
-    let symmetry = *symmetry;
-    let info = &solution.info;
     watch = Stopwatch::start();
-    choices.extend(equilibrium.choices.iter().cloned());
-    choices.extend(rest.nonlinear(model));
-    choices.push(Decision {
-        choice: info.method.name().to_owned(),
-        why: format!("{} system of {} unknowns", symmetry.name(), info.free_dofs),
-    });
-    choices.extend(volumes_choice(model));
-
-    let u = &solution.displacement;
-    let residual: Vec<f64> = internal.iter().zip(load).map(|(k, f)| k - f).collect();
-    let mut reactions = vec![Vector::<D>::zeros(); rest.conditions.len()];
-    for (dof, holder) in holder.iter().enumerate() {
-        if let Some(condition) = holder {
-            reactions[*condition][dof % D] += solution.reactions[dof];
-        }
-    }
-    let mut balance = Vector::<D>::zeros();
-    internal
-        .iter()
-        .enumerate()
-        .for_each(|(dof, f)| balance[dof % D] += f);
-    // the sizes of nodal forces: their sum vanishes where pressure or two faces pull against each other
-    let size = |forces: &[f64]| -> f64 {
-        let nodal = forces.chunks_exact(D);
-        nodal
-            .map(|f| Vector::<D>::from_column_slice(f).norm())
-            .sum()
-    };
-    let scale = size(load) + size(&solution.reactions);
+    choices.extend(body.decisions(equilibrium));
     let zone_of_site = zone_of_site(model);
+    let residual = equilibrium.residual();
     let solved = Solved {
         model,
         operator: operator.as_ref(),
-        displacement: u,
+        displacement: &equilibrium.solution.displacement,
         residual: &residual,
         zone_of_site: &zone_of_site,
         system: system.as_ref().map(|s| s as &dyn SemiDiscrete),
@@ -202,28 +137,162 @@ fn solve_chosen<const D: usize>(
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
-    let rotations = Rotations::new(model, is_linear);
-    let rotation = rotations
-        .largest(u)
-        .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
-    let mut told = warnings(model, joining, &proof);
-    told.extend(indefinite(symmetry, info.method));
-    told.extend(rotation.as_ref().map(Rotation::warning));
-    let out_of_balance_relative = if scale > 0.0 {
-        balance.norm() / scale
-    } else {
-        0.0
-    };
-    told.extend(out_of_balance(
-        balance.as_slice(),
-        out_of_balance_relative,
-        joining,
-    ));
-    let summary = RunSummary {
+    let sizes = body.sizes([nodes, cells], &equilibrium.stiffness);
+    Ok(RunSummary {
         scene: name,
-        dimension: D,
-        coupling: joining.name.to_owned(),
-        sizes: Sizes {
+        sizes,
+        choices,
+        total_seconds: timings.total(),
+        timings,
+        peak_memory_bytes: peak_memory_bytes(),
+        files,
+        ..body.summary(equilibrium, is_linear, joining, proof)
+    })
+}
+
+/// A model with its rows and conditions, about to be solved.
+struct StaticBody<'a, const D: usize> {
+    model: &'a Model<D>,
+    coupling: &'a dyn Coupling<D>,
+    operator: &'a dyn Operator<D>,
+    rest: &'a RunSettings<D>,
+}
+
+impl<const D: usize> StaticBody<'_, D> {
+    /// Proves what a stiffness shows before it is solved with; the proof, and its seconds.
+    ///
+    /// # Errors
+    /// [`RunError::Proof`] for one that refuses the model.
+    fn prove(
+        &self,
+        stiffness: &BlockCsr,
+        progress: &dyn Progress,
+    ) -> Result<(Proof, f64), RunError> {
+        let mut clock = Stopwatch::start();
+        let mut taken = Timings::default();
+        let proof = proof::prove(
+            &Subject {
+                model: self.model,
+                coupling: self.coupling,
+                operator: self.operator,
+                rest: self.rest,
+                stiffness: Some(stiffness),
+                system: None,
+                affine_forces: &[],
+            },
+            progress,
+        )?;
+        proof::hold(&proof)?;
+        clock.lap(&mut taken, "proof");
+        Ok((proof, taken.total()))
+    }
+
+    /// Proves an equilibrium that is known already.
+    fn prove_cached(
+        &self,
+        known: &Equilibrium,
+        timings: &mut Timings,
+        progress: &dyn Progress,
+    ) -> Result<Proof, RunError> {
+        let (proof, seconds) = self.prove(&known.stiffness, progress)?;
+        known.timings.add_to(timings);
+        timings.add("proof", seconds);
+        Ok(proof)
+    }
+
+    /// Assembles, proves and solves; `system` has the forces that are not linear, if any are not.
+    ///
+    /// # Errors
+    /// [`RunError`] for a condition that meets no site, a proof that refuses the model, a system without a solution.
+    fn solve(
+        &self,
+        system: Option<&mut dyn SemiDiscrete>,
+        timings: &mut Timings,
+        progress: &dyn Progress,
+    ) -> Result<(Equilibrium, Proof), RunError> {
+        let mut proof = Proof::default();
+        let prove = |stiffness: &BlockCsr| {
+            let (found, seconds) = self.prove(stiffness, progress)?;
+            proof = found;
+            Ok(seconds)
+        };
+        let solved = equilibrium(
+            &StaticInput {
+                model: self.model,
+                coupling: self.coupling,
+                operator: self.operator,
+                conditions: &self.rest.conditions,
+                solver: &self.rest.solver,
+                time: 0.0,
+            },
+            system,
+            Timings::default(),
+            prove,
+            progress,
+        )?;
+        solved.timings.add_to(timings);
+        Ok((solved, proof))
+    }
+
+    /// What was decided about the solution.
+    fn decisions(&self, equilibrium: &Equilibrium) -> Vec<Decision> {
+        let info = &equilibrium.solution.info;
+        let mut choices = equilibrium.choices.clone();
+        choices.extend(self.rest.nonlinear(self.model));
+        choices.push(Decision {
+            choice: info.method.name().to_owned(),
+            why: format!(
+                "{} system of {} unknowns",
+                equilibrium.symmetry.name(),
+                info.free_dofs
+            ),
+        });
+        choices.extend(volumes_choice(self.model));
+        choices
+    }
+
+    /// What the summary says of the solution: forces, energy, rotation, warnings.
+    fn summary(
+        &self,
+        equilibrium: &Equilibrium,
+        is_linear: bool,
+        joining: CouplingTraits,
+        proof: Proof,
+    ) -> RunSummary {
+        let solution = &equilibrium.solution;
+        let info = &solution.info;
+        let rotations = Rotations::new(self.model, is_linear);
+        let rotation = rotations
+            .largest(&solution.displacement)
+            .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
+        let balance = Balance::<D>::of(equilibrium);
+        let (force, relative) = (balance.force.as_slice(), balance.relative);
+        let mut told = warnings(self.model, joining, &proof);
+        told.extend(indefinite(equilibrium.symmetry, info.method));
+        told.extend(rotation.as_ref().map(Rotation::warning));
+        told.extend(out_of_balance(force, relative, joining));
+        RunSummary {
+            dimension: D,
+            coupling: joining.name.to_owned(),
+            warnings: told,
+            proof,
+            rotation,
+            iterations: info.iterations,
+            factor_nonzeros: info.factor_nnz,
+            residual: info.relative_residual,
+            out_of_balance_force: force.to_vec(),
+            out_of_balance_relative: relative,
+            applied: equilibrium.applied.clone(),
+            reactions: self.reactions(equilibrium),
+            energy: equilibrium.energy,
+            ..RunSummary::default()
+        }
+    }
+
+    /// Sizes of a model with so many nodes and cells.
+    fn sizes(&self, [nodes, cells]: [usize; 2], stiffness: &BlockCsr) -> Sizes {
+        let model = self.model;
+        Sizes {
             nodes,
             cells,
             sites: model.sites.len(),
@@ -232,25 +301,22 @@ fn solve_chosen<const D: usize>(
                 .iter()
                 .filter(|s| matches!(s.kind, SiteKind::Point(_)))
                 .count(),
-            bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
+            bonds: model.body().map_or(0, |b| b.bond_count()) + self.operator.additional_bonds(),
             dofs: stiffness.dofs(),
             nonzeros: stiffness.nonzeros(),
-        },
-        choices,
-        total_seconds: timings.total(),
-        timings,
-        peak_memory_bytes: peak_memory_bytes(),
-        warnings: told,
-        proof,
-        rotation,
-        iterations: info.iterations,
-        factor_nonzeros: info.factor_nnz,
-        residual: info.relative_residual,
-        out_of_balance_force: balance.iter().copied().collect(),
-        out_of_balance_relative,
-        applied: applied.clone(),
-        reactions: rest
-            .conditions
+        }
+    }
+
+    /// The force of each condition that holds dofs.
+    fn reactions(&self, equilibrium: &Equilibrium) -> Vec<Reaction> {
+        let conditions = &self.rest.conditions;
+        let mut reactions = vec![Vector::<D>::zeros(); conditions.len()];
+        for (dof, holder) in equilibrium.holder.iter().enumerate() {
+            if let Some(condition) = holder {
+                reactions[*condition][dof % D] += equilibrium.solution.reactions[dof];
+            }
+        }
+        conditions
             .iter()
             .zip(&reactions)
             .filter(|(c, _)| c.holds())
@@ -258,10 +324,39 @@ fn solve_chosen<const D: usize>(
                 condition: c.name.clone(),
                 force: r.iter().copied().collect(),
             })
-            .collect(),
-        energy: *energy,
-        motion: None,
-        files,
-    };
-    Ok(summary)
+            .collect()
+    }
+}
+
+/// The sum of internal forces: zero but for round-off in a model that conserves momentum.
+struct Balance<const D: usize> {
+    force: Vector<D>,
+    /// Over the sizes of nodal loads and reactions.
+    relative: f64,
+}
+
+impl<const D: usize> Balance<D> {
+    /// Of a solution.
+    fn of(equilibrium: &Equilibrium) -> Self {
+        let mut force = Vector::<D>::zeros();
+        equilibrium
+            .internal
+            .iter()
+            .enumerate()
+            .for_each(|(dof, f)| force[dof % D] += f);
+        // the sizes of nodal forces: their sum vanishes where pressure or two faces pull against each other
+        let size = |forces: &[f64]| -> f64 {
+            let nodal = forces.chunks_exact(D);
+            nodal
+                .map(|f| Vector::<D>::from_column_slice(f).norm())
+                .sum()
+        };
+        let scale = size(&equilibrium.load) + size(&equilibrium.solution.reactions);
+        let relative = if scale > 0.0 {
+            force.norm() / scale
+        } else {
+            0.0
+        };
+        Self { force, relative }
+    }
 }

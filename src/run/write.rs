@@ -280,139 +280,197 @@ pub fn snapshot<const D: usize>(
     more: &[OverSites<'_>],
     shown: Shown,
 ) -> Snapshot {
-    let model = solved.model;
-    let mesh = &model.mesh;
-    // nodes that elements use, then points
-    let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
-    let mut snapshot = Snapshot::default();
-    let mut site_of_point: Vec<Option<usize>> = Vec::new();
-    let mut node_of_point: Vec<Option<usize>> = Vec::new();
-    let mut displacement: Vec<Vector<D>> = Vec::new();
-    let mut zones = Vec::new();
-    let (mut strains, mut stresses) = (Vec::new(), Vec::new());
-    let of_cells: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
-        .map(|system| system.cell_stresses(solved.displacement))
-        .unwrap_or_default()
-        .into_iter()
-        .collect();
-    let mut shown_cells = Vec::new();
-    let mut site_of_node = vec![None; mesh.nodes.len()];
-    for (site, s) in model.sites.iter().enumerate() {
-        if let SiteKind::Node(n) = s.kind {
-            site_of_node[n as usize] = Some(site);
+    let mut rows = SnapshotRows::new(solved);
+    rows.push_elements(shown);
+    rows.push_points(shown);
+    rows.snapshot.point_fields = rows.point_fields(more);
+    rows.snapshot.cell_fields = rows.cell_fields();
+    rows.snapshot
+}
+
+/// Points and cells of a file with their fields as they are collected: nodes that elements use and elements, then peridynamic points as both.
+struct SnapshotRows<'a, const D: usize> {
+    solved: &'a Solved<'a, D>,
+    snapshot: Snapshot,
+    /// The site of each point of the file, and its node.
+    site_of_point: Vec<Option<usize>>,
+    node_of_point: Vec<Option<usize>>,
+    displacement: Vec<Vector<D>>,
+    zones: Vec<u8>,
+    strains: Vec<Tensor<D>>,
+    stresses: Vec<Tensor<D>>,
+    shown_cells: Vec<u32>,
+}
+
+impl<'a, const D: usize> SnapshotRows<'a, D> {
+    fn new(solved: &'a Solved<'a, D>) -> Self {
+        Self {
+            solved,
+            snapshot: Snapshot::default(),
+            site_of_point: Vec::new(),
+            node_of_point: Vec::new(),
+            displacement: Vec::new(),
+            zones: Vec::new(),
+            strains: Vec::new(),
+            stresses: Vec::new(),
+            shown_cells: Vec::new(),
         }
     }
-    for c in (0..mesh.cell_count()).filter(|&c| shown.includes(c) && model.is_element(c)) {
-        let mut nodes = [0u32; 8];
-        for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
-            let entry = &mut point_of_node[n as usize];
-            if *entry == u32::MAX {
-                *entry = snapshot.points.len() as u32;
-                snapshot.points.push(padded(&mesh.nodes[n as usize]));
-                displacement.push(solved.node(n as usize));
-                site_of_point.push(site_of_node[n as usize]);
-                node_of_point.push(Some(n as usize));
-            }
-            *slot = *entry;
-        }
-        snapshot.push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
-        zones.push(label(model.zones[c]));
-        let gradient = solved.element_gradient(c);
-        strains.push(strain(&gradient));
-        stresses.push(match of_cells.get(&(c as u32)) {
-            Some(rows) => Tensor::from_fn(|i, j| rows[i][j]),
-            None => (solved.operator)
-                .cell_stress(c, solved.displacement)
-                .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
-        });
-        shown_cells.push(c as u32);
-    }
-    let intact = Intact::of(solved);
-    // of force states that are not linear; the others follow from the displacements
-    let known: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
-        .map(|system| system.stresses(solved.displacement))
-        .unwrap_or_default()
-        .into_iter()
-        .collect();
-    let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
-        .into_par_iter()
-        .filter(|&site| {
-            shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
-        })
-        .map(|site| {
-            let stress = match (known.get(&(site as u32)), model.point_of(site)) {
-                (Some(rows), _) => Tensor::from_fn(|i, j| rows[i][j]),
-                (None, Some((body, p))) => {
-                    body.partial_stress_of(p, solved.displacement, |j| intact.is_intact(p, j))
-                }
-                (None, None) => Tensor::zeros(),
-            };
-            (site, strain(&solved.point_gradient(site, &intact)), stress)
-        })
-        .collect();
-    for (site, e, stress) in on_points {
-        let number = snapshot.points.len() as u32;
-        snapshot.points.push(padded(&model.sites[site].position));
-        snapshot.push_cell(CellShape::Vertex, &[number]);
-        displacement.push(solved.site(site));
-        site_of_point.push(Some(site));
-        node_of_point.push(None);
-        zones.push(label(solved.zone_of_site[site]));
-        strains.push(e);
-        stresses.push(stress);
-    }
-    let of_site = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        site_of_point.iter().map(|s| s.map_or(0.0, f)).collect()
-    };
-    // a local site has none
-    let horizon = |site: usize| match (&model.peridynamics, solved.zone_of_site[site]) {
-        (None, _) | (_, Zone::Local) => 0.0,
-        (Some(p), _) => (p.horizon)(&model.sites[site].position),
-    };
-    let on_site = |s: usize, values: &[f64]| Vector::<D>::from_column_slice(&values[s * D..][..D]);
-    snapshot.point_fields = vec![
-        Field::vector("displacement", &displacement),
-        Field::scalar("beta", of_site(&|s| solved.operator.beta(s))),
-        Field::scalar("horizon", of_site(&horizon)),
-    ];
-    if !solved.residual.is_empty() {
-        let residual: Vec<Vector<D>> = site_of_point
-            .iter()
-            .map(|s| s.map_or(Vector::zeros(), |s| on_site(s, solved.residual)))
+
+    /// Elements with strain and stress at their centres, and their nodes.
+    fn push_elements(&mut self, shown: Shown) {
+        let solved = self.solved;
+        let (model, mesh) = (solved.model, &solved.model.mesh);
+        let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
+        let of_cells: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
+            .map(|system| system.cell_stresses(solved.displacement))
+            .unwrap_or_default()
+            .into_iter()
             .collect();
-        snapshot
-            .point_fields
-            .push(Field::vector("residual", &residual));
-    }
-    for field in more {
-        snapshot.point_fields.push(match field {
-            OverSites::Scalar(name, values) => Field::scalar(name, of_site(&|s| values[s])),
-            OverSites::Vector(name, values) => {
-                let at = |(site, node): (&Option<usize>, &Option<usize>)| match (site, node) {
-                    (_, Some(n)) => model.node_transfer.displacement(*n, values),
-                    (Some(s), None) => on_site(*s, values),
-                    (None, None) => Vector::zeros(),
-                };
-                let vectors: Vec<Vector<D>> =
-                    site_of_point.iter().zip(&node_of_point).map(at).collect();
-                Field::vector(name, &vectors)
+        let mut site_of_node = vec![None; mesh.nodes.len()];
+        for (site, s) in model.sites.iter().enumerate() {
+            if let SiteKind::Node(n) = s.kind {
+                site_of_node[n as usize] = Some(site);
             }
-        });
-    }
-    let shown = zones.len();
-    snapshot.cell_fields = vec![
-        Field::labels("model", zones),
-        Field::tensor("strain", &strains),
-        Field::tensor("stress", &stresses),
-    ];
-    let remembered = solved.system.map(|system| system.remembered_by_cells());
-    for (name, values) in remembered.into_iter().flatten() {
-        let values: FxHashMap<u32, f64> = values.into_iter().collect();
-        let mut field = vec![0.0; shown];
-        for (value, c) in field.iter_mut().zip(&shown_cells) {
-            *value = values.get(c).copied().unwrap_or(0.0);
         }
-        snapshot.cell_fields.push(Field::scalar(name, field));
+        for c in (0..mesh.cell_count()).filter(|&c| shown.includes(c) && model.is_element(c)) {
+            let mut nodes = [0u32; 8];
+            for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
+                let entry = &mut point_of_node[n as usize];
+                if *entry == u32::MAX {
+                    *entry = self.snapshot.points.len() as u32;
+                    self.snapshot.points.push(padded(&mesh.nodes[n as usize]));
+                    self.displacement.push(solved.node(n as usize));
+                    self.site_of_point.push(site_of_node[n as usize]);
+                    self.node_of_point.push(Some(n as usize));
+                }
+                *slot = *entry;
+            }
+            self.snapshot
+                .push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
+            self.zones.push(label(model.zones[c]));
+            let gradient = solved.element_gradient(c);
+            self.strains.push(strain(&gradient));
+            self.stresses.push(match of_cells.get(&(c as u32)) {
+                Some(rows) => Tensor::from_fn(|i, j| rows[i][j]),
+                None => (solved.operator)
+                    .cell_stress(c, solved.displacement)
+                    .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
+            });
+            self.shown_cells.push(c as u32);
+        }
     }
-    snapshot
+
+    /// Peridynamic points with strain and stress of their families.
+    fn push_points(&mut self, shown: Shown) {
+        let solved = self.solved;
+        let model = solved.model;
+        let intact = Intact::of(solved);
+        // of force states that are not linear; the others follow from the displacements
+        let known: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
+            .map(|system| system.stresses(solved.displacement))
+            .unwrap_or_default()
+            .into_iter()
+            .collect();
+        let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
+            .into_par_iter()
+            .filter(|&site| {
+                shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
+            })
+            .map(|site| {
+                let stress = match (known.get(&(site as u32)), model.point_of(site)) {
+                    (Some(rows), _) => Tensor::from_fn(|i, j| rows[i][j]),
+                    (None, Some((body, p))) => {
+                        body.partial_stress_of(p, solved.displacement, |j| intact.is_intact(p, j))
+                    }
+                    (None, None) => Tensor::zeros(),
+                };
+                (site, strain(&solved.point_gradient(site, &intact)), stress)
+            })
+            .collect();
+        for (site, e, stress) in on_points {
+            let number = self.snapshot.points.len() as u32;
+            self.snapshot
+                .points
+                .push(padded(&model.sites[site].position));
+            self.snapshot.push_cell(CellShape::Vertex, &[number]);
+            self.displacement.push(solved.site(site));
+            self.site_of_point.push(Some(site));
+            self.node_of_point.push(None);
+            self.zones.push(label(solved.zone_of_site[site]));
+            self.strains.push(e);
+            self.stresses.push(stress);
+        }
+    }
+
+    /// Displacement, blending, horizon and residual, and `more` fields over sites.
+    fn point_fields(&self, more: &[OverSites<'_>]) -> Vec<Field> {
+        let solved = self.solved;
+        let model = solved.model;
+        let of_site = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            self.site_of_point
+                .iter()
+                .map(|s| s.map_or(0.0, f))
+                .collect()
+        };
+        // a local site has none
+        let horizon = |site: usize| match (&model.peridynamics, solved.zone_of_site[site]) {
+            (None, _) | (_, Zone::Local) => 0.0,
+            (Some(p), _) => (p.horizon)(&model.sites[site].position),
+        };
+        let on_site =
+            |s: usize, values: &[f64]| Vector::<D>::from_column_slice(&values[s * D..][..D]);
+        let mut fields = vec![
+            Field::vector("displacement", &self.displacement),
+            Field::scalar("beta", of_site(&|s| solved.operator.beta(s))),
+            Field::scalar("horizon", of_site(&horizon)),
+        ];
+        if !solved.residual.is_empty() {
+            let residual: Vec<Vector<D>> = self
+                .site_of_point
+                .iter()
+                .map(|s| s.map_or(Vector::zeros(), |s| on_site(s, solved.residual)))
+                .collect();
+            fields.push(Field::vector("residual", &residual));
+        }
+        for field in more {
+            fields.push(match field {
+                OverSites::Scalar(name, values) => Field::scalar(name, of_site(&|s| values[s])),
+                OverSites::Vector(name, values) => {
+                    let at = |(site, node): (&Option<usize>, &Option<usize>)| match (site, node) {
+                        (_, Some(n)) => model.node_transfer.displacement(*n, values),
+                        (Some(s), None) => on_site(*s, values),
+                        (None, None) => Vector::zeros(),
+                    };
+                    let places = self.site_of_point.iter().zip(&self.node_of_point);
+                    let vectors: Vec<Vector<D>> = places.map(at).collect();
+                    Field::vector(name, &vectors)
+                }
+            });
+        }
+        fields
+    }
+
+    /// Model, strain and stress, and what local laws remember.
+    fn cell_fields(&self) -> Vec<Field> {
+        let shown = self.zones.len();
+        let mut fields = vec![
+            Field::labels("model", self.zones.clone()),
+            Field::tensor("strain", &self.strains),
+            Field::tensor("stress", &self.stresses),
+        ];
+        let remembered = self
+            .solved
+            .system
+            .map(|system| system.remembered_by_cells());
+        for (name, values) in remembered.into_iter().flatten() {
+            let values: FxHashMap<u32, f64> = values.into_iter().collect();
+            let mut field = vec![0.0; shown];
+            for (value, c) in field.iter_mut().zip(&self.shown_cells) {
+                *value = values.get(c).copied().unwrap_or(0.0);
+            }
+            fields.push(Field::scalar(name, field));
+        }
+        fields
+    }
 }

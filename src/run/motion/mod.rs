@@ -7,6 +7,7 @@
 //! | `time_dependent_loads.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
 //! | `initial_state.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
+//! | `step_observer.rs` | what follows each step: what is watched, what is written |
 //! | `quasi_static.rs` | the run under a load that grows |
 //! | `time_step.rs` | the time step, with sub-cycling |
 //! | `guard.rs`, `seen.rs` | what is watched meanwhile: energy, rotation of elements |
@@ -23,6 +24,7 @@ pub mod quasi_static;
 pub(crate) mod rezoning;
 pub(crate) mod seen;
 pub mod setup;
+pub mod step_observer;
 pub mod time_dependent_loads;
 pub mod time_step;
 pub mod writer;

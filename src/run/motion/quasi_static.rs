@@ -8,6 +8,7 @@ use super::RunOptions;
 use super::dynamic_system::{plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
 use super::setup::{ModelSetup, breaks, laid_out, opened, restore};
+use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
 use crate::coupling::{Model, Operator, Sampler};
@@ -15,7 +16,7 @@ use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
 use crate::observe::summary::{
-    Decision, Ended, MotionSummary, Rotation, RunSummary, peak_memory_bytes,
+    Decision, Ended, MotionSummary, Rotation, RunSummary, Timings, peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::run::equilibrium;
@@ -24,17 +25,18 @@ use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
-use crate::run::solution::{self, Solved};
 use crate::run::warnings::{locking, warnings};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
 use crate::scene::validated::Scene;
 use crate::solve::direct::Factor;
-use crate::solve::explicit::Drive;
+use crate::solve::explicit::{Drive, State};
 use crate::solve::krylov::LinearMap;
-use crate::solve::quasi_static::{self, Equilibrium, LoadState, LoadStep, QuasiStaticParams};
+use crate::solve::quasi_static::{
+    self, Equilibrium, LoadState, LoadStep, QuasiStaticInfo, QuasiStaticParams,
+};
 use crate::solve::statics::{self, StaticProblem};
-use crate::system::Symmetry;
+use crate::system::{SemiDiscrete, Symmetry};
 use crate::tensor::padded;
 
 /// Runs a scene under a load that grows.
@@ -61,28 +63,116 @@ fn load_steps<const D: usize>(
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    let ModelSetup {
-        title,
-        joining,
+    let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
+    let mut system = laid_out.moving.system;
+    let (mut timings, mut watch) = (laid_out.timings, laid_out.watch);
+    let mut choices = laid_out.choices;
+    let pace = step_choice(spec);
+    let params = equilibrium_params(spec, &mut choices);
+    let near = match params.equilibrium {
+        Equilibrium::Newton => {
+            let symmetry = system.symmetry();
+            let near = factors(model, operator, symmetry, rest, &mut choices, progress)?;
+            watch.lap(&mut timings, "factorisation");
+            near
+        }
+        Equilibrium::Relaxation => None,
+    };
+    let begin = start(model, &rest.initial);
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
+    restore(system.as_mut(), saved.as_ref(), &file)?;
+    let breaks = breaks(system.as_ref(), rest);
+    let mut recorder = recorder(model, rest, spec, options, breaks, file, saved.as_ref())?;
+    recorder.hold(drive.holders());
+    let edge = saved.as_ref().and_then(|s| s.edge);
+    let (state, mut loaded) = first_state(begin, saved);
+    let first = state.step;
+    let mut observer = LoadStepObserver {
         model,
-        operator,
         rest,
-        mut moving,
-        mut choices,
-        proof,
-        mut timings,
-        mut watch,
-        ..
-    } = laid_out;
-    let step = spec.duration / spec.steps as f64;
-    let pace = StepChoice {
-        step,
+        spec,
+        options,
+        progress,
+        pace,
+        breaks,
+        drive: &drive,
+        fields: FieldOutput::new(model, operator),
+        recorder,
+        rotations: Rotations::new(model, laid_out.moving.is_linear),
+        state,
+        edge,
+        ended: Ended::Finished,
+        rotation: None,
+        failed: None,
+    };
+    watch.lap(&mut timings, "start");
+    let near = near.as_ref().map(|f| f as &dyn LinearMap);
+    let (info, seconds) =
+        observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings)?;
+    choices.push(Decision {
+        choice: format!("{} products or passes", info.iterations),
+        why: "of all load steps of this run".to_owned(),
+    });
+    let summary = observer.summary(system.as_ref(), info.iterations, first, seconds)?;
+    let mut told = warnings(model, laid_out.joining, &laid_out.proof);
+    told.extend(locking(model, &rest.local_laws));
+    told.extend(summary.rotation.as_ref().map(Rotation::warning));
+    Ok(RunSummary {
+        scene: laid_out.title,
+        coupling: laid_out.joining.name.to_owned(),
+        sizes: sizes(model, operator),
+        choices,
+        total_seconds: timings.total(),
+        timings,
+        peak_memory_bytes: peak_memory_bytes(),
+        warnings: told,
+        proof: laid_out.proof,
+        ..summary
+    })
+}
+
+/// The files of a run, from its beginning or cut back to a checkpoint.
+///
+/// # Errors
+/// [`ObserveError`] for files that cannot be made or cut.
+fn recorder<'a, const D: usize>(
+    model: &Model<D>,
+    rest: &'a RunSettings<D>,
+    spec: &Spec,
+    options: &RunOptions<'a>,
+    breaks: Breaks,
+    file: CheckpointFile,
+    saved: Option<&Saved>,
+) -> Result<Recorder<'a, D>, ObserveError> {
+    Recorder::new(
+        &rest.output,
+        &rest.conditions,
+        &Sampler::new(model),
+        breaks,
+        false,
+        file,
+        RunOptions {
+            checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
+            ..*options
+        },
+        saved.map(|s| &s.written),
+    )
+}
+
+/// Load steps of equal length.
+fn step_choice(spec: &Spec) -> StepChoice {
+    StepChoice {
+        step: spec.duration / spec.steps as f64,
         steps: spec.steps as u64,
         stable: 0.0,
         certified: 0.0,
         site: 0,
         since: (0, 0.0),
-    };
+    }
+}
+
+/// How each load step finds its equilibrium.
+fn equilibrium_params(spec: &Spec, choices: &mut Vec<Decision>) -> QuasiStaticParams {
     let params = QuasiStaticParams {
         equilibrium: match spec.method {
             LoadStepSpec::Implicit => Equilibrium::Newton,
@@ -100,204 +190,221 @@ fn load_steps<const D: usize>(
         .to_owned(),
         why: format!("{} load steps to t = {}", spec.steps, number(spec.duration)),
     });
-    let near = match params.equilibrium {
-        Equilibrium::Newton => {
-            let symmetry = moving.system.symmetry();
-            let near = factors(model, operator, symmetry, rest, &mut choices, progress)?;
-            watch.lap(&mut timings, "factorisation");
-            near
-        }
-        Equilibrium::Relaxation => None,
-    };
-    let begin = start(model, &rest.initial);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, step, pace.steps)?;
-    restore(moving.system.as_mut(), saved.as_ref(), &file)?;
-    let breaks = breaks(moving.system.as_ref(), rest);
-    let mut recorder = Recorder::new(
-        &rest.output,
-        &rest.conditions,
-        &Sampler::new(model),
-        breaks,
-        false,
-        file,
-        RunOptions {
-            checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
-            ..*options
-        },
-        saved.as_ref().map(|s| &s.written),
-    )?;
-    recorder.hold(drive.holders());
-    let zones = solution::zone_of_site(model);
-    let solved =
-        |moment: &Moment<'_>, visit: &mut dyn FnMut(&Solved<'_, D>) -> Result<(), ObserveError>| {
-            visit(&Solved {
-                model,
-                operator,
-                displacement: &moment.state.u,
-                residual: &[],
-                zone_of_site: &zones,
-                system: Some(moment.system),
-                broken: &moment.broken_bonds(),
-            })
-        };
-    let place = |site: usize| model.sites[site].position;
-    let mut edge = saved.as_ref().and_then(|s| s.edge);
-    let dofs = begin.u.len();
-    let mut loaded = LoadState::at_rest(dofs);
-    // fields, time, step, work, broken bonds: what a checkpoint keeps
+    params
+}
+
+/// The state that the first load step begins with: what a checkpoint keeps (fields, time, step, work, broken bonds), and what the solver advances.
+fn first_state(begin: State, saved: Option<Saved>) -> (State, LoadState) {
+    let mut loaded = LoadState::at_rest(begin.u.len());
     let mut state = begin;
     if let Some(saved) = saved {
         state = saved.state;
         // the state at t = 0 counts as one of the driver's steps
         loaded.step = state.step + 1;
-        loaded.u.clone_from(&state.u);
         loaded.broken = state.broken;
-    } else {
-        loaded.u.clone_from(&state.u);
     }
-    let first = state.step;
-    let times = |k: u64| (k <= pace.steps).then_some(k as f64 * step);
-    watch.lap(&mut timings, "start");
-    let written = recorder.seconds;
-    progress.stage("load steps", Some(pace.steps));
-    progress.advance(first);
-    let clock = Instant::now();
-    let mut ended = Ended::Finished;
-    let mut failed = None;
-    let rotations = Rotations::new(model, moving.is_linear);
-    let mut rotation = None;
-    options.begin_steps();
-    let mut observe = |seen: &LoadStep<'_>| -> ControlFlow<()> {
+    loaded.u.clone_from(&state.u);
+    (state, loaded)
+}
+
+/// Watches and writes the load steps of a run.
+struct LoadStepObserver<'a, const D: usize> {
+    model: &'a Model<D>,
+    rest: &'a RunSettings<D>,
+    spec: &'a Spec,
+    options: &'a RunOptions<'a>,
+    progress: &'a dyn Progress,
+    pace: StepChoice,
+    breaks: Breaks,
+    drive: &'a SceneDrive<'a, D>,
+    fields: FieldOutput<'a, D>,
+    recorder: Recorder<'a, D>,
+    rotations: Rotations<'a, D>,
+    /// Fields, time, step, work, broken bonds: what a checkpoint keeps.
+    state: State,
+    edge: Option<EdgeReached>,
+    ended: Ended,
+    rotation: Option<Rotation>,
+    failed: Option<ObserveError>,
+}
+
+impl<const D: usize> LoadStepObserver<'_, D> {
+    /// Takes the load steps to the end, or to where the run stops; adds the seconds of the stages to `timings`, and returns those of all.
+    ///
+    /// # Errors
+    /// [`RunError`] of a load step or a file.
+    fn take_steps(
+        &mut self,
+        system: &mut dyn SemiDiscrete,
+        params: QuasiStaticParams,
+        near: Option<&dyn LinearMap>,
+        loaded: &mut LoadState,
+        timings: &mut Timings,
+    ) -> Result<(QuasiStaticInfo, f64), RunError> {
+        let written = self.recorder.seconds;
+        let (progress, pace, drive) = (self.progress, self.pace, self.drive);
+        let times = |k: u64| (k <= pace.steps).then_some(k as f64 * pace.step);
+        progress.stage("load steps", Some(pace.steps));
+        progress.advance(self.state.step);
+        let clock = Instant::now();
+        self.options.begin_steps();
+        let mut observe = |seen: &LoadStep<'_>| self.observe(seen);
+        let info = quasi_static::run(system, drive, params, near, &times, loaded, &mut observe)?;
+        if let Some(error) = self.failed.take() {
+            return Err(error.into());
+        }
+        progress.finish();
+        let seconds = clock.elapsed().as_secs_f64();
+        let writing = self.recorder.seconds - written;
+        timings.add("load steps", seconds - writing);
+        timings.add("output", writing);
+        Ok((info, seconds))
+    }
+
+    /// Watches and writes a load step; says whether the next is taken.
+    fn observe(&mut self, seen: &LoadStep<'_>) -> ControlFlow<()> {
         let begins = seen.state.step == 1;
+        self.take_state(seen);
+        self.find_damage_at_edge(seen);
+        self.find_reason_to_end();
+        if let Err(error) = self.write(seen, begins) {
+            self.failed = Some(error);
+            return ControlFlow::Break(());
+        }
+        let state = &self.state;
+        self.progress.advance(u64::from(!begins));
+        self.progress.tell(&format!(
+            "t = {:.3e}, {} iterations, {} bonds broken",
+            state.time, seen.iterations, state.broken
+        ));
+        match self.ended {
+            Ended::Finished => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        }
+    }
+
+    /// Takes the state of a load step over.
+    fn take_state(&mut self, seen: &LoadStep<'_>) {
+        let state = &mut self.state;
         state.work += seen.work;
-        let loads: Vec<f64> = drive
-            .prescribed()
-            .iter()
-            .map(|&dof| seen.load[dof as usize])
-            .collect();
         state.step = seen.state.step - 1;
         state.time = seen.time;
         state.u.copy_from_slice(&seen.state.u);
         state.broken = seen.state.broken;
-        if breaks == Breaks::Possibly && edge.is_none() {
-            edge = seen.system.damage_at_edge().map(|site| EdgeReached {
-                step: state.step,
-                time: state.time,
+    }
+
+    /// Looks for damage at the edge of the nonlocal zone, as long as there is none.
+    fn find_damage_at_edge(&mut self, seen: &LoadStep<'_>) {
+        if self.breaks == Breaks::Possibly && self.edge.is_none() {
+            self.edge = seen.system.damage_at_edge().map(|site| EdgeReached {
+                step: self.state.step,
+                time: self.state.time,
                 site: site as u64,
             });
         }
-        let last = state.step == pace.steps;
-        if edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
-            ended = Ended::DamageAtEdge;
-        } else if options.interrupt.is_some_and(|i| i.load(Ordering::Relaxed)) && !last {
-            ended = Ended::Interrupted;
+    }
+
+    /// Whether the state is that of the last load step.
+    fn is_last(&self) -> bool {
+        self.state.step == self.pace.steps
+    }
+
+    /// Why the run ends with this load step, if it does: damage at the edge, an interrupt, elements that have rotated too far.
+    fn find_reason_to_end(&mut self) {
+        let interrupt = self.options.interrupt;
+        if self.edge.is_some() && self.rest.breaking.at_edge == EdgeSpec::Stop {
+            self.ended = Ended::DamageAtEdge;
+        } else if interrupt.is_some_and(|i| i.load(Ordering::Relaxed)) && !self.is_last() {
+            self.ended = Ended::Interrupted;
         }
-        let found = rotations.largest(&state.u);
-        let limit = spec.largest_rotation.unwrap_or(f64::INFINITY);
-        if ended == Ended::Finished && found.as_ref().is_some_and(|r| r.degrees > limit) {
-            ended = Ended::ElementsRotated;
+        let found = self.rotations.largest(&self.state.u);
+        let limit = self.spec.largest_rotation.unwrap_or(f64::INFINITY);
+        if self.ended == Ended::Finished && found.as_ref().is_some_and(|r| r.degrees > limit) {
+            self.ended = Ended::ElementsRotated;
         }
-        rotation = found.and_then(|r| {
-            let when = Some((state.step, state.time));
-            rotations.told(r.degrees, r.place, 0.0, 0.0, when)
-        });
-        let moment = Moment::at_rest(&state, seen.system, (seen.force, &loads));
+        let when = Some((self.state.step, self.state.time));
+        self.rotation = found.and_then(|r| self.rotations.told(r.degrees, r.place, 0.0, 0.0, when));
+    }
+
+    /// Writes a row of the history, and the fields and a checkpoint where they are due.
+    fn write(&mut self, seen: &LoadStep<'_>, begins: bool) -> Result<(), ObserveError> {
+        let loads: Vec<f64> = self
+            .drive
+            .prescribed()
+            .iter()
+            .map(|&dof| seen.load[dof as usize])
+            .collect();
+        let last = self.is_last();
+        let (state, recorder) = (&self.state, &mut self.recorder);
+        let moment = Moment::at_rest(state, seen.system, (seen.force, &loads));
         let shown = begins
             || last
-            || matches!(ended, Ended::DamageAtEdge | Ended::ElementsRotated)
-            || state.step.is_multiple_of(spec.output_every as u64);
-        let leave = ended != Ended::Finished || (last && recorder.keeps_state());
-        let mut write = || -> Result<(), ObserveError> {
-            if begins {
-                recorder.begin(&moment);
-            }
-            let energies = recorder.energies(&moment);
-            recorder.row(&moment, energies, place)?;
-            if shown {
-                solved(&moment, &mut |s| recorder.output(&moment, s))?;
-            }
-            if leave || (!begins && recorder.is_checkpoint_due(state.step)) {
-                recorder.checkpoint(&moment, pace, edge, None, &Seen::default())?;
-            }
-            Ok(())
-        };
-        if let Err(error) = write() {
-            failed = Some(error);
-            return ControlFlow::Break(());
+            || matches!(self.ended, Ended::DamageAtEdge | Ended::ElementsRotated)
+            || state.step.is_multiple_of(self.spec.output_every as u64);
+        let leave = self.ended != Ended::Finished || (last && recorder.keeps_state());
+        if begins {
+            recorder.begin(&moment);
         }
-        progress.advance(u64::from(!begins));
-        progress.tell(&format!(
-            "t = {:.3e}, {} iterations, {} bonds broken",
-            state.time, seen.iterations, state.broken
-        ));
-        match ended {
-            Ended::Finished => ControlFlow::Continue(()),
-            _ => ControlFlow::Break(()),
+        let energies = recorder.energies(&moment);
+        let place = |site: usize| self.model.sites[site].position;
+        recorder.row(&moment, energies, place)?;
+        if shown {
+            self.fields.write(recorder, &moment)?;
         }
-    };
-    let info = quasi_static::run(
-        moving.system.as_mut(),
-        &drive,
-        params,
-        near.as_ref().map(|f| f as &dyn LinearMap),
-        &times,
-        &mut loaded,
-        &mut observe,
-    )?;
-    if let Some(error) = failed {
-        return Err(error.into());
+        if leave || (!begins && recorder.is_checkpoint_due(state.step)) {
+            recorder.checkpoint(&moment, self.pace, self.edge, None, &Seen::default())?;
+        }
+        Ok(())
     }
-    progress.finish();
-    let seconds = clock.elapsed().as_secs_f64();
-    timings.add("load steps", seconds - (recorder.seconds - written));
-    timings.add("output", recorder.seconds - written);
-    let stored = moving.system.stored_energy(&state.u);
-    let (_, applied) = loads::loads(model, &rest.conditions, state.time)?;
-    let plane = plane_energy(model, rest)?;
-    choices.push(Decision {
-        choice: format!("{} products or passes", info.iterations),
-        why: "of all load steps of this run".to_owned(),
-    });
-    let mut told = warnings(model, joining, &proof);
-    told.extend(locking(model, &rest.local_laws));
-    told.extend(rotation.as_ref().map(Rotation::warning));
-    Ok(RunSummary {
-        scene: title,
-        dimension: D,
-        coupling: joining.name.to_owned(),
-        sizes: sizes(model, operator),
-        choices,
-        total_seconds: timings.total(),
-        timings,
-        peak_memory_bytes: peak_memory_bytes(),
-        warnings: told,
-        proof,
-        applied,
-        rotation,
-        iterations: info.iterations,
-        motion: Some(MotionSummary {
-            ended,
+
+    /// Energies, cracks, loads and files at the end of the run; `first` is the step that it began with, `seconds` are those of its steps.
+    ///
+    /// # Errors
+    /// [`RunError`] for loads or a fracture energy that cannot be evaluated.
+    fn summary(
+        self,
+        system: &dyn SemiDiscrete,
+        iterations: usize,
+        first: u64,
+        seconds: f64,
+    ) -> Result<RunSummary, RunError> {
+        let (model, state) = (self.model, &self.state);
+        let stored = system.stored_energy(&state.u);
+        let (_, applied) = loads::loads(model, &self.rest.conditions, state.time)?;
+        let plane = plane_energy(model, self.rest)?;
+        let motion = MotionSummary {
+            ended: self.ended,
             steps: state.step,
-            of_steps: pace.steps,
+            of_steps: self.pace.steps,
             time: state.time,
-            step,
+            step: self.pace.step,
             stable_step: None,
             kinetic_energy: 0.0,
             stored_energy: stored,
             external_work: state.work,
-            missing_energy: recorder.energy_at_start + state.work - stored,
+            missing_energy: self.recorder.energy_at_start + state.work - stored,
             energy_gain: None,
-            cracks: cracks(moving.system.as_ref(), breaks, plane),
-            inelastic_energy: inelastic_energy(moving.system.as_ref()),
+            cracks: cracks(system, self.breaks, plane),
+            inelastic_energy: inelastic_energy(system),
             broken_bonds: state.broken,
-            edge_reached: edge.map(|e| (e.time, place(e.site as usize).iter().copied().collect())),
+            edge_reached: self.edge.map(|e| {
+                let x = model.sites[e.site as usize].position;
+                (e.time, x.iter().copied().collect())
+            }),
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),
             switches: Vec::new(),
             nonlocal_share: [0.0; 3],
-        }),
-        files: recorder.files(),
-        ..RunSummary::default()
-    })
+        };
+        Ok(RunSummary {
+            dimension: D,
+            applied,
+            iterations,
+            motion: Some(motion),
+            files: self.recorder.files(),
+            rotation: self.rotation,
+            ..RunSummary::default()
+        })
+    }
 }
 
 /// What is added to the stiffness, as a part of its diagonal, so that pieces that nothing holds have factors too: far above round-off, and too little to
