@@ -61,6 +61,24 @@ impl fmt::Display for Prediction {
                 self.operations
             )?;
         }
+        self.write_steps(f)?;
+        writeln!(
+            f,
+            "time                   about {:.1} s on {} threads",
+            self.total_seconds,
+            rayon::current_num_threads()
+        )?;
+        self.write_error(f)?;
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Prediction {
+    /// The steps of a scene in time.
+    fn write_steps(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(m) = &self.motion {
             writeln!(
                 f,
@@ -77,12 +95,11 @@ impl fmt::Display for Prediction {
                 m.seconds_per_step
             )?;
         }
-        writeln!(
-            f,
-            "time                   about {:.1} s on {} threads",
-            self.total_seconds,
-            rayon::current_num_threads()
-        )?;
+        Ok(())
+    }
+
+    /// How far results will be from those of a finer model, or why that is not known.
+    fn write_error(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(e) = &self.error {
             writeln!(
                 f,
@@ -98,9 +115,6 @@ impl fmt::Display for Prediction {
             )?;
         } else if let Some(why) = &self.no_error {
             writeln!(f, "error                  not predicted: {why}")?;
-        }
-        for warning in &self.warnings {
-            writeln!(f, "warning: {warning}")?;
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `resource_estimate.rs` | of a static scene: sizes, memory, time |
+//! | `solver_estimate.rs` | what solving with a stiffness takes |
 //! | `motion_estimate.rs` | of one that moves |
 //! | `counted.rs` | the same from volumes, where the model is too large to be laid out |
 //! | `output_cost.rs` | what outputs will cost |
@@ -15,6 +16,7 @@ mod error_prediction;
 mod motion_estimate;
 pub mod output_cost;
 mod resource_estimate;
+mod solver_estimate;
 
 pub use error_prediction::{ErrorPrediction, ErrorReference};
 pub use resource_estimate::{MotionPrediction, Prediction};

@@ -3,10 +3,9 @@
 use std::time::Instant;
 
 use super::output_cost::{TrialFolder, file_seconds, made_up};
-use super::resource_estimate::{
-    MotionPrediction, OUTPUT_BYTES, Planned, Prediction, holds, warnings,
-};
-use crate::coupling::Sampler;
+use super::resource_estimate::{MotionPrediction, Prediction, holds, warnings};
+use super::solver_estimate::{OUTPUT_BYTES, Planned};
+use crate::coupling::{Model, Operator, Sampler};
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::series::Series;
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
@@ -20,8 +19,9 @@ use crate::run::motion::setup::{ModelSetup, breaks, laid_out};
 use crate::run::motion::step_observer::moment;
 use crate::run::motion::time_dependent_loads::SceneDrive;
 use crate::run::motion::time_step::{held, paced};
-use crate::run::motion::writer::Recorder;
+use crate::run::motion::writer::{Breaks, Moment, Recorder, StepChoice};
 use crate::run::proof::growth::GrowthQuestion;
+use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
 use crate::run::write::OverSites;
 use crate::run::{RunError, RunOptions};
@@ -129,6 +129,114 @@ enum Files {
     None,
 }
 
+/// Seconds of a step, from a few that are taken.
+///
+/// # Errors
+/// [`RunError`] of a step.
+fn seconds_per_step(
+    motion: &mut Explicit<'_>,
+    steps: u64,
+    is_linear: bool,
+) -> Result<f64, RunError> {
+    // the first touch memory, and wake threads
+    let mut taken = 0u64;
+    let mut clock = Instant::now();
+    let mut tried = TRIED_FOR;
+    while taken < steps && (taken < 2 * WARM || clock.elapsed().as_secs_f64() < tried) {
+        motion.step()?;
+        moment(motion, is_linear);
+        taken += 1;
+        if taken == WARM {
+            let run = clock.elapsed().as_secs_f64() / WARM as f64 * steps as f64;
+            tried = (0.1 * run).clamp(LEAST_TRIED, TRIED_FOR);
+            clock = Instant::now();
+        }
+    }
+    let timed = if taken > WARM { taken - WARM } else { taken };
+    Ok(clock.elapsed().as_secs_f64() / timed as f64)
+}
+
+/// Seconds that output takes.
+struct OutputCost {
+    /// Of opening the history and its first row.
+    opened: f64,
+    per_row: f64,
+    per_file: f64,
+}
+
+impl OutputCost {
+    /// Writes rows and a sample of a file as the run does, elsewhere; `count` files are wanted, none without VTU.
+    ///
+    /// # Errors
+    /// [`RunError`] if they cannot be written.
+    fn of<const D: usize>(
+        model: &Model<D>,
+        operator: &dyn Operator<D>,
+        rest: &RunSettings<D>,
+        breaks: Breaks,
+        is_linear: bool,
+        shown: &Moment<'_>,
+        count: Option<f64>,
+    ) -> Result<Self, RunError> {
+        let folder = TrialFolder::new(&rest.output.directory);
+        let output = Output {
+            directory: folder.path().to_path_buf(),
+            ..rest.output.clone()
+        };
+        let begun = Instant::now();
+        let mut recorder = Recorder::new(
+            &output,
+            &rest.conditions,
+            &Sampler::new(model),
+            breaks,
+            is_linear,
+            CheckpointFile::new(folder.path().join("trial.checkpoint"), 0),
+            RunOptions::default(),
+            None,
+        )?;
+        recorder.begin(shown);
+        let place = |site: usize| model.sites[site].position;
+        let energies = recorder.energies(shown);
+        recorder.row(shown, energies, place)?;
+        let opened = begun.elapsed().as_secs_f64();
+        let begun = Instant::now();
+        for _ in 0..ROWS {
+            let energies = recorder.energies(shown);
+            recorder.row(shown, energies, place)?;
+        }
+        let per_row = begun.elapsed().as_secs_f64() / f64::from(ROWS);
+        let per_file = if let Some(count) = count {
+            let u = made_up(shown.state.u.len());
+            let solved = Solved {
+                model,
+                operator,
+                displacement: &u,
+                residual: &[],
+                zone_of_site: &solution::zone_of_site(model),
+                system: None,
+                broken: &[],
+            };
+            let mut series = Series::new(folder.path(), "trial");
+            let more = [OverSites::Vector("velocity", &u)];
+            file_seconds(&solved, &more, count, |s| series.push(0.0, s).map(drop))?
+        } else {
+            0.0
+        };
+        Ok(Self {
+            opened,
+            per_row,
+            per_file,
+        })
+    }
+}
+
+/// Files that a run writes; none without VTU.
+fn files_of<const D: usize>(spec: &Spec, rest: &RunSettings<D>) -> Option<f64> {
+    let count = (spec.duration / spec.output_interval).ceil() + 1.0;
+    rest.output.vtu.then_some(count)
+}
+
+/// Sizes, memory and time of the steps of a run, from some that are taken.
 fn steps<const D: usize>(
     mut laid_out: ModelSetup<'_, D>,
     spec: &Spec,
@@ -165,108 +273,64 @@ fn steps<const D: usize>(
         ExplicitParams::with_step(pace.step),
         begin,
     )?;
-    // the first touch memory, and wake threads
-    let mut taken = 0u64;
-    let mut clock = Instant::now();
-    let mut tried = TRIED_FOR;
-    while taken < pace.steps && (taken < 2 * WARM || clock.elapsed().as_secs_f64() < tried) {
-        motion.step()?;
-        moment(&motion, is_linear);
-        taken += 1;
-        if taken == WARM {
-            let run = clock.elapsed().as_secs_f64() / WARM as f64 * pace.steps as f64;
-            tried = (0.1 * run).clamp(LEAST_TRIED, TRIED_FOR);
-            clock = Instant::now();
-        }
-    }
-    let timed = if taken > WARM { taken - WARM } else { taken };
-    let seconds_per_step = clock.elapsed().as_secs_f64() / timed as f64;
+    let seconds_per_step = seconds_per_step(&mut motion, pace.steps, is_linear)?;
 
-    // rows and files as the run writes them, elsewhere
-    let folder = TrialFolder::new(&rest.output.directory);
-    let output = Output {
-        directory: folder.path().to_path_buf(),
-        ..rest.output.clone()
-    };
-    let begun = Instant::now();
-    let mut recorder = Recorder::new(
-        &output,
-        &rest.conditions,
-        &Sampler::new(model),
+    let shown = moment(&motion, is_linear);
+    let operator = laid_out.operator;
+    let cost = OutputCost::of(
+        model,
+        operator,
+        rest,
         breaks,
         is_linear,
-        CheckpointFile::new(folder.path().join("trial.checkpoint"), 0),
-        RunOptions::default(),
-        None,
+        &shown,
+        files_of(spec, rest),
     )?;
-    let shown = moment(&motion, is_linear);
-    recorder.begin(&shown);
-    let place = |site: usize| model.sites[site].position;
-    let energies = recorder.energies(&shown);
-    recorder.row(&shown, energies, place)?;
-    let opened = begun.elapsed().as_secs_f64();
-    let begun = Instant::now();
-    for _ in 0..ROWS {
-        let energies = recorder.energies(&shown);
-        recorder.row(&shown, energies, place)?;
-    }
-    let per_row = begun.elapsed().as_secs_f64() / f64::from(ROWS);
-    let per_file = if rest.output.vtu {
-        let count = (spec.duration / spec.output_interval).ceil() + 1.0;
-        let u = made_up(shown.state.u.len());
-        let solved = Solved {
-            model,
-            operator: laid_out.operator,
-            displacement: &u,
-            residual: &[],
-            zone_of_site: &solution::zone_of_site(model),
-            system: None,
-            broken: &[],
-        };
-        let mut series = Series::new(folder.path(), "trial");
-        let more = [OverSites::Vector("velocity", &u)];
-        file_seconds(&solved, &more, count, |s| series.push(0.0, s).map(drop))?
-    } else {
-        0.0
-    };
     drop(motion);
     progress.finish();
 
-    let (files, written) = if rest.output.vtu {
-        let count = (spec.duration / spec.output_interval).ceil() + 1.0;
-        (Files::Some, count)
-    } else {
-        (Files::None, 0.0)
+    let (files, written) = match files_of(spec, rest) {
+        Some(count) => (Files::Some, count),
+        None => (Files::None, 0.0),
     };
     let rows = (spec.duration / spec.history_interval)
         .ceil()
         .min(pace.steps as f64)
         + 1.0;
     let timings = &mut laid_out.timings;
-    timings.add("start", opened + per_file);
+    timings.add("start", cost.opened + cost.per_file);
     timings.add("steps", pace.steps as f64 * seconds_per_step);
     timings.add(
         "output",
-        (written - 1.0).max(0.0) * per_file + rows * per_row,
+        (written - 1.0).max(0.0) * cost.per_file + rows * cost.per_row,
     );
     let mut prediction = Prediction {
-        motion: Some(MotionPrediction {
-            step: pace.step,
-            steps: pace.steps,
-            stable_step: pace.stable,
-            certified_step: pace.certified,
-            certified_at: model.sites[pace.site as usize]
-                .position
-                .iter()
-                .copied()
-                .collect(),
-            seconds_per_step,
-        }),
+        motion: Some(motion_of(model, &pace, seconds_per_step)),
         ..prediction(&laid_out, held.len(), files, Some(state_bytes))
     };
     prediction.warnings = warnings(model, laid_out.joining, &prediction);
     holds(&prediction)?;
     Ok(prediction)
+}
+
+/// The steps of a run.
+fn motion_of<const D: usize>(
+    model: &Model<D>,
+    pace: &StepChoice,
+    seconds_per_step: f64,
+) -> MotionPrediction {
+    MotionPrediction {
+        step: pace.step,
+        steps: pace.steps,
+        stable_step: pace.stable,
+        certified_step: pace.certified,
+        certified_at: model.sites[pace.site as usize]
+            .position
+            .iter()
+            .copied()
+            .collect(),
+        seconds_per_step,
+    }
 }
 
 /// Predicts a run under a load that grows: sizes and memory, for what a load step takes shows only when bonds break.

@@ -4,15 +4,14 @@
 //! Each row of the stiffness is computed and dropped at once; only its pattern stays, from which ordering and symbolic
 //! factorisation follow. That costs the time of an assembly and a tenth of its memory, and no factorisation.
 
-use std::time::Duration;
-
 use serde::Serialize;
 
 use super::error_prediction::ErrorPrediction;
 use super::output_cost::{made_up, output_seconds};
+use super::solver_estimate::Planned;
 use crate::assembly::Pattern;
 use crate::coupling::zone_distance::Edge;
-use crate::coupling::{Model, PointSource, SiteKind, Zone};
+use crate::coupling::{Coupling, Model, Operator, PointSource, SiteKind, Zone};
 use crate::mesh::Mesh;
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::summary::{
@@ -34,13 +33,8 @@ use crate::run::warnings::doubts;
 use crate::scene::Scene;
 use crate::scene::spec::{CouplingTraits, ZonesNeeded};
 use crate::solve::FreeDofs;
-use crate::solve::direct::Analysis;
-use crate::solve::factor_time_estimate::{rehearse, seconds_per_scalar};
-use crate::solve::ordering::SiteGraph;
-use crate::solve::statics::{MethodUsed, StaticError, expected_method};
-use crate::solve::symbolic::FactorCost;
+use crate::solve::statics::MethodUsed;
 use crate::system::Symmetry;
-use crate::tensor::padded;
 
 /// What a run will need.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -108,85 +102,6 @@ pub struct MotionPrediction {
     pub seconds_per_step: f64,
 }
 
-/// A factorisation is rehearsed for so long at most, and for no longer than a tenth of what it takes at [`OPERATIONS`].
-const REHEARSED: f64 = 0.5;
-
-/// Operations per second of one thread, to tell how long to rehearse; the prediction does not use it.
-const OPERATIONS: f64 = 1e10;
-
-/// Solves with the factors, each with a product and a residual: one or two refinements, and one that finds nothing to gain.
-const SUBSTITUTIONS: f64 = 3.0;
-
-/// Times that a whole iterative solve reads the stiffness, set-up and cycles included: `benches/solvers.rs` takes 0.8e-7 to
-/// 2.5e-7 s of CPU per stored scalar, and [`seconds_per_scalar`] gives 1e-10 s there.
-const PASSES: f64 = 1500.0;
-
-/// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
-pub(crate) const OUTPUT_BYTES: u64 = 900;
-
-/// Bytes of a factorisation on two threads over those on one: two subtrees hold contribution blocks. Measured on the scenes
-/// of `tests/check.rs`: 1.23 to 1.36 for Cholesky, whose factors are the smaller part, 1.0 to 1.15 for LU.
-const CHOLESKY: f64 = 1.26;
-
-/// As [`CHOLESKY`].
-const LU: f64 = 1.1;
-
-/// Bytes of a multigrid hierarchy and of the vectors of an iteration over those of the stiffness; measured 2.1 to 2.2.
-const HIERARCHY: f64 = 2.1;
-
-/// Bytes of program and buffers that a run touches after its model is laid out; measured.
-const PROGRAM: u64 = 3_700_000;
-
-/// How a stiffness that is not assembled yet will be solved with.
-pub(crate) struct Planned {
-    pub analysis: Analysis,
-    pub cost: FactorCost,
-    pub method: MethodUsed,
-    /// Bytes of the stiffness.
-    pub stiffness: u64,
-    /// Bytes of the factors, or of the multigrid hierarchy.
-    pub solver: u64,
-}
-
-impl Planned {
-    pub fn of<const D: usize>(
-        model: &Model<D>,
-        pattern: &Pattern,
-        free: &FreeDofs,
-        rest: &RunSettings<D>,
-        symmetry: Symmetry,
-    ) -> Result<Self, RunError> {
-        let nonzeros = pattern.stored * D * D;
-        let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-        let mut params = equilibrium::params(&rest.solver);
-        let stored = pattern.distinct * D * D * 8 + pattern.stored * 4 + model.sites.len() * 8;
-        // a run holds the stiffness by then
-        params.memory_limit = params
-            .memory_limit
-            .map(|left| left.saturating_sub(stored as u64));
-        let graph = SiteGraph::from_pattern(&pattern.row_offsets, &pattern.columns, free);
-        let analysis =
-            Analysis::of_graph(graph, &positions, params.ordering).map_err(StaticError::from)?;
-        let cost = analysis.cost(symmetry);
-        let method = expected_method(&params, symmetry, &cost, nonzeros);
-        let solver = match method {
-            MethodUsed::Cholesky => analysis.bytes() + (cost.bytes as f64 * CHOLESKY) as u64,
-            MethodUsed::Lu => analysis.bytes() + (cost.bytes as f64 * LU) as u64,
-            // coarse levels share no rows
-            _ => analysis
-                .bytes()
-                .max((HIERARCHY * (nonzeros * 8 + pattern.stored * 4) as f64) as u64),
-        };
-        Ok(Self {
-            analysis,
-            cost,
-            method,
-            stiffness: stored as u64,
-            solver,
-        })
-    }
-}
-
 /// Predicts a static run.
 ///
 /// # Errors
@@ -206,144 +121,56 @@ pub(crate) fn predict<const D: usize>(
     watch.lap(&mut timings, "sites and bonds");
     let laid_out = resident_memory_bytes().unwrap_or(0);
     let layout_peak = peak_memory_bytes().unwrap_or(0);
-    let fields = proof::affine_displacements(&model);
-    let pattern = model.pattern(operator.as_ref(), &fields, progress);
-    drop(fields);
+    let pattern = affine_pattern(&model, operator.as_ref(), progress);
     watch.lap(&mut timings, "assembly");
 
     loads::loads(&model, &rest.conditions, 0.0)?;
-    let (prescribed, _) = loads::supports(&model, &rest.conditions, 0.0)?;
-    let free = FreeDofs::from_prescribed(&prescribed, D);
-    let proof = proof::prove(
-        &Subject {
-            model: &model,
-            coupling: coupling.as_ref(),
-            operator: operator.as_ref(),
-            rest: &rest,
-            stiffness: None,
-            system: None,
-            affine_forces: &pattern.products,
-        },
+    let free = free_dofs(&model, &rest)?;
+    let proof = proved(
+        &model,
+        coupling.as_ref(),
+        operator.as_ref(),
+        &rest,
+        &pattern,
         progress,
     )?;
-    proof::hold(&proof)?;
     watch.lap(&mut timings, "proof");
     let mut choices = rest.choices.clone();
     choices.extend(rest.placed.iter().cloned());
     choices.push(rest.coupling(joining));
     let symmetry = equilibrium::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
-    let Planned {
-        analysis,
-        cost,
-        method,
-        stiffness,
-        solver,
-    } = Planned::of(&model, &pattern, &free, &rest, symmetry)?;
+    let plan = Planned::of(&model, &pattern, &free, &rest, symmetry)?;
     watch.lap(&mut timings, "conditions and ordering");
-    let factorised = matches!(method, MethodUsed::Cholesky | MethodUsed::Lu);
     progress.finish();
 
-    let points = model
-        .sites
-        .iter()
-        .filter(|s| matches!(s.kind, SiteKind::Point(_)))
-        .count();
-    let sizes = Sizes {
-        nodes,
-        cells,
-        sites: model.sites.len(),
-        points,
-        bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
-        dofs: model.sites.len() * D,
-        nonzeros,
-    };
-    let nonlinear = rest.nonlinear(&model);
-    // led by the factors of the stiffness, where these are worth their cost
-    let solver_name = match nonlinear {
-        None => method.name(),
-        Some(_) => MethodUsed::Newton.name(),
-    };
-    choices.extend(nonlinear);
-    choices.push(Decision {
-        choice: solver_name.to_owned(),
-        why: format!("{} system of {} unknowns", symmetry.name(), free.count()),
-    });
-    if let Some(p) = &model.peridynamics {
-        choices.push(Decision {
-            choice: format!("{:?} bond weights", p.weights),
-            why: match p.weights {
-                BondWeights::Plain => {
-                    "the papers' quadrature; its elastic tensor is not isotropic".to_owned()
-                }
-                BondWeights::Isotropic if model.is_lattice() => {
-                    "the lattice carries the typed elastic constants".to_owned()
-                }
-                BondWeights::Isotropic => scattered(&model),
-                BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
-            },
-        });
-        choices.extend(setup::volumes_choice(&model));
-    }
+    let sizes = sizes_of(&model, operator.as_ref(), [nodes, cells], nonzeros);
+    choices.extend(solver_decisions(
+        &model,
+        &rest,
+        plan.method,
+        symmetry,
+        free.count(),
+    ));
+    choices.extend(weights_decisions(&model));
 
-    let output_bytes = OUTPUT_BYTES * (model.mesh.cell_count() + points) as u64;
-    let memory = vec![
-        Share {
-            name: "model",
-            bytes: laid_out,
-        },
-        Share {
-            name: "program",
-            bytes: PROGRAM,
-        },
-        Share {
-            name: "stiffness",
-            bytes: stiffness,
-        },
-        Share {
-            name: "solver",
-            bytes: solver,
-        },
-        Share {
-            name: "output",
-            bytes: output_bytes,
-        },
-    ];
-    let peak = laid_out + PROGRAM + stiffness + solver.max(output_bytes);
-    let threads = rayon::current_num_threads() as f64;
-    if factorised {
-        let most = (0.1 * cost.flops / OPERATIONS / threads).clamp(0.01, REHEARSED);
-        let told = rehearse(&analysis, symmetry, Duration::from_secs_f64(most));
-        let product = nonzeros as f64 * seconds_per_scalar() / threads;
-        timings.add("factorisation", told.factorisation);
-        timings.add("solve", SUBSTITUTIONS * (told.substitution + product));
-    } else {
-        let pass = nonzeros as f64 * seconds_per_scalar() / threads;
-        timings.add("iteration", PASSES * pass);
-    }
-    let zones = solution::zone_of_site(&model);
-    let displacement = made_up(model.sites.len() * D);
-    let made_up = Solved {
-        model: &model,
-        operator: operator.as_ref(),
-        displacement: &displacement,
-        residual: &displacement,
-        zone_of_site: &zones,
-        system: None,
-        broken: &[],
-    };
-    timings.add("output", output_seconds(&rest.output, &made_up)?);
+    let (memory, peak) = plan.memory(laid_out, &sizes);
+    plan.add_seconds(symmetry, nonzeros, &mut timings);
+    timings.add(
+        "output",
+        seconds_of_output(&model, operator.as_ref(), &rest)?,
+    );
     let mut prediction = Prediction {
         scene: title,
         counted: None,
         dimension: D,
         coupling: joining.name.to_owned(),
         sizes,
-        method: Some(method),
+        method: Some(plan.method),
         symmetry,
         unknowns: free.count(),
-        factor_nonzeros: if factorised { cost.factor_nnz } else { 0 },
-        operations: if factorised { cost.flops } else { 0.0 },
+        factor_nonzeros: plan.factor_nonzeros(),
+        operations: plan.operations(),
         peak_memory_bytes: peak.max(layout_peak),
         memory,
         total_seconds: timings.total(),
@@ -358,6 +185,147 @@ pub(crate) fn predict<const D: usize>(
     prediction.warnings = warnings(&model, joining, &prediction);
     holds(&prediction)?;
     Ok(prediction)
+}
+
+/// Sizes of a model that is laid out, of a mesh of so many nodes and cells.
+fn sizes_of<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    [nodes, cells]: [usize; 2],
+    nonzeros: usize,
+) -> Sizes {
+    let points = model
+        .sites
+        .iter()
+        .filter(|s| matches!(s.kind, SiteKind::Point(_)))
+        .count();
+    Sizes {
+        nodes,
+        cells,
+        sites: model.sites.len(),
+        points,
+        bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
+        dofs: model.sites.len() * D,
+        nonzeros,
+    }
+}
+
+/// What bond weights and volumes of points do.
+fn weights_decisions<const D: usize>(model: &Model<D>) -> Vec<Decision> {
+    let mut choices = Vec::new();
+    if let Some(p) = &model.peridynamics {
+        choices.push(Decision {
+            choice: format!("{:?} bond weights", p.weights),
+            why: match p.weights {
+                BondWeights::Plain => {
+                    "the papers' quadrature; its elastic tensor is not isotropic".to_owned()
+                }
+                BondWeights::Isotropic if model.is_lattice() => {
+                    "the lattice carries the typed elastic constants".to_owned()
+                }
+                BondWeights::Isotropic => scattered(model),
+                BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
+            },
+        });
+        choices.extend(setup::volumes_choice(model));
+    }
+    choices
+}
+
+/// Seconds of the output, from a sample of it that is written.
+///
+/// # Errors
+/// [`RunError`] if it cannot be written.
+fn seconds_of_output<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    rest: &RunSettings<D>,
+) -> Result<f64, RunError> {
+    let zones = solution::zone_of_site(model);
+    let displacement = made_up(model.sites.len() * D);
+    let made_up = Solved {
+        model,
+        operator,
+        displacement: &displacement,
+        residual: &displacement,
+        zone_of_site: &zones,
+        system: None,
+        broken: &[],
+    };
+    Ok(output_seconds(&rest.output, &made_up)?)
+}
+
+/// What is shown of a model by its rows on affine fields.
+///
+/// # Errors
+/// [`RunError::Proof`] for a proof that refuses the model.
+fn proved<const D: usize>(
+    model: &Model<D>,
+    coupling: &dyn Coupling<D>,
+    operator: &dyn Operator<D>,
+    rest: &RunSettings<D>,
+    pattern: &Pattern,
+    progress: &dyn Progress,
+) -> Result<Proof, RunError> {
+    let proof = proof::prove(
+        &Subject {
+            model,
+            coupling,
+            operator,
+            rest,
+            stiffness: None,
+            system: None,
+            affine_forces: &pattern.products,
+        },
+        progress,
+    )?;
+    proof::hold(&proof)?;
+    Ok(proof)
+}
+
+/// The pattern of the stiffness, with the forces of affine fields.
+fn affine_pattern<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    progress: &dyn Progress,
+) -> Pattern {
+    let fields = proof::affine_displacements(model);
+    model.pattern(operator, &fields, progress)
+}
+
+/// Unknowns that no condition prescribes.
+///
+/// # Errors
+/// [`RunError`] for a condition that meets no site.
+fn free_dofs<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+) -> Result<FreeDofs, RunError> {
+    let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
+    Ok(FreeDofs::from_prescribed(&prescribed, D))
+}
+
+/// How the system is solved, and why not linearly where it is not.
+fn solver_decisions<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+    method: MethodUsed,
+    symmetry: Symmetry,
+    unknowns: usize,
+) -> Vec<Decision> {
+    let mut choices = Vec::new();
+    let nonlinear = rest.nonlinear(model);
+    // led by the factors of the stiffness, where these are worth their cost
+    let solver_name = match nonlinear {
+        None => method.name(),
+        Some(_) => MethodUsed::Newton.name(),
+    };
+    choices.extend(nonlinear);
+    choices.push(Decision {
+        choice: solver_name.to_owned(),
+        why: format!("{} system of {} unknowns", symmetry.name(), unknowns),
+    });
+    choices
 }
 
 /// Bonds beyond which a scene deserves a second thought.

@@ -12,6 +12,7 @@ use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
 use crate::peridynamics::{Influence, TIE_TOLERANCE};
 use crate::run::error::RunError;
+use crate::scene::Peridynamics;
 use crate::scene::points::Points;
 use crate::scene::solve::Solve;
 use crate::scene::spec::WeightsSpec;
@@ -114,7 +115,6 @@ impl Counts {
             is_moving: scene.solve != Solve::Static,
             ..Self::default()
         };
-        let corners = (1 << D) as f64;
         let of_elements = |nodes: f64| nodes * 3f64.powi(D as i32) * (D * D) as f64;
         let Some(p) = &scene.peridynamics else {
             counts.dofs = (mesh.nodes.len() * D) as f64;
@@ -137,31 +137,7 @@ impl Counts {
             && p.weights != WeightsSpec::Fitted
             && p.horizon.as_constant().is_some();
 
-        // families around Gauss points are as large as those of points, and one for each corner of an element
-        let mut around_elements = 0.0;
-        let mut largest_family: f64 = 0.0;
-        for (c, role) in roles.iter().enumerate() {
-            let volume = mesh.cell_volume(c).abs();
-            let (spacing, delta) = match &p.points {
-                Points::Cells => (volume.powf(1.0 / D as f64), horizon[c]),
-                Points::Lattice { spacing, .. } => (*spacing, horizon[c]),
-                Points::Lattices { lattices, of_cell } => {
-                    let own = &lattices[usize::from(of_cell[c])];
-                    (own.spacing, own.horizon)
-                }
-            };
-            let family = || family_size::<D>(delta / spacing);
-            match role {
-                CellRole::Points => {
-                    let points = volume / spacing.powi(D as i32);
-                    counts.points += points;
-                    counts.bonds += points * family();
-                    largest_family = largest_family.max(family());
-                }
-                CellRole::StressElement => around_elements += corners * family(),
-                CellRole::Element => {}
-            }
-        }
+        let around_elements = counts.add_families(mesh, p, &roles, &horizon);
         let levels = if reach == Reach::Own { 1.0 } else { 2.0 };
         let spacing = match &p.points {
             Points::Cells => None,
@@ -197,6 +173,41 @@ impl Counts {
         let blocks = (row + 1.0).min(nodes + counts.points);
         counts.nonzeros = of_elements(nodes) + counts.points * blocks * (D * D) as f64;
         counts
+    }
+
+    /// Adds points and their bonds by the volume of the cells; returns the bonds of families around Gauss points.
+    fn add_families<const D: usize>(
+        &mut self,
+        mesh: &Mesh<D>,
+        p: &Peridynamics<D>,
+        roles: &[CellRole],
+        horizon: &[f64],
+    ) -> f64 {
+        let corners = (1 << D) as f64;
+        // families around Gauss points are as large as those of points, and one for each corner of an element
+        let mut around_elements = 0.0;
+        for (c, role) in roles.iter().enumerate() {
+            let volume = mesh.cell_volume(c).abs();
+            let (spacing, delta) = match &p.points {
+                Points::Cells => (volume.powf(1.0 / D as f64), horizon[c]),
+                Points::Lattice { spacing, .. } => (*spacing, horizon[c]),
+                Points::Lattices { lattices, of_cell } => {
+                    let own = &lattices[usize::from(of_cell[c])];
+                    (own.spacing, own.horizon)
+                }
+            };
+            let family = || family_size::<D>(delta / spacing);
+            match role {
+                CellRole::Points => {
+                    let points = volume / spacing.powi(D as i32);
+                    self.points += points;
+                    self.bonds += points * family();
+                }
+                CellRole::StressElement => around_elements += corners * family(),
+                CellRole::Element => {}
+            }
+        }
+        around_elements
     }
 
     /// The memory that the counts ask for; what of it is held at the same time, [`Counts::peak`] sums.

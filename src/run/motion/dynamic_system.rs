@@ -13,6 +13,7 @@ use crate::run::definiteness;
 use crate::run::equilibrium;
 use crate::run::error::RunError;
 use crate::run::setup::RunSettings;
+use crate::scene::failure::Breaking;
 use crate::scene::initial::{Initial, InitialKind};
 use crate::scene::materials::Fracture;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
@@ -53,25 +54,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         PrecisionSpec::Double => Storage::Double,
         PrecisionSpec::Single => Storage::Single,
     };
-    let stretches = critical_stretch.as_ref().map(|critical| match critical {
-        Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
-        Critical::ByHorizon(list) => {
-            let each = list.iter().map(|(d, s)| format!("{s:.3e} (horizon {d})"));
-            let each: Vec<String> = each.collect();
-            format!("bonds break at the stretch {}", each.join(", "))
-        }
-    });
-    let breaks = match (stretches, breaking.fracture) {
-        (Some(s), Some(Fracture::Energy(g))) => {
-            let takes = match breaking.calibration {
-                CalibrationSpec::Lattice => "a plane of the lattice takes it",
-                CalibrationSpec::Continuum => "a continuous family takes it",
-            };
-            format!("{s}, the fracture energy is {g:e}: {takes}")
-        }
-        (Some(s), _) => s,
-        (None, _) => "no bond breaks: no fracture-energy, no critical-stretch".to_owned(),
-    };
+    let breaks = failure_text(critical_stretch.as_ref(), breaking);
     let density = |material: u16| rest.density[material as usize];
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
     let is_linear = critical_stretch.is_none()
@@ -110,60 +93,117 @@ pub(crate) fn dynamic<'a, const D: usize>(
                     pairwise: rest.ratio.pairwise,
                 });
             }
-            if model.body().is_some() {
-                let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
-                    _ if is_linear => "",
-                    (Interface::Faces, true) => "; those cut at the seam likewise",
-                    (Interface::Faces, false) => {
-                        "; within two horizons of the seam they are linear and do not break"
-                    }
-                    _ => "",
-                };
-                choices.push(Decision {
-                    choice: bonds.to_owned(),
-                    why: breaks + at_seam,
-                });
-            }
-            if storage == Storage::Single {
-                let (choice, why) = match model.body() {
-                    Some(_) => (
-                        "weights of bonds in four bytes",
-                        "precision = \"single\": each bond is listed, also where the points fill a lattice, which needs no list",
-                    ),
-                    None => (
-                        "precision = \"single\" changes nothing",
-                        "there are no bonds",
-                    ),
-                };
-                choices.push(Decision {
-                    choice: choice.to_owned(),
-                    why: why.to_owned(),
-                });
-            }
+            tell_bonds(
+                model,
+                coupling,
+                &motion,
+                is_linear,
+                (bonds, breaks),
+                storage,
+                choices,
+            );
             Ok(DynamicSystem {
                 bytes: motion.memory_bytes(),
                 system: Box::new(motion),
                 is_linear,
             })
         }
-        Err(error) if is_linear => {
-            let stiffness = model.assemble(operator, progress);
-            let symmetry = equilibrium::symmetry(coupling, || stiffness.asymmetry(), choices);
-            choices.push(Decision {
-                choice: "assembled stiffness instead of bonds".to_owned(),
-                why: reason(&error),
-            });
-            Ok(DynamicSystem {
-                bytes: stiffness.values.len() * 8 + stiffness.columns.len() * 4,
-                system: Box::new(LinearMotion {
-                    mass: masses(model, density),
-                    stiffness,
-                    symmetry,
-                }),
-                is_linear,
-            })
-        }
+        Err(error) if is_linear => Ok(assembled(
+            model, coupling, operator, rest, &error, choices, progress,
+        )),
         Err(error) => Err(error.into()),
+    }
+}
+/// In words: at which stretch bonds break, and what fracture energy that is.
+fn failure_text<const D: usize>(critical: Option<&Critical>, breaking: &Breaking<D>) -> String {
+    let stretches = critical.map(|critical| match critical {
+        Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
+        Critical::ByHorizon(list) => {
+            let each = list.iter().map(|(d, s)| format!("{s:.3e} (horizon {d})"));
+            let each: Vec<String> = each.collect();
+            format!("bonds break at the stretch {}", each.join(", "))
+        }
+    });
+    match (stretches, breaking.fracture) {
+        (Some(s), Some(Fracture::Energy(g))) => {
+            let takes = match breaking.calibration {
+                CalibrationSpec::Lattice => "a plane of the lattice takes it",
+                CalibrationSpec::Continuum => "a continuous family takes it",
+            };
+            format!("{s}, the fracture energy is {g:e}: {takes}")
+        }
+        (Some(s), _) => s,
+        (None, _) => "no bond breaks: no fracture-energy, no critical-stretch".to_owned(),
+    }
+}
+
+/// Tells how bonds deform and break, and how they are stored.
+fn tell_bonds<const D: usize>(
+    model: &Model<D>,
+    coupling: &dyn Coupling<D>,
+    motion: &CoupledSystem<'_, D>,
+    is_linear: bool,
+    (bonds, breaks): (&str, String),
+    storage: Storage,
+    choices: &mut Vec<Decision>,
+) {
+    if model.body().is_some() {
+        let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
+            _ if is_linear => "",
+            (Interface::Faces, true) => "; those cut at the seam likewise",
+            (Interface::Faces, false) => {
+                "; within two horizons of the seam they are linear and do not break"
+            }
+            _ => "",
+        };
+        choices.push(Decision {
+            choice: bonds.to_owned(),
+            why: breaks + at_seam,
+        });
+    }
+    if storage == Storage::Single {
+        let (choice, why) = match model.body() {
+            Some(_) => (
+                "weights of bonds in four bytes",
+                "precision = \"single\": each bond is listed, also where the points fill a lattice, which needs no list",
+            ),
+            None => (
+                "precision = \"single\" changes nothing",
+                "there are no bonds",
+            ),
+        };
+        choices.push(Decision {
+            choice: choice.to_owned(),
+            why: why.to_owned(),
+        });
+    }
+}
+
+/// The assembled stiffness, where bonds cannot be traversed for an `error`.
+fn assembled<'a, const D: usize>(
+    model: &'a Model<D>,
+    coupling: &dyn Coupling<D>,
+    operator: &dyn Operator<D>,
+    rest: &RunSettings<D>,
+    error: &SystemError,
+    choices: &mut Vec<Decision>,
+    progress: &dyn Progress,
+) -> DynamicSystem<'a> {
+    let density = |material: u16| rest.density[material as usize];
+    let stiffness = model.assemble(operator, progress);
+    let symmetry = equilibrium::symmetry(coupling, || stiffness.asymmetry(), choices);
+    choices.push(Decision {
+        choice: "assembled stiffness instead of bonds".to_owned(),
+        why: reason(error),
+    });
+    DynamicSystem {
+        bytes: stiffness.values.len() * 8 + stiffness.columns.len() * 4,
+        system: Box::new(LinearMotion {
+            mass: masses(model, density),
+            stiffness,
+            symmetry,
+        }),
+        is_linear: true,
     }
 }
 

@@ -210,6 +210,77 @@ fn cut_bonds_reach<const D: usize>(model: &Model<D>, site: u32) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// The rows that are out of balance by what they are, and what the stress at them is predicted with.
+struct Classified<'a, const D: usize> {
+    subject: &'a Subject<'a, D>,
+    around: &'a Around<'a, D>,
+    tensor: &'a Tensor4<D>,
+    nodal: &'a dyn Fn(&Tensor<D>, &mut [f64]),
+    /// Rows out of balance, with the class of each, the facet that it lies at, and whether no other surface is near.
+    rows: Vec<(u32, (RowClass, Option<usize>, bool))>,
+    /// By how much each row is out of balance.
+    worst: &'a [f64],
+}
+
+impl<const D: usize> Classified<'_, D> {
+    /// By how much a row is out of balance: what is not a number is largest.
+    fn size(&self, s: u32) -> f64 {
+        match self.worst[s as usize] {
+            r if r.is_nan() => f64::INFINITY,
+            r => r,
+        }
+    }
+
+    /// The worst row of a class, and unless that `is_told` by another class, the error of the stress there.
+    fn of_class(&self, class: RowClass, is_told: bool) -> Option<Unbalanced> {
+        let own = self.rows.iter().filter(move |(_, c)| c.0 == class);
+        // of rows that are alike but for rounding, the first
+        let first_of = |counts: &dyn Fn(bool) -> bool| {
+            let mut counted = own.clone().filter(|(_, c)| counts(c.2));
+            let most = counted
+                .clone()
+                .map(|(s, _)| self.size(*s))
+                .fold(0.0, f64::max);
+            counted.find(|(s, _)| self.size(*s) >= most * (1.0 - ALIKE))
+        };
+        let &(largest, _) = first_of(&|_| true)?;
+        // where one surface alone lies near, if anywhere: at a corner no uniform stress leaves both sides free
+        let &(place, (_, facet, _)) =
+            first_of(&|is_alone| is_alone).or_else(|| first_of(&|_| true))?;
+        let mut found = Unbalanced {
+            class,
+            rows: own.count(),
+            residual: self.size(largest),
+            at: self.subject.model.sites[largest as usize]
+                .position
+                .iter()
+                .copied()
+                .collect(),
+            stress_error: None,
+            is_unpredictable: false,
+            stress_at: Vec::new(),
+        };
+        if is_told || found.residual < limits::NEGLIGIBLE {
+            return Some(found);
+        }
+        match predicted(
+            self.subject,
+            self.around,
+            self.tensor,
+            (class, place, facet),
+            self.nodal,
+        ) {
+            Predicted::NotAsked => {}
+            Predicted::Unknown => found.is_unpredictable = true,
+            Predicted::Error(e) => {
+                found.stress_error = Some(e.relative);
+                found.stress_at = e.at.iter().copied().collect();
+            }
+        }
+        Some(found)
+    }
+}
+
 /// Sorts the rows that are out of balance, and predicts the error of the stress at the worst of each class.
 fn unbalanced<const D: usize>(
     subject: &Subject<'_, D>,
@@ -249,51 +320,18 @@ fn unbalanced<const D: usize>(
         scale: tensor.amax(),
         centre: centre(model),
     };
-    let mut classes: Vec<RowClass> = classified.iter().map(|c| c.0).collect();
+    let classified = Classified {
+        subject,
+        around: &around,
+        tensor,
+        nodal,
+        rows: off.iter().copied().zip(classified).collect(),
+        worst,
+    };
+    let of_class = |class, is_told| classified.of_class(class, is_told);
+    let mut classes: Vec<RowClass> = classified.rows.iter().map(|(_, c)| c.0).collect();
     classes.sort_unstable();
     classes.dedup();
-    let of_class = |class: RowClass, is_told: bool| {
-        let own = off
-            .iter()
-            .zip(&classified)
-            .filter(move |(_, c)| c.0 == class);
-        // what is not a number is largest
-        let size = |s: u32| match worst[s as usize] {
-            r if r.is_nan() => f64::INFINITY,
-            r => r,
-        };
-        // of rows that are alike but for rounding, the first
-        let first_of = |counts: &dyn Fn(bool) -> bool| {
-            let mut counted = own.clone().filter(|(_, c)| counts(c.2));
-            let most = counted.clone().map(|(&s, _)| size(s)).fold(0.0, f64::max);
-            counted.find(|(s, _)| size(**s) >= most * (1.0 - ALIKE))
-        };
-        let (&largest, _) = first_of(&|_| true)?;
-        // where one surface alone lies near, if anywhere: at a corner no uniform stress leaves both sides free
-        let (&place, &(_, facet, _)) =
-            first_of(&|is_alone| is_alone).or_else(|| first_of(&|_| true))?;
-        let mut found = Unbalanced {
-            class,
-            rows: own.count(),
-            residual: size(largest),
-            at: position(largest).iter().copied().collect(),
-            stress_error: None,
-            is_unpredictable: false,
-            stress_at: Vec::new(),
-        };
-        if is_told || found.residual < limits::NEGLIGIBLE {
-            return Some(found);
-        }
-        match predicted(subject, &around, tensor, (class, place, facet), nodal) {
-            Predicted::NotAsked => {}
-            Predicted::Unknown => found.is_unpredictable = true,
-            Predicted::Error(e) => {
-                found.stress_error = Some(e.relative);
-                found.stress_at = e.at.iter().copied().collect();
-            }
-        }
-        Some(found)
-    };
     // each prediction costs a factorisation: free sides stand for loaded ones, and a surface for where the seam meets it
     let has = |class: RowClass| classes.contains(&class);
     let is_told = |class: RowClass| match class {

@@ -127,13 +127,13 @@ impl RowClass {
     }
 }
 
-/// What is told of a class of rows.
-fn verdict(rows: &Unbalanced, is_lattice: bool, is_truncated: bool) -> Option<Finding> {
-    let place = |x: &[f64]| {
-        let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
-        format!("({})", x.join(", "))
-    };
-    let (what, remedy, [warn, refuse]) = match rows.class {
+/// Where rows of a class are, what to do about them, and from which error on they are warned of and refused; none of rows at a crack.
+fn described(
+    class: RowClass,
+    is_lattice: bool,
+    is_truncated: bool,
+) -> Option<(&'static str, &'static str, [f64; 2])> {
+    Some(match class {
         RowClass::Seam if is_lattice && is_truncated => (
             "at the seam",
             "leave peridynamics.points out, whose lattice follows the mesh, or make the elements beside the zone no larger than two spacings",
@@ -185,7 +185,16 @@ fn verdict(rows: &Unbalanced, is_lattice: bool, is_truncated: bool) -> Option<Fi
             [limits::WARN_SURFACE, f64::INFINITY],
         ),
         RowClass::Crack => return None,
+    })
+}
+
+/// What is told of a class of rows.
+fn verdict(rows: &Unbalanced, is_lattice: bool, is_truncated: bool) -> Option<Finding> {
+    let place = |x: &[f64]| {
+        let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
+        format!("({})", x.join(", "))
     };
+    let (what, remedy, [warn, refuse]) = described(rows.class, is_lattice, is_truncated)?;
     let is_surface = !matches!(rows.class, RowClass::Seam | RowClass::Points);
     if rows.residual < limits::NEGLIGIBLE {
         return None;

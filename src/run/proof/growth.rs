@@ -76,6 +76,27 @@ const FACTORISED: &str = "a Cholesky factorisation of the stiffness shows no neg
 /// The dearest factorisation that is made only to prove that no mode grows: some seconds of one core.
 const MOST_FLOPS: f64 = 1e10;
 
+/// The line of the proof: whether a mode grows, and what shows it.
+fn line_of(found: &Growth, exponent: f64, unseen: f64, place: &[f64]) -> String {
+    let how = evidence(found);
+    let hidden = format!(
+        "growth by less than a factor of {} over the run would not show",
+        factor(unseen)
+    );
+    match exponent > LEAST {
+        true => format!(
+            "a mode grows by a factor of {} over the run, as exp({} t), largest at ({}) ({how}); the energy balance is watched",
+            factor(exponent),
+            number(found.rate),
+            coordinates(place)
+        ),
+        false if unseen <= UNSEEN.ln() => format!("no mode grows over the run ({how}; {hidden})"),
+        false => format!(
+            "whether a mode grows over the run is not known ({how} showed none; {hidden}); the energy balance is watched"
+        ),
+    }
+}
+
 /// Looks for modes that grow over a run of `steps` steps of `step`; at most a tenth of its products, and at least 200.
 ///
 /// # Errors
@@ -115,23 +136,7 @@ pub(crate) fn check(
             remedy: asked.remedy,
         });
     }
-    let how = evidence(&found);
-    let hidden = format!(
-        "growth by less than a factor of {} over the run would not show",
-        factor(unseen)
-    );
-    let line = match grows {
-        true => format!(
-            "a mode grows by a factor of {} over the run, as exp({} t), largest at ({}) ({how}); the energy balance is watched",
-            factor(exponent),
-            number(found.rate),
-            coordinates(&place)
-        ),
-        false if unseen <= UNSEEN.ln() => format!("no mode grows over the run ({how}; {hidden})"),
-        false => format!(
-            "whether a mode grows over the run is not known ({how} showed none; {hidden}); the energy balance is watched"
-        ),
-    };
+    let line = line_of(&found, exponent, unseen, &place);
     let mut findings = Vec::new();
     if exponent > TOLD {
         findings.push(Finding {

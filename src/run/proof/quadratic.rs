@@ -26,6 +26,68 @@ const MOST: usize = 300;
 /// Families are whole if the sum of their bonds is below this fraction of the sum of lengths.
 const WHOLE: f64 = 1e-6;
 
+/// Errors of the force density beside the seam, over `C_1111` times the second gradient.
+struct Density {
+    largest: f64,
+    mean: f64,
+    /// The error and the point where it is largest.
+    worst: (f64, usize),
+}
+
+impl Density {
+    /// Of second moments of the forces, by volume, of the sites of a seam.
+    fn of<const D: usize>(
+        moments: &[(f64, Vec<Tensor<D>>)],
+        seam: &[(usize, usize)],
+        stiffness: f64,
+    ) -> Self {
+        let first = seam[0].0;
+        let volume: f64 = moments.iter().map(|m| m.0).sum();
+        let mut largest = 0.0f64;
+        let mut mean = vec![Tensor::<D>::zeros(); pairs::<D>().count()];
+        let mut worst = (0.0, first);
+        for ((v, sums), &(point, _)) in moments.iter().zip(seam).filter(|(m, _)| m.0 > 0.0) {
+            for (m, s) in mean.iter_mut().zip(sums) {
+                *m += s / (volume * stiffness);
+                let here = s.amax() / (v * stiffness);
+                largest = largest.max(here);
+                if here > worst.0 {
+                    worst = (here, point);
+                }
+            }
+        }
+        let density = mean.iter().map(|m| m.amax()).fold(0.0, f64::max);
+        Self {
+            largest,
+            mean: density,
+            worst,
+        }
+    }
+}
+
+/// What is told of an error that is too large.
+fn finding(predicted: f64, place: Vec<f64>) -> Finding {
+    let (severity, limit) = match predicted > REFUSED {
+        true => (Severity::Refusal, REFUSED),
+        false => (Severity::Warning, WARNED),
+    };
+    Finding {
+        severity,
+        value: predicted,
+        limit,
+        message: format!(
+            "the seam errs under quadratic fields, most at ({}): where the strain varies across the nonlocal zone, about {:.0} % of that change is wrong, and halves with the horizon only; use elements as small as the spacing of the points there, put a point of the lattice on a corner of the mesh, or use coupling.truncated",
+            place
+                .iter()
+                .map(|x| format!("{x:.4}"))
+                .collect::<Vec<_>>()
+                .join(", "),
+            100.0 * predicted
+        ),
+        place,
+    }
+}
+
 /// Applies the rows beside the seam to every quadratic field.
 ///
 /// # Errors
@@ -70,44 +132,20 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
             },
         )
         .collect();
-    let volume: f64 = moments.iter().map(|m| m.0).sum();
-    let mut largest = 0.0f64;
-    let mut mean = vec![Tensor::<D>::zeros(); pairs::<D>().count()];
-    let mut worst = (0.0, first);
-    for ((v, sums), &(point, _)) in moments.iter().zip(&seam).filter(|(m, _)| m.0 > 0.0) {
-        for (m, s) in mean.iter_mut().zip(sums) {
-            *m += s / (volume * stiffness);
-            let here = s.amax() / (v * stiffness);
-            largest = largest.max(here);
-            if here > worst.0 {
-                worst = (here, point);
-            }
-        }
-    }
-    let density = mean.iter().map(|m| m.amax()).fold(0.0, f64::max);
+    let Density {
+        largest,
+        mean,
+        worst,
+    } = Density::of(&moments, &seam, stiffness);
     let horizon = body.cloud.horizon[first];
     let length = zone_size(subject);
-    let by_points = density * horizon / length;
+    let by_points = mean * horizon / length;
     let by_elements = stress_error(subject, &tensor) / length;
     let predicted = by_points.max(by_elements);
     let mut findings = Vec::new();
     if predicted > WARNED {
-        let place: Vec<f64> = body.cloud.position[worst.1].iter().copied().collect();
-        let (severity, limit) = match predicted > REFUSED {
-            true => (Severity::Refusal, REFUSED),
-            false => (Severity::Warning, WARNED),
-        };
-        findings.push(Finding {
-            severity,
-            value: predicted,
-            limit,
-            message: format!(
-                "the seam errs under quadratic fields, most at ({}): where the strain varies across the nonlocal zone, about {:.0} % of that change is wrong, and halves with the horizon only; use elements as small as the spacing of the points there, put a point of the lattice on a corner of the mesh, or use coupling.truncated",
-                place.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", "),
-                100.0 * predicted
-            ),
-            place,
-        });
+        let place = body.cloud.position[worst.1].iter().copied().collect();
+        findings.push(finding(predicted, place));
     }
     findings.extend(small_stress_elements(subject));
     let figure = |name: &str, value| Figure {
@@ -126,7 +164,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         },
         figures: vec![
             figure("largest error of the force density", largest),
-            figure("mean error of the force density", density),
+            figure("mean error of the force density", mean),
             figure("predicted by points", by_points),
             figure("predicted by stress in elements", by_elements),
         ],
