@@ -69,12 +69,8 @@ impl<const D: usize> Bins<D> {
     }
 }
 
-/// Expresses nodes at the seam, that are no sites, through the sites around them.
-pub(super) fn fit_nodes<const D: usize>(
-    at: &Sites<'_, D>,
-    interface: Interface,
-    cloud: &PointCloud<D>,
-) -> Result<Transfer, ModelError> {
+/// Nodes of the cells at the seam that are no sites.
+fn nodes_to_fit<const D: usize>(at: &Sites<'_, D>, interface: Interface) -> Vec<bool> {
     let mut wanted = vec![false; at.mesh.nodes.len()];
     let cells = match interface {
         Interface::Faces => 0,
@@ -89,6 +85,16 @@ pub(super) fn fit_nodes<const D: usize>(
             }
         }
     }
+    wanted
+}
+
+/// Expresses nodes at the seam, that are no sites, through the sites around them.
+pub(super) fn fit_nodes<const D: usize>(
+    at: &Sites<'_, D>,
+    interface: Interface,
+    cloud: &PointCloud<D>,
+) -> Result<Transfer, ModelError> {
+    let wanted = nodes_to_fit(at, interface);
     let (degree, with_nodes) = match interface {
         Interface::Overlap | Interface::Faces => (FitDegree::Quadratic, false),
         Interface::Constrained(degree) => (degree, true),

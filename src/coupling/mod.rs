@@ -31,6 +31,7 @@ pub mod error_indicator;
 pub mod field_evaluation;
 mod interface_interpolation;
 mod lattice_axes;
+mod lattice_box;
 pub mod least_squares_gradient;
 pub mod model;
 mod multi_lattice;

@@ -11,7 +11,7 @@ use crate::{
         CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Reach, Surfaces, Zone,
         bond_cutting::{self, LatticeFactors, WholeFamily},
         interface_interpolation::{self, Sites},
-        multi_lattice::{self, CompletedLattice, ContinuedLattice},
+        multi_lattice::{self, ContinuedLattice, MergedLattices},
         point_cloud::{PointCloud, Volumes},
         point_generation::{self, Beyond},
         recovery::Patch,
@@ -149,18 +149,7 @@ impl<const D: usize> Model<D> {
             });
         }
         progress.stage("sites", None);
-        let clouds = match &model.peridynamics {
-            Some(p) if has_points => {
-                let beyond = match model.interface {
-                    Interface::Faces => Beyond::Continued,
-                    _ => Beyond::Empty,
-                };
-                model.check_lattices(p)?;
-                let reach = reach(coupling.as_ref(), p);
-                point_generation::place(&model.mesh, &model.zones, &model.roles, p, reach, beyond)?
-            }
-            _ => Vec::new(),
-        };
+        let clouds = model.place_clouds(coupling.as_ref())?;
         let node_site = model.place_nodes(coupling.interface());
         if !clouds.is_empty() {
             model.place_points(
@@ -179,6 +168,23 @@ impl<const D: usize> Model<D> {
         }
         model.share_out();
         Ok((model, coupling))
+    }
+
+    /// The peridynamic points of each lattice; none without peridynamic cells.
+    fn place_clouds(&self, coupling: &dyn Coupling<D>) -> Result<Vec<PointCloud<D>>, ModelError> {
+        match &self.peridynamics {
+            Some(p) if self.roles.contains(&CellRole::Points) => {
+                let beyond = match self.interface {
+                    Interface::Faces => Beyond::Continued,
+                    _ => Beyond::Empty,
+                };
+                self.check_lattices(p)?;
+                let reach = reach(coupling, p);
+                let (mesh, zones) = (&self.mesh, &self.zones);
+                point_generation::place(mesh, zones, &self.roles, p, reach, beyond)
+            }
+            _ => Ok(Vec::new()),
+        }
     }
 
     /// The problem that the model was laid out from, to lay it out anew with other zones.
@@ -265,101 +271,47 @@ impl<const D: usize> Model<D> {
     ) -> Result<(), ModelError> {
         progress.stage("families", None);
         let reach = reach(coupling, p);
-        let mut grown = clouds
+        let grown = clouds
             .into_iter()
             .enumerate()
             .map(|(l, cloud)| self.grow(p, cloud, l, reach))
-            .collect::<Result<Vec<_>, _>>()?
-            .into_iter();
-        let Some(CompletedLattice {
-            mut cloud,
-            mut families,
-            mut passing,
-            factors: first,
-            wide,
-            is_constant: constant,
-        }) = grown.next()
-        else {
+            .collect::<Result<Vec<_>, _>>()?;
+        let Some(merged) = MergedLattices::of(grown) else {
             return Ok(());
         };
-        let mut factors = vec![first];
-        let mut of_point = vec![0u16; cloud.position.len()];
-        let mut horizons = vec![cloud.horizon.first().copied().unwrap_or(0.0)];
-        for next in grown {
-            families.append(&next.families);
-            if let (Some(all), Some(more)) = (&mut passing, &next.passing) {
-                all.append(more);
-            }
-            of_point.extend(vec![factors.len() as u16; next.cloud.position.len()]);
-            horizons.extend(next.cloud.horizon.first());
-            cloud.append(next.cloud);
-            factors.push(next.factors);
-        }
+        let MergedLattices {
+            cloud,
+            families,
+            passing,
+            factors,
+            wide,
+            is_constant,
+            of_point,
+            horizons,
+        } = merged;
         self.spacing = cloud.spacing;
         self.is_lattice = factors[0].is_lattice();
         self.volumes = cloud.volumes;
 
-        let mut point_site = vec![NONE; cloud.position.len()];
-        for (i, element) in cloud.element.iter().enumerate() {
-            if element.is_none() {
-                point_site[i] = self.sites.len() as u32;
-                self.sites.push(Site {
-                    position: cloud.position[i],
-                    kind: SiteKind::Point(i as u32),
-                    volume: cloud.volume[i],
-                });
-            }
-        }
+        let point_site = self.place_point_sites(&cloud);
         progress.stage("seam", None);
-        let barriers = Barriers::new(p.barriers.clone());
-        let sites = Sites {
-            mesh: &self.mesh,
-            roles: &self.roles,
-            sites: &self.sites,
-            node_site,
-            barriers: &barriers,
-        };
-        self.node_transfer =
-            interface_interpolation::fit_nodes(&sites, coupling.interface(), &cloud)?;
-        let (transfer, _) = self.transfer_of(&sites, &cloud, |i| point_site[i]);
-        if let Some((wide, renumbered)) = wide {
-            let site = |i: usize| point_site[renumbered[i] as usize];
-            let (transfer, patches) = self.transfer_of(&sites, &wide, site);
-            self.patches = patches;
-            self.surroundings = Some(Cloud {
-                position: wide.position,
-                volume: wide.volume,
-                horizon: wide.horizon,
-                transfer,
-            });
-        }
+        let transfer = self.express_places(p, &cloud, wide, &point_site, node_site, coupling)?;
         progress.stage("bonds", None);
         let shells = |horizon: f64, xi: &Vector<D>| {
             let mut known = factors.iter().filter_map(|l| l.factor(horizon, xi));
             known.next().unwrap_or(1.0)
         };
-        let weighting = match (p.weights, factors[0].is_lattice()) {
-            (BondWeights::Isotropic, true) => Factors::Shells(&shells),
-            (BondWeights::Plain, true) if factors[0].has_partial_volumes() => {
-                Factors::Shells(&shells)
-            }
-            (BondWeights::Fitted, _) => Factors::Fitted,
-            _ => Factors::Plain,
-        };
-        let ends = if constant && p.weights != BondWeights::Fitted {
+        let is_regular = is_constant && p.weights != BondWeights::Fitted;
+        let weighting = weighting(p, &factors[0], &shells);
+        let ends = if is_regular {
             Ends::Alike
         } else {
             Ends::Differ
         };
-        if p.weights == BondWeights::Plain
-            && let Some(whole) = factors[0].whole_family(p, horizons[0])?
-        {
-            // the local side carries the stiffness of the peridynamic quadrature, or the seam would be a jump of material
-            self.tensors[peridynamic_material as usize] = whole.tensor;
-            self.plain_lattice = Some(whole);
+        if p.weights == BondWeights::Plain {
+            self.carry_plain_stiffness(p, &factors[0], horizons[0], peridynamic_material)?;
         }
         if let Some(families) = passing {
-            let is_regular = constant && p.weights != BondWeights::Fitted;
             let whole = multi_lattice::whole_families(p, &factors, &horizons, is_regular)?;
             self.passing = Some(ContinuedLattice {
                 families,
@@ -378,6 +330,72 @@ impl<const D: usize> Model<D> {
             .map_err(|e| ModelError::family("the point", e))?;
         self.body = Some(body);
         self.factors = factors.into_iter().zip(horizons).collect();
+        Ok(())
+    }
+
+    /// Makes sites of the points that follow no element; returns the site of each point.
+    fn place_point_sites(&mut self, cloud: &PointCloud<D>) -> Vec<u32> {
+        let mut point_site = vec![NONE; cloud.position.len()];
+        for (i, element) in cloud.element.iter().enumerate() {
+            if element.is_none() {
+                point_site[i] = self.sites.len() as u32;
+                self.sites.push(Site {
+                    position: cloud.position[i],
+                    kind: SiteKind::Point(i as u32),
+                    volume: cloud.volume[i],
+                });
+            }
+        }
+        point_site
+    }
+
+    /// Expresses nodes that are no sites, points in elements and those around elements that carry a partial stress through sites; returns how points follow.
+    fn express_places(
+        &mut self,
+        p: &Peridynamics<D>,
+        cloud: &PointCloud<D>,
+        wide: Option<(PointCloud<D>, Vec<u32>)>,
+        point_site: &[u32],
+        node_site: &[u32],
+        coupling: &dyn Coupling<D>,
+    ) -> Result<Transfer, ModelError> {
+        let barriers = Barriers::new(p.barriers.clone());
+        let sites = Sites {
+            mesh: &self.mesh,
+            roles: &self.roles,
+            sites: &self.sites,
+            node_site,
+            barriers: &barriers,
+        };
+        self.node_transfer =
+            interface_interpolation::fit_nodes(&sites, coupling.interface(), cloud)?;
+        let (transfer, _) = self.transfer_of(&sites, cloud, |i| point_site[i]);
+        if let Some((wide, renumbered)) = wide {
+            let site = |i: usize| point_site[renumbered[i] as usize];
+            let (transfer, patches) = self.transfer_of(&sites, &wide, site);
+            self.patches = patches;
+            self.surroundings = Some(Cloud {
+                position: wide.position,
+                volume: wide.volume,
+                horizon: wide.horizon,
+                transfer,
+            });
+        }
+        Ok(transfer)
+    }
+
+    /// Gives the local side the stiffness of the peridynamic quadrature with plain weights, or the seam would be a jump of material.
+    fn carry_plain_stiffness(
+        &mut self,
+        p: &Peridynamics<D>,
+        factors: &LatticeFactors<D>,
+        horizon: f64,
+        peridynamic_material: u16,
+    ) -> Result<(), ModelError> {
+        if let Some(whole) = factors.whole_family(p, horizon)? {
+            self.tensors[peridynamic_material as usize] = whole.tensor;
+            self.plain_lattice = Some(whole);
+        }
         Ok(())
     }
 
@@ -521,6 +539,20 @@ impl<const D: usize> Model<D> {
     /// Whether a cell belongs to the finite elements of the model (as opposed to holding points).
     pub fn is_element(&self, cell: usize) -> bool {
         self.roles[cell] != CellRole::Points && self.mesh.shapes[cell] != CellShape::Vertex
+    }
+}
+
+/// How the bonds of a body are weighted.
+fn weighting<'a, const D: usize>(
+    p: &Peridynamics<D>,
+    factors: &LatticeFactors<D>,
+    shells: &'a (dyn Fn(f64, &Vector<D>) -> f64 + Sync),
+) -> Factors<'a, D> {
+    match (p.weights, factors.is_lattice()) {
+        (BondWeights::Isotropic, true) => Factors::Shells(shells),
+        (BondWeights::Plain, true) if factors.has_partial_volumes() => Factors::Shells(shells),
+        (BondWeights::Fitted, _) => Factors::Fitted,
+        _ => Factors::Plain,
     }
 }
 

@@ -7,6 +7,7 @@ use crate::{
         bond_cutting::{self, LatticeFactors, WholeFamily},
         point_cloud::PointCloud,
     },
+    mesh::boundary::BoundaryFacet,
     peridynamics::{Families, PartialVolume, TIE_TOLERANCE},
     tensor::{Tensor4, Vector},
 };
@@ -39,6 +40,80 @@ pub(super) struct CompletedLattice<const D: usize> {
     pub is_constant: bool,
 }
 
+/// All lattices of a body as one cloud.
+pub(super) struct MergedLattices<const D: usize> {
+    pub cloud: PointCloud<D>,
+    pub families: Families,
+    /// Families of the points in elements.
+    pub passing: Option<Families>,
+    /// Of each lattice.
+    pub factors: Vec<LatticeFactors<D>>,
+    /// Of the first lattice, see [`CompletedLattice::wide`].
+    pub wide: Option<(PointCloud<D>, Vec<u32>)>,
+    pub is_constant: bool,
+    /// The lattice of each point.
+    pub of_point: Vec<u16>,
+    /// Of each lattice.
+    pub horizons: Vec<f64>,
+}
+
+impl<const D: usize> MergedLattices<D> {
+    /// Lattices one after the other; none of no lattice.
+    pub fn of(grown: Vec<CompletedLattice<D>>) -> Option<Self> {
+        let mut grown = grown.into_iter();
+        let CompletedLattice {
+            mut cloud,
+            mut families,
+            mut passing,
+            factors: first,
+            wide,
+            is_constant,
+        } = grown.next()?;
+        let mut factors = vec![first];
+        let mut of_point = vec![0u16; cloud.position.len()];
+        let mut horizons = vec![cloud.horizon.first().copied().unwrap_or(0.0)];
+        for next in grown {
+            families.append(&next.families);
+            if let (Some(all), Some(more)) = (&mut passing, &next.passing) {
+                all.append(more);
+            }
+            of_point.extend(vec![factors.len() as u16; next.cloud.position.len()]);
+            horizons.extend(next.cloud.horizon.first());
+            cloud.append(next.cloud);
+            factors.push(next.factors);
+        }
+        Some(Self {
+            cloud,
+            families,
+            passing,
+            factors,
+            wide,
+            is_constant,
+            of_point,
+            horizons,
+        })
+    }
+}
+
+/// Refuses horizons below the spacing, and a lattice without points of its own.
+fn check_cloud<const D: usize>(cloud: &PointCloud<D>) -> Result<(), ModelError> {
+    for (x, &horizon) in cloud.position.iter().zip(&cloud.horizon) {
+        if !(horizon.is_finite() && horizon >= cloud.spacing * (1.0 - 1e-9)) {
+            return Err(ModelError::Horizon {
+                position: x.iter().copied().collect(),
+                horizon,
+                spacing: cloud.spacing,
+            });
+        }
+    }
+    if cloud.element.iter().all(Option::is_some) {
+        return Err(ModelError::NoPoints {
+            spacing: cloud.spacing,
+        });
+    }
+    Ok(())
+}
+
 impl<const D: usize> Model<D> {
     /// Completes the families of the points of one lattice, and drops the points that nothing needs.
     pub(super) fn grow(
@@ -48,20 +123,7 @@ impl<const D: usize> Model<D> {
         lattice: usize,
         reach: Reach,
     ) -> Result<CompletedLattice<D>, ModelError> {
-        for (x, &horizon) in cloud.position.iter().zip(&cloud.horizon) {
-            if !(horizon.is_finite() && horizon >= cloud.spacing * (1.0 - 1e-9)) {
-                return Err(ModelError::Horizon {
-                    position: x.iter().copied().collect(),
-                    horizon,
-                    spacing: cloud.spacing,
-                });
-            }
-        }
-        if cloud.element.iter().all(Option::is_some) {
-            return Err(ModelError::NoPoints {
-                spacing: cloud.spacing,
-            });
-        }
+        check_cloud(&cloud)?;
         let is_constant = cloud
             .horizon
             .iter()
@@ -77,16 +139,7 @@ impl<const D: usize> Model<D> {
         };
         let factors = LatticeFactors::new(p, &cloud)?;
         factors.drop_without_share(&cloud, &mut families);
-        let surface = match (self.interface, p.surfaces) {
-            // a bond may leave the body through the elements around, but not through a free surface of the points
-            (Interface::Faces, _) => {
-                let mut facets = self.mesh.outer_facets();
-                facets.retain(|f| self.lattice_in(&p.points, f.cell as usize) == Some(lattice));
-                Some(facets)
-            }
-            (_, Surfaces::Cut) => Some(self.mesh.outer_facets()),
-            (_, Surfaces::Uncut) => None,
-        };
+        let surface = self.cutting_surface(p, lattice);
         let longest = reaches.iter().copied().fold(0.0, f64::max);
         bond_cutting::cut(
             p,
@@ -132,6 +185,20 @@ impl<const D: usize> Model<D> {
             wide,
             is_constant,
         })
+    }
+
+    /// The facets of the mesh that cut bonds of a lattice, if any do.
+    fn cutting_surface(&self, p: &Peridynamics<D>, lattice: usize) -> Option<Vec<BoundaryFacet>> {
+        match (self.interface, p.surfaces) {
+            // a bond may leave the body through the elements around, but not through a free surface of the points
+            (Interface::Faces, _) => {
+                let mut facets = self.mesh.outer_facets();
+                facets.retain(|f| self.lattice_in(&p.points, f.cell as usize) == Some(lattice));
+                Some(facets)
+            }
+            (_, Surfaces::Cut) => Some(self.mesh.outer_facets()),
+            (_, Surfaces::Uncut) => None,
+        }
     }
 
     /// Whether a position may be in the family of a Gauss point of an element that carries the partial stress.

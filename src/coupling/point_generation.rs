@@ -5,7 +5,10 @@ use rayon::prelude::*;
 use crate::{
     coupling::{
         CellRole, ModelError, Peridynamics, PointSource, Reach, Zone,
-        interface_interpolation::Bins, lattice_axes::lattice_axes, point_cloud::PointCloud,
+        interface_interpolation::Bins,
+        lattice_axes::lattice_axes,
+        lattice_box::{LatticeBox, samples_of},
+        point_cloud::PointCloud,
     },
     fem::{self, Locator},
     mesh::Mesh,
@@ -147,124 +150,17 @@ impl<const D: usize> Placement<'_, D> {
     }
 
     fn on_lattice(&self, h: f64, origin: Vector<D>) -> Result<PointCloud<D>, ModelError> {
-        let (mesh, zones, roles) = (self.mesh, self.zones, self.roles);
-        let cells = |keep: &dyn Fn(usize) -> bool| {
-            Locator::new(mesh, (0..mesh.cell_count()).filter(|&c| keep(c)))
-        };
-        let elements = cells(&|c| !self.mine[c]);
-        let nearest = Nearest::new(mesh, roles, h);
-        // at a face that zones share, the zone that comes first here has the point
-        let by_zone = [Zone::Nonlocal, Zone::Transition, Zone::Local]
-            .map(|zone| (zone, cells(&|c| self.mine[c] && zones[c] == zone)));
-        let tolerance = 1e-9;
-        let in_region = |x: &Vector<D>| {
-            by_zone
-                .iter()
-                .find(|(_, l)| l.holds(mesh, x, tolerance))
-                .map(|(z, _)| *z)
-        };
-
-        let first: Vector<D> = ((self.low - origin) / h).map(f64::floor);
-        let last: Vector<D> = ((self.high - origin) / h).map(f64::ceil);
-        let points: f64 = (last - first).iter().map(|n| n + 1.0).product();
-        if points > f64::from(u32::MAX) {
-            return Err(ModelError::TooManyPoints { spacing: h, points });
-        }
-        let counts: [usize; D] = std::array::from_fn(|i| (last[i] - first[i]) as usize + 1);
-        let total: usize = counts.iter().product();
-        let position = |index: usize| {
-            let mut rest = index;
-            let mut k = first;
-            for i in (0..D).rev() {
-                k[i] += (rest % counts[i]) as f64;
-                rest /= counts[i];
-            }
-            origin + k * h
-        };
-        // lattice cells that an edge of the region passes: their volume is sampled
-        let mut edge = vec![false; total];
-        let region_cells = (0..mesh.cell_count() as u32).filter(|&c| self.mine[c as usize]);
-        for facet in mesh.boundary_facets(region_cells) {
-            let (lo, hi) = mesh.bounds_of(&facet.nodes);
-            mark_box(&mut edge, &counts, &first, &origin, h, &lo, &hi);
-        }
-        // what lies farther from the region than families reach is not needed
-        let mut near = vec![false; total];
-        let wanted = |c: u32| self.mine[c as usize] || roles[c as usize] == CellRole::StressElement;
-        let cells = (0..mesh.cell_count() as u32).filter(|&c| wanted(c));
-        for c in cells.clone() {
-            let (lo, hi) = mesh.bounds_of(mesh.cell(c as usize));
-            mark_box(&mut near, &counts, &first, &origin, h, &lo, &hi);
-        }
-        for facet in mesh.boundary_facets(cells) {
-            let (lo, hi) = mesh.bounds_of(&facet.nodes);
-            let (lo, hi) = (lo - self.margin, hi + self.margin);
-            mark_box(&mut near, &counts, &first, &origin, h, &lo, &hi);
-        }
-        let samples = if D == 3 { 4 } else { 8 };
-        let whole = h.powi(D as i32);
-        type Found<const D: usize> = (Vector<D>, f64, f64, Zone, Option<(u32, Vec<f64>)>);
-        // points, and the volume of the region that voids take
-        let found: Vec<(Vec<Found<D>>, f64)> = (0..total.div_ceil(BLOCK))
+        let sampler = LatticeSampler::new(self, LatticeBox::new(&self.low, &self.high, origin, h)?);
+        let found: Vec<(Vec<Found<D>>, f64)> = (0..sampler.lattice.total().div_ceil(BLOCK))
             .into_par_iter()
-            .map(|block| {
-                let mut list = Vec::new();
-                let mut emptied = 0.0;
-                for index in block * BLOCK..((block + 1) * BLOCK).min(total) {
-                    let x = position(index);
-                    if !near[index] {
-                        continue;
-                    }
-                    if self.in_void(&x) {
-                        let mut inside = 0;
-                        let count = samples_of::<D>(if edge[index] { samples } else { 1 }, |o| {
-                            inside += usize::from(in_region(&(x + o * h)).is_some());
-                        });
-                        emptied += whole * inside as f64 / count as f64;
-                        continue;
-                    }
-                    let located = elements.locate(mesh, &x, tolerance);
-                    let zone = match &located {
-                        Some(l) => Some(zones[l.cell]),
-                        None => in_region(&x),
-                    };
-                    let zone = match (zone, self.beyond) {
-                        (Some(zone), _) => zone,
-                        (None, Beyond::Empty) => continue,
-                        (None, Beyond::Continued) => {
-                            list.push((x, whole, 0.0, Zone::Local, Some(nearest.around(&x))));
-                            continue;
-                        }
-                    };
-                    let (mut volume, mut share) =
-                        (whole, if located.is_none() { whole } else { 0.0 });
-                    if edge[index] {
-                        let (mut body, mut here, mut gone) = (0, 0, 0);
-                        let count = samples_of::<D>(samples, |offset| {
-                            let s = x + offset * h;
-                            let inside = in_region(&s).is_some();
-                            if self.in_void(&s) {
-                                gone += usize::from(inside);
-                                return;
-                            }
-                            here += usize::from(inside);
-                            body += usize::from(inside || elements.holds(mesh, &s, tolerance));
-                        });
-                        volume = whole * body as f64 / count as f64;
-                        share = whole * here as f64 / count as f64;
-                        emptied += whole * gone as f64 / count as f64;
-                    }
-                    if volume > 0.0 {
-                        let element = located.map(|l| match roles[l.cell] {
-                            CellRole::Points => nearest.around(&x),
-                            _ => (l.cell as u32, l.shape[..l.nodes].to_vec()),
-                        });
-                        list.push((x, volume, share, zone, element));
-                    }
-                }
-                (list, emptied)
-            })
+            .map(|block| sampler.block(block))
             .collect();
+        Ok(self.cloud_of(found, h))
+    }
+
+    /// The cloud of what was found on a lattice, with the volume that voids take of each block.
+    fn cloud_of(&self, found: Vec<(Vec<Found<D>>, f64)>, h: f64) -> PointCloud<D> {
+        let whole = h.powi(D as i32);
         let mut cloud = PointCloud::empty(h, self.region);
         cloud.axes = Some(Tensor::identity());
         let region = self.region - found.iter().map(|(_, emptied)| emptied).sum::<f64>();
@@ -287,7 +183,170 @@ impl<const D: usize> Placement<'_, D> {
             cloud.volumes.points += share * factor;
             cloud.push(x, volume * factor, self.horizon(&x), zone, element);
         }
-        Ok(cloud)
+        cloud
+    }
+}
+
+/// A point of a lattice: position, volume, how much of that lies in the region, zone, and the element that it follows with its shape values.
+type Found<const D: usize> = (Vector<D>, f64, f64, Zone, Option<(u32, Vec<f64>)>);
+
+/// Positions that are nearer than this, in sizes of a cell, lie in the cell.
+const TOLERANCE: f64 = 1e-9;
+
+/// Decides of each point of a lattice whether it is one of the body's, and how large its volume is.
+struct LatticeSampler<'a, const D: usize> {
+    place: &'a Placement<'a, D>,
+    lattice: LatticeBox<D>,
+    elements: Locator<D>,
+    nearest: Nearest<'a, D>,
+    /// Cells of the region by zones: at a face that zones share, the zone that comes first here has the point.
+    by_zone: [(Zone, Locator<D>); 3],
+    /// Lattice cells that an edge of the region passes: their volume is sampled.
+    edge: Vec<bool>,
+    /// Points that are needed: not farther from the region than families reach.
+    near: Vec<bool>,
+    /// Samples along an edge of a cell.
+    samples: usize,
+    /// Volume of a whole cell of the lattice.
+    whole: f64,
+}
+
+impl<'a, const D: usize> LatticeSampler<'a, D> {
+    fn new(place: &'a Placement<'a, D>, lattice: LatticeBox<D>) -> Self {
+        let (mesh, zones, roles) = (place.mesh, place.zones, place.roles);
+        let cells = |keep: &dyn Fn(usize) -> bool| {
+            Locator::new(mesh, (0..mesh.cell_count()).filter(|&c| keep(c)))
+        };
+        let h = lattice.spacing();
+        let mut sampler = Self {
+            elements: cells(&|c| !place.mine[c]),
+            nearest: Nearest::new(mesh, roles, h),
+            by_zone: [Zone::Nonlocal, Zone::Transition, Zone::Local]
+                .map(|zone| (zone, cells(&|c| place.mine[c] && zones[c] == zone))),
+            edge: vec![false; lattice.total()],
+            near: vec![false; lattice.total()],
+            samples: if D == 3 { 4 } else { 8 },
+            whole: h.powi(D as i32),
+            place,
+            lattice,
+        };
+        sampler.mark_edge();
+        sampler.mark_near();
+        sampler
+    }
+
+    /// Marks the lattice cells that an edge of the region passes.
+    fn mark_edge(&mut self) {
+        let Placement { mesh, ref mine, .. } = *self.place;
+        let region_cells = (0..mesh.cell_count() as u32).filter(|&c| mine[c as usize]);
+        for facet in mesh.boundary_facets(region_cells) {
+            let (lo, hi) = mesh.bounds_of(&facet.nodes);
+            self.lattice.mark(&mut self.edge, &lo, &hi);
+        }
+    }
+
+    /// Marks the points that families of the region reach.
+    fn mark_near(&mut self) {
+        let Placement {
+            mesh,
+            roles,
+            ref mine,
+            margin,
+            ..
+        } = *self.place;
+        let wanted = |c: u32| mine[c as usize] || roles[c as usize] == CellRole::StressElement;
+        let cells = (0..mesh.cell_count() as u32).filter(|&c| wanted(c));
+        for c in cells.clone() {
+            let (lo, hi) = mesh.bounds_of(mesh.cell(c as usize));
+            self.lattice.mark(&mut self.near, &lo, &hi);
+        }
+        for facet in mesh.boundary_facets(cells) {
+            let (lo, hi) = mesh.bounds_of(&facet.nodes);
+            let (lo, hi) = (lo - margin, hi + margin);
+            self.lattice.mark(&mut self.near, &lo, &hi);
+        }
+    }
+
+    /// The zone of the region's cell around a position.
+    fn in_region(&self, x: &Vector<D>) -> Option<Zone> {
+        self.by_zone
+            .iter()
+            .find(|(_, l)| l.holds(self.place.mesh, x, TOLERANCE))
+            .map(|(z, _)| *z)
+    }
+
+    /// The points of a block of the lattice, and the volume of the region that voids take.
+    fn block(&self, block: usize) -> (Vec<Found<D>>, f64) {
+        let mut list = Vec::new();
+        let mut emptied = 0.0;
+        for index in block * BLOCK..((block + 1) * BLOCK).min(self.near.len()) {
+            if self.near[index] {
+                list.extend(self.point(index, &mut emptied));
+            }
+        }
+        (list, emptied)
+    }
+
+    /// A point, if there is one here; adds the volume that voids take of its cell to `emptied`.
+    fn point(&self, index: usize, emptied: &mut f64) -> Option<Found<D>> {
+        let Placement {
+            mesh, zones, roles, ..
+        } = *self.place;
+        let (whole, h) = (self.whole, self.lattice.spacing());
+        let x = self.lattice.position(index);
+        if self.place.in_void(&x) {
+            let mut inside = 0;
+            let samples = if self.edge[index] { self.samples } else { 1 };
+            let count = samples_of::<D>(samples, |o| {
+                inside += usize::from(self.in_region(&(x + o * h)).is_some());
+            });
+            *emptied += whole * inside as f64 / count as f64;
+            return None;
+        }
+        let located = self.elements.locate(mesh, &x, TOLERANCE);
+        let zone = match &located {
+            Some(l) => Some(zones[l.cell]),
+            None => self.in_region(&x),
+        };
+        let zone = match (zone, self.place.beyond) {
+            (Some(zone), _) => zone,
+            (None, Beyond::Empty) => return None,
+            (None, Beyond::Continued) => {
+                return Some((x, whole, 0.0, Zone::Local, Some(self.nearest.around(&x))));
+            }
+        };
+        let (mut volume, mut share) = (whole, if located.is_none() { whole } else { 0.0 });
+        if self.edge[index] {
+            (volume, share) = self.sampled_volume(&x, emptied);
+        }
+        (volume > 0.0).then(|| {
+            let element = located.map(|l| match roles[l.cell] {
+                CellRole::Points => self.nearest.around(&x),
+                _ => (l.cell as u32, l.shape[..l.nodes].to_vec()),
+            });
+            (x, volume, share, zone, element)
+        })
+    }
+
+    /// The volume of the body in the cell around `x`, and that of the region.
+    fn sampled_volume(&self, x: &Vector<D>, emptied: &mut f64) -> (f64, f64) {
+        let (whole, h) = (self.whole, self.lattice.spacing());
+        let (mut body, mut here, mut gone) = (0, 0, 0);
+        let count = samples_of::<D>(self.samples, |offset| {
+            let s = x + offset * h;
+            let inside = self.in_region(&s).is_some();
+            if self.place.in_void(&s) {
+                gone += usize::from(inside);
+                return;
+            }
+            here += usize::from(inside);
+            body += usize::from(inside || self.elements.holds(self.place.mesh, &s, TOLERANCE));
+        });
+        *emptied += whole * gone as f64 / count as f64;
+        (
+            whole * body as f64 / count as f64,
+            whole * here as f64 / count as f64,
+        )
     }
 }
 
@@ -339,61 +398,6 @@ impl<'a, const D: usize> Nearest<'a, D> {
         }
         (0, Vec::new())
     }
-}
-
-fn mark_box<const D: usize>(
-    edge: &mut [bool],
-    counts: &[usize; D],
-    first: &Vector<D>,
-    origin: &Vector<D>,
-    h: f64,
-    lo: &Vector<D>,
-    hi: &Vector<D>,
-) {
-    let half = 0.5 * (1.0 - 1e-9);
-    let mut from = [0usize; D];
-    let mut to = [0usize; D];
-    for i in 0..D {
-        let a = ((lo[i] - origin[i]) / h - half - first[i]).ceil().max(0.0);
-        let b = ((hi[i] - origin[i]) / h + half - first[i])
-            .floor()
-            .min(counts[i] as f64 - 1.0);
-        if a > b {
-            return;
-        }
-        (from[i], to[i]) = (a as usize, b as usize);
-    }
-    let mut k = from;
-    loop {
-        let index = (0..D).fold(0, |index, i| index * counts[i] + k[i]);
-        edge[index] = true;
-        let mut axis = D;
-        loop {
-            if axis == 0 {
-                return;
-            }
-            axis -= 1;
-            if k[axis] < to[axis] {
-                k[axis] += 1;
-                break;
-            }
-            k[axis] = from[axis];
-        }
-    }
-}
-
-/// Visits `n^D` equal parts of the unit cell around the origin by their centres; returns their number.
-fn samples_of<const D: usize>(n: usize, mut visit: impl FnMut(Vector<D>)) -> usize {
-    let count = n.pow(D as u32);
-    for index in 0..count {
-        let mut rest = index;
-        visit(Vector::from_fn(|_, _| {
-            let k = rest % n;
-            rest /= n;
-            (k as f64 + 0.5) / n as f64 - 0.5
-        }));
-    }
-    count
 }
 
 #[cfg(test)]

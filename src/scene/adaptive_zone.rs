@@ -5,6 +5,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::failure::Breaking;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
+use super::source::Span;
 use super::spec::{CouplingSpec, CutBondsSpec, SceneSpec, SkinSpec, ZonesNeeded};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
@@ -42,24 +43,14 @@ pub struct Follow {
     pub barred: Vec<bool>,
 }
 
-/// How the zone follows, if the scene wants it to.
-pub(crate) fn follow<const D: usize>(
-    spec: &SceneSpec,
+/// Refuses scenes whose zone cannot follow the crack; the peridynamic side and its law of one whose zone can.
+fn supported<'a, const D: usize>(
+    span: Span,
     joined: &mut SelectedCoupling,
     solve: &Solve,
     breaking: &Breaking<D>,
-    bonds: Option<(&Peridynamics<D>, &dyn Law<D>)>,
-    mesh: &Mesh<D>,
-    is_peridynamic: impl Fn(usize) -> bool,
-) -> Result<Option<Follow>, SceneError> {
-    let Some(typed) = &spec.zones.follow else {
-        return Ok(None);
-    };
-    if let ZonesNeeded::Everywhere(_) = joined.joining.zones {
-        // one zone ignores what is said of zones
-        return Ok(None);
-    }
-    let span = typed.span();
+    bonds: Option<(&'a Peridynamics<D>, &'a dyn Law<D>)>,
+) -> Result<(&'a Peridynamics<D>, &'a dyn Law<D>), SceneError> {
     let refused = |message: String, label: &str, help: &str| {
         SceneError::new(SceneErrorKind::Conflict, message)
             .label(span.clone(), label)
@@ -115,6 +106,27 @@ pub(crate) fn follow<const D: usize>(
             "remove one of the two",
         ));
     }
+    Ok((p, law))
+}
+
+/// How the zone follows, if the scene wants it to.
+pub(crate) fn follow<const D: usize>(
+    spec: &SceneSpec,
+    joined: &mut SelectedCoupling,
+    solve: &Solve,
+    breaking: &Breaking<D>,
+    bonds: Option<(&Peridynamics<D>, &dyn Law<D>)>,
+    mesh: &Mesh<D>,
+    is_peridynamic: impl Fn(usize) -> bool,
+) -> Result<Option<Follow>, SceneError> {
+    let Some(typed) = &spec.zones.follow else {
+        return Ok(None);
+    };
+    if let ZonesNeeded::Everywhere(_) = joined.joining.zones {
+        // one zone ignores what is said of zones
+        return Ok(None);
+    }
+    let (p, law) = supported(typed.span(), joined, solve, breaking, bonds)?;
     let horizon = (0..mesh.cell_count())
         .map(|c| p.horizon_at(&mesh.centroid(c)))
         .fold(0.0, f64::max);

@@ -170,6 +170,44 @@ pub(crate) fn conditions<const D: usize>(
     Ok(found)
 }
 
+/// Where a condition holds: a set of the mesh, or a shape.
+fn support<const D: usize>(
+    place: &str,
+    name: &Text,
+    on: Option<&Text>,
+    inside: Option<&ShapeSpec>,
+    mesh: &Mesh<D>,
+) -> Result<Support<D>, SceneError> {
+    Ok(match (on, inside) {
+        (Some(set), None) => {
+            let at = format!("{place}.on");
+            let known = mesh.set_names();
+            let Some(nodes) = mesh.nodes_of_set(&set.value) else {
+                return Err(unknown_set(&at, set, "set", &known, mesh));
+            };
+            not_empty(&at, set, nodes.len())?;
+            Support::Set {
+                name: set.value.clone(),
+                nodes,
+                facets: mesh.facet_sets.get(&set.value).cloned().unwrap_or_default(),
+            }
+        }
+        (None, Some(shape)) => Support::Inside(self::inside(place, name, shape, mesh)?),
+        (both, _) => {
+            let (what, label) = match both {
+                Some(_) => ("both `on` and `inside`", "two places"),
+                None => ("neither `on` nor `inside`", "where?"),
+            };
+            return Err(
+                SceneError::new(SceneErrorKind::Choice, format!("`{place}` has {what}"))
+                    .label(name.span.clone(), label)
+                    .help("keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`"),
+            );
+        }
+    })
+}
+
+/// A condition: what is prescribed, where, and by which components.
 fn one<const D: usize>(
     name: &Text,
     spec: &ConditionSpec,
@@ -195,34 +233,7 @@ fn one<const D: usize>(
             if kind == "velocity" {
                 moves(&place, name, &components, clock)?;
             }
-            let support = match (on, inside) {
-                (Some(set), None) => {
-                    let at = format!("{place}.on");
-                    let known = mesh.set_names();
-                    let Some(nodes) = mesh.nodes_of_set(&set.value) else {
-                        return Err(unknown_set(&at, set, "set", &known, mesh));
-                    };
-                    not_empty(&at, set, nodes.len())?;
-                    Support::Set {
-                        name: set.value.clone(),
-                        nodes,
-                        facets: mesh.facet_sets.get(&set.value).cloned().unwrap_or_default(),
-                    }
-                }
-                (None, Some(shape)) => Support::Inside(self::inside(&place, name, shape, mesh)?),
-                (both, _) => {
-                    let (what, label) = match both {
-                        Some(_) => ("both `on` and `inside`", "two places"),
-                        None => ("neither `on` nor `inside`", "where?"),
-                    };
-                    return Err(SceneError::new(
-                        SceneErrorKind::Choice,
-                        format!("`{place}` has {what}"),
-                    )
-                    .label(name.span.clone(), label)
-                    .help("keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`"));
-                }
-            };
+            let support = support(&place, name, on.as_ref(), inside.as_ref(), mesh)?;
             if let Support::Set { nodes, .. } = &support {
                 finite(
                     &place,

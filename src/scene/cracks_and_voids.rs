@@ -3,7 +3,8 @@
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::region;
-use super::spec::{SceneSpec, ShapeSpec};
+use super::spec::{SceneSpec, ShapeSpec, VoidSpec};
+use super::value::Text;
 use crate::coupling::Zone;
 use crate::fem::Locator;
 use crate::mesh::Mesh;
@@ -13,6 +14,44 @@ use crate::tensor::Vector;
 /// Empty regions, and what cuts bonds.
 type Obstacles<const D: usize> = (Vec<Shape<D>>, Vec<Barrier<D>>);
 
+/// The shape of a void, which has a volume and lies in nonlocal cells.
+fn void_shape<const D: usize>(
+    name: &Text,
+    v: &VoidSpec,
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+) -> Result<Shape<D>, SceneError> {
+    let place = format!("voids.{name}.inside");
+    let shape = region::shape(&place, &v.inside, mesh, &name.span)?;
+    if !matches!(
+        shape,
+        Shape::Box { .. } | Shape::Ball { .. } | Shape::Polygon(_)
+    ) {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`{place}` has no volume"),
+        )
+        .label(name.span.clone(), "nothing lies inside")
+        .help("use `box`, `ball` or, in 2D, `polygon`; a surface is a crack: [cracks.NAME]"));
+    }
+    let inside = |c: &usize| shape.signed_distance(&mesh.centroid(*c)) < 0.0;
+    if let Some(c) = (0..mesh.cell_count())
+        .filter(|&c| zones[c] != Zone::Nonlocal)
+        .find(inside)
+    {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!(
+                "`{place}` covers cell {c} at {:?}, which is not nonlocal",
+                mesh.centroid(c).as_slice()
+            ),
+        )
+        .label(name.span.clone(), "finite elements cannot be emptied")
+        .help("enlarge [zones.nonlocal] around the void, or leave it out of the mesh (cutouts)"));
+    }
+    Ok(shape)
+}
+
 /// Voids, and the barriers that they and cracks are.
 pub(crate) fn obstacles<const D: usize>(
     spec: &SceneSpec,
@@ -21,36 +60,7 @@ pub(crate) fn obstacles<const D: usize>(
 ) -> Result<Obstacles<D>, SceneError> {
     let (mut voids, mut barriers) = (Vec::new(), Vec::new());
     for (name, v) in &spec.voids {
-        let place = format!("voids.{name}.inside");
-        let shape = region::shape(&place, &v.inside, mesh, &name.span)?;
-        if !matches!(
-            shape,
-            Shape::Box { .. } | Shape::Ball { .. } | Shape::Polygon(_)
-        ) {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}` has no volume"),
-            )
-            .label(name.span.clone(), "nothing lies inside")
-            .help("use `box`, `ball` or, in 2D, `polygon`; a surface is a crack: [cracks.NAME]"));
-        }
-        let inside = |c: &usize| shape.signed_distance(&mesh.centroid(*c)) < 0.0;
-        if let Some(c) = (0..mesh.cell_count())
-            .filter(|&c| zones[c] != Zone::Nonlocal)
-            .find(inside)
-        {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "`{place}` covers cell {c} at {:?}, which is not nonlocal",
-                    mesh.centroid(c).as_slice()
-                ),
-            )
-            .label(name.span.clone(), "finite elements cannot be emptied")
-            .help(
-                "enlarge [zones.nonlocal] around the void, or leave it out of the mesh (cutouts)",
-            ));
-        }
+        let shape = void_shape(name, v, mesh, zones)?;
         if v.cut_bonds {
             barriers.push(Barrier::Void(shape.clone()));
         }

@@ -29,6 +29,7 @@ use crate::observe::report::number;
 use crate::observe::summary::Decision;
 use crate::peridynamics::Influence;
 use crate::scene::points::Points;
+use crate::scene::selected_coupling::SelectedCoupling;
 
 /// A scene that is validated but for its nonlocal zone, and for what follows from that.
 pub(crate) struct Draft<'a, const D: usize> {
@@ -112,16 +113,10 @@ impl<'a, const D: usize> Draft<'a, D> {
         Ok(scene)
     }
 
-    /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
-    fn with_coupling(
-        &self,
-        placed: Option<&Placed>,
-        instead: Option<&CouplingSpec>,
-    ) -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
-        let (spec, mesh) = (self.spec, &self.mesh);
-        let mut joined = coupling_selection::joined(spec, &self.materials, mesh, placed, instead)?;
+    /// Refuses a coupling with a peridynamic side in a scene without [peridynamics].
+    fn refuse_missing_peridynamics(&self, joined: &SelectedCoupling) -> Result<(), SceneError> {
         let joining = joined.joining;
-        if spec.peridynamics.is_none()
+        if self.spec.peridynamics.is_none()
             && !matches!(joining.zones, ZonesNeeded::Everywhere(Zone::Local))
         {
             return Err(SceneError::new(
@@ -131,6 +126,19 @@ impl<'a, const D: usize> Draft<'a, D> {
             .label(joined.span.clone(), "has a peridynamic side")
             .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
         }
+        Ok(())
+    }
+
+    /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
+    fn with_coupling(
+        &self,
+        placed: Option<&Placed>,
+        instead: Option<&CouplingSpec>,
+    ) -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
+        let (spec, mesh) = (self.spec, &self.mesh);
+        let mut joined = coupling_selection::joined(spec, &self.materials, mesh, placed, instead)?;
+        let joining = joined.joining;
+        self.refuse_missing_peridynamics(&joined)?;
         let mut zones = zones::zones(spec, &joined, mesh, placed)?;
         let peridynamics = (spec.peridynamics.as_ref())
             .map(|p| peridynamics::peridynamics(p, joining.lattice, mesh, &zones))

@@ -37,14 +37,12 @@ pub struct Contact {
     pub stiffness_factor: f64,
 }
 
-/// How bonds of the peridynamic material `material` deform and break.
-pub(crate) fn breaking<const D: usize>(
+/// Refuses what is said of broken bonds where none breaks.
+fn refuse_needless<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
-    mesh: &Mesh<D>,
-) -> Result<Breaking<D>, SceneError> {
-    let fracture = material.fracture;
-    if fracture.is_none() {
+) -> Result<(), SceneError> {
+    if material.fracture.is_none() {
         let needless = |span, what: &str| {
             SceneError::new(
                 SceneErrorKind::Conflict,
@@ -75,26 +73,19 @@ pub(crate) fn breaking<const D: usize>(
             return Err(needless(edge.span(), "`zones.damage-at-edge` is set"));
         }
     }
-    let calibration = spec
-        .peridynamics
-        .as_ref()
-        .and_then(|p| p.calibration.as_ref());
-    if let (Some(typed), None | Some(Fracture::Stretch(_))) = (calibration, fracture) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`peridynamics.calibration` is set, but the material `{}` has no fracture energy",
-                material.name
-            ),
-        )
-        .label(typed.span(), "of what?")
-        .help("give the material a fracture-energy, or remove this"));
-    }
-    let solve = spec.solve.as_ref().map(|s| s.get_ref());
-    let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
+    Ok(())
+}
+
+/// How the force of a bond depends on the displacement.
+fn bonds_of<const D: usize>(
+    spec: &SceneSpec,
+    material: &Material<D>,
+    is_static: bool,
+) -> Result<BondsSpec, SceneError> {
+    let fracture = material.fracture;
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
     let is_objective = (material.law.force_state()).is_some_and(|f| f.is_objective());
-    let bonds = match typed {
+    Ok(match typed {
         Some(bonds) => {
             if *bonds.get_ref() == BondsSpec::Exact && !is_objective {
                 return Err(SceneError::new(
@@ -118,7 +109,35 @@ pub(crate) fn breaking<const D: usize>(
             BondsSpec::Exact
         }
         None => BondsSpec::Linear,
-    };
+    })
+}
+
+/// How bonds of the peridynamic material `material` deform and break.
+pub(crate) fn breaking<const D: usize>(
+    spec: &SceneSpec,
+    material: &Material<D>,
+    mesh: &Mesh<D>,
+) -> Result<Breaking<D>, SceneError> {
+    let fracture = material.fracture;
+    refuse_needless(spec, material)?;
+    let calibration = spec
+        .peridynamics
+        .as_ref()
+        .and_then(|p| p.calibration.as_ref());
+    if let (Some(typed), None | Some(Fracture::Stretch(_))) = (calibration, fracture) {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!(
+                "`peridynamics.calibration` is set, but the material `{}` has no fracture energy",
+                material.name
+            ),
+        )
+        .label(typed.span(), "of what?")
+        .help("give the material a fracture-energy, or remove this"));
+    }
+    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
+    let bonds = bonds_of(spec, material, is_static)?;
     let mut no_fail = Vec::with_capacity(spec.no_fail.len());
     for (name, shape) in &spec.no_fail {
         no_fail.push(region(&format!("no-fail.{name}"), shape, mesh)?);

@@ -5,10 +5,59 @@ use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics::Peridynamics;
 use super::region;
-use super::spec::{CouplingTraits, LatticeStart, SceneSpec};
+use super::spec::{BodySpec, CouplingTraits, LatticeStart, SceneSpec};
+use super::value::Text;
 use crate::coupling::{Lattice, Zone};
 use crate::mesh::Mesh;
 use crate::scene::points::Points;
+
+/// The cells, the spacing and the horizon of a body.
+fn body_region<const D: usize>(
+    place: &str,
+    body: &BodySpec,
+    mesh: &Mesh<D>,
+) -> Result<(Vec<bool>, f64, f64), SceneError> {
+    let inside = region::region(&format!("{place}.inside"), &body.inside, mesh)?.select(mesh);
+    let spacing = bounds_checks::positive(&format!("{place}.spacing"), &body.spacing)?;
+    let horizon = bounds_checks::positive(&format!("{place}.horizon"), &body.horizon)?;
+    if horizon < spacing * (1.0 - 1e-9) {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`{place}.horizon` is {horizon}, below the spacing {spacing} of its points"),
+        )
+        .label(body.horizon.span.clone(), "no point would have a neighbour")
+        .help("make it two to six times the spacing"));
+    }
+    Ok((inside, spacing, horizon))
+}
+
+/// Refuses bodies, or a rest of the zone, of which the layers of elements between them leave nothing.
+fn refuse_empty_zones<const D: usize>(
+    spec: &SceneSpec,
+    first: &Text,
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+    of_cell: &[u16],
+) -> Result<(), SceneError> {
+    for (l, name) in std::iter::once("the rest of `zones.nonlocal`")
+        .chain(spec.zones.bodies.keys().map(|k| k.value.as_str()))
+        .enumerate()
+    {
+        let holds = |c: usize| zones[c] == Zone::Nonlocal && usize::from(of_cell[c]) == l;
+        if !(0..mesh.cell_count()).any(holds) {
+            return Err(SceneError::new(
+                SceneErrorKind::Empty,
+                format!("the layers of elements between bodies take every cell of {name}"),
+            )
+            .label(
+                first.span.clone(),
+                "bodies are kept apart by a layer one cell thick",
+            )
+            .help("refine the mesh, or move the bodies"));
+        }
+    }
+    Ok(())
+}
 
 /// Gives the bodies of `zones.bodies` their lattices, and makes elements of the cells that touch a body from the rest of the zone.
 pub(crate) fn bodies<const D: usize>(
@@ -49,19 +98,7 @@ pub(crate) fn bodies<const D: usize>(
     let mut of_cell = vec![0u16; mesh.cell_count()];
     for (name, body) in &spec.zones.bodies {
         let place = format!("zones.bodies.{name}");
-        let inside = region::region(&format!("{place}.inside"), &body.inside, mesh)?.select(mesh);
-        let spacing = bounds_checks::positive(&format!("{place}.spacing"), &body.spacing)?;
-        let horizon = bounds_checks::positive(&format!("{place}.horizon"), &body.horizon)?;
-        if horizon < spacing * (1.0 - 1e-9) {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!(
-                    "`{place}.horizon` is {horizon}, below the spacing {spacing} of its points"
-                ),
-            )
-            .label(body.horizon.span.clone(), "no point would have a neighbour")
-            .help("make it two to six times the spacing"));
-        }
+        let (inside, spacing, horizon) = body_region(&place, body, mesh)?;
         let mut any = false;
         for c in (0..mesh.cell_count()).filter(|&c| inside[c] && zones[c] == Zone::Nonlocal) {
             of_cell[c] = lattices.len() as u16;
@@ -82,23 +119,7 @@ pub(crate) fn bodies<const D: usize>(
         });
     }
     add_layers(mesh, zones, &of_cell);
-    for (l, name) in std::iter::once("the rest of `zones.nonlocal`")
-        .chain(spec.zones.bodies.keys().map(|k| k.value.as_str()))
-        .enumerate()
-    {
-        let holds = |c: usize| zones[c] == Zone::Nonlocal && usize::from(of_cell[c]) == l;
-        if !(0..mesh.cell_count()).any(holds) {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("the layers of elements between bodies take every cell of {name}"),
-            )
-            .label(
-                first.span.clone(),
-                "bodies are kept apart by a layer one cell thick",
-            )
-            .help("refine the mesh, or move the bodies"));
-        }
-    }
+    refuse_empty_zones(spec, first, mesh, zones, &of_cell)?;
     Ok(Peridynamics {
         points: Points::Lattices { lattices, of_cell },
         ..p

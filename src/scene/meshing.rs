@@ -9,7 +9,7 @@ use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{corners, position};
 use super::source::Span;
-use super::spec::{AxisSpec, CutoutSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
+use super::spec::{AxisSpec, CutoutSpec, FileMeshSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
 use super::value::{Coordinates, Text};
 use crate::mesh::generate::{Axis, CutOut, Grid};
 use crate::mesh::{Mesh, MeshError, quality, read};
@@ -17,6 +17,27 @@ use crate::observe::checkpoint::Fingerprint;
 
 /// The most cells that a generated mesh may have: beyond it a typing error is likelier than a wish.
 const MOST_CELLS: f64 = 1e8;
+
+/// A mesh that is read from a file, or that the scene was given in memory.
+fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Mesh<D>, SceneError> {
+    let path = directory.join(&file.path.value);
+    let failed = |error: MeshError| {
+        SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
+            .label(file.path.span.clone(), "this mesh")
+            .help("the path is relative to the scene file")
+    };
+    match &file.held {
+        Some(parts) => parts.mesh().map_err(|error| {
+            SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
+                .help("the scene was given this mesh in memory")
+        }),
+        None => {
+            let mesh = read::read(&path).map_err(failed)?;
+            quality::check(&mesh).map_err(failed)?;
+            Ok(mesh)
+        }
+    }
+}
 
 /// The mesh of a scene whose file lies in `directory`.
 pub(crate) fn build<const D: usize>(
@@ -74,25 +95,7 @@ pub(crate) fn build<const D: usize>(
                 cells,
             )?
         }
-        MeshSpec::File(file) => {
-            let path = directory.join(&file.path.value);
-            let failed = |error: MeshError| {
-                SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
-                    .label(file.path.span.clone(), "this mesh")
-                    .help("the path is relative to the scene file")
-            };
-            match &file.held {
-                Some(parts) => parts.mesh().map_err(|error| {
-                    SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
-                        .help("the scene was given this mesh in memory")
-                })?,
-                None => {
-                    let mesh = read::read(&path).map_err(failed)?;
-                    quality::check(&mesh).map_err(failed)?;
-                    mesh
-                }
-            }
-        }
+        MeshSpec::File(file) => from_file(file, directory)?,
     };
     can_be_computed_with(&mesh)?;
     if !matches!(spec, MeshSpec::File(_)) {

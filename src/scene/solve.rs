@@ -152,6 +152,57 @@ fn pace(every: Option<&Every>) -> Option<Pace> {
     every.map(|e| e.pace)
 }
 
+/// The time between files.
+fn output_interval(spec: &ExplicitSpec, duration: f64) -> Result<f64, SceneError> {
+    let output_interval = match (&spec.outputs, &spec.output_interval) {
+        (Some(count), Some(interval)) => {
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                "`solve.explicit` has both `outputs` and `output-interval`",
+            )
+            .label(count.span.clone(), "a number of files")
+            .label(interval.span.clone(), "a time between files")
+            .help("keep one of them"));
+        }
+        (Some(count), None) => duration / count.value.max(1) as f64,
+        (None, given) => interval("output-interval", given, duration, duration / 20.0)?,
+    };
+    if duration / output_interval > MOST_FILES {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!(
+                "`solve.explicit` asks for {:.1e} VTU files",
+                duration / output_interval
+            ),
+        )
+        .label(spec.duration.span.clone(), "over this time")
+        .help(format!(
+            "the limit is {MOST_FILES:.0e}; the history has a row for each of many more instants"
+        )));
+    }
+    Ok(output_interval)
+}
+
+/// A time between rows or files; the default where the scene leaves it out.
+fn interval(
+    key: &str,
+    number: &Option<Number>,
+    duration: f64,
+    default: f64,
+) -> Result<f64, SceneError> {
+    match number {
+        None => Ok(default),
+        Some(n) => bounds_checks::within(
+            &format!("solve.explicit.{key}"),
+            n,
+            n.value > 0.0 && n.value <= duration,
+            "must be positive and at most the duration",
+            "make it a fraction of the duration",
+        ),
+    }
+}
+
+/// A scene in time: its steps, and how often it is written and watched.
 fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
     let place = |key: &str| format!("solve.explicit.{key}");
     let duration = bounds_checks::positive(&place("duration"), &spec.duration)?;
@@ -179,42 +230,7 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
         )?,
         None => 0.95,
     };
-    let interval = |key: &str, number: &Option<Number>, default: f64| match number {
-        None => Ok(default),
-        Some(n) => bounds_checks::within(
-            &place(key),
-            n,
-            n.value > 0.0 && n.value <= duration,
-            "must be positive and at most the duration",
-            "make it a fraction of the duration",
-        ),
-    };
-    let output_interval = match (&spec.outputs, &spec.output_interval) {
-        (Some(count), Some(interval)) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                "`solve.explicit` has both `outputs` and `output-interval`",
-            )
-            .label(count.span.clone(), "a number of files")
-            .label(interval.span.clone(), "a time between files")
-            .help("keep one of them"));
-        }
-        (Some(count), None) => duration / count.value.max(1) as f64,
-        (None, given) => interval("output-interval", given, duration / 20.0)?,
-    };
-    if duration / output_interval > MOST_FILES {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!(
-                "`solve.explicit` asks for {:.1e} VTU files",
-                duration / output_interval
-            ),
-        )
-        .label(spec.duration.span.clone(), "over this time")
-        .help(format!(
-            "the limit is {MOST_FILES:.0e}; the history has a row for each of many more instants"
-        )));
-    }
+    let output_interval = output_interval(spec, duration)?;
     Ok(Explicit {
         duration,
         step,
@@ -231,6 +247,7 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
         history_interval: interval(
             "history-interval",
             &spec.history_interval,
+            duration,
             duration / 1000.0,
         )?,
         checkpoint_every: pace(spec.checkpoint_every.as_ref()),

@@ -22,6 +22,115 @@ pub(crate) struct Placed {
     pub span: Span,
 }
 
+/// The region of the nonlocal zone: placed, or drawn in the scene.
+fn nonlocal_region<const D: usize>(
+    spec: &SceneSpec,
+    joined: &SelectedCoupling,
+    mesh: &Mesh<D>,
+    placed: Option<&Placed>,
+) -> Result<(Region<D>, Span), SceneError> {
+    Ok(match (placed, &spec.zones.nonlocal) {
+        (Some(p), _) => {
+            let cells = (0..mesh.cell_count() as u32).filter(|&c| p.nonlocal[c as usize]);
+            (Region::Cells(cells.collect()), p.span.clone())
+        }
+        (None, Some(n)) => {
+            let region = region::region("zones.nonlocal", n.get_ref(), mesh)?;
+            (region, n.span())
+        }
+        (None, None) => {
+            return Err(SceneError::new(
+                SceneErrorKind::Missing,
+                format!("coupling `{}` needs a nonlocal zone", joined.joining.name),
+            )
+            .label(joined.span.clone(), "couples a local and a nonlocal zone")
+            .help(
+                "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }, or zones = \"auto\"",
+            ));
+        }
+    })
+}
+
+/// The nonlocal zone as it is drawn or placed.
+struct NonlocalZone<const D: usize> {
+    region: Region<D>,
+    /// One entry per cell.
+    inner: Vec<bool>,
+    /// Where the scene asks for it.
+    span: Span,
+}
+
+/// Marks the cells of the transition zone: those that the scene draws, or around a zone that was placed as many as the coupling asks for.
+fn mark_transition<const D: usize>(
+    spec: &SceneSpec,
+    joined: &SelectedCoupling,
+    mesh: &Mesh<D>,
+    placed: Option<&Placed>,
+    nonlocal: &NonlocalZone<D>,
+    zones: &mut [Zone],
+) -> Result<(), SceneError> {
+    let (joining, count) = (joined.joining, mesh.cell_count());
+    let needs_transition = matches!(joining.zones, ZonesNeeded::Transition { .. });
+    let NonlocalZone {
+        region,
+        inner,
+        span: drawn,
+    } = nonlocal;
+    if let Some(transition) = &spec.zones.transition {
+        let span = transition.span();
+        let selected = transition_cells(transition.get_ref(), region, inner, mesh)?;
+        let both: Vec<usize> = (0..count).filter(|&c| selected[c] && inner[c]).collect();
+        let all = inner.iter().filter(|n| **n).count();
+        if !both.is_empty() && both.len() != all {
+            let at = mesh.centroid(both[0]);
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                format!(
+                    "`zones.transition` overlaps {} of the {all} cells of `zones.nonlocal`, the first at {:?}",
+                    both.len(),
+                    at.as_slice()
+                ),
+            )
+            .label(span, "overlaps in part")
+            .label(drawn.clone(), "this zone")
+            .help("let it enclose the nonlocal zone, or keep the two apart; around = 0.1 does the former"));
+        }
+        let mut any = false;
+        for c in (0..count).filter(|&c| selected[c] && !inner[c]) {
+            zones[c] = Zone::Transition;
+            any = true;
+        }
+        if !any && needs_transition {
+            return Err(empty("zones.transition", span, mesh));
+        }
+    } else if let (Some(_), ZonesNeeded::Transition { width, .. }) = (placed, joining.zones) {
+        // the width that the method asks for, and half a cell, so that cells make it up
+        let horizon = spec.peridynamics.as_ref().map(|p| &p.horizon);
+        let reach = |x: &Vector<D>| horizon.map_or(0.0, |h| h.eval(&padded(x)));
+        let largest = (0..count)
+            .map(|c| reach(&mesh.centroid(c)))
+            .fold(0.0, f64::max);
+        let size = mesh.cell_volume(0).abs().powf(1.0 / D as f64);
+        for (zone, close) in
+            zones
+                .iter_mut()
+                .zip(around(region, inner, mesh, width * largest + 0.5 * size))
+        {
+            if close {
+                *zone = Zone::Transition;
+            }
+        }
+    } else if needs_transition {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            format!("coupling `{}` needs a transition zone", joining.name),
+        )
+        .label(joined.span.clone(), "works where both models overlap")
+        .help("add [zones.transition] with around = ..., at least one horizon"));
+    }
+    Ok(())
+}
+
 /// The model of each cell; `placed` is the nonlocal zone of a scene that does not draw it.
 pub(crate) fn zones<const D: usize>(
     spec: &SceneSpec,
@@ -34,29 +143,7 @@ pub(crate) fn zones<const D: usize>(
     if let ZonesNeeded::Everywhere(zone) = joining.zones {
         return Ok(vec![zone; count]);
     }
-    let needs_transition = matches!(joining.zones, ZonesNeeded::Transition { .. });
-    let chosen = joined.span.clone();
-    let (region, span) = match (placed, &spec.zones.nonlocal) {
-        (Some(p), _) => {
-            let cells = (0..count as u32).filter(|&c| p.nonlocal[c as usize]);
-            (Region::Cells(cells.collect()), p.span.clone())
-        }
-        (None, Some(n)) => {
-            let region = region::region("zones.nonlocal", n.get_ref(), mesh)?;
-            (region, n.span())
-        }
-        (None, None) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("coupling `{}` needs a nonlocal zone", joining.name),
-            )
-            .label(chosen, "couples a local and a nonlocal zone")
-            .help(
-                "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }, or zones = \"auto\"",
-            ));
-        }
-    };
-    let drawn = span.clone();
+    let (region, span) = nonlocal_region(spec, joined, mesh, placed)?;
     let inner = region.select(mesh);
     if !inner.contains(&true) {
         return Err(empty("zones.nonlocal", span, mesh));
@@ -80,58 +167,12 @@ pub(crate) fn zones<const D: usize>(
             .help("refine the mesh, enlarge the zone or leave the skin out"));
         }
     }
-    if let Some(transition) = &spec.zones.transition {
-        let span = transition.span();
-        let selected = transition_cells(transition.get_ref(), &region, &inner, mesh)?;
-        let both: Vec<usize> = (0..count).filter(|&c| selected[c] && inner[c]).collect();
-        let all = inner.iter().filter(|n| **n).count();
-        if !both.is_empty() && both.len() != all {
-            let at = mesh.centroid(both[0]);
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "`zones.transition` overlaps {} of the {all} cells of `zones.nonlocal`, the first at {:?}",
-                    both.len(),
-                    at.as_slice()
-                ),
-            )
-            .label(span, "overlaps in part")
-            .label(drawn, "this zone")
-            .help("let it enclose the nonlocal zone, or keep the two apart; around = 0.1 does the former"));
-        }
-        let mut any = false;
-        for c in (0..count).filter(|&c| selected[c] && !inner[c]) {
-            zones[c] = Zone::Transition;
-            any = true;
-        }
-        if !any && needs_transition {
-            return Err(empty("zones.transition", span, mesh));
-        }
-    } else if let (Some(_), ZonesNeeded::Transition { width, .. }) = (placed, joining.zones) {
-        // the width that the method asks for, and half a cell, so that cells make it up
-        let horizon = spec.peridynamics.as_ref().map(|p| &p.horizon);
-        let reach = |x: &Vector<D>| horizon.map_or(0.0, |h| h.eval(&padded(x)));
-        let largest = (0..count)
-            .map(|c| reach(&mesh.centroid(c)))
-            .fold(0.0, f64::max);
-        let size = mesh.cell_volume(0).abs().powf(1.0 / D as f64);
-        for (zone, close) in
-            zones
-                .iter_mut()
-                .zip(around(&region, &inner, mesh, width * largest + 0.5 * size))
-        {
-            if close {
-                *zone = Zone::Transition;
-            }
-        }
-    } else if needs_transition {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            format!("coupling `{}` needs a transition zone", joining.name),
-        )
-        .label(chosen, "works where both models overlap")
-        .help("add [zones.transition] with around = ..., at least one horizon"));
-    }
+    let nonlocal = NonlocalZone {
+        region,
+        inner,
+        span: span.clone(),
+    };
+    mark_transition(spec, joined, mesh, placed, &nonlocal, &mut zones)?;
     // partial stress needs no elements: it lets the horizon vary throughout a body
     let needs_elements = !matches!(joined.coupling, CouplingSpec::PartialStress(_));
     if needs_elements && !zones.contains(&Zone::Local) {

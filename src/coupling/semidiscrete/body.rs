@@ -1,6 +1,6 @@
 //! The points of a moving model and their bonds.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ use crate::{
     assembly::Transfer,
     coupling::{Model, NonlinearSeam, Operator, SiteKind},
     peridynamics::{
-        Accelerator, Families, PdBody,
+        Accelerator, Families, Law, PdBody,
         bond_force::{
             BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, Storage, bond_pass,
         },
@@ -43,6 +43,159 @@ pub(super) struct MovingBody<const D: usize> {
     pub force: Vec<f64>,
 }
 
+/// The contact of points without a bond, where the scene has it.
+fn contact_of<const D: usize>(
+    behaviour: &BondBehaviour<'_, D>,
+    body: &PdBody<D>,
+    own_row: &[bool],
+    spacing: f64,
+) -> Result<Option<Mutex<Contact<D>>>, SystemError> {
+    let contact = match behaviour.contact {
+        Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {
+            position: &body.cloud.position,
+            volume: &body.cloud.volume,
+            rows: own_row,
+            spacing: spacing,
+            approach: c.approach,
+            stiffness: c.stiffness / 15.0
+                * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),
+            skin: 0.25 * spacing,
+        })?)),
+        None => None,
+    };
+    Ok(contact)
+}
+
+/// What the pass over the bonds of a body is made from.
+struct PassInput<'a, const D: usize> {
+    body: &'a PdBody<D>,
+    law: &'a Arc<dyn Law<D>>,
+    families: &'a Families,
+    /// Whether the families are those of the body.
+    is_whole: bool,
+    /// Whether each point is a site.
+    rows: &'a [bool],
+    no_fail: &'a [bool],
+    seam: Option<&'a NonlinearSeam<D>>,
+    behaviour: &'a BondBehaviour<'a, D>,
+}
+
+impl<const D: usize> PassInput<'_, D> {
+    /// The pass: pairwise, of a solid, or of the law.
+    ///
+    /// # Errors
+    /// [`SystemError`] for a law without a force state, or bonds that cannot stretch.
+    fn pass(&self) -> Result<Box<dyn BondPass<D>>, SystemError> {
+        let Self {
+            body,
+            law,
+            families,
+            seam,
+            behaviour,
+            ..
+        } = *self;
+        // a seam leaves some of the body's bonds out: those that stay keep their coefficients
+        let is_all_of =
+            |i: usize| self.is_whole || families.of(i).len() == body.families.of(i).len();
+        let pair = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
+            true => body.kernel(i).0[k],
+            false => coefficient(body, i, families.of(i)[k]),
+        };
+        let omega = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
+            true => body.kernel(i).1[k],
+            false => omega_of(body, i, families.of(i)[k]),
+        };
+        let force = match (law.accelerator(), law.force_state()) {
+            (Some(Accelerator::Pairwise), _) => BondForce::Pairwise { coefficient: &pair },
+            (Some(Accelerator::Solid { bulk, shear }), _) => BondForce::Solid {
+                omega: &omega,
+                bulk,
+                shear,
+            },
+            (None, Some(_)) => BondForce::Law { law, body },
+            (None, None) => return Err(SystemError::Law { law: law.name() }),
+        };
+        let by_bond = |i: usize, _: usize, _: &Vector<D>| {
+            let critical = behaviour.critical_stretch.as_ref();
+            critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon[i]))
+        };
+        let broken = behaviour
+            .broken
+            .filter(|b| !b.is_empty())
+            .map(|b| b.among(&body.cloud.position));
+        let pass = bond_pass(&BondSetup {
+            position: &body.cloud.position,
+            volume: &body.cloud.volume,
+            families,
+            rows: self.rows,
+            without_energy: seam.map_or(&[], NonlinearSeam::without_energy),
+            force,
+            kinematics: behaviour.kinematics,
+            failure: behaviour.critical_stretch.as_ref().map(|s| Failure {
+                critical: match s {
+                    Critical::Uniform(s) => CriticalStretch::Uniform(*s),
+                    Critical::ByHorizon(_) => CriticalStretch::PerBond(&by_bond),
+                },
+                no_fail: self.no_fail,
+            }),
+            precracked: broken.as_ref().map(|b| b as _),
+            layout: match behaviour.storage {
+                Storage::Double => Layout::Automatic,
+                Storage::Single => Layout::List,
+            },
+            storage: behaviour.storage,
+        })?;
+        Ok(pass)
+    }
+}
+
+/// By how many sites all points are later, if they all are.
+fn shift_of(site_of_point: &[u32]) -> Option<usize> {
+    let first = site_of_point.first().copied().unwrap_or(0);
+    site_of_point
+        .iter()
+        // in 64 bits, since a first point that is no site counts on beyond NONE
+        .zip(u64::from(first)..)
+        .all(|(&site, wanted)| u64::from(site) == wanted && site != NONE)
+        .then_some(first as usize)
+}
+
+/// Which points are sites, and which rows are those of the body.
+struct PointSites {
+    site_of_point: Vec<u32>,
+    bonds_of_site: Vec<u32>,
+    /// Points whose row is that of the body.
+    own_row: Vec<bool>,
+}
+
+impl PointSites {
+    fn of<const D: usize>(
+        model: &Model<D>,
+        operator: &dyn Operator<D>,
+        points: usize,
+        is_seam: bool,
+    ) -> Self {
+        let mut site_of_point = vec![NONE; points];
+        let mut bonds_of_site = vec![NONE; model.sites.len()];
+        let mut own_row = vec![false; points];
+        for (site, s) in model.sites.iter().enumerate() {
+            if let SiteKind::Point(point) = s.kind {
+                site_of_point[point as usize] = site as u32;
+                let is_own = is_seam || operator.is_body_row(site);
+                own_row[point as usize] = is_own;
+                if is_own || operator.has_body_bonds(site) {
+                    bonds_of_site[site] = point;
+                }
+            }
+        }
+        Self {
+            site_of_point,
+            bonds_of_site,
+            own_row,
+        }
+    }
+}
+
 impl<const D: usize> MovingBody<D> {
     pub fn new(
         model: &Model<D>,
@@ -54,19 +207,11 @@ impl<const D: usize> MovingBody<D> {
             return Ok(None);
         };
         let points = body.cloud.position.len();
-        let mut site_of_point = vec![NONE; points];
-        let mut bonds_of_site = vec![NONE; model.sites.len()];
-        let mut own_row = vec![false; points];
-        for (site, s) in model.sites.iter().enumerate() {
-            if let SiteKind::Point(point) = s.kind {
-                site_of_point[point as usize] = site as u32;
-                let is_own = seam.is_some() || operator.is_body_row(site);
-                own_row[point as usize] = is_own;
-                if is_own || operator.has_body_bonds(site) {
-                    bonds_of_site[site] = point;
-                }
-            }
-        }
+        let PointSites {
+            site_of_point,
+            bonds_of_site,
+            own_row,
+        } = PointSites::of(model, operator, points, seam.is_some());
         let is_site: Vec<bool> = site_of_point.iter().map(|&s| s != NONE).collect();
         let no_fail: Vec<bool> = (0..points)
             .into_par_iter()
@@ -98,78 +243,21 @@ impl<const D: usize> MovingBody<D> {
         } else {
             Vec::new()
         };
-        // a seam leaves some of the body's bonds out: those that stay keep their coefficients
-        let is_all_of = |i: usize| all_pass || families.of(i).len() == body.families.of(i).len();
-        let pair = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
-            true => body.kernel(i).0[k],
-            false => coefficient(body, i, families.of(i)[k]),
-        };
-        let omega = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
-            true => body.kernel(i).1[k],
-            false => omega_of(body, i, families.of(i)[k]),
-        };
-        let force = match (p.law.accelerator(), p.law.force_state()) {
-            (Some(Accelerator::Pairwise), _) => BondForce::Pairwise { coefficient: &pair },
-            (Some(Accelerator::Solid { bulk, shear }), _) => BondForce::Solid {
-                omega: &omega,
-                bulk,
-                shear,
-            },
-            (None, Some(_)) => BondForce::Law { law: &p.law, body },
-            (None, None) => return Err(SystemError::Law { law: p.law.name() }),
-        };
-        let by_bond = |i: usize, _: usize, _: &Vector<D>| {
-            let critical = behaviour.critical_stretch.as_ref();
-            critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon[i]))
-        };
-        let broken = behaviour
-            .broken
-            .filter(|b| !b.is_empty())
-            .map(|b| b.among(&body.cloud.position));
-        let pass = bond_pass(&BondSetup {
-            position: &body.cloud.position,
-            volume: &body.cloud.volume,
+        let pass = PassInput {
+            body,
+            law: &p.law,
             families,
+            is_whole: all_pass,
             rows: &is_site,
-            without_energy: seam.map_or(&[], NonlinearSeam::without_energy),
-            force,
-            kinematics: behaviour.kinematics,
-            failure: behaviour.critical_stretch.as_ref().map(|s| Failure {
-                critical: match s {
-                    Critical::Uniform(s) => CriticalStretch::Uniform(*s),
-                    Critical::ByHorizon(_) => CriticalStretch::PerBond(&by_bond),
-                },
-                no_fail: &no_fail,
-            }),
-            precracked: broken.as_ref().map(|b| b as _),
-            layout: match behaviour.storage {
-                Storage::Double => Layout::Automatic,
-                Storage::Single => Layout::List,
-            },
-            storage: behaviour.storage,
-        })?;
-        let contact = match behaviour.contact {
-            Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {
-                position: &body.cloud.position,
-                volume: &body.cloud.volume,
-                rows: &own_row,
-                spacing: model.spacing(),
-                approach: c.approach,
-                stiffness: c.stiffness / 15.0
-                    * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),
-                skin: 0.25 * model.spacing(),
-            })?)),
-            None => None,
-        };
+            no_fail: &no_fail,
+            seam,
+            behaviour,
+        }
+        .pass()?;
+        let contact = contact_of(behaviour, body, &own_row, model.spacing())?;
         let asks = |i: usize| families.of(i).iter().any(|&j| !is_site[j as usize]);
         let is_asked = contact.is_some() || (0..points).any(|i| is_site[i] && asks(i));
-        let first = site_of_point.first().copied().unwrap_or(0);
-        let shift = site_of_point
-            .iter()
-            // in 64 bits, since a first point that is no site counts on beyond NONE
-            .zip(u64::from(first)..)
-            .all(|(&site, wanted)| u64::from(site) == wanted && site != NONE)
-            .then_some(first as usize);
+        let shift = shift_of(&site_of_point);
         Ok(Some(Self {
             pass,
             critical_stretch: behaviour.critical_stretch.clone(),

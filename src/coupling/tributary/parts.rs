@@ -34,6 +34,47 @@ pub struct Parts<const D: usize> {
     quadrature: Vec<(Vector<D>, f64)>,
 }
 
+/// The cells of a lattice that the edge of a region or a void cuts, and the corners of the box around the region.
+fn marked<const D: usize>(
+    model: &Model<D>,
+    mine: &[bool],
+    cells: Cells<D>,
+    voids: &[Shape<D>],
+) -> (Marks<D>, [Vector<D>; 2]) {
+    let mesh = &model.mesh;
+    let own = || (0..mesh.cell_count()).filter(|&c| mine[c]);
+    let mut nodes: Vec<u32> = own().flat_map(|c| mesh.cell(c).iter().copied()).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let (low, high) = mesh.bounds_of(&nodes);
+    let mut marks = Marks::new(cells, &low, &high);
+    for facet in mesh.boundary_facets(own().map(|c| c as u32)) {
+        let (low, high) = mesh.bounds_of(&facet.nodes);
+        marks.mark(&low, &high);
+    }
+    marks.mark_voids(voids);
+    (marks, [low, high])
+}
+
+/// Parts of the cells of a lattice that the edge of the region cuts, from the elements `own` of the region.
+fn pieces_of<const D: usize>(
+    model: &Model<D>,
+    own: Vec<usize>,
+    marks: &Marks<D>,
+    voids: &[Shape<D>],
+    detail: Detail,
+) -> FoundCells<D> {
+    let pieces: Vec<Vec<([i32; D], Found<D>)>> = own
+        .par_iter()
+        .map(|&c| marks.pieces(model, c, voids, detail))
+        .collect();
+    let mut found = FoundCells::default();
+    for (index, piece) in pieces.into_iter().flatten() {
+        found.entry(index).or_default().take_in(piece);
+    }
+    found
+}
+
 impl<const D: usize> Parts<D> {
     /// The parts of some cells that hold points; `counts` has one entry per cell of the mesh.
     pub fn of_cells(model: &Model<D>, counts: &[bool], detail: Detail) -> Self {
@@ -261,28 +302,10 @@ impl<const D: usize> Parts<D> {
         let mesh = &model.mesh;
         let voids: &[Shape<D>] = model.peridynamics.as_ref().map_or(&[], |p| &p.voids);
         let own = || (0..mesh.cell_count()).filter(|&c| mine[c]);
-        let mut nodes: Vec<u32> = own().flat_map(|c| mesh.cell(c).iter().copied()).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        let (low, high) = mesh.bounds_of(&nodes);
-        let mut marks = Marks::new(cells, &low, &high);
-        for facet in mesh.boundary_facets(own().map(|c| c as u32)) {
-            let (low, high) = mesh.bounds_of(&facet.nodes);
-            marks.mark(&low, &high);
-        }
-        marks.mark_voids(voids);
+        let (marks, [low, high]) = marked(model, mine, cells, voids);
         let is_cut = |index: &[i32; D]| marks.is_marked(index);
         let whole = cells.spacing.powi(D as i32);
-        // cells that the edge of the region cuts
-        let pieces: Vec<Vec<([i32; D], Found<D>)>> = own()
-            .collect::<Vec<_>>()
-            .par_iter()
-            .map(|&c| marks.pieces(model, c, voids, detail))
-            .collect();
-        let mut found = FoundCells::default();
-        for (index, piece) in pieces.into_iter().flatten() {
-            found.entry(index).or_default().take_in(piece);
-        }
+        let mut found = pieces_of(model, own().collect(), &marks, voids, detail);
         let near = marks.near_marked();
         let grid = Grid::new(model, number, cells, beyond, |index| {
             detail == Detail::Quadrature || marks.number(index).is_some_and(|n| near[n])

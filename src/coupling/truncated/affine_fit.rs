@@ -406,6 +406,63 @@ pub(super) fn points_at_seam<'b, const D: usize>(
     (0..segments.site.len() as u32).filter(|&p| segments.at_seam[p as usize])
 }
 
+/// The rows of the conditions on what parts hand to dilatations.
+struct StateRows {
+    /// The second moments of each point.
+    points: FxHashMap<u32, usize>,
+    /// The forces on each site.
+    sites: FxHashMap<u32, usize>,
+    /// The second moments of each element.
+    cells: FxHashMap<u32, usize>,
+    /// Nodes, ascending.
+    order: Vec<u32>,
+    /// Rows from this one on ask for more than what is there.
+    closed: usize,
+    count: usize,
+}
+
+impl StateRows {
+    /// Of the points, nodes and elements at a seam.
+    fn of<const D: usize>(segments: &Segments<'_, D>, nodes: &FxHashMap<u32, Vector<D>>) -> Self {
+        let mut count = 0;
+        let mut rows = |size: usize| {
+            count += size;
+            count - size
+        };
+        let moments = D * (D + 1) / 2;
+        let mut points: FxHashMap<u32, usize> = FxHashMap::default();
+        let mut sites: FxHashMap<u32, usize> = FxHashMap::default();
+        for p in points_at_seam(segments) {
+            points.insert(p, rows(moments));
+            sites.insert(segments.site[p as usize], rows(D));
+        }
+        let closed = rows(0);
+        let mut order: Vec<u32> = nodes.keys().copied().collect();
+        order.sort_unstable();
+        for &site in &order {
+            sites.insert(site, rows(D));
+        }
+        let mut cells: FxHashMap<u32, usize> = FxHashMap::default();
+        for s in &segments.cut {
+            for end in &s.ends {
+                if let End::Face(foot) = end {
+                    for &c in &foot.cells {
+                        cells.entry(c).or_insert_with(|| rows(moments - 1));
+                    }
+                }
+            }
+        }
+        Self {
+            points,
+            sites,
+            cells,
+            order,
+            closed,
+            count,
+        }
+    }
+}
+
 /// Changes what parts hand to dilatations; returns what is left, relative.
 ///
 /// Conditions: the second moments of what a point is handed stay as they are, those of an element become isotropic; the forces of a uniform pressure on a point stay in balance, those on a node become its share of the
@@ -419,34 +476,14 @@ fn state_change<const D: usize>(
     let volume = segments.model.typical_volume();
     let area = segments.model.spacing().powi(D as i32 - 1);
     let over_m = D as f64 / reference.shape.trace();
-    let mut count = 0;
-    let mut rows = |size: usize| {
-        count += size;
-        count - size
-    };
-    let moments = D * (D + 1) / 2;
-    let mut points: FxHashMap<u32, usize> = FxHashMap::default();
-    let mut sites: FxHashMap<u32, usize> = FxHashMap::default();
-    for p in points_at_seam(segments) {
-        points.insert(p, rows(moments));
-        sites.insert(segments.site[p as usize], rows(D));
-    }
-    let closed = rows(0);
-    let mut order: Vec<u32> = nodes.keys().copied().collect();
-    order.sort_unstable();
-    for &site in &order {
-        sites.insert(site, rows(D));
-    }
-    let mut cells: FxHashMap<u32, usize> = FxHashMap::default();
-    for s in &segments.cut {
-        for end in &s.ends {
-            if let End::Face(foot) = end {
-                for &c in &foot.cells {
-                    cells.entry(c).or_insert_with(|| rows(moments - 1));
-                }
-            }
-        }
-    }
+    let StateRows {
+        points,
+        sites,
+        cells,
+        order,
+        closed,
+        count,
+    } = StateRows::of(segments, nodes);
     let mut conditions = Conditions::new(count);
     let mut hands = Vec::with_capacity(2 * parts.len());
     for part in parts {

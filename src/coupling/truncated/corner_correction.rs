@@ -27,6 +27,7 @@ use super::{
 use crate::{
     assembly::Row,
     coupling::bond_cutting::WholeFamily,
+    mesh::Mesh,
     tensor::{Tensor, Vector},
 };
 
@@ -45,6 +46,33 @@ pub(super) struct EdgeCorrection<const D: usize> {
 
 /// How exactly an edge has to follow the lattice.
 const ALIGNED: f64 = 1e-6;
+
+/// An edge of the faces that close a zone, with the normal and the centre of each face at it.
+type FaceEdge<const D: usize> = ([u32; 2], Vec<(Vector<D>, Vector<D>)>);
+
+/// The edges of the faces at which bonds end, by their nodes.
+fn edges_of_faces<const D: usize>(mesh: &Mesh<D>, side: &[Side]) -> Vec<FaceEdge<D>> {
+    let mut faces: HashMap<[u32; 2], Vec<(Vector<D>, Vector<D>)>> = HashMap::new();
+    let seam = mesh.interface_facets(side, &Side::Points, &Side::Element);
+    let seam = seam.into_iter().map(|facet| facet.first);
+    // where a zone ends at the boundary of the mesh, its edges there close the frame: an open string would turn under a rotation
+    let outer = mesh.outer_facets().into_iter();
+    for facet in seam.chain(outer.filter(|f| side[f.cell as usize] == Side::Points)) {
+        let area = mesh.facet_normal_area(&facet);
+        let n = &facet.nodes;
+        let centre = n.iter().map(|&n| mesh.nodes[n as usize]).sum::<Vector<D>>() / n.len() as f64;
+        for k in 0..n.len() {
+            let (a, b) = (n[k], n[(k + 1) % n.len()]);
+            faces
+                .entry([a.min(b), a.max(b)])
+                .or_default()
+                .push((area / area.norm(), centre));
+        }
+    }
+    let mut edges: Vec<_> = faces.into_iter().collect();
+    edges.sort_unstable_by_key(|e| e.0);
+    edges
+}
 
 impl<const D: usize> EdgeCorrection<D> {
     /// The strings along the edges where two faces of a zone meet at a right angle, in 3D, on a lattice that is its own mirror image in both faces.
@@ -70,26 +98,7 @@ impl<const D: usize> EdgeCorrection<D> {
         };
         let origin = &segments.body.cloud.position[first];
         let side = sides(model, lattice);
-        let mut faces: HashMap<[u32; 2], Vec<(Vector<D>, Vector<D>)>> = HashMap::new();
-        let seam = mesh.interface_facets(&side, &Side::Points, &Side::Element);
-        let seam = seam.into_iter().map(|facet| facet.first);
-        // where a zone ends at the boundary of the mesh, its edges there close the frame: an open string would turn under a rotation
-        let outer = mesh.outer_facets().into_iter();
-        for facet in seam.chain(outer.filter(|f| side[f.cell as usize] == Side::Points)) {
-            let area = mesh.facet_normal_area(&facet);
-            let n = &facet.nodes;
-            let centre =
-                n.iter().map(|&n| mesh.nodes[n as usize]).sum::<Vector<D>>() / n.len() as f64;
-            for k in 0..n.len() {
-                let (a, b) = (n[k], n[(k + 1) % n.len()]);
-                faces
-                    .entry([a.min(b), a.max(b)])
-                    .or_default()
-                    .push((area / area.norm(), centre));
-            }
-        }
-        let mut edges: Vec<_> = faces.into_iter().collect();
-        edges.sort_unstable_by_key(|e| e.0);
+        let edges = edges_of_faces(mesh, &side);
         let mut known: HashMap<bool, f64> = HashMap::new();
         for (nodes, faces) in edges {
             let [(n, _), (m, beyond)] = faces.as_slice() else {

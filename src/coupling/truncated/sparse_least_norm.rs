@@ -74,6 +74,15 @@ struct Found {
     is_far: bool,
 }
 
+/// Where Newton's method for the dual stands.
+struct DualPoint {
+    multiplier: Vec<f64>,
+    /// The changes before floors.
+    z: Vec<f64>,
+    /// What the conditions miss.
+    gap: Vec<f64>,
+}
+
 impl Conditions {
     /// For so many conditions, without a change yet.
     pub fn new(count: usize) -> Self {
@@ -335,18 +344,18 @@ impl Conditions {
     fn newton(&self, target: &[f64], floor: f64, steps: Steps) -> Found {
         let goal = 1e-15 * norm(target);
 
-        let lifted = |z: &[f64]| -> Vec<f64> {
-            let all = z.iter().enumerate();
-            all.map(|(k, z)| z.max(self.floor_of(k, floor))).collect()
-        };
+        let lifted = |z: &[f64]| self.lifted(z, floor);
         let left = |x: &[f64]| self.left(target, x);
         // the dual is below half of the square of any change that meets the conditions
         let most_change = MOST_CHANGE * floor.abs().max(1.0);
         let bound = 0.5 * self.changes() as f64 * most_change * most_change;
-        let mut multiplier = vec![0.0; self.count];
-        let mut z = vec![0.0; self.changes()];
-        let mut gap = left(&lifted(&z));
-        let mut best = (norm(&gap), z.clone());
+        let z = vec![0.0; self.changes()];
+        let mut at = DualPoint {
+            multiplier: vec![0.0; self.count],
+            gap: left(&lifted(&z)),
+            z,
+        };
+        let mut best = (norm(&at.gap), at.z.clone());
         let (most, factors) = match steps {
             Steps::Gradients { .. } => (MOST_STEPS, self.factors(|_| true)),
             Steps::Direct => (MOST_DIRECT_STEPS, None),
@@ -356,62 +365,42 @@ impl Conditions {
             if best.0 <= goal {
                 break;
             }
-            let is_free = |k: usize| z[k] >= self.floor_of(k, floor);
+            let is_free = |k: usize| at.z[k] >= self.floor_of(k, floor);
             let direction = match steps {
                 Steps::Gradients { in_step, .. } => {
                     let led_by = factors.as_ref().map(|f| (f, in_step));
-                    let (direction, iterations) = self.newton_step(&gap, is_free, led_by);
+                    let (direction, iterations) = self.newton_step(&at.gap, is_free, led_by);
                     if led_by.is_some() {
                         led += iterations;
                         is_slow = iterations >= in_step;
                     }
                     direction
                 }
-                Steps::Direct => match self.direct_step(&gap, norm(target), is_free) {
+                Steps::Direct => match self.direct_step(&at.gap, norm(target), is_free) {
                     Some(direction) => direction,
                     None => break,
                 },
             };
-            let rise = dot(&gap, &direction);
+            let rise = dot(&at.gap, &direction);
             if rise <= 0.0 {
                 // conjugate gradients found nothing that leaves less
                 break;
             }
-            let (here, was) = (self.dual(target, &multiplier, &z, floor), norm(&gap));
-            let mut step = 1.0;
-            let mut moved = false;
-            while step > 1e-4 {
-                let trial: Vec<f64> = multiplier
-                    .iter()
-                    .zip(&direction)
-                    .map(|(m, d)| m + step * d)
-                    .collect();
-                let next = self.transposed(&trial);
-                let changed = lifted(&next);
-                let remaining = left(&changed);
-                // near the end the dual is flat to round-off, the gap is not
-                if norm(&remaining) < 0.9 * was
-                    || self.dual(target, &trial, &next, floor) > here + 1e-4 * step * rise
-                {
-                    (multiplier, z, gap) = (trial, next, remaining);
-                    moved = true;
-                    break;
-                }
-                step *= 0.5;
-            }
-            if !moved {
+            let was = norm(&at.gap);
+            let Some(next) = self.line_search(target, floor, &at, &direction, rise) else {
                 break;
-            }
-            let reached = norm(&gap);
+            };
+            at = next;
+            let reached = norm(&at.gap);
             // at round-off factors gain nothing more
             let is_met = steps == Steps::Direct
                 && best.0 <= MET * norm(target)
                 && reached > STALLED * best.0;
             if reached < best.0 {
-                best = (reached, z.clone());
+                best = (reached, at.z.clone());
             }
             let is_stalled = floor == f64::NEG_INFINITY && reached > STALLED * was;
-            is_far = self.dual(target, &multiplier, &z, floor) > bound;
+            is_far = self.dual(target, &at.multiplier, &at.z, floor) > bound;
             if is_stalled
                 || is_far
                 || is_met
@@ -422,22 +411,82 @@ impl Conditions {
         }
         let (mut reached, mut z) = best;
         if let Some(factors) = &factors {
-            for _ in 0..MOST_CORRECTIONS {
-                let correction = self.transposed(&solved(factors, &left(&lifted(&z))));
-                let next: Vec<f64> = z.iter().zip(correction).map(|(z, c)| z + c).collect();
-                let remaining = norm(&left(&lifted(&next)));
-                if remaining < STALLED * reached {
-                    (reached, z) = (remaining, next);
-                } else {
-                    break;
-                }
-            }
+            (reached, z) = self.refined(factors, target, floor, (reached, z));
         }
         Found {
             left: reached,
             change: lifted(&z),
             is_far,
         }
+    }
+
+    /// Corrects changes by the factors of all conditions as long as that gains; what is left, and the changes.
+    fn refined(
+        &self,
+        factors: &Llt<usize, f64>,
+        target: &[f64],
+        floor: f64,
+        (mut reached, mut z): (f64, Vec<f64>),
+    ) -> (f64, Vec<f64>) {
+            for _ in 0..MOST_CORRECTIONS {
+                let correction = self.transposed(&solved(
+                    factors,
+                    &self.left(target, &self.lifted(&z, floor)),
+                ));
+                let next: Vec<f64> = z.iter().zip(correction).map(|(z, c)| z + c).collect();
+                let remaining = norm(&self.left(target, &self.lifted(&next, floor)));
+                if remaining < STALLED * reached {
+                    (reached, z) = (remaining, next);
+                } else {
+                    break;
+                }
+            }
+        (reached, z)
+    }
+
+    /// A change of each number, no lower than its floor.
+    fn lifted(&self, z: &[f64], floor: f64) -> Vec<f64> {
+        let all = z.iter().enumerate();
+        all.map(|(k, z)| z.max(self.floor_of(k, floor))).collect()
+    }
+
+    /// Halves the step along a `direction` until the dual rises by a part of what its slope `rise` promises, or the gap falls; none where it never does.
+    fn line_search(
+        &self,
+        target: &[f64],
+        floor: f64,
+        at: &DualPoint,
+        direction: &[f64],
+        rise: f64,
+    ) -> Option<DualPoint> {
+        let (here, was) = (
+            self.dual(target, &at.multiplier, &at.z, floor),
+            norm(&at.gap),
+        );
+        let mut step = 1.0;
+        while step > 1e-4 {
+            let trial: Vec<f64> = at
+                .multiplier
+                .iter()
+                .zip(direction)
+                .map(|(m, d)| m + step * d)
+                .collect();
+            let next = self.transposed(&trial);
+            let changed = self.lifted(&next, floor);
+            let remaining = self.left(target, &changed);
+            // near the end the dual is flat to round-off, the gap is not
+            if norm(&remaining) < 0.9 * was
+                || self.dual(target, &trial, &next, floor) > here + 1e-4 * step * rise
+            {
+                return Some(DualPoint {
+                    multiplier: trial,
+                    z: next,
+                    gap: remaining,
+                });
+            }
+            step *= 0.5;
+        }
+        None
     }
 
     /// Solves the normal equations of the changes off the floor as far as their residual falls; the factors of those of all changes that `led_by` has make that a matter of few iterations, and it has the most of them. Returns how many it took.

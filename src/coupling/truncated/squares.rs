@@ -249,6 +249,17 @@ fn system<const D: usize>(
         conditions.close();
     }
     conditions.free_from_here();
+    add_shifts(&mut conditions, segments, shifts, &rows, count);
+    (conditions, target)
+}
+/// Adds the columns of shifts along faces.
+fn add_shifts<const D: usize>(
+    conditions: &mut Conditions,
+    segments: &Segments<'_, D>,
+    shifts: &[Shift],
+    rows: &FxHashMap<u32, usize>,
+    count: usize,
+) {
     for shift in shifts {
         let part = Part::Piece(shift.piece);
         let shape = part.shape(segments);
@@ -265,7 +276,6 @@ fn system<const D: usize>(
         }
         conditions.close();
     }
-    (conditions, target)
 }
 
 /// Gives the parts their factors.
