@@ -108,6 +108,34 @@ fn check_cell<const D: usize>(mesh: &Mesh<D>, c: usize) -> Result<(), FemError> 
     Ok(())
 }
 
+/// Where each block row begins, and the columns of its blocks: nodes of the cells around a node that are part of the body.
+fn columns_of_rows<'a, const D: usize>(
+    mesh: &Mesh<D>,
+    cells_of: impl Fn(usize) -> &'a [u32] + Sync,
+    is_part: impl Fn(u32) -> bool + Sync,
+) -> (Vec<usize>, Vec<u32>) {
+    let count = mesh.nodes.len();
+    let columns: Vec<Vec<u32>> = (0..count)
+        .into_par_iter()
+        .map(|n| {
+            let mut columns: Vec<u32> = cells_of(n)
+                .iter()
+                .filter(|&&c| is_part(c))
+                .flat_map(|&c| mesh.cell(c as usize).iter().copied())
+                .collect();
+            columns.sort_unstable();
+            columns.dedup();
+            columns
+        })
+        .collect();
+    let mut row_offsets = vec![0usize; count + 1];
+    for n in 0..count {
+        row_offsets[n + 1] = row_offsets[n] + columns[n].len();
+    }
+    let columns: Vec<u32> = columns.into_iter().flatten().collect();
+    (row_offsets, columns)
+}
+
 /// The stiffness of a body: one block row per node of the mesh, `K u = f_external`.
 ///
 /// `tangent` gives each cell's stiffness tensor \[Pa\], or `None` for a cell that is no part of the body. Rows of nodes
@@ -124,24 +152,8 @@ pub fn assemble<'a, const D: usize>(
     let count = mesh.nodes.len();
     let (offsets, cells) = mesh.node_cells();
     let cells_of = |n: usize| &cells[offsets[n] as usize..offsets[n + 1] as usize];
-    let columns: Vec<Vec<u32>> = (0..count)
-        .into_par_iter()
-        .map(|n| {
-            let mut columns: Vec<u32> = cells_of(n)
-                .iter()
-                .filter(|&&c| tangent(c as usize).is_some())
-                .flat_map(|&c| mesh.cell(c as usize).iter().copied())
-                .collect();
-            columns.sort_unstable();
-            columns.dedup();
-            columns
-        })
-        .collect();
-    let mut row_offsets = vec![0usize; count + 1];
-    for n in 0..count {
-        row_offsets[n + 1] = row_offsets[n] + columns[n].len();
-    }
-    let columns: Vec<u32> = columns.into_iter().flatten().collect();
+    let is_part = |c: u32| tangent(c as usize).is_some();
+    let (row_offsets, columns) = columns_of_rows(mesh, cells_of, is_part);
 
     let mut values = vec![0.0; columns.len() * D * D];
     let mut tasks: Vec<(usize, &mut [f64])> = Vec::new();

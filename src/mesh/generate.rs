@@ -39,6 +39,65 @@ pub enum Axis {
     Coordinates(Vec<f64>),
 }
 
+/// Coordinates with a constant `spacing` in the fine interval from `a` to `b`, that grow by a ratio up to the largest size on both sides.
+fn graded_coordinates(
+    [min, max]: [f64; 2],
+    [a, b]: [f64; 2],
+    spacing: f64,
+    ratio: f64,
+    largest: f64,
+) -> Result<Vec<f64>, String> {
+    check_ends(min, max)?;
+    if !(min <= a && a < b && b <= max) {
+        return Err(format!(
+            "the fine interval [{a}, {b}] must lie within [{min}, {max}] and have a length"
+        ));
+    }
+    if !(spacing > 0.0 && spacing.is_finite()) {
+        return Err(format!("spacing = {spacing}; it must be positive"));
+    }
+    if !(ratio >= 1.0 && ratio.is_finite()) {
+        return Err(format!("growth ratio = {ratio}; it must be at least 1"));
+    }
+    if largest.is_nan() || largest < spacing {
+        return Err(format!(
+            "the largest size {largest} is below the spacing {spacing}; make it larger"
+        ));
+    }
+    let count = ((b - a) / spacing).round();
+    if (count * spacing - (b - a)).abs() > 1e-6 * spacing || count < 1.0 {
+        return Err(format!(
+            "the fine interval [{a}, {b}] is {:.6} spacings of {spacing} long; make it a whole number",
+            (b - a) / spacing
+        ));
+    }
+    let count = count as usize;
+    let first = (a / spacing).round();
+    let on_multiples = (first * spacing - a).abs() <= 1e-6 * spacing;
+    let mut x: Vec<f64> = graded(a - min, spacing, ratio, largest)?
+        .into_iter()
+        .map(|d| a - d)
+        .rev()
+        .collect();
+    x.push(a);
+    x.extend((1..count).map(|i| {
+        if on_multiples {
+            (first + i as f64) * spacing
+        } else {
+            between(a, b, i, count)
+        }
+    }));
+    x.push(b);
+    x.extend(
+        graded(max - b, spacing, ratio, largest)?
+            .into_iter()
+            .map(|d| b + d),
+    );
+    let last = x.len() - 1;
+    (x[0], x[last]) = (min, max);
+    Ok(x)
+}
+
 impl Axis {
     /// The coordinates, strictly increasing, with both ends exact.
     ///
@@ -62,57 +121,7 @@ impl Axis {
                 spacing,
                 ratio,
                 largest,
-            } => {
-                check_ends(*min, *max)?;
-                if !(min <= a && a < b && b <= max) {
-                    return Err(format!(
-                        "the fine interval [{a}, {b}] must lie within [{min}, {max}] and have a length"
-                    ));
-                }
-                if !(*spacing > 0.0 && spacing.is_finite()) {
-                    return Err(format!("spacing = {spacing}; it must be positive"));
-                }
-                if !(*ratio >= 1.0 && ratio.is_finite()) {
-                    return Err(format!("growth ratio = {ratio}; it must be at least 1"));
-                }
-                if largest.is_nan() || largest < spacing {
-                    return Err(format!(
-                        "the largest size {largest} is below the spacing {spacing}; make it larger"
-                    ));
-                }
-                let count = ((b - a) / spacing).round();
-                if (count * spacing - (b - a)).abs() > 1e-6 * spacing || count < 1.0 {
-                    return Err(format!(
-                        "the fine interval [{a}, {b}] is {:.6} spacings of {spacing} long; make it a whole number",
-                        (b - a) / spacing
-                    ));
-                }
-                let count = count as usize;
-                let first = (a / spacing).round();
-                let on_multiples = (first * spacing - a).abs() <= 1e-6 * spacing;
-                let mut x: Vec<f64> = graded(a - min, *spacing, *ratio, *largest)?
-                    .into_iter()
-                    .map(|d| a - d)
-                    .rev()
-                    .collect();
-                x.push(*a);
-                x.extend((1..count).map(|i| {
-                    if on_multiples {
-                        (first + i as f64) * spacing
-                    } else {
-                        between(*a, *b, i, count)
-                    }
-                }));
-                x.push(*b);
-                x.extend(
-                    graded(max - b, *spacing, *ratio, *largest)?
-                        .into_iter()
-                        .map(|d| b + d),
-                );
-                let last = x.len() - 1;
-                (x[0], x[last]) = (*min, *max);
-                Ok(x)
-            }
+            } => graded_coordinates([*min, *max], [*a, *b], *spacing, *ratio, *largest),
             Self::Coordinates(x) => {
                 if x.len() < 2 {
                     return Err(format!("{} coordinates; give at least 2", x.len()));

@@ -123,6 +123,29 @@ impl Default for RawMesh {
     }
 }
 
+/// Cells by their sorted nodes, with the groups that name them.
+type KnownCells = HashMap<[u32; 8], (u32, HashSet<u32>)>;
+
+/// Sorts the sets of cells and nodes, and leaves one of equal entries in each set.
+fn sort_sets<const D: usize>(mesh: &mut Mesh<D>) {
+    for set in mesh
+        .cell_sets
+        .values_mut()
+        .chain(mesh.node_sets.values_mut())
+    {
+        set.sort_unstable();
+        set.dedup();
+    }
+    for set in mesh.facet_sets.values_mut() {
+        let mut seen = HashSet::new();
+        set.retain(|facet| {
+            let mut key: Facet = facet.clone();
+            key.sort_unstable();
+            seen.insert(key)
+        });
+    }
+}
+
 impl RawMesh {
     pub(super) fn dimension(&self, source: &Source) -> Result<usize, MeshError> {
         let found = self.elements.iter().map(|e| e.shape.dimension()).max();
@@ -161,49 +184,15 @@ impl RawMesh {
             ..Mesh::default()
         };
         // a 2.2 file repeats an element for each of its groups
-        let mut known: HashMap<[u32; 8], (u32, HashSet<u32>)> = HashMap::new();
+        let mut known: KnownCells = HashMap::new();
         let mut nodes: Vec<u32> = Vec::with_capacity(8);
         for element in &self.elements {
             nodes.clear();
-            let tags = &self.element_nodes[element.start..][..element.shape.node_count()];
-            for tag in tags {
-                let Some(&n) = numbers.get(tag) else {
-                    return Err(MeshError::MissingNode {
-                        path: path(),
-                        place: source.place(element.at),
-                        element: element.tag,
-                        node: *tag,
-                    });
-                };
-                nodes.push(n);
-            }
+            self.find_nodes(element, &numbers, source, &mut nodes)?;
             let names = &self.groups[element.group as usize];
             let dimension = element.shape.dimension();
             if dimension == D {
-                let mut key = [u32::MAX; 8];
-                key[..nodes.len()].copy_from_slice(&nodes);
-                key.sort_unstable();
-                let cell = match known.entry(key) {
-                    Entry::Vacant(slot) => {
-                        let cell = mesh.cell_count() as u32;
-                        slot.insert((cell, HashSet::from([element.group])));
-                        mesh.push_cell(element.shape, &nodes);
-                        cell
-                    }
-                    Entry::Occupied(mut slot) => {
-                        let (cell, groups) = slot.get_mut();
-                        if !groups.insert(element.group) {
-                            let first = self.cell_tag(D, *cell as usize);
-                            return Err(MeshError::DuplicateElement {
-                                path: path(),
-                                place: source.place(element.at),
-                                element: element.tag,
-                                first,
-                            });
-                        }
-                        *cell
-                    }
-                };
+                let cell = self.cell_of(element, &nodes, source, &mut known, &mut mesh)?;
                 for name in names {
                     mesh.cell_sets.entry(name.clone()).or_default().push(cell);
                 }
@@ -220,26 +209,76 @@ impl RawMesh {
             }
         }
         self.check_plane(&mesh, source)?;
-        for set in mesh
-            .cell_sets
-            .values_mut()
-            .chain(mesh.node_sets.values_mut())
-        {
-            set.sort_unstable();
-            set.dedup();
-        }
-        for set in mesh.facet_sets.values_mut() {
-            let mut seen = HashSet::new();
-            set.retain(|facet| {
-                let mut key: Facet = facet.clone();
-                key.sort_unstable();
-                seen.insert(key)
-            });
-        }
+        sort_sets(&mut mesh);
         let all = (0..mesh.cell_count() as u32).collect();
         mesh.cell_sets.entry("all".into()).or_insert(all);
         mesh.drop_unused_nodes();
         Ok(mesh)
+    }
+
+    /// The numbers of an element's nodes.
+    ///
+    /// # Errors
+    /// [`MeshError::MissingNode`].
+    fn find_nodes(
+        &self,
+        element: &RawElement,
+        numbers: &HashMap<u64, u32>,
+        source: &Source,
+        nodes: &mut Vec<u32>,
+    ) -> Result<(), MeshError> {
+        let tags = &self.element_nodes[element.start..][..element.shape.node_count()];
+        for tag in tags {
+            let Some(&n) = numbers.get(tag) else {
+                return Err(MeshError::MissingNode {
+                    path: source.path.clone(),
+                    place: source.place(element.at),
+                    element: element.tag,
+                    node: *tag,
+                });
+            };
+            nodes.push(n);
+        }
+        Ok(())
+    }
+
+    /// The cell of an element: a new one, or one that an earlier group has made.
+    ///
+    /// # Errors
+    /// [`MeshError::DuplicateElement`].
+    fn cell_of<const D: usize>(
+        &self,
+        element: &RawElement,
+        nodes: &[u32],
+        source: &Source,
+        known: &mut KnownCells,
+        mesh: &mut Mesh<D>,
+    ) -> Result<u32, MeshError> {
+        let mut key = [u32::MAX; 8];
+        key[..nodes.len()].copy_from_slice(nodes);
+        key.sort_unstable();
+        let cell = match known.entry(key) {
+            Entry::Vacant(slot) => {
+                let cell = mesh.cell_count() as u32;
+                slot.insert((cell, HashSet::from([element.group])));
+                mesh.push_cell(element.shape, nodes);
+                cell
+            }
+            Entry::Occupied(mut slot) => {
+                let (cell, groups) = slot.get_mut();
+                if !groups.insert(element.group) {
+                    let first = self.cell_tag(D, *cell as usize);
+                    return Err(MeshError::DuplicateElement {
+                        path: source.path.clone(),
+                        place: source.place(element.at),
+                        element: element.tag,
+                        first,
+                    });
+                }
+                *cell
+            }
+        };
+        Ok(cell)
     }
 
     /// Number of each node tag; refuses a tag that comes twice and coordinates that are no numbers.

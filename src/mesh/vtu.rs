@@ -78,6 +78,37 @@ pub(super) fn parse<'a>(
     Ok((grids?, file.source))
 }
 
+/// Hands on `count` numbers that are written as words.
+fn each_word(
+    text: &[u8],
+    kind: Kind,
+    count: u64,
+    named: &dyn Fn(String, &str) -> MeshError,
+    take: &mut dyn FnMut(Number) -> Result<(), String>,
+) -> Result<(), MeshError> {
+    let mut found = 0u64;
+    for word in text
+        .split(u8::is_ascii_whitespace)
+        .filter(|w| !w.is_empty())
+    {
+        let number = std::str::from_utf8(word).ok().and_then(|w| kind.parse(w));
+        let Some(number) = number else {
+            let word: String = String::from_utf8_lossy(word).chars().take(40).collect();
+            return Err(named(format!("\"{word}\""), "a number"));
+        };
+        found += 1;
+        if found > count {
+            break;
+        }
+        take(number).map_err(|e| named(e, "a number that fits the grid"))?;
+    }
+    if found == count {
+        return Ok(());
+    }
+    let more = if found > count { "more" } else { "fewer" };
+    Err(named(format!("{more} numbers"), &format!("{count}")))
+}
+
 impl<'a> File<'a> {
     fn pieces(&mut self) -> Result<Vec<Piece<'a>>, MeshError> {
         let bytes = self.source.bytes;
@@ -355,27 +386,7 @@ impl<'a> File<'a> {
         };
         let mut data = match &array.content {
             Content::Text(text) => {
-                let mut found = 0u64;
-                for word in text
-                    .split(u8::is_ascii_whitespace)
-                    .filter(|w| !w.is_empty())
-                {
-                    let number = std::str::from_utf8(word).ok().and_then(|w| kind.parse(w));
-                    let Some(number) = number else {
-                        let word: String = String::from_utf8_lossy(word).chars().take(40).collect();
-                        return Err(named(format!("\"{word}\""), "a number"));
-                    };
-                    found += 1;
-                    if found > count {
-                        break;
-                    }
-                    take(number).map_err(|e| named(e, "a number that fits the grid"))?;
-                }
-                if found == count {
-                    return Ok(());
-                }
-                let more = if found > count { "more" } else { "fewer" };
-                return Err(named(format!("{more} numbers"), &format!("{count}")));
+                return each_word(text, kind, count, &named, take);
             }
             Content::Base64(text) => Data::base64(text),
             Content::Appended(offset) => {

@@ -242,13 +242,9 @@ pub fn bytes_text(bytes: u64) -> String {
     }
 }
 
-impl fmt::Display for RunSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "{} ({}D, coupling: {})\n",
-            self.scene, self.dimension, self.coupling
-        )?;
+impl RunSummary {
+    /// The table of sizes.
+    fn write_sizes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let s = &self.sizes;
         let mut grid = vec![vec!["size".to_owned(), "number".to_owned()]];
         for (name, value) in [
@@ -267,6 +263,35 @@ impl fmt::Display for RunSummary {
             grid.push(vec![name.to_owned(), grouped(value)]);
         }
         writeln!(f, "{}", aligned(&grid))?;
+        Ok(())
+    }
+
+    /// How well a static solution meets equilibrium.
+    fn write_balance(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "relative residual      {} after {} iteration(s)",
+            number(self.residual),
+            self.iterations
+        )?;
+        writeln!(
+            f,
+            "out-of-balance force   {} relative to the sum of nodal loads and reactions ({})",
+            number(self.out_of_balance_relative),
+            components(&self.out_of_balance_force)
+        )?;
+        Ok(())
+    }
+}
+
+impl fmt::Display for RunSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} ({}D, coupling: {})\n",
+            self.scene, self.dimension, self.coupling
+        )?;
+        self.write_sizes(f)?;
         if !self.choices.is_empty() {
             for c in &self.choices {
                 writeln!(f, "chosen: {} ({})", c.choice, c.why)?;
@@ -287,20 +312,7 @@ impl fmt::Display for RunSummary {
         }
         match &self.motion {
             Some(motion) => motion.write(self.dimension, f)?,
-            None => {
-                writeln!(
-                    f,
-                    "relative residual      {} after {} iteration(s)",
-                    number(self.residual),
-                    self.iterations
-                )?;
-                writeln!(
-                    f,
-                    "out-of-balance force   {} relative to the sum of nodal loads and reactions ({})",
-                    number(self.out_of_balance_relative),
-                    components(&self.out_of_balance_force)
-                )?;
-            }
+            None => self.write_balance(f)?,
         }
         if let Some(energy) = self.energy {
             writeln!(f, "stored energy          {}", number(energy))?;

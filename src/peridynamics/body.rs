@@ -79,6 +79,33 @@ pub enum Factors<'a, const D: usize> {
     OfFamily(&'a FamilyFactors<'a>),
 }
 
+impl<const D: usize> Scratch<D> {
+    /// The kernel factors of the bonds of a point.
+    fn fill_factors(
+        &mut self,
+        i: usize,
+        factors: &Factors<'_, D>,
+        law: &dyn LinearForceState<D>,
+        horizon: f64,
+    ) -> Result<(), PdError> {
+        self.factors.clear();
+        match factors {
+            Factors::Plain => self.factors.resize(self.bonds.len(), 1.0),
+            Factors::Shells(f) => {
+                self.factors
+                    .extend(self.bonds.iter().map(|xi| f(horizon, xi)));
+            }
+            Factors::Fitted => {
+                let bonds = self.bonds.iter().copied().zip(self.volumes.iter().copied());
+                let bonds: Vec<(Vector<D>, f64)> = bonds.collect();
+                self.factors.extend(fitted(law, &bonds, horizon)?);
+            }
+            Factors::OfFamily(f) => self.factors.extend(f(i)?),
+        }
+        Ok(())
+    }
+}
+
 impl<const D: usize> PdBody<D> {
     /// Builds the coefficients of all bonds.
     ///
@@ -128,19 +155,7 @@ impl<const D: usize> PdBody<D> {
                 );
                 of.volumes.clear();
                 of.volumes.extend(family.map(|j| cloud.volume[j]));
-                of.factors.clear();
-                match factors {
-                    Factors::Plain => of.factors.resize(of.bonds.len(), 1.0),
-                    Factors::Shells(f) => {
-                        of.factors.extend(of.bonds.iter().map(|xi| f(horizon, xi)));
-                    }
-                    Factors::Fitted => {
-                        let bonds = of.bonds.iter().copied().zip(of.volumes.iter().copied());
-                        let bonds: Vec<(Vector<D>, f64)> = bonds.collect();
-                        of.factors.extend(fitted(law, &bonds, horizon).map_err(at)?);
-                    }
-                    Factors::OfFamily(f) => of.factors.extend(f(i).map_err(at)?),
-                }
+                of.fill_factors(i, factors, law, horizon).map_err(at)?;
                 law.coefficients(
                     &Family {
                         bonds: &of.bonds,

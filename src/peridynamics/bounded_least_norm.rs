@@ -30,6 +30,73 @@ pub struct NotMet {
     pub(crate) unbounded_met: bool,
 }
 
+/// The step along a `direction` of the given slope, halved until the dual falls enough.
+fn step_length(
+    dual: &dyn Fn(&DVector<f64>) -> f64,
+    mu: &DVector<f64>,
+    direction: &DVector<f64>,
+    slope: f64,
+) -> f64 {
+    let mut length = 1.0;
+    let start = dual(mu);
+    while length > 1e-6 && dual(&(mu + direction * length)) > start - 1e-4 * length * slope {
+        length *= 0.5;
+    }
+    length
+}
+
+/// The magnitude of the terms of each condition, that it is judged against.
+fn scales(rows: &DMatrix<f64>, shares: &[f64], missing: &DVector<f64>) -> DVector<f64> {
+    DVector::from_fn(rows.nrows(), |c, _| {
+        let terms: f64 = shares
+            .iter()
+            .enumerate()
+            .map(|(k, d)| d * rows[(c, k)].abs())
+            .sum();
+        terms.max(missing[c].abs()).max(f64::MIN_POSITIVE)
+    })
+}
+
+/// What multipliers lead to.
+struct Trial {
+    /// The change of each bond.
+    change: Vec<f64>,
+    /// What each condition misses then.
+    residual: DVector<f64>,
+    /// Bonds that are off the bound.
+    off: Vec<bool>,
+}
+
+impl Trial {
+    /// At the multipliers `mu`, with changes no lower than the limit.
+    fn at(
+        mu: &DVector<f64>,
+        rows: &DMatrix<f64>,
+        shares: &[f64],
+        missing: &DVector<f64>,
+        limit: f64,
+    ) -> Self {
+        let mut change = vec![0.0; shares.len()];
+        let mut residual = missing.clone();
+        let mut off = vec![false; shares.len()];
+        for (k, &d) in shares.iter().enumerate() {
+            if d == 0.0 {
+                continue;
+            }
+            let t = rows.column(k).dot(mu);
+            change[k] = t.max(limit);
+            let b = rows.column(k);
+            residual.axpy(-d * change[k], &b, 1.0);
+            off[k] = t > limit;
+        }
+        Self {
+            change,
+            residual,
+            off,
+        }
+    }
+}
+
 /// Minimises `½ Σ d Δ²` subject to `Σ_k b_ck d_k Δ_k = missing_c` and `1 + Δ ≥ bound`; `rows` holds b, `shares` d.
 ///
 /// The dual is smooth: `Δ_k = max(l, Σ_c b_ck μ_c)`. Newton's method with the normal equations of the bonds off the bound and a step
@@ -40,7 +107,6 @@ pub fn least_change(
     missing: &DVector<f64>,
     bound: Bound,
 ) -> Result<Vec<f64>, NotMet> {
-    let conditions = rows.nrows();
     let limit = match bound {
         Bound::Free => f64::NEG_INFINITY,
         Bound::AtLeast(least) => least - 1.0,
@@ -61,34 +127,18 @@ pub fn least_change(
             .sum();
         sum - mu.dot(missing)
     };
-    // A condition is judged against the magnitude of its own terms.
-    let scales = DVector::from_fn(conditions, |c, _| {
-        let terms: f64 = shares
-            .iter()
-            .enumerate()
-            .map(|(k, d)| d * rows[(c, k)].abs())
-            .sum();
-        terms.max(missing[c].abs()).max(f64::MIN_POSITIVE)
-    });
-    let mut mu = DVector::zeros(conditions);
+    let scales = scales(rows, shares, missing);
+    let mut mu = DVector::zeros(rows.nrows());
     let mut best: Option<(f64, Vec<f64>)> = None;
     let mut full_rank = 0;
     // The normal equations, kept while the same bonds are off the bound.
     let mut solved_for: Option<(Vec<bool>, Normal)> = None;
     for step in 0..MOST_STEPS {
-        let mut change = vec![0.0; shares.len()];
-        let mut residual = missing.clone();
-        let mut off = vec![false; shares.len()];
-        for (k, &d) in shares.iter().enumerate() {
-            if d == 0.0 {
-                continue;
-            }
-            let t = free_change(&mu, k);
-            change[k] = t.max(limit);
-            let b = rows.column(k);
-            residual.axpy(-d * change[k], &b, 1.0);
-            off[k] = t > limit;
-        }
+        let Trial {
+            change,
+            residual,
+            off,
+        } = Trial::at(&mu, rows, shares, missing, limit);
         let miss = residual.component_div(&scales).amax();
         let previous = best.as_ref().map(|(m, _)| *m);
         if best.is_none() || previous.is_some_and(|m| miss < m) {
@@ -112,17 +162,11 @@ pub fn least_change(
             break;
         };
         let direction = normal.solve(&residual);
-        let mut length = 1.0;
         // Near the solution rounding hides the fall of the dual, and the full step is right.
-        if bound != Bound::Free && miss > 1e-8 {
-            let slope = residual.dot(&direction);
-            let start = dual(&mu);
-            while length > 1e-6
-                && dual(&(&mu + &direction * length)) > start - 1e-4 * length * slope
-            {
-                length *= 0.5;
-            }
-        }
+        let length = match bound != Bound::Free && miss > 1e-8 {
+            true => step_length(&dual, &mu, &direction, residual.dot(&direction)),
+            false => 1.0,
+        };
         mu.axpy(length, &direction, 1.0);
         if bound == Bound::Free && step >= 3 {
             break;

@@ -36,41 +36,51 @@ pub(super) struct Grid<const D: usize> {
     numbers: Vec<u32>,
 }
 
+/// Refuses lists whose lengths do not fit, and numbers that are no positions or horizons.
+fn check<const D: usize>(
+    cloud: &[Vector<D>],
+    queries: &[Vector<D>],
+    horizons: &[f64],
+) -> Result<(), FamilyError> {
+    if cloud.len() >= u32::MAX as usize || queries.len() >= u32::MAX as usize {
+        return Err(FamilyError::Length {
+            what: "the list of points",
+            length: cloud.len().max(queries.len()),
+            wanted: "more than 32-bit point numbers reach; split the model",
+        });
+    }
+    if horizons.len() != queries.len() {
+        return Err(FamilyError::Length {
+            what: "the list of horizons",
+            length: horizons.len(),
+            wanted: "not one per point",
+        });
+    }
+    for (list, points) in [("point", cloud), ("query", queries)] {
+        if let Some(i) = points.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
+            return Err(FamilyError::Position {
+                list,
+                point: i,
+                position: points[i].iter().copied().collect(),
+            });
+        }
+    }
+    if let Some(i) = horizons.iter().position(|d| !(d.is_finite() && *d > 0.0)) {
+        return Err(FamilyError::Horizon {
+            point: i,
+            horizon: horizons[i],
+        });
+    }
+    Ok(())
+}
+
 impl<const D: usize> Grid<D> {
     pub(super) fn new(
         cloud: &[Vector<D>],
         queries: &[Vector<D>],
         horizons: &[f64],
     ) -> Result<Self, FamilyError> {
-        if cloud.len() >= u32::MAX as usize || queries.len() >= u32::MAX as usize {
-            return Err(FamilyError::Length {
-                what: "the list of points",
-                length: cloud.len().max(queries.len()),
-                wanted: "more than 32-bit point numbers reach; split the model",
-            });
-        }
-        if horizons.len() != queries.len() {
-            return Err(FamilyError::Length {
-                what: "the list of horizons",
-                length: horizons.len(),
-                wanted: "not one per point",
-            });
-        }
-        for (list, points) in [("point", cloud), ("query", queries)] {
-            if let Some(i) = points.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
-                return Err(FamilyError::Position {
-                    list,
-                    point: i,
-                    position: points[i].iter().copied().collect(),
-                });
-            }
-        }
-        if let Some(i) = horizons.iter().position(|d| !(d.is_finite() && *d > 0.0)) {
-            return Err(FamilyError::Horizon {
-                point: i,
-                horizon: horizons[i],
-            });
-        }
+        check(cloud, queries, horizons)?;
 
         let low = cloud.iter().skip(1).fold(
             cloud.first().copied().unwrap_or_else(Vector::zeros),

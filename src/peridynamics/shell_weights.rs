@@ -159,6 +159,38 @@ pub enum ShellError {
     },
 }
 
+/// The refusal of a number that nothing can be done with.
+fn refusal(what: &'static str, value: f64, wanted: &'static str) -> ShellError {
+    ShellError::Input {
+        what,
+        value,
+        wanted,
+    }
+}
+
+/// Refuses a spacing and kernel values that are not those of a lattice.
+fn check_input<const D: usize>(
+    lattice: &LatticeFamily<D>,
+    spacing: f64,
+    base: &[f64],
+) -> Result<(), ShellError> {
+    let refuse = |what, value, wanted| Err(refusal(what, value, wanted));
+    if !(spacing.is_finite() && spacing > 0.0) {
+        return refuse("the spacing", spacing, "positive");
+    }
+    if base.len() != lattice.shells.len() {
+        return refuse(
+            "the number of kernel values",
+            base.len() as f64,
+            "one per shell",
+        );
+    }
+    if let Some(&g) = base.iter().find(|g| !(g.is_finite() && **g >= 0.0)) {
+        return refuse("a shell's kernel value", g, "not negative");
+    }
+    Ok(())
+}
+
 /// Factors `w`, one per shell, for which `Σ w g ξ⊗ξ⊗ξ⊗ξ V` on the lattice is isotropic and Cauchy-symmetric.
 ///
 /// `base` holds `g(|ξ|)` of each shell (bond-based: λ; LPS: `ω/|ξ|²`), `spacing` is h, `V = h^D`. The factors minimise
@@ -176,26 +208,7 @@ pub fn isotropic_shell_factors<const D: usize>(
     base: &[f64],
     target: ShellTarget,
 ) -> Result<Vec<f64>, ShellError> {
-    let refuse = |what, value, wanted| {
-        Err(ShellError::Input {
-            what,
-            value,
-            wanted,
-        })
-    };
-    if !(spacing.is_finite() && spacing > 0.0) {
-        return refuse("the spacing", spacing, "positive");
-    }
-    if base.len() != lattice.shells.len() {
-        return refuse(
-            "the number of kernel values",
-            base.len() as f64,
-            "one per shell",
-        );
-    }
-    if let Some(&g) = base.iter().find(|g| !(g.is_finite() && **g >= 0.0)) {
-        return refuse("a shell's kernel value", g, "not negative");
-    }
+    check_input(lattice, spacing, base)?;
     let shares: Vec<f64> = lattice
         .shells
         .iter()
@@ -205,7 +218,7 @@ pub fn isotropic_shell_factors<const D: usize>(
     // Plus zero turns −0 into 0, for the message.
     let trace = shares.iter().sum::<f64>() + 0.0;
     if !(trace.is_finite() && trace > 0.0) {
-        return refuse("the sum of the shells' weights", trace, "positive");
+        return Err(refusal("the sum of the shells' weights", trace, "positive"));
     }
     let scale = match target {
         ShellTarget::Isotropy => 1.0,
@@ -213,7 +226,7 @@ pub fn isotropic_shell_factors<const D: usize>(
             let d = D as f64;
             t * d * (d + 2.0) / 3.0 / (trace * spacing.powi(D as i32))
         }
-        ShellTarget::Strength(t) => return refuse("the wanted strength", t, "positive"),
+        ShellTarget::Strength(t) => return Err(refusal("the wanted strength", t, "positive")),
     };
     // Isotropy, and the trace kept: what scale leaves is a change of the shells against one another.
     let conditions = if D == 1 { 0 } else { 2 };

@@ -126,6 +126,52 @@ fn subtract_lower(target: MatMut<'_, f64>, factor: MatRef<'_, f64>) {
     }
 }
 
+/// `L21 ← A21 U11⁻¹`, `upper ← L11⁻¹ P A12`, `schur ← schur − L21 U12`, with the factors of the pivot block.
+fn eliminate(
+    panel: &mut [f64],
+    upper: &mut [f64],
+    schur: &mut [f64],
+    permutation: &[u32],
+    p: usize,
+    r: usize,
+) {
+    let height = p + r;
+    if r == 0 || p == 0 {
+        return;
+    }
+    let (diagonal, mut below) = view_mut(panel, height, p).split_at_row_mut(p);
+    let diagonal = diagonal.into_const();
+    below.as_mut().par_row_chunks_mut(TILE).for_each(|rows| {
+        // L21 U11 = A21, transposed
+        solve_lower_triangular_in_place(diagonal.transpose(), rows.transpose_mut(), Par::Seq);
+    });
+    let below = below.into_const();
+    upper
+        .par_chunks_mut(TILE * p)
+        .zip(schur.par_chunks_mut(TILE * r))
+        .for_each(|(columns, target)| {
+            let mut scratch = Vec::with_capacity(p);
+            columns.chunks_mut(p).for_each(|column| {
+                scratch.clear();
+                scratch.extend_from_slice(column);
+                for (i, &from) in permutation.iter().enumerate() {
+                    column[i] = scratch[from as usize];
+                }
+            });
+            let count = columns.len() / p;
+            let mut columns = view_mut(columns, p, count);
+            solve_unit_lower_triangular_in_place(diagonal, columns.as_mut(), Par::Seq);
+            matmul(
+                view_mut(target, r, count),
+                Accum::Add,
+                below,
+                columns.as_ref(),
+                -1.0,
+                Par::Seq,
+            );
+        });
+}
+
 /// `P [A11 A12] = L11 [U11 U12]`, `panel ← [L11\U11; L21]`, `upper ← U12`, `schur ← schur − L21 U12`.
 ///
 /// Rows are exchanged within the pivot block only (by size, that is partial pivoting); `permutation[k]` is the row
@@ -204,40 +250,7 @@ pub(crate) fn lu(
             }
         });
     }
-    if r == 0 || p == 0 {
-        return;
-    }
-    let (diagonal, mut below) = view_mut(panel, height, p).split_at_row_mut(p);
-    let diagonal = diagonal.into_const();
-    below.as_mut().par_row_chunks_mut(TILE).for_each(|rows| {
-        // L21 U11 = A21, transposed
-        solve_lower_triangular_in_place(diagonal.transpose(), rows.transpose_mut(), Par::Seq);
-    });
-    let below = below.into_const();
-    upper
-        .par_chunks_mut(TILE * p)
-        .zip(schur.par_chunks_mut(TILE * r))
-        .for_each(|(columns, target)| {
-            let mut scratch = Vec::with_capacity(p);
-            columns.chunks_mut(p).for_each(|column| {
-                scratch.clear();
-                scratch.extend_from_slice(column);
-                for (i, &from) in permutation.iter().enumerate() {
-                    column[i] = scratch[from as usize];
-                }
-            });
-            let count = columns.len() / p;
-            let mut columns = view_mut(columns, p, count);
-            solve_unit_lower_triangular_in_place(diagonal, columns.as_mut(), Par::Seq);
-            matmul(
-                view_mut(target, r, count),
-                Accum::Add,
-                below,
-                columns.as_ref(),
-                -1.0,
-                Par::Seq,
-            );
-        });
+    eliminate(panel, upper, schur, permutation, p, r);
 }
 
 #[cfg(test)]

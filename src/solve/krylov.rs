@@ -175,6 +175,21 @@ pub fn conjugate_gradients(
     })
 }
 
+/// Takes the directions of a basis out of `w`; how much of each was in it, with a place for what is left.
+fn orthogonalise(basis: &[Vec<f64>], w: &mut [f64]) -> Vec<f64> {
+    let k = basis.len() - 1;
+    let mut column = vec![0.0; k + 2];
+    // twice is enough [Giraud2005], and once is not for nearly dependent vectors
+    for _ in 0..2 {
+        for (h, v) in column.iter_mut().zip(basis) {
+            let c = dot(v, w);
+            *h += c;
+            add_scaled(-c, v, w);
+        }
+    }
+    column
+}
+
 /// Solves `A x = b` by GMRES with the preconditioner on the right, restarted, from `x = 0`.
 ///
 /// The residual of the recurrence is the residual of the system itself (right preconditioning). Any fixed linear
@@ -215,15 +230,7 @@ pub fn gmres(
             let mut w = vec![0.0; n];
             operator.apply_into(&z, &mut w);
             let before = norm(&w);
-            let mut column = vec![0.0; k + 2];
-            // twice is enough [Giraud2005], and once is not for nearly dependent vectors
-            for _ in 0..2 {
-                for (h, v) in column.iter_mut().zip(&basis) {
-                    let c = dot(v, &w);
-                    *h += c;
-                    add_scaled(-c, v, &mut w);
-                }
-            }
+            let mut column = orthogonalise(&basis, &mut w);
             let size = norm(&w);
             column[k + 1] = size;
             residual = least.push(column) / scale;

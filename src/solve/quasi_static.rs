@@ -122,6 +122,29 @@ impl Balance {
     }
 }
 
+/// Refuses a displacement or prescribed dofs that are not those of the system.
+fn check_shapes(
+    prescribed: &[u32],
+    state: &LoadState,
+    dofs: usize,
+) -> Result<(), QuasiStaticError> {
+    let last = prescribed.iter().max().map_or(0, |&k| k as usize + 1);
+    for (what, found, wrong) in [
+        ("the displacement", state.u.len(), state.u.len() != dofs),
+        ("the list of prescribed dofs", last, last > dofs),
+    ] {
+        if wrong {
+            let expected = dofs;
+            return Err(QuasiStaticError::Shape {
+                what,
+                found,
+                expected,
+            });
+        }
+    }
+    Ok(())
+}
+
 /// Runs load steps, those that `state` has done left out; `times` is the time of each by its number, none beyond the last. After each, `observe` may stop.
 ///
 /// `near` is an inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves Newton's method iterations.
@@ -140,20 +163,7 @@ pub fn run(
     let block = system.block().max(1);
     let dofs = system.mass().len() * block;
     let prescribed = drive.prescribed().to_vec();
-    let last = prescribed.iter().max().map_or(0, |&k| k as usize + 1);
-    for (what, found, wrong) in [
-        ("the displacement", state.u.len(), state.u.len() != dofs),
-        ("the list of prescribed dofs", last, last > dofs),
-    ] {
-        if wrong {
-            let expected = dofs;
-            return Err(QuasiStaticError::Shape {
-                what,
-                found,
-                expected,
-            });
-        }
-    }
+    check_shapes(&prescribed, state, dofs)?;
     let mut held = vec![None; dofs];
     prescribed
         .iter()
@@ -176,61 +186,16 @@ pub fn run(
     let mut values = vec![0.0; prescribed.len()];
     let mut info = QuasiStaticInfo::default();
     while let Some(time) = times(state.step) {
-        (work.step, work.time) = (state.step, time);
-        work.balanced = 0.0;
-        let mut account = None;
+        work.step = state.step;
         let before = state.step.checked_sub(1).and_then(times);
-        work.interval = Interval {
-            end: before.unwrap_or(time),
-            length: 0.0,
-        };
-        if let Some(before) = before {
-            drive.load_into(before, &mut work.load);
-            work.balanced = work.evaluate(&state.u)?.scale;
-            account = Some(Balance::of(&work, &state.u));
-        }
-        let interval = Interval {
-            end: time,
-            length: before.map_or(0.0, |before| time - before),
-        };
-        work.interval = interval;
-        drive.load_into(time, &mut work.load);
-        drive.displacement_into(time, &mut values);
-        work.find_row_sums();
-        let mut moved = 0.0;
-        for (&k, v) in prescribed.iter().zip(&values) {
-            moved += work.resisted(k as usize, v - state.u[k as usize]);
-        }
-        work.balanced = work.balanced.max(MOVED * moved.sqrt());
-        let (mut broken, mut rounds) = (0, 0);
-        let mut iterations = work.set_out(&mut state.u, &prescribed, &values)?;
-        let residual = loop {
-            let (count, residual) = work.equilibrium(&mut state.u)?;
-            iterations += count;
-            if let Some(account) = &mut account {
-                account.advance(&work, &state.u);
-            }
-            let now = work.system.internal_force_into(
-                &state.u,
-                &mut work.force,
-                interval,
-                FailureUpdate::Update,
-            );
-            if now == 0 {
-                break residual;
-            }
-            work.system.account_for_breaks(&Halfway::at(&state.u));
-            broken += now;
-            rounds += 1;
-            if rounds >= params.max_rounds {
-                return Err(QuasiStaticError::NeverHolds {
-                    step: work.step,
-                    time,
-                    rounds,
-                    broken,
-                });
-            }
-        };
+        let mut account = work.apply_load(drive, before, time, &mut values, &state.u)?;
+        let predicted = work.set_out(&mut state.u, &prescribed, &values)?;
+        let Settled {
+            broken,
+            rounds,
+            iterations,
+            residual,
+        } = work.settle(&mut state.u, predicted, account.as_mut())?;
         work.system.commit();
         state.step += 1;
         state.broken += broken;
@@ -256,7 +221,96 @@ pub fn run(
     Ok(info)
 }
 
+/// A load step in equilibrium, in which no further bond breaks.
+struct Settled {
+    broken: u64,
+    rounds: usize,
+    iterations: usize,
+    residual: f64,
+}
+
 impl Run<'_> {
+    /// Takes the loads and the prescribed displacements of a load step, from the time `before` it; the work so far, of all but the first.
+    fn apply_load(
+        &mut self,
+        drive: &dyn Drive,
+        before: Option<f64>,
+        time: f64,
+        values: &mut [f64],
+        u: &[f64],
+    ) -> Result<Option<Balance>, QuasiStaticError> {
+        self.time = time;
+        self.balanced = 0.0;
+        let mut account = None;
+        self.interval = Interval {
+            end: before.unwrap_or(time),
+            length: 0.0,
+        };
+        if let Some(before) = before {
+            drive.load_into(before, &mut self.load);
+            self.balanced = self.evaluate(u)?.scale;
+            account = Some(Balance::of(self, u));
+        }
+        let interval = Interval {
+            end: time,
+            length: before.map_or(0.0, |before| time - before),
+        };
+        self.interval = interval;
+        drive.load_into(time, &mut self.load);
+        drive.displacement_into(time, values);
+        self.find_row_sums();
+        let mut moved = 0.0;
+        for (&k, v) in drive.prescribed().iter().zip(values.iter()) {
+            moved += self.resisted(k as usize, v - u[k as usize]);
+        }
+        self.balanced = self.balanced.max(MOVED * moved.sqrt());
+        Ok(account)
+    }
+
+    /// Seeks equilibrium and breaks bonds in turn, until none breaks.
+    fn settle(
+        &mut self,
+        u: &mut [f64],
+        mut iterations: usize,
+        mut account: Option<&mut Balance>,
+    ) -> Result<Settled, QuasiStaticError> {
+        let (mut broken, mut rounds) = (0, 0);
+        let interval = self.interval;
+        let residual = loop {
+            let (count, residual) = self.equilibrium(u)?;
+            iterations += count;
+            if let Some(account) = account.as_deref_mut() {
+                account.advance(self, u);
+            }
+            let now = self.system.internal_force_into(
+                u,
+                &mut self.force,
+                interval,
+                FailureUpdate::Update,
+            );
+            if now == 0 {
+                break residual;
+            }
+            self.system.account_for_breaks(&Halfway::at(u));
+            broken += now;
+            rounds += 1;
+            if rounds >= self.params.max_rounds {
+                return Err(QuasiStaticError::NeverHolds {
+                    step: self.step,
+                    time: self.time,
+                    rounds,
+                    broken,
+                });
+            }
+        };
+        Ok(Settled {
+            broken,
+            rounds,
+            iterations,
+            residual,
+        })
+    }
+
     /// Finds equilibrium with bonds held; returns iterations and relative residual.
     fn equilibrium(&mut self, u: &mut [f64]) -> Result<(usize, f64), QuasiStaticError> {
         self.find_row_sums();

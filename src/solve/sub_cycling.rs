@@ -127,6 +127,29 @@ enum Terms {
     Absolute,
 }
 
+/// Whether each dof is free.
+fn free_dofs(system: &dyn SemiDiscrete, prescribed: &[u32]) -> Vec<bool> {
+    let d = system.block().max(1);
+    let mut is_free = vec![true; system.mass().len() * d];
+    prescribed.iter().for_each(|&k| is_free[k as usize] = false);
+    is_free
+}
+
+/// The largest row sum over mass of each site's free dofs.
+fn rates(system: &dyn SemiDiscrete, is_free: &[bool]) -> Vec<f64> {
+    let (d, mass) = (system.block().max(1), system.mass());
+    let sums = system.row_sums();
+    let rates: Vec<f64> = mass
+        .iter()
+        .enumerate()
+        .map(|(site, m)| {
+            let free = (site * d..(site + 1) * d).filter(|&k| is_free[k]);
+            free.map(|k| sums[k] / m).fold(0.0, f64::max)
+        })
+        .collect();
+    rates
+}
+
 impl FineSites {
     /// The sites that limit the step, for `sub_steps` steps of them; `prescribed` lists the dofs that are not free.
     ///
@@ -149,17 +172,8 @@ impl FineSites {
             return Err(SubCyclingError::Unsymmetric);
         }
         let (d, mass) = (system.block().max(1), system.mass());
-        let mut is_free = vec![true; mass.len() * d];
-        prescribed.iter().for_each(|&k| is_free[k as usize] = false);
-        let sums = system.row_sums();
-        let rates: Vec<f64> = mass
-            .iter()
-            .enumerate()
-            .map(|(site, m)| {
-                let free = (site * d..(site + 1) * d).filter(|&k| is_free[k]);
-                free.map(|k| sums[k] / m).fold(0.0, f64::max)
-            })
-            .collect();
+        let is_free = free_dofs(system, prescribed);
+        let rates = rates(system, &is_free);
         let recurrence = Recurrence::new(sub_steps);
         let unbreakable = system.tangent_is_constant();
         let stiffest = rates.iter().copied().fold(0.0, f64::max);

@@ -54,6 +54,23 @@ const NONE: u32 = u32::MAX;
 /// tuned further.
 const MERGE: [(usize, f64); 4] = [(8, 1.0), (24, 0.5), (64, 0.15), (usize::MAX, 0.05)];
 
+/// Runs of columns with the same structure: the run of each column, and the columns of each run.
+fn fundamental_supernodes(parent: &[u32], count: &[u32]) -> (Vec<u32>, Vec<Vec<u32>>) {
+    let n = parent.len();
+    let mut of_column = vec![0u32; n];
+    let mut columns: Vec<Vec<u32>> = Vec::new();
+    for j in 0..n {
+        let same = j > 0 && parent[j - 1] == j as u32 && count[j - 1] == count[j] + 1;
+        if !same {
+            columns.push(Vec::new());
+        }
+        let s = columns.len() - 1;
+        columns[s].push(j as u32);
+        of_column[j] = s as u32;
+    }
+    (of_column, columns)
+}
+
 impl Symbolic {
     /// Analyses `graph` for elimination in `order`.
     pub fn new(graph: &SiteGraph, order: &[u32]) -> Symbolic {
@@ -66,17 +83,7 @@ impl Symbolic {
         let (parent, count) = elimination_tree(graph, &order, &number);
 
         // fundamental supernodes: runs of columns with the same structure
-        let mut of_column = vec![0u32; n];
-        let mut columns: Vec<Vec<u32>> = Vec::new();
-        for j in 0..n {
-            let same = j > 0 && parent[j - 1] == j as u32 && count[j - 1] == count[j] + 1;
-            if !same {
-                columns.push(Vec::new());
-            }
-            let s = columns.len() - 1;
-            columns[s].push(j as u32);
-            of_column[j] = s as u32;
-        }
+        let (of_column, mut columns) = fundamental_supernodes(&parent, &count);
         let mut node_parent: Vec<u32> = columns
             .iter()
             .map(|c| match parent[c[c.len() - 1] as usize] {

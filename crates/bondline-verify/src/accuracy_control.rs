@@ -168,6 +168,48 @@ fn source(case: &Case, wanted: f64) -> Result<Source, String> {
     Ok(source)
 }
 
+/// Tells of an accuracy how near to what was wanted it came, and at which cost.
+fn push_outcome(
+    table: &mut Table,
+    progress: &dyn Progress,
+    label: &str,
+    what: String,
+    outcome: &Outcome,
+) {
+    let (error, wanted) = (outcome.error, outcome.wanted);
+    table.push(Row::info(label, "error over wanted", error / wanted).because(what));
+    progress.note(&format!(
+            "{label}: error {:.2} of it, predicted {:.2}; cost {:.2} of the cheapest; time predicted {:.2}",
+            error / wanted,
+            outcome.predicted / wanted,
+            outcome.cost,
+            outcome.time
+        ));
+    table.push(Row::info(
+        label,
+        "predicted error over measured",
+        outcome.predicted / error,
+    ));
+    table.push(Row::info(label, "cost over the cheapest", outcome.cost));
+    table.push(Row::info(
+        label,
+        "predicted time over measured",
+        outcome.time,
+    ));
+    for (what, error) in [
+        (
+            "error predicted by `check` over measured",
+            outcome.checked.usual,
+        ),
+        ("the same from coarser runs alone", outcome.checked.coarser),
+    ] {
+        table.push(match error {
+            Some(e) => Row::info(label, what, e / outcome.error),
+            None => Row::refused(label, what, "no versions that can be paid for"),
+        });
+    }
+}
+
 fn measured(
     case: &Case,
     outcomes: &mut Vec<Outcome>,
@@ -233,40 +275,13 @@ fn measured(
         };
         let what = chosen.choices.iter().map(|c| c.choice.clone());
         let label = format!("{} ({}), {wanted}", case.name, case.half.name());
-        table.push(
-            Row::info(&label, "error over wanted", error / wanted)
-                .because(what.collect::<Vec<_>>().join("; ")),
+        push_outcome(
+            table,
+            progress,
+            &label,
+            what.collect::<Vec<_>>().join("; "),
+            &outcome,
         );
-        progress.note(&format!(
-            "{label}: error {:.2} of it, predicted {:.2}; cost {:.2} of the cheapest; time predicted {:.2}",
-            error / wanted,
-            outcome.predicted / wanted,
-            outcome.cost,
-            outcome.time
-        ));
-        table.push(Row::info(
-            &label,
-            "predicted error over measured",
-            outcome.predicted / error,
-        ));
-        table.push(Row::info(&label, "cost over the cheapest", outcome.cost));
-        table.push(Row::info(
-            &label,
-            "predicted time over measured",
-            outcome.time,
-        ));
-        for (what, error) in [
-            (
-                "error predicted by `check` over measured",
-                outcome.checked.usual,
-            ),
-            ("the same from coarser runs alone", outcome.checked.coarser),
-        ] {
-            table.push(match error {
-                Some(e) => Row::info(&label, what, e / outcome.error),
-                None => Row::refused(&label, what, "no versions that can be paid for"),
-            });
-        }
         outcomes.push(outcome);
     }
     Ok(())

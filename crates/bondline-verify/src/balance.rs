@@ -148,13 +148,8 @@ fn laws(effort: Effort) -> Vec<(&'static str, Law)> {
     laws
 }
 
-/// Out-of-balance force at one seam of a bar, under cubic and quartic fields.
-pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
-    let ratios: &[u32] = if effort == Effort::Full {
-        &[3, 4, 6]
-    } else {
-        &[3]
-    };
+/// A seam of every method, by the name of its law.
+fn seam_cases(effort: Effort, ratios: &[u32]) -> Vec<(&'static str, Case)> {
     let mut cases = Vec::new();
     for (name, law) in laws(effort) {
         for &ratio in ratios {
@@ -189,6 +184,17 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
             }
         }
     }
+    cases
+}
+
+/// Out-of-balance force at one seam of a bar, under cubic and quartic fields.
+pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
+    let ratios: &[u32] = if effort == Effort::Full {
+        &[3, 4, 6]
+    } else {
+        &[3]
+    };
+    let cases = seam_cases(effort, ratios);
     progress.stage("out-of-balance force", Some(cases.len() as u64));
     let rows: Vec<Vec<Row>> = cases
         .into_par_iter()

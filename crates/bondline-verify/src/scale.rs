@@ -235,6 +235,37 @@ fn table(title: &str, rows: Vec<Row>) -> Table {
     table
 }
 
+/// The largest systems that can be factorised, solved directly too; `largest` are the cells of such a square and a block.
+fn against_direct(
+    iterative: Vec<(Case, f64)>,
+    (square, block): (usize, usize),
+    effort: Effort,
+    progress: &dyn Progress,
+) -> Table {
+    let mut rows = Vec::new();
+    for (case, seconds) in iterative {
+        let largest = case.cells == square && case.ratio == 6
+            || case.coupling == "splice" && case.cells == block;
+        if !largest {
+            continue;
+        }
+        let direct = Case {
+            method: "direct",
+            ..case
+        };
+        if let Some(run) = measured(direct, progress, &mut rows) {
+            let ratio = solver_seconds(&run) / seconds;
+            let quantity = "time of the direct solver over that of the iterative one";
+            rows.push(match effort {
+                // small systems are the direct solver's own ground
+                Effort::Quick => Row::info(case.name(), quantity, ratio),
+                Effort::Full => Row::at_least(case.name(), quantity, ratio, SPEED_LIMIT),
+            });
+        }
+    }
+    table("Against the direct solver", rows)
+}
+
 /// Runs the suite.
 ///
 /// A fixed horizon δ on finer and finer lattices (m grows with the lattice), a fixed m, a coupled block of a million unknowns, and direct
@@ -301,27 +332,11 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         }
     }
     tables.push(table("FE and PD coupled in a block, m = 3", rows));
-    let mut rows = Vec::new();
-    for (case, seconds) in iterative {
-        let largest = case.cells == edges[2] && case.ratio == 6
-            || case.coupling == "splice" && case.cells == factorised;
-        if !largest {
-            continue;
-        }
-        let direct = Case {
-            method: "direct",
-            ..case
-        };
-        if let Some(run) = measured(direct, progress, &mut rows) {
-            let ratio = solver_seconds(&run) / seconds;
-            let quantity = "time of the direct solver over that of the iterative one";
-            rows.push(match effort {
-                // small systems are the direct solver's own ground
-                Effort::Quick => Row::info(case.name(), quantity, ratio),
-                Effort::Full => Row::at_least(case.name(), quantity, ratio, SPEED_LIMIT),
-            });
-        }
-    }
-    tables.push(table("Against the direct solver", rows));
+    tables.push(against_direct(
+        iterative,
+        (edges[2], factorised),
+        effort,
+        progress,
+    ));
     tables
 }

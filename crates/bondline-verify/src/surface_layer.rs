@@ -7,7 +7,7 @@ use crate::{
     typed,
 };
 use bondline::{
-    coupling::SiteKind,
+    coupling::{Model, SiteKind},
     observe::report::{Columns, Row, Table},
     peridynamics::Micromodulus,
     progress::{Progress, Silent},
@@ -30,30 +30,16 @@ struct Pulled {
     ratio: f64,
 }
 
-/// Pulls the bar by its ends; what it shows is compared with the tensor of its elements.
-fn pull(coupling: &str, law: Law, ratio: u32, weights: &str) -> Result<Pulled, String> {
-    let half: [f64; 3] = std::array::from_fn(|i| 0.5 * CELLS[i] as f64 * SPACING);
-    let text = format!(
-        "kinematics = \"solid\"\ncoupling = \"{coupling}\"\n{}{}[peridynamics]\nhorizon = {:?}\npoints.lattice = {{ spacing = {SPACING}, origin = {} }}\nweights = \"{weights}\"\n{}[zones]\nnonlocal = {{ everywhere = true }}\nskin = \"free-surfaces\"\n{}",
-        typed::grid(half.map(|h| -h), half, CELLS),
-        typed::material(law, YOUNGS_MODULUS, POISSON),
-        f64::from(ratio) * SPACING,
-        typed::place([0.5 * SPACING; 3]),
-        typed::law_line(law),
-        typed::FREE
-    );
-    let laid = scene::model::<3>(&text, &[]).map_err(|e| e.to_string())?;
-    let model = &laid.model;
-    // uniaxial stress of the tensor that the elements have
-    let c = model.tensor_of_cell(0);
-    let (c11, c12) = (c.get(0, 0, 0, 0), c.get(0, 0, 1, 1));
-    let ratio = c12 / (c11 + c12);
-    let modulus = c11 - 2.0 * c12 * ratio;
-    let stiffness = laid.stiffness().map_err(|e| e.to_string())?;
-    let exact = |x: &Vector<3>| Vector::<3>::new(x[0], -ratio * x[1], -ratio * x[2]) * STRETCH;
+/// Displacements that are prescribed, and the sites at both ends: those along x, and on the planes of symmetry those across.
+fn held(
+    model: &Model<3>,
+    half: [f64; 3],
+    exact: &dyn Fn(&Vector<3>) -> Vector<3>,
+    dofs: usize,
+) -> (Vec<Option<f64>>, Vec<usize>) {
     // both ends are held along x only; what is free of rigid motion, by the four lines in the middle of the ends' edges
     let layer = |x: f64, at: f64| (x.abs() - at).abs() < 0.6 * SPACING;
-    let mut prescribed = vec![None; stiffness.dofs()];
+    let mut prescribed = vec![None; dofs];
     let mut ends = Vec::new();
     for (s, site) in model.sites.iter().enumerate() {
         let x = &site.position;
@@ -82,6 +68,31 @@ fn pull(coupling: &str, law: Law, ratio: u32, weights: &str) -> Result<Pulled, S
             }
         }
     }
+    (prescribed, ends)
+}
+
+/// Pulls the bar by its ends; what it shows is compared with the tensor of its elements.
+fn pull(coupling: &str, law: Law, ratio: u32, weights: &str) -> Result<Pulled, String> {
+    let half: [f64; 3] = std::array::from_fn(|i| 0.5 * CELLS[i] as f64 * SPACING);
+    let text = format!(
+        "kinematics = \"solid\"\ncoupling = \"{coupling}\"\n{}{}[peridynamics]\nhorizon = {:?}\npoints.lattice = {{ spacing = {SPACING}, origin = {} }}\nweights = \"{weights}\"\n{}[zones]\nnonlocal = {{ everywhere = true }}\nskin = \"free-surfaces\"\n{}",
+        typed::grid(half.map(|h| -h), half, CELLS),
+        typed::material(law, YOUNGS_MODULUS, POISSON),
+        f64::from(ratio) * SPACING,
+        typed::place([0.5 * SPACING; 3]),
+        typed::law_line(law),
+        typed::FREE
+    );
+    let laid = scene::model::<3>(&text, &[]).map_err(|e| e.to_string())?;
+    let model = &laid.model;
+    // uniaxial stress of the tensor that the elements have
+    let c = model.tensor_of_cell(0);
+    let (c11, c12) = (c.get(0, 0, 0, 0), c.get(0, 0, 1, 1));
+    let ratio = c12 / (c11 + c12);
+    let modulus = c11 - 2.0 * c12 * ratio;
+    let stiffness = laid.stiffness().map_err(|e| e.to_string())?;
+    let exact = |x: &Vector<3>| Vector::<3>::new(x[0], -ratio * x[1], -ratio * x[2]) * STRETCH;
+    let (prescribed, ends) = held(model, half, &exact, stiffness.dofs());
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
     let solution = statics::solve(
         &StaticProblem {

@@ -146,26 +146,21 @@ pub fn linear_scale() -> f64 {
     SLOPE * YOUNGS_MODULUS / (DENSITY * LENGTH)
 }
 
-/// Accelerations of the points on the axis of a bar of `D` dimensions, of points `spacing` apart and of a square section of
-/// `across` (odd) points a side (without meaning in 1D).
-///
-/// # Errors
-/// [`SceneFailure`] of its scene or model.
-pub fn profile<const D: usize>(
+/// The scene of a bar.
+fn bar_scene<const D: usize>(
     law: BarLaw,
     model: BarModel,
     spacing: f64,
     across: usize,
     horizon: &str,
-    progress: &dyn Progress,
-) -> Result<Profile, SceneFailure> {
+) -> String {
     let section = 0.5 * across as f64 * spacing;
     let half: [f64; D] = std::array::from_fn(|k| [0.5 * LENGTH, section][k.min(1)]);
     let cells = (LENGTH / spacing).round() as usize;
     let (bond_law, rest) = law.law();
     // partial stress everywhere but at one end, out of reach of what is looked at: a scene has a nonlocal zone
     let last = std::array::from_fn(|k| if k == 0 { half[0] - SMALL } else { -half[k] });
-    let text = format!(
+    format!(
         "kinematics = \"{}\"\ncoupling = {}\n{}{}{rest}[peridynamics]\nhorizon = \"{horizon}\"\npoints.lattice = {{ spacing = {spacing:?}, origin = {} }}\n{}{}[zones]\nnonlocal = {}\ntransition = {{ everywhere = true }}\n{}",
         typed::kinematics::<D>(),
         model.coupling(),
@@ -180,7 +175,23 @@ pub fn profile<const D: usize>(
         typed::UNCUT,
         typed::cuboid(last, half),
         typed::FREE
-    );
+    )
+}
+
+/// Accelerations of the points on the axis of a bar of `D` dimensions, of points `spacing` apart and of a square section of
+/// `across` (odd) points a side (without meaning in 1D).
+///
+/// # Errors
+/// [`SceneFailure`] of its scene or model.
+pub fn profile<const D: usize>(
+    law: BarLaw,
+    model: BarModel,
+    spacing: f64,
+    across: usize,
+    horizon: &str,
+    progress: &dyn Progress,
+) -> Result<Profile, SceneFailure> {
+    let text = bar_scene::<D>(law, model, spacing, across, horizon);
     progress.stage("sites and bonds", None);
     let laid = scene::model::<D>(&text, &[])?;
     let bar = &laid.model;
@@ -333,6 +344,28 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     vec![table, printed(&varying_bonds)]
 }
 
+/// The weighted volume of the influence function against that of a lattice.
+fn push_weighted_volume(table: &mut Table) {
+    let lattice = bondline::peridynamics::LatticeFamily::<3>::new(12.0, 1e-6);
+    if let Ok(lattice) = lattice {
+        let sum: f64 = lattice
+            .shells
+            .iter()
+            .map(|s| {
+                let r = s.length(1.0);
+                s.offsets.len() as f64 * Influence::Gaussian.value(r, 12.0) * r * r
+            })
+            .sum();
+        table.push(Row::within(
+            "Gaussian of Algorithm 1",
+            "weighted volume, closed form over the sum of a lattice of m = 12",
+            Influence::Gaussian.weighted_volume::<3>(12.0) / sum,
+            1.0,
+            0.02,
+        ));
+    }
+}
+
 /// What section 7.2 prints of its bar: numbers of bonds, and stable steps.
 fn printed(varying: &Option<usize>) -> Table {
     let mut table = Table::new(
@@ -401,24 +434,7 @@ fn printed(varying: &Option<usize>) -> Table {
         "smallest horizon that the printed steps imply [m]",
         implied,
     ));
-    let lattice = bondline::peridynamics::LatticeFamily::<3>::new(12.0, 1e-6);
-    if let Ok(lattice) = lattice {
-        let sum: f64 = lattice
-            .shells
-            .iter()
-            .map(|s| {
-                let r = s.length(1.0);
-                s.offsets.len() as f64 * Influence::Gaussian.value(r, 12.0) * r * r
-            })
-            .sum();
-        table.push(Row::within(
-            "Gaussian of Algorithm 1",
-            "weighted volume, closed form over the sum of a lattice of m = 12",
-            Influence::Gaussian.weighted_volume::<3>(12.0) / sum,
-            1.0,
-            0.02,
-        ));
-    }
+    push_weighted_volume(&mut table);
     table
 }
 

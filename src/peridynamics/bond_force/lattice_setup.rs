@@ -27,6 +27,46 @@ struct Filled {
     without_energy: Vec<bool>,
 }
 
+/// What a solid adds to a lattice: factors of dilatation and of the deviatoric part from the weighted volumes of families.
+fn solid<const D: usize>(
+    stencil: &Stencil<D>,
+    volume: &[f64],
+    without_energy: &[bool],
+    bulk: f64,
+    shear: f64,
+) -> Solid {
+    let (groups, cells) = (stencil.groups.len(), stencil.point_of.len());
+    let relative = |cell: usize| volume[cell];
+    let offsets = &stencil.offsets;
+    let bits = |g: usize| &stencil.reference[g * offsets.len()..(g + 1) * offsets.len()];
+    let d = D as f64;
+    let mut solid = Solid {
+        dilatation: vec![[0.0; LANES]; groups],
+        volumetric: vec![[0.0; LANES]; groups],
+        deviatoric: vec![0.0; cells],
+        pull: vec![0.0; cells],
+        group_of: vec![NONE; cells.div_ceil(LANES)],
+    };
+    for (g, &cell) in stencil.groups.iter().enumerate() {
+        let cell = cell as usize;
+        solid.group_of[cell / LANES] = g as u32;
+        let mut m = [0.0; LANES];
+        for (o, &b) in offsets.iter().zip(bits(g)) {
+            for lane in (0..LANES).filter(|l| b >> l & 1 == 1) {
+                m[lane] += o.moment * relative(((cell + lane) as isize + o.delta) as usize);
+            }
+        }
+        let own = |lane: &usize| !without_energy.get(cell + lane).copied().unwrap_or(false);
+        for lane in (0..LANES).filter(|&l| m[l] > 0.0).filter(own) {
+            solid.dilatation[g][lane] = d / m[lane];
+            solid.volumetric[g][lane] = (d * bulk - (d + 2.0) * shear) / m[lane];
+            solid.deviatoric[cell + lane] = d * (d + 2.0) * shear / m[lane];
+        }
+    }
+    // the weights carry the lattice's own volume, so m is in true units and forces are too
+    solid
+}
+
 impl<const D: usize> Lattice<D> {
     /// The pass of a cloud, or why it has none.
     pub(super) fn new(setup: &BondSetup<'_, D>) -> Result<Self, String> {
@@ -144,34 +184,7 @@ impl<const D: usize> Lattice<D> {
             BondForce::Law { .. } => return Err("the law has no lattice pass".into()),
             BondForce::Pairwise { .. } => None,
             BondForce::Solid { bulk, shear, .. } => {
-                let d = D as f64;
-                let mut solid = Solid {
-                    dilatation: vec![[0.0; LANES]; groups],
-                    volumetric: vec![[0.0; LANES]; groups],
-                    deviatoric: vec![0.0; cells],
-                    pull: vec![0.0; cells],
-                    group_of: vec![NONE; cells.div_ceil(LANES)],
-                };
-                for (g, &cell) in stencil.groups.iter().enumerate() {
-                    let cell = cell as usize;
-                    solid.group_of[cell / LANES] = g as u32;
-                    let mut m = [0.0; LANES];
-                    for (o, &b) in offsets.iter().zip(bits(g)) {
-                        for lane in (0..LANES).filter(|l| b >> l & 1 == 1) {
-                            m[lane] +=
-                                o.moment * relative(((cell + lane) as isize + o.delta) as usize);
-                        }
-                    }
-                    let own =
-                        |lane: &usize| !without_energy.get(cell + lane).copied().unwrap_or(false);
-                    for lane in (0..LANES).filter(|&l| m[l] > 0.0).filter(own) {
-                        solid.dilatation[g][lane] = d / m[lane];
-                        solid.volumetric[g][lane] = (d * bulk - (d + 2.0) * shear) / m[lane];
-                        solid.deviatoric[cell + lane] = d * (d + 2.0) * shear / m[lane];
-                    }
-                }
-                // the weights carry the lattice's own volume, so m is in true units and forces are too
-                Some(solid)
+                Some(solid(&stencil, &volume, &without_energy, bulk, shear))
             }
         };
         // a group is even if all bonds of its points see the same

@@ -288,6 +288,85 @@ fn numbers<const D: usize>(
     })
 }
 
+/// The point of each cell of the box; `NONE` for an empty one.
+fn points_of_cells<const D: usize>(cells: &Box3, site: &[[i32; D]]) -> Result<Vec<u32>, String> {
+    let mut point_of = vec![NONE; cells.cells];
+    for (i, s) in site.iter().enumerate() {
+        let cell = cells.cell(std::array::from_fn(
+            |a| if a < D { s[a] as usize } else { 0 },
+        ));
+        if point_of[cell] != NONE {
+            return Err(format!("points {} and {i} lie on one site", point_of[cell]));
+        }
+        point_of[cell] = i as u32;
+    }
+    Ok(point_of)
+}
+
+/// Where the points of the lanes of each group are.
+struct LaneSites<'a, const D: usize> {
+    groups: &'a [u32],
+    point_of: &'a [u32],
+    position: &'a OffsetTable<usize, D>,
+}
+
+impl<const D: usize> LaneSites<'_, D> {
+    /// One bit for each lane, group and offset: whether there is a bond, and whether it stands at the start.
+    fn bits(
+        &self,
+        setup: &BondSetup<'_, D>,
+        stencil: usize,
+        step: impl Fn(usize, u32) -> [i32; D] + Sync,
+    ) -> (Vec<u8>, Vec<u8>) {
+        let with_family = |p: u32| p != NONE && !setup.families.of(p as usize).is_empty();
+        let mut reference = vec![0u8; self.groups.len() * stencil];
+        let mut intact = reference.clone();
+        reference
+            .par_chunks_mut(stencil.max(1))
+            .zip(intact.par_chunks_mut(stencil.max(1)))
+            .zip(self.groups)
+            .for_each(|((reference, intact), &cell)| {
+                for lane in 0..LANES {
+                    let i = self.point_of[cell as usize + lane];
+                    if !with_family(i) {
+                        continue;
+                    }
+                    let i = i as usize;
+                    for &j in setup.families.of(i) {
+                        let Some(o) = self.position.of(&step(i, j)) else {
+                            continue;
+                        };
+                        reference[o] |= 1 << lane;
+                        if !setup.precracked.is_some_and(|cut| cut(i, j as usize)) {
+                            intact[o] |= 1 << lane;
+                        }
+                    }
+                }
+            });
+        (reference, intact)
+    }
+}
+
+/// The offsets of a stencil with their weights; one that is known only as its opposite has the numbers of that.
+fn offsets_of<const D: usize>(
+    steps: &[[i32; D]],
+    found: &OffsetTable<(f64, f64), D>,
+    cells: &Box3,
+    spacing: [f64; D],
+    volume: f64,
+) -> Vec<Offset<D>> {
+    let offsets: Vec<Offset<D>> = steps
+        .iter()
+        .map(|s| {
+            let mirror = s.map(|s| -s);
+            let key = if *s < mirror { *s } else { mirror };
+            let (weight, limit) = found.of(&key).or(found.of(s)).unwrap_or_default();
+            Offset::new(*s, spacing, cells.delta(s), weight * volume, limit)
+        })
+        .collect();
+    offsets
+}
+
 impl<const D: usize> Stencil<D> {
     /// The stencil of a cloud, or why it has none.
     pub(super) fn new(setup: &BondSetup<'_, D>, volume: f64) -> Result<Self, String> {
@@ -327,27 +406,10 @@ impl<const D: usize> Stencil<D> {
                 cells.cells
             ));
         }
-        let offsets: Vec<Offset<D>> = steps
-            .iter()
-            .map(|s| {
-                let mirror = s.map(|s| -s);
-                let key = if *s < mirror { *s } else { mirror };
-                let (weight, limit) = found.of(&key).or(found.of(s)).unwrap_or_default();
-                Offset::new(*s, spacing, cells.delta(s), weight * volume, limit)
-            })
-            .collect();
+        let offsets = offsets_of(&steps, &found, &cells, spacing, volume);
         let number = |(o, s): (usize, &[i32; D])| (*s, o);
         let position = OffsetTable::new(&steps.iter().enumerate().map(number).collect::<Vec<_>>());
-        let mut point_of = vec![NONE; cells.cells];
-        for (i, s) in site.iter().enumerate() {
-            let cell = cells.cell(std::array::from_fn(
-                |a| if a < D { s[a] as usize } else { 0 },
-            ));
-            if point_of[cell] != NONE {
-                return Err(format!("points {} and {i} lie on one site", point_of[cell]));
-            }
-            point_of[cell] = i as u32;
-        }
+        let point_of = points_of_cells(&cells, &site)?;
         let with_family = |p: u32| p != NONE && !setup.families.of(p as usize).is_empty();
         let groups: Vec<u32> = cells
             .groups()
@@ -362,30 +424,12 @@ impl<const D: usize> Stencil<D> {
             ));
         }
         let stencil = offsets.len();
-        let mut reference = vec![0u8; groups.len() * stencil];
-        let mut intact = reference.clone();
-        reference
-            .par_chunks_mut(stencil.max(1))
-            .zip(intact.par_chunks_mut(stencil.max(1)))
-            .zip(&groups)
-            .for_each(|((reference, intact), &cell)| {
-                for lane in 0..LANES {
-                    let i = point_of[cell as usize + lane];
-                    if !with_family(i) {
-                        continue;
-                    }
-                    let i = i as usize;
-                    for &j in setup.families.of(i) {
-                        let Some(o) = position.of(&step(i, j)) else {
-                            continue;
-                        };
-                        reference[o] |= 1 << lane;
-                        if !setup.precracked.is_some_and(|cut| cut(i, j as usize)) {
-                            intact[o] |= 1 << lane;
-                        }
-                    }
-                }
-            });
+        let sites = LaneSites {
+            groups: &groups,
+            point_of: &point_of,
+            position: &position,
+        };
+        let (reference, intact) = sites.bits(setup, stencil, step);
         let stencil = Self {
             offsets,
             point_of,

@@ -61,6 +61,21 @@ fn zoned(spec: &SceneSpec) -> bool {
     spec.zones.nonlocal.is_some() || spec.zones.auto.is_some()
 }
 
+/// The error that a scene asks for, if it does.
+fn wanted_error(spec: &SceneSpec, source: &Source) -> Result<Option<f64>, SceneError> {
+    match &spec.accuracy {
+        Some(a) if a.value > 0.0 && a.value < 1.0 => Ok(Some(a.value)),
+        Some(a) => Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`accuracy` is {}", a.value),
+        )
+        .label(a.span.clone(), "must lie between 0 and 1")
+        .help("write the relative error that is wanted, accuracy = 0.01 for 1 %")
+        .shown_in(source)),
+        None => Ok(None),
+    }
+}
+
 impl AccuracyRequest {
     /// What a scene with an `accuracy` leaves open; `None` without one.
     pub fn of(source: &Source) -> Result<Option<Self>, SceneError> {
@@ -103,18 +118,8 @@ impl AccuracyRequest {
             filled.push_override(o)?;
         }
         let spec = SceneSpec::parse(&filled)?;
-        let accuracy = match &spec.accuracy {
-            Some(a) if a.value > 0.0 && a.value < 1.0 => a.value,
-            Some(a) => {
-                return Err(SceneError::new(
-                    SceneErrorKind::WrongValue,
-                    format!("`accuracy` is {}", a.value),
-                )
-                .label(a.span.clone(), "must lie between 0 and 1")
-                .help("write the relative error that is wanted, accuracy = 0.01 for 1 %")
-                .shown_in(source));
-            }
-            None => return Ok(None),
+        let Some(accuracy) = wanted_error(&spec, source)? else {
+            return Ok(None);
         };
         let base = Base::of(&spec);
         let (min, max) = variants::corners(&spec).unwrap_or_default();

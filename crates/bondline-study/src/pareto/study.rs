@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::parameters::Outcome;
 use super::record::{self, write_line};
 use super::surrogate::{Effects, most_promising};
-use super::trial::{Attempt, Runner};
+use super::trial::{Attempt, Ran, Runner};
 use crate::pareto::parameters::{Case, TradeEnd, TradeError, TradeParams};
 use crate::variants::{Base, Setting};
 use crate::variants::{Measured, Quantity};
@@ -139,22 +139,7 @@ impl Study<'_> {
             Attempt::OverTime => Outcome::OverTime {
                 seconds: started.elapsed().as_secs_f64(),
             },
-            Attempt::Ran(ran) => {
-                let errors: Vec<Option<f64>> = self
-                    .quantities
-                    .iter()
-                    .map(|q| ran.measured.error(&self.reference, q))
-                    .collect();
-                match errors.iter().position(Option::is_none) {
-                    Some(k) => Outcome::Refused {
-                        why: format!("its outputs have no {}", self.quantities[k].name()),
-                    },
-                    None => Outcome::Ran {
-                        cost: ran.cost,
-                        errors: errors.into_iter().flatten().collect(),
-                    },
-                }
-            }
+            Attempt::Ran(ran) => self.outcome(&ran),
         };
         // what a case writes is of no further use
         let _ = std::fs::remove_dir_all(&folder);
@@ -171,6 +156,24 @@ impl Study<'_> {
         })?;
         self.cases.push(case);
         Ok(None)
+    }
+
+    /// Cost and errors of a case that has run.
+    fn outcome(&self, ran: &Ran) -> Outcome {
+        let errors: Vec<Option<f64>> = self
+            .quantities
+            .iter()
+            .map(|q| ran.measured.error(&self.reference, q))
+            .collect();
+        match errors.iter().position(Option::is_none) {
+            Some(k) => Outcome::Refused {
+                why: format!("its outputs have no {}", self.quantities[k].name()),
+            },
+            None => Outcome::Ran {
+                cost: ran.cost,
+                errors: errors.into_iter().flatten().collect(),
+            },
+        }
     }
 
     /// Combinations of settings that ran alone, at most one of each knob, whose outcome is not known.

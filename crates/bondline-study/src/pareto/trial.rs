@@ -37,6 +37,35 @@ pub(super) struct Runner<'a> {
     pub interrupt: Option<&'a AtomicBool>,
 }
 
+/// Cost and outputs of a run that has ended, from its folder and its summary.
+fn read_outcome(folder: &Path, summary: &Path) -> Result<Attempt, TradeError> {
+    let file_error = |source| TradeError::File {
+        path: folder.to_path_buf(),
+        source,
+    };
+    let text = std::fs::read_to_string(summary).map_err(file_error)?;
+    let summary: serde_json::Value =
+        serde_json::from_str(&text).map_err(|e| TradeError::Summary {
+            text: text.clone(),
+            why: e.to_string(),
+        })?;
+    let stages = summary["timings"].as_array().into_iter().flatten();
+    let output: f64 = stages
+        .filter(|s| s["name"] == "output")
+        .filter_map(|s| s["seconds"].as_f64())
+        .sum();
+    let number = |v: &serde_json::Value| v.as_f64().unwrap_or(0.0);
+    let steps = summary["motion"]["steps"].as_f64().unwrap_or(1.0);
+    let cost = Cost {
+        seconds: number(&summary["total_seconds"]) - output,
+        memory: number(&summary["peak_memory_bytes"]),
+        bond_visits: number(&summary["sizes"]["bonds"]) * steps,
+        unknowns: number(&summary["sizes"]["dofs"]),
+    };
+    let measured = Measured::read(folder, &summary).map_err(file_error)?;
+    Ok(Attempt::Ran(Ran { cost, measured }))
+}
+
 impl Runner<'_> {
     /// Runs the scene with overrides in a process of its own; its files go to `folder`.
     pub(super) fn run(
@@ -131,27 +160,7 @@ impl Runner<'_> {
                 one_line(&text)
             }));
         }
-        let text = std::fs::read_to_string(&summary).map_err(file_error)?;
-        let summary: serde_json::Value =
-            serde_json::from_str(&text).map_err(|e| TradeError::Summary {
-                text: text.clone(),
-                why: e.to_string(),
-            })?;
-        let stages = summary["timings"].as_array().into_iter().flatten();
-        let output: f64 = stages
-            .filter(|s| s["name"] == "output")
-            .filter_map(|s| s["seconds"].as_f64())
-            .sum();
-        let number = |v: &serde_json::Value| v.as_f64().unwrap_or(0.0);
-        let steps = summary["motion"]["steps"].as_f64().unwrap_or(1.0);
-        let cost = Cost {
-            seconds: number(&summary["total_seconds"]) - output,
-            memory: number(&summary["peak_memory_bytes"]),
-            bond_visits: number(&summary["sizes"]["bonds"]) * steps,
-            unknowns: number(&summary["sizes"]["dofs"]),
-        };
-        let measured = Measured::read(folder, &summary).map_err(file_error)?;
-        Ok(Attempt::Ran(Ran { cost, measured }))
+        read_outcome(folder, &summary)
     }
 }
 

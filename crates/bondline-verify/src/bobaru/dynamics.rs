@@ -151,6 +151,54 @@ fn modulus(micromodulus: Micromodulus, spacing: f64) -> f64 {
         .sum()
 }
 
+/// Arrival, amplitude and the size of families of a grid, against the printed ones.
+fn push_raw(
+    table: &mut Table,
+    case: &str,
+    found: &Peak,
+    (n, horizon, inside, time, amplitude): (i32, f64, i32, f64, f64),
+) {
+    table.push(Row::within(case, "arrival", found.time, time, 1e-9));
+    // the table cuts its digits
+    table.push(Row::within(
+        case,
+        "amplitude",
+        found.amplitude,
+        amplitude,
+        1.1e-3,
+    ));
+    let m = horizon * f64::from(n - 1) / 450.0;
+    let family = 2.0 * (m + 1e-9).floor() + 1.0;
+    let row = Row::info(case, "nodes in the horizon", family).with_reference(f64::from(inside));
+    table.push(if family == f64::from(inside) {
+                    row
+                } else {
+                    row.differs("the printed horizon and number of nodes give another m than the printed count; the arrival times are those of the horizon")
+                });
+    table.push(Row::info(
+        case,
+        "arrival by stiffness alone, 400/sqrt(1 - 1/m^2)",
+        400.0 / (1.0 - 1.0 / (m * m)).sqrt(),
+    ));
+}
+
+/// Rates of convergence of the arrival and the amplitude.
+fn push_rates(table: &mut Table, weights: Weights, effort: Effort, late: f64, low: f64) {
+    if weights == Weights::Raw && effort == Effort::Full {
+        table.push(Row::within("raw", "rate of the arrival", late, 1.245, 0.05));
+        table.push(Row::within(
+            "raw",
+            "rate of the amplitude",
+            low,
+            1.371,
+            0.05,
+        ));
+    } else if effort == Effort::Full {
+        table.push(Row::info("normalised", "rate of the arrival", late));
+        table.push(Row::info("normalised", "rate of the amplitude", low));
+    }
+}
+
 /// Table IV: uniform refinement, with the volumes of the text and with normalised weights.
 pub fn table_four(effort: Effort) -> Table {
     let mut table = Table::new(
@@ -192,62 +240,25 @@ pub fn table_four(effort: Effort) -> Table {
             };
             let case = format!("{word}, {n} nodes");
             if weights == Weights::Raw {
-                table.push(Row::within(&case, "arrival", found.time, time, 1e-9));
-                // the table cuts its digits
-                table.push(Row::within(
+                push_raw(
+                    &mut table,
                     &case,
-                    "amplitude",
-                    found.amplitude,
-                    amplitude,
-                    1.1e-3,
-                ));
-                let m = horizon * f64::from(n - 1) / 450.0;
-                let family = 2.0 * (m + 1e-9).floor() + 1.0;
-                let row = Row::info(&case, "nodes in the horizon", family)
-                    .with_reference(f64::from(inside));
-                table.push(if family == f64::from(inside) {
-                    row
-                } else {
-                    row.differs("the printed horizon and number of nodes give another m than the printed count; the arrival times are those of the horizon")
-                });
-                table.push(Row::info(
-                    &case,
-                    "arrival by stiffness alone, 400/sqrt(1 - 1/m^2)",
-                    400.0 / (1.0 - 1.0 / (m * m)).sqrt(),
-                ));
+                    &found,
+                    (n, horizon, inside, time, amplitude),
+                );
             } else {
                 table.push(Row::info(&case, "arrival", found.time).with_reference(time));
                 table
                     .push(Row::info(&case, "amplitude", found.amplitude).with_reference(amplitude));
             }
         }
-        if weights == Weights::Raw && effort == Effort::Full {
-            table.push(Row::within(
-                "raw",
-                "rate of the arrival",
-                -slope(&nodes, &late),
-                1.245,
-                0.05,
-            ));
-            table.push(Row::within(
-                "raw",
-                "rate of the amplitude",
-                -slope(&nodes, &low),
-                1.371,
-                0.05,
-            ));
-        } else if effort == Effort::Full {
-            table.push(Row::info(
-                "normalised",
-                "rate of the arrival",
-                -slope(&nodes, &late),
-            ));
-            table.push(Row::info(
-                "normalised",
-                "rate of the amplitude",
-                -slope(&nodes, &low),
-            ));
-        }
+        push_rates(
+            &mut table,
+            weights,
+            effort,
+            -slope(&nodes, &late),
+            -slope(&nodes, &low),
+        );
     }
     table.push(Row::within(
         "initial",

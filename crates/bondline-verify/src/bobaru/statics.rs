@@ -264,15 +264,37 @@ const UNIFORM: &str = "fully stated (dx = 20/(N-1), delta = half of the nodes in
 const REFINED: &str = "the refined zone is said to be below 15 % of the bar and to keep its coarse nodes from seeing the loads; with the printed m both cannot be \
     (case b takes 18 to 25 %); ours keeps the second: |x| < 1 + coarse horizon";
 
+/// Errors on a grid of the second table: uniform, or with a zone that is finer by a `ratio`.
+fn errors_of(g: usize, i: usize, ratio: f64, rule: Rule) -> Errors {
+    let half_family = [10.0, 15.0, 20.0, 25.0];
+    // nodes in the horizon of graded grids
+    let count = [23.5, 32.5, 43.5, 55.0];
+    let total = (NODES[i] - 1) as f64;
+    if g == 0 {
+        let h = 20.0 / total;
+        let x: Vec<f64> = (0..NODES[i])
+            .map(|j| (j as f64 - 0.5 * total) * h)
+            .collect();
+        let horizon = vec![half_family[i] * h; x.len()];
+        error(x, &horizon, rule, 0.5)
+    } else {
+        // fine spacing h, horizon c h/2; the zone ends at 1 + ratio c h/2, and spacings add up to N - 1
+        let reach = 0.5 * count[i];
+        let h = (2.0 * (1.0 - 1.0 / ratio) + 20.0 / ratio)
+            / (total - 2.0 * ratio * reach * (1.0 - 1.0 / ratio));
+        let fine = reach * h;
+        let zone = (0.0, 1.0 + ratio * fine);
+        let grid = Graded::new(10.0, zone, NODES[i], ratio, (fine, ratio * fine));
+        error(grid.x, &grid.horizon, rule, 0.5)
+    }
+}
+
 /// Table II: uniform and graded grids of a longer bar.
 pub fn table_two() -> Table {
     let mut table = Table::new(
         format!("Bobaru 2009, Table II: {SETUP}; -10 < x < 10, error at x = 0.5 in per cent"),
         Columns::Full,
     );
-    let half_family = [10.0, 15.0, 20.0, 25.0];
-    // nodes in the horizon of graded grids
-    let count = [23.5, 32.5, 43.5, 55.0];
     let printed = [
         [[3.375, 1.025, 0.516, 0.259], [3.745, 1.259, 0.562, 0.288]],
         [[1.172, 0.625, 0.454, 0.314], [1.047, 0.331, 0.170, 0.109]],
@@ -291,24 +313,7 @@ pub fn table_two() -> Table {
                 ..PLAIN
             };
             for i in 0..4 {
-                let total = (NODES[i] - 1) as f64;
-                all[g][k][i] = if g == 0 {
-                    let h = 20.0 / total;
-                    let x: Vec<f64> = (0..NODES[i])
-                        .map(|j| (j as f64 - 0.5 * total) * h)
-                        .collect();
-                    let horizon = vec![half_family[i] * h; x.len()];
-                    error(x, &horizon, rule, 0.5)
-                } else {
-                    // fine spacing h, horizon c h/2; the zone ends at 1 + ratio c h/2, and spacings add up to N - 1
-                    let reach = 0.5 * count[i];
-                    let h = (2.0 * (1.0 - 1.0 / ratio) + 20.0 / ratio)
-                        / (total - 2.0 * ratio * reach * (1.0 - 1.0 / ratio));
-                    let fine = reach * h;
-                    let zone = (0.0, 1.0 + ratio * fine);
-                    let grid = Graded::new(10.0, zone, NODES[i], ratio, (fine, ratio * fine));
-                    error(grid.x, &grid.horizon, rule, 0.5)
-                };
+                all[g][k][i] = errors_of(g, i, ratio, rule);
                 let row = Row::info(
                     &case,
                     format!("error, {} nodes", NODES[i]),

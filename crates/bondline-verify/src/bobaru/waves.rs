@@ -271,12 +271,8 @@ fn outcome(plan: Plan) -> Outcome {
     }
 }
 
-/// Refinement 4:1 against the uniform grid of the same fine spacing.
-pub fn refinement() -> Table {
-    let mut table = Table::new(
-        "Refinement in dynamics: 4:1 against a uniform grid as fine, normalised weights, forces in pairs, Verlet with dt = 0.15, t = 400",
-        Columns::Full,
-    );
+/// A uniform grid, and three that are refined where the wave is.
+fn refined_runs() -> Vec<Outcome> {
     let uniform = Plan {
         nodes: 4 * (OURS.nodes - 1) + 1,
         horizon: 0.25 * OURS.horizon,
@@ -295,10 +291,65 @@ pub fn refinement() -> Table {
         },
         ..OURS
     };
-    let runs: Vec<Outcome> = [uniform, OURS, often, source]
+    [uniform, OURS, often, source]
         .into_par_iter()
         .map(outcome)
-        .collect();
+        .collect()
+}
+
+/// A grid that follows the wave against the uniform one.
+fn push_refined(table: &mut Table, name: &str, k: usize, base: &Outcome, r: &Outcome) {
+    let ratio = base.point_steps as f64 / r.point_steps as f64;
+    let error = r.error / base.error;
+    if k == 1 {
+        table.push(Row::at_most(
+            name,
+            "largest jump of the energy at a change",
+            r.jump,
+            1e-4,
+        ));
+        table.push(
+            Row::at_most(
+                name,
+                "largest jump of the momentum at a change",
+                r.momentum,
+                1e-2,
+            )
+            .because("over 0.01, the amplitude of the wave times its speed"),
+        );
+        table.push(Row::at_most(
+            name,
+            "error over that of the uniform grid",
+            error,
+            1.05,
+        ));
+        table.push(Row::at_least(
+            name,
+            "node steps of the uniform grid over these",
+            ratio,
+            2.0,
+        ));
+    } else {
+        table.push(Row::info(
+            name,
+            "largest jump of the energy at a change",
+            r.jump,
+        ));
+        table.push(Row::info(
+            name,
+            "error over that of the uniform grid",
+            error,
+        ));
+    }
+}
+
+/// Refinement 4:1 against the uniform grid of the same fine spacing.
+pub fn refinement() -> Table {
+    let mut table = Table::new(
+        "Refinement in dynamics: 4:1 against a uniform grid as fine, normalised weights, forces in pairs, Verlet with dt = 0.15, t = 400",
+        Columns::Full,
+    );
+    let runs = refined_runs();
     let base = &runs[0];
     let names = [
         "uniform",
@@ -332,48 +383,7 @@ pub fn refinement() -> Table {
             continue;
         }
         table.push(Row::info(name, "changes of the grid", r.changes as f64));
-        let ratio = base.point_steps as f64 / r.point_steps as f64;
-        let error = r.error / base.error;
-        if k == 1 {
-            table.push(Row::at_most(
-                name,
-                "largest jump of the energy at a change",
-                r.jump,
-                1e-4,
-            ));
-            table.push(
-                Row::at_most(
-                    name,
-                    "largest jump of the momentum at a change",
-                    r.momentum,
-                    1e-2,
-                )
-                .because("over 0.01, the amplitude of the wave times its speed"),
-            );
-            table.push(Row::at_most(
-                name,
-                "error over that of the uniform grid",
-                error,
-                1.05,
-            ));
-            table.push(Row::at_least(
-                name,
-                "node steps of the uniform grid over these",
-                ratio,
-                2.0,
-            ));
-        } else {
-            table.push(Row::info(
-                name,
-                "largest jump of the energy at a change",
-                r.jump,
-            ));
-            table.push(Row::info(
-                name,
-                "error over that of the uniform grid",
-                error,
-            ));
-        }
+        push_refined(&mut table, name, k, base, r);
     }
     table
 }

@@ -92,6 +92,37 @@ fn solution() -> Table {
     table
 }
 
+/// The methods against each other, as far as the text compares them.
+fn compare(table: &mut Table, between: &[[f64; 2]]) {
+    if let [hermite, midpoint, elements, half_hats] = *between {
+        for (k, time) in ["tau = 2", "tau = 8"].into_iter().enumerate() {
+            table.push(
+                Row::info(
+                    time,
+                    "error midpoint / Gauss-Hermite",
+                    midpoint[k] / hermite[k],
+                )
+                .because("the text: almost the same accuracy, Gauss-Hermite somewhat better"),
+            );
+            let ratio = elements[k] / hermite[k];
+            let row = Row::info(time, "error elements / Gauss-Hermite", ratio);
+            table.push(if ratio < 1.0 {
+                row.because("the text: elements are best")
+            } else {
+                row.differs(
+                    "the text: elements are best. At the nodes they are so only once waves have come back from the ends, and owe that to whole hats, whose rows at \
+                    the ends do not add up to 0 and hold the bar there; half hats do not",
+                )
+            });
+            table.push(Row::info(
+                time,
+                "error half hats / whole hats",
+                half_hats[k] / elements[k],
+            ));
+        }
+    }
+}
+
 fn discretisations(n: usize) -> Table {
     let mut table = Table::new(
         format!(
@@ -155,33 +186,7 @@ fn discretisations(n: usize) -> Table {
         ));
         between.push([bar.error(2.0), bar.error(8.0)]);
     }
-    if let [hermite, midpoint, elements, half_hats] = between[..] {
-        for (k, time) in ["tau = 2", "tau = 8"].into_iter().enumerate() {
-            table.push(
-                Row::info(
-                    time,
-                    "error midpoint / Gauss-Hermite",
-                    midpoint[k] / hermite[k],
-                )
-                .because("the text: almost the same accuracy, Gauss-Hermite somewhat better"),
-            );
-            let ratio = elements[k] / hermite[k];
-            let row = Row::info(time, "error elements / Gauss-Hermite", ratio);
-            table.push(if ratio < 1.0 {
-                row.because("the text: elements are best")
-            } else {
-                row.differs(
-                    "the text: elements are best. At the nodes they are so only once waves have come back from the ends, and owe that to whole hats, whose rows at \
-                    the ends do not add up to 0 and hold the bar there; half hats do not",
-                )
-            });
-            table.push(Row::info(
-                time,
-                "error half hats / whole hats",
-                half_hats[k] / elements[k],
-            ));
-        }
-    }
+    compare(&mut table, &between);
     table
 }
 

@@ -34,6 +34,33 @@ fn uniform(x: f64) -> f64 {
     x
 }
 
+/// Stresses where the slope of the horizon is kept while the horizon goes to zero.
+fn push_ramp(table: &mut Table, rule: &[(f64, f64)]) {
+    // slope of the horizon kept while the horizon goes to zero
+    let mut gaps = Vec::new();
+    for e in [0.2, 0.1, 0.05] {
+        let horizon = |x: f64| e + 0.3 * x;
+        let bar = Continuum {
+            displacement: &uniform,
+            horizon: &horizon,
+            rule,
+        };
+        gaps.push((bar.stress(0.0) - bar.partial_stress(0.0)).abs());
+    }
+    let spread =
+        gaps.iter().copied().fold(0.0, f64::max) - gaps.iter().copied().fold(1.0, f64::min);
+    table.push(Row::info("slope 0.3 kept, u = x", "stress, pd - ps", gaps[2]).differs(
+        "(2.23) bounds it by delta |grad T1|, which is 0 under a uniform strain; a linear ramp leaves a constant stress difference of the order of the squared slope, \
+         whatever the horizon. No ghost force follows (its divergence is 0), but pd and ps stresses do not meet",
+    ));
+    table.push(Row::at_most(
+        "slope 0.3 kept, u = x",
+        "its spread over three horizons",
+        spread,
+        1e-12,
+    ));
+}
+
 /// Orders of (2.23) to (2.28) in δ = ε d(x).
 fn orders() -> Table {
     let mut table = Table::new(
@@ -91,30 +118,38 @@ fn orders() -> Table {
             table.push(Row::info(case, format!("{name}: at eps = 0.025"), d[3]));
         }
     }
-    // slope of the horizon kept while the horizon goes to zero
-    let mut gaps = Vec::new();
-    for e in [0.2, 0.1, 0.05] {
-        let horizon = |x: f64| e + 0.3 * x;
-        let bar = Continuum {
-            displacement: &uniform,
-            horizon: &horizon,
-            rule: &rule,
-        };
-        gaps.push((bar.stress(0.0) - bar.partial_stress(0.0)).abs());
-    }
-    let spread =
-        gaps.iter().copied().fold(0.0, f64::max) - gaps.iter().copied().fold(1.0, f64::min);
-    table.push(Row::info("slope 0.3 kept, u = x", "stress, pd - ps", gaps[2]).differs(
-        "(2.23) bounds it by delta |grad T1|, which is 0 under a uniform strain; a linear ramp leaves a constant stress difference of the order of the squared slope, \
-         whatever the horizon. No ghost force follows (its divergence is 0), but pd and ps stresses do not meet",
-    ));
-    table.push(Row::at_most(
-        "slope 0.3 kept, u = x",
-        "its spread over three horizons",
-        spread,
-        1e-12,
-    ));
+    push_ramp(&mut table, &rule);
     table
+}
+
+/// The ghost forces of both models on a bar of 400 points.
+fn push_models(table: &mut Table, progress: &dyn Progress) {
+    for (name, model) in [
+        ("partial stress", BarModel::PartialStress),
+        ("standard", BarModel::Standard),
+    ] {
+        let case = format!("{name}, 400 points, delta = 0.2 + 0.06 sin x");
+        let what = "largest ghost force over E u'/L";
+        let bar = profile::<1>(
+            BarLaw::Correspondence,
+            model,
+            0.025,
+            1,
+            "0.2 + 0.06 * sin(x)",
+            progress,
+        );
+        table.push(match bar {
+            Ok(bar) => {
+                let largest = bar.linear.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
+                let value = largest / linear_scale();
+                match model {
+                    BarModel::PartialStress => Row::at_most(case, what, value, 1e-8),
+                    BarModel::Standard => Row::info(case, what, value),
+                }
+            }
+            Err(e) => Row::refused(case, what, e.to_string()),
+        });
+    }
 }
 
 /// (2.18): the ghost force of a bar of variable horizon under u = x.
@@ -194,32 +229,7 @@ fn ghost_force(progress: &dyn Progress) -> Table {
         bar.partial_force(0.0).abs(),
         1e-12,
     ));
-    for (name, model) in [
-        ("partial stress", BarModel::PartialStress),
-        ("standard", BarModel::Standard),
-    ] {
-        let case = format!("{name}, 400 points, delta = 0.2 + 0.06 sin x");
-        let what = "largest ghost force over E u'/L";
-        let bar = profile::<1>(
-            BarLaw::Correspondence,
-            model,
-            0.025,
-            1,
-            "0.2 + 0.06 * sin(x)",
-            progress,
-        );
-        table.push(match bar {
-            Ok(bar) => {
-                let largest = bar.linear.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
-                let value = largest / linear_scale();
-                match model {
-                    BarModel::PartialStress => Row::at_most(case, what, value, 1e-8),
-                    BarModel::Standard => Row::info(case, what, value),
-                }
-            }
-            Err(e) => Row::refused(case, what, e.to_string()),
-        });
-    }
+    push_models(&mut table, progress);
     table
 }
 

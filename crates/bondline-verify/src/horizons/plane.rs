@@ -56,6 +56,36 @@ pub struct Strip {
     bonds: Vec<PlaneBond>,
 }
 
+/// The nodes of the strip: the fine lattice on the left, the coarse one on the right.
+fn nodes(ratio: usize, m: usize) -> Vec<Node> {
+    let coarse = ratio as f64;
+    let reach = m as f64 * coarse;
+    let columns = (2.0 * reach) as usize + 3;
+    let mut nodes = Vec::new();
+    for i in 0..columns {
+        let x = i as f64 + 0.5;
+        for j in 0..ratio {
+            nodes.push(Node {
+                at: [-x, j as f64 + 0.5],
+                area: 1.0,
+                wide: false,
+                whole: x + m as f64 <= columns as f64,
+            });
+        }
+    }
+    let columns = 2 * m + 3;
+    for i in 0..columns {
+        let x = i as f64 + 0.5;
+        nodes.push(Node {
+            at: [x * coarse, 0.5 * coarse],
+            area: coarse * coarse,
+            wide: true,
+            whole: x + m as f64 <= columns as f64,
+        });
+    }
+    nodes
+}
+
 impl Strip {
     /// The strip for m = δ/h on both sides, kernel c/|ξ|³, both lattices with `C_1111 = 1`.
     pub fn new(ratio: usize, m: usize, between: Between) -> Self {
@@ -81,29 +111,7 @@ impl Strip {
                 0.0
             }
         };
-        let columns = (2.0 * reach) as usize + 3;
-        let mut nodes = Vec::new();
-        for i in 0..columns {
-            let x = i as f64 + 0.5;
-            for j in 0..ratio {
-                nodes.push(Node {
-                    at: [-x, j as f64 + 0.5],
-                    area: 1.0,
-                    wide: false,
-                    whole: x + m as f64 <= columns as f64,
-                });
-            }
-        }
-        let columns = 2 * m + 3;
-        for i in 0..columns {
-            let x = i as f64 + 0.5;
-            nodes.push(Node {
-                at: [x * coarse, 0.5 * coarse],
-                area: coarse * coarse,
-                wide: true,
-                whole: x + m as f64 <= columns as f64,
-            });
-        }
+        let nodes = nodes(ratio, m);
         let mut strip = Self {
             nodes,
             bonds: Vec::new(),

@@ -184,6 +184,20 @@ enum Breaks {
     WithinZone,
 }
 
+/// Damage along the row of points on one side of the line at `y`.
+fn damage_beside(x: &[Vector<2>], y: f64, damage: &[f64], side: f64) -> Vec<(f64, f64)> {
+    let beside = x.iter().zip(damage);
+    let beside = beside.filter(|(x, _)| (x[1] - y - side * SPACING).abs() < 0.1 * SPACING);
+    beside.map(|(x, d)| (x[0], *d)).collect()
+}
+
+/// How far from the middle, in spacings, points have lost a `part` of the bonds that a crack cuts.
+fn tip_of(x: &[Vector<2>], y: f64, damage: &[f64], part: f64) -> f64 {
+    let both = [0.5, -0.5].map(|side| damage_beside(x, y, damage, side));
+    let lost = both.iter().flatten().filter(|(_, d)| *d >= part * CUT);
+    lost.map(|(x, _)| x.abs() / SPACING).fold(0.0, f64::max)
+}
+
 fn run_crack(
     case: &Case,
     coupling: Option<&str>,
@@ -232,16 +246,7 @@ fn run_crack(
         }
     };
     motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
-    let row = |damage: &[f64], side: f64| -> Vec<(f64, f64)> {
-        let beside = x.iter().zip(damage);
-        let beside = beside.filter(|(x, _)| (x[1] - y - side * SPACING).abs() < 0.1 * SPACING);
-        beside.map(|(x, d)| (x[0], *d)).collect()
-    };
-    let tip = |damage: &[f64], part: f64| {
-        let both = [0.5, -0.5].map(|side| row(damage, side));
-        let lost = both.iter().flatten().filter(|(_, d)| *d >= part * CUT);
-        lost.map(|(x, _)| x.abs() / SPACING).fold(0.0, f64::max)
-    };
+    let tip = |damage: &[f64], part: f64| tip_of(&x, y, damage, part);
     let mut done = 0;
     while done < steps.unwrap_or(STEPS) {
         done += 1;
@@ -261,7 +266,7 @@ fn run_crack(
     let taken = motion.dissipated_energy().unwrap_or(0.0);
     let damage = motion.damage().unwrap_or_default();
     let longer = [0.5, -0.5].map(|side| {
-        let row = row(&damage, side);
+        let row = damage_beside(&x, y, &damage, side);
         row.iter().map(|(_, d)| (d / CUT).min(1.0)).sum()
     });
     Ok(Run {
