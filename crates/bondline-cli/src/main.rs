@@ -3,7 +3,7 @@
 mod command;
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
@@ -278,6 +278,102 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Runs a scene and prints its summary.
+fn run(
+    scene: SceneArguments,
+    json: bool,
+    output: Option<PathBuf>,
+    (threads, oversubscribe): (Option<usize>, bool),
+    checkpoint_every: Option<Pace>,
+    resume: bool,
+) -> miette::Result<ExitCode> {
+    let oversubscribe = match oversubscribe {
+        true => Oversubscribe::Allowed,
+        false => Oversubscribe::Refused,
+    };
+    threads::start(threads, oversubscribe)?;
+    let mut scene = load(&scene)?;
+    if let Some(directory) = output {
+        scene.set_output_directory(directory);
+    }
+    if !scene.moves() && (resume || checkpoint_every.is_some()) {
+        return Err(miette::miette!(
+            "a static scene has no checkpoints: leave out --resume and --checkpoint-every, or add [solve.explicit]"
+        ));
+    }
+    let interrupt = scene.moves().then(interrupt::listen).transpose()?;
+    let options = RunOptions {
+        start: if resume {
+            StartFrom::Checkpoint
+        } else {
+            StartFrom::Beginning
+        },
+        checkpoint_every,
+        interrupt: interrupt.map(|i| &i.asked),
+        heeds: interrupt.map(|i| &i.heeded),
+        observer: None,
+    };
+    let summary = scene
+        .run_with(&options, &TerminalProgress::on_stderr())
+        .map_err(|e| miette::miette!("{e}"))?;
+    let code = match summary.motion.as_ref().map(|m| m.ended) {
+        None | Some(Ended::Finished) => ExitCode::SUCCESS,
+        Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => {
+            ExitCode::from(AT_EDGE)
+        }
+        Some(Ended::Interrupted) => ExitCode::from(INTERRUPTED),
+    };
+    if json {
+        print(summary.json().map_err(|e| miette::miette!("{e}"))?)?;
+    } else {
+        print(summary)?;
+    }
+    Ok(code)
+}
+
+/// Runs a scene with finer and finer meshes, and prints, writes and plots the differences.
+fn converge(
+    scene: &SceneArguments,
+    refinement: Refinement,
+    (levels, factor): (usize, f64),
+    output: &Path,
+    json: bool,
+) -> miette::Result<()> {
+    let params = ConvergeParams {
+        refinement,
+        levels,
+        factor,
+    };
+    let progress = TerminalProgress::on_stderr();
+    let found = bondline_study::converge(&scene.scene, &scene.overrides, &params, &progress)
+        .map_err(|e| match e {
+            ConvergeError::Scene(e) => report(*e),
+            other => miette::miette!("{other}"),
+        })?;
+    let format = if json {
+        tables::Format::Json
+    } else {
+        tables::Format::Text
+    };
+    print(tables::render(&[found.table()], format).trim_end())?;
+    let stem = scene.scene.file_stem().unwrap_or_default();
+    let name = format!("{}-{}", stem.to_string_lossy(), found.refinement.name());
+    let csv = output.join(format!("{name}.csv"));
+    found.write_csv(&csv).map_err(|e| miette::miette!("{e}"))?;
+    tell(format_args!("wrote {}", csv.display()));
+    // levels that agree to round-off leave nothing to plot on logarithmic axes
+    if found.orders().iter().any(Option::is_some) {
+        let svg = output.join(format!("{name}.svg"));
+        found
+            .plot()
+            .write(&svg)
+            .map_err(|e| miette::miette!("{e}"))?;
+        tell(format_args!("wrote {}", svg.display()));
+    }
+    Ok(())
+}
+
+/// Does what a command says.
 fn execute(command: Command) -> miette::Result<ExitCode> {
     memory::limit(command.memory());
     match command {
@@ -290,48 +386,14 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             checkpoint_every,
             resume,
         } => {
-            let oversubscribe = match oversubscribe {
-                true => Oversubscribe::Allowed,
-                false => Oversubscribe::Refused,
-            };
-            threads::start(threads, oversubscribe)?;
-            let mut scene = load(&scene)?;
-            if let Some(directory) = output {
-                scene.set_output_directory(directory);
-            }
-            if !scene.moves() && (resume || checkpoint_every.is_some()) {
-                return Err(miette::miette!(
-                    "a static scene has no checkpoints: leave out --resume and --checkpoint-every, or add [solve.explicit]"
-                ));
-            }
-            let interrupt = scene.moves().then(interrupt::listen).transpose()?;
-            let options = RunOptions {
-                start: if resume {
-                    StartFrom::Checkpoint
-                } else {
-                    StartFrom::Beginning
-                },
+            return run(
+                scene,
+                json,
+                output,
+                (threads, oversubscribe),
                 checkpoint_every,
-                interrupt: interrupt.map(|i| &i.asked),
-                heeds: interrupt.map(|i| &i.heeded),
-                observer: None,
-            };
-            let summary = scene
-                .run_with(&options, &TerminalProgress::on_stderr())
-                .map_err(|e| miette::miette!("{e}"))?;
-            let code = match summary.motion.as_ref().map(|m| m.ended) {
-                None | Some(Ended::Finished) => ExitCode::SUCCESS,
-                Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => {
-                    ExitCode::from(AT_EDGE)
-                }
-                Some(Ended::Interrupted) => ExitCode::from(INTERRUPTED),
-            };
-            if json {
-                print(summary.json().map_err(|e| miette::miette!("{e}"))?)?;
-            } else {
-                print(summary)?;
-            }
-            return Ok(code);
+                resume,
+            );
         }
         Command::Check {
             scene,
@@ -358,40 +420,7 @@ fn execute(command: Command) -> miette::Result<ExitCode> {
             factor,
             output,
             json,
-        } => {
-            let params = ConvergeParams {
-                refinement: kind.into(),
-                levels,
-                factor,
-            };
-            let progress = TerminalProgress::on_stderr();
-            let found =
-                bondline_study::converge(&scene.scene, &scene.overrides, &params, &progress)
-                    .map_err(|e| match e {
-                        ConvergeError::Scene(e) => report(*e),
-                        other => miette::miette!("{other}"),
-                    })?;
-            let format = if json {
-                tables::Format::Json
-            } else {
-                tables::Format::Text
-            };
-            print(tables::render(&[found.table()], format).trim_end())?;
-            let stem = scene.scene.file_stem().unwrap_or_default();
-            let name = format!("{}-{}", stem.to_string_lossy(), found.refinement.name());
-            let csv = output.join(format!("{name}.csv"));
-            found.write_csv(&csv).map_err(|e| miette::miette!("{e}"))?;
-            tell(format_args!("wrote {}", csv.display()));
-            // levels that agree to round-off leave nothing to plot on logarithmic axes
-            if found.orders().iter().any(Option::is_some) {
-                let svg = output.join(format!("{name}.svg"));
-                found
-                    .plot()
-                    .write(&svg)
-                    .map_err(|e| miette::miette!("{e}"))?;
-                tell(format_args!("wrote {}", svg.display()));
-            }
-        }
+        } => converge(&scene, kind.into(), (levels, factor), &output, json)?,
         Command::New { path, template } => {
             let template = match template {
                 TemplateName::Bar => Template::Bar,

@@ -71,6 +71,34 @@ fn pixel(value: f64) -> String {
     }
 }
 
+/// The colour of a level; grey beyond the last, of values that are not finite.
+fn fill(level: usize) -> String {
+    if level < LEVELS {
+        colour(level)
+    } else {
+        "#b0b0b0".to_owned()
+    }
+}
+
+/// A path along corners, that `place` puts on the page.
+fn outline(corners: &[[f64; 2]], place: impl Fn(&[f64; 2]) -> [f64; 2]) -> String {
+    // relative moves need fewer digits; they start from the rounded corner, so that errors do not add up
+    let mut d = String::new();
+    let mut last = [0.0, 0.0];
+    for (i, corner) in corners.iter().enumerate() {
+        let at = place(corner).map(|v| (v * 100.0).round() / 100.0);
+        let command = if i == 0 { "M" } else { "l" };
+        let _ = write!(
+            d,
+            "{command}{} {}",
+            pixel(at[0] - last[0]),
+            pixel(at[1] - last[1])
+        );
+        last = at;
+    }
+    d
+}
+
 impl FieldMap {
     /// Writes the picture; makes the folder if it is missing.
     ///
@@ -121,31 +149,8 @@ impl FieldMap {
     }
 
     fn svg(&self, path: &Path) -> Result<String, ObserveError> {
-        let mut lo = [f64::INFINITY; 2];
-        let mut hi = [f64::NEG_INFINITY; 2];
-        for (entry, (corners, _)) in self.polygons().enumerate() {
-            for corner in corners {
-                for k in 0..2 {
-                    if !corner[k].is_finite() {
-                        return Err(ObserveError::NotFinite {
-                            path: path.to_path_buf(),
-                            field: "position".to_owned(),
-                            entry,
-                            value: corner[k],
-                        });
-                    }
-                    lo[k] = lo[k].min(corner[k]);
-                    hi[k] = hi[k].max(corner[k]);
-                }
-            }
-        }
+        let (lo, hi) = self.bounds(path)?;
         let span = (hi[0] - lo[0]).max(hi[1] - lo[1]);
-        if span.is_nan() || span <= 0.0 {
-            return Err(ObserveError::Empty {
-                path: path.to_path_buf(),
-                what: "the picture has no cells or points of any size",
-            });
-        }
         let scale = EXTENT / span;
         let [side, above, below] = MARGIN;
         let (w, h) = ((hi[0] - lo[0]) * scale, (hi[1] - lo[1]) * scale);
@@ -157,23 +162,7 @@ impl FieldMap {
                 above + (hi[1] - p[1]) * scale,
             ]
         };
-        let outline = |corners: &[[f64; 2]]| {
-            // relative moves need fewer digits; they start from the rounded corner, so that errors do not add up
-            let mut d = String::new();
-            let mut last = [0.0, 0.0];
-            for (i, corner) in corners.iter().enumerate() {
-                let at = place(corner).map(|v| (v * 100.0).round() / 100.0);
-                let command = if i == 0 { "M" } else { "l" };
-                let _ = write!(
-                    d,
-                    "{command}{} {}",
-                    pixel(at[0] - last[0]),
-                    pixel(at[1] - last[1])
-                );
-                last = at;
-            }
-            d
-        };
+        let outline = |corners: &[[f64; 2]]| outline(corners, place);
 
         let (first, last) = self.value_range();
         let mut paths = vec![String::new(); LEVELS + 1];
@@ -199,11 +188,7 @@ impl FieldMap {
         // a hair of the same colour hides the gaps that a renderer leaves between neighbours
         svg.push_str("<g stroke-width=\"0.8\" stroke-linejoin=\"round\">\n");
         for (level, d) in paths.iter().enumerate().filter(|(_, d)| !d.is_empty()) {
-            let fill = if level < LEVELS {
-                colour(level)
-            } else {
-                "#b0b0b0".to_owned()
-            };
+            let fill = fill(level);
             let _ = writeln!(svg, "<path fill=\"{fill}\" stroke=\"{fill}\" d=\"{d}\"/>");
         }
         svg.push_str("</g>\n");
@@ -219,7 +204,19 @@ impl FieldMap {
             );
         }
 
-        let x = side + w + 24.0;
+        self.write_bar(&mut svg, [side + w + 24.0, above, bar_height]);
+        let _ = writeln!(
+            svg,
+            "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>\n</svg>",
+            pixel(width - side),
+            pixel(above - 14.0),
+            escape(&self.label)
+        );
+        Ok(svg)
+    }
+    /// The bar of colours with values beside it: at `x`, from `above` down.
+    fn write_bar(&self, svg: &mut String, [x, above, bar_height]: [f64; 3]) {
+        let (first, last) = self.value_range();
         let step = bar_height / LEVELS as f64;
         for level in 0..LEVELS {
             let y = above + bar_height - (level + 1) as f64 * step;
@@ -250,14 +247,39 @@ impl FieldMap {
                 pixel(above + bar_height * (1.0 - share) + 5.0)
             );
         }
-        let _ = writeln!(
-            svg,
-            "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>\n</svg>",
-            pixel(width - side),
-            pixel(above - 14.0),
-            escape(&self.label)
-        );
-        Ok(svg)
+    }
+
+    /// The corners of the box around all cells.
+    ///
+    /// # Errors
+    /// [`ObserveError`] for a position that is not finite, and where nothing has any size.
+    fn bounds(&self, path: &Path) -> Result<([f64; 2], [f64; 2]), ObserveError> {
+        let mut lo = [f64::INFINITY; 2];
+        let mut hi = [f64::NEG_INFINITY; 2];
+        for (entry, (corners, _)) in self.polygons().enumerate() {
+            for corner in corners {
+                for k in 0..2 {
+                    if !corner[k].is_finite() {
+                        return Err(ObserveError::NotFinite {
+                            path: path.to_path_buf(),
+                            field: "position".to_owned(),
+                            entry,
+                            value: corner[k],
+                        });
+                    }
+                    lo[k] = lo[k].min(corner[k]);
+                    hi[k] = hi[k].max(corner[k]);
+                }
+            }
+        }
+        let span = (hi[0] - lo[0]).max(hi[1] - lo[1]);
+        if span.is_nan() || span <= 0.0 {
+            return Err(ObserveError::Empty {
+                path: path.to_path_buf(),
+                what: "the picture has no cells or points of any size",
+            });
+        }
+        Ok((lo, hi))
     }
 }
 

@@ -72,10 +72,16 @@ impl Periodic {
         y: &mut [f64],
         symbol: impl Fn([usize; 3], &mut [C; 3]) + Sync,
     ) {
-        let [m0, m1, m2] = self.modes();
+        let mut planes = self.to_modes(components, x);
+        let slabs = self.apply_symbol(components, &planes, symbol);
+        self.to_values(components, &slabs, &mut planes, y);
+    }
+
+    /// The modes along axes 2 and 1 of planes of constant i0: [component][i0][k2][k1].
+    fn to_modes(&self, components: usize, x: &[f64]) -> Vec<C> {
+        let [_, m1, m2] = self.modes();
         let [n0, n1, n2] = self.inner;
         let plane = m2 * m1;
-        // planes of constant i0, modes along axes 2 and 1: [component][i0][k2][k1]
         let mut planes = vec![C::default(); components * n0 * plane];
         planes
             .par_chunks_mut(plane)
@@ -102,7 +108,19 @@ impl Periodic {
                     self.forward[1].process_with_scratch(plane, scratch1);
                 },
             );
-        // axis 0, the symbol and back, for one k2 at a time: [k2][component][i0][k1]
+        planes
+    }
+
+    /// The modes along axis 0, the symbol and back, for one k2 at a time: [k2][component][i0][k1].
+    fn apply_symbol(
+        &self,
+        components: usize,
+        planes: &[C],
+        symbol: impl Fn([usize; 3], &mut [C; 3]) + Sync,
+    ) -> Vec<C> {
+        let [m0, m1, m2] = self.modes();
+        let n0 = self.inner[0];
+        let plane = m2 * m1;
         let slab = components * n0 * m1;
         let mut slabs = vec![C::default(); m2 * slab];
         slabs.par_chunks_mut(slab).enumerate().for_each_init(
@@ -150,6 +168,15 @@ impl Periodic {
                 }
             },
         );
+        slabs
+    }
+
+    /// Values from modes, back along axes 1 and 2; `planes` is work space.
+    fn to_values(&self, components: usize, slabs: &[C], planes: &mut [C], y: &mut [f64]) {
+        let [_, m1, m2] = self.modes();
+        let [n0, n1, n2] = self.inner;
+        let plane = m2 * m1;
+        let slab = components * n0 * m1;
         let scale = 1.0 / self.period.iter().product::<usize>() as f64;
         y.par_chunks_mut(n1 * n2)
             .zip(planes.par_chunks_mut(plane))
