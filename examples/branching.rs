@@ -241,37 +241,8 @@ fn couplings() -> Result<Vec<Table>, Failure> {
     Ok(vec![table])
 }
 
-fn tables() -> Result<Vec<Table>, Failure> {
-    let output = PathBuf::from(argument("--output").unwrap_or("out/branching".into()));
-    // in turn, so that what else the machine does meets both; the least disturbed run of each tells its time
-    let (name, pure): (_, &[&str]) = ("truncated", &["coupling=nonlocal"]);
-    let (mut full, mut coupled) = (crack("full", pure, &output)?, crack(name, &[], &output)?);
-    let fastest = |of: &mut Crack, again: Crack| {
-        for (known, seconds) in of.seconds.iter_mut().zip(again.seconds) {
-            *known = known.min(seconds);
-        }
-    };
-    for _ in 1..TURNS {
-        fastest(&mut full, crack("full", pure, &output)?);
-        fastest(&mut coupled, crack(name, &[], &output)?);
-    }
-    let mut table = Table::new(
-        "branching, coupled against full PD",
-        report::Columns::default(),
-    );
-    let mut series = vec![];
-    let alone = "full PD";
-    table.push(Row::info(alone, "branch point, mm", full.point * 1e3));
-    table.push(Row::info(alone, "branch time, us", full.time * 1e6));
-    table.push(Row::info(alone, "dissipated energy, J/m", full.dissipated));
-    let mut paths = |name: &str, crack: &Crack, stroke| {
-        for (half, path) in ["upper", "lower"].iter().zip(&crack.paths) {
-            let path = path.iter().map(|p| (p.0 * 1e3, p.1 * 1e3)).collect();
-            series.push(Series::new(format!("{name}, {half}"), stroke, path));
-        }
-    };
-    paths("full PD", &full, Stroke::Dashed);
-    paths(name, &coupled, Stroke::Line);
+/// Where and when the crack branches, what it takes and how thin it is, against full peridynamics.
+fn push_accuracy(table: &mut Table, name: &str, full: &Crack, coupled: &Crack) {
     let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0).abs();
     table.push(Row::at_most(
         name,
@@ -308,6 +279,40 @@ fn tables() -> Result<Vec<Table>, Failure> {
         1e3 * coupled.thickness,
         2.0,
     ));
+}
+
+fn tables() -> Result<Vec<Table>, Failure> {
+    let output = PathBuf::from(argument("--output").unwrap_or("out/branching".into()));
+    // in turn, so that what else the machine does meets both; the least disturbed run of each tells its time
+    let (name, pure): (_, &[&str]) = ("truncated", &["coupling=nonlocal"]);
+    let (mut full, mut coupled) = (crack("full", pure, &output)?, crack(name, &[], &output)?);
+    let fastest = |of: &mut Crack, again: Crack| {
+        for (known, seconds) in of.seconds.iter_mut().zip(again.seconds) {
+            *known = known.min(seconds);
+        }
+    };
+    for _ in 1..TURNS {
+        fastest(&mut full, crack("full", pure, &output)?);
+        fastest(&mut coupled, crack(name, &[], &output)?);
+    }
+    let mut table = Table::new(
+        "branching, coupled against full PD",
+        report::Columns::default(),
+    );
+    let mut series = vec![];
+    let alone = "full PD";
+    table.push(Row::info(alone, "branch point, mm", full.point * 1e3));
+    table.push(Row::info(alone, "branch time, us", full.time * 1e6));
+    table.push(Row::info(alone, "dissipated energy, J/m", full.dissipated));
+    let mut paths = |name: &str, crack: &Crack, stroke| {
+        for (half, path) in ["upper", "lower"].iter().zip(&crack.paths) {
+            let path = path.iter().map(|p| (p.0 * 1e3, p.1 * 1e3)).collect();
+            series.push(Series::new(format!("{name}, {half}"), stroke, path));
+        }
+    };
+    paths("full PD", &full, Stroke::Dashed);
+    paths(name, &coupled, Stroke::Line);
+    push_accuracy(&mut table, name, &full, &coupled);
     // a time is no reason to fail, but a miss is not to be read as a pass
     for (k, what) in ["total time", "time of the steps alone"].iter().enumerate() {
         let ratio = full.seconds[k] / coupled.seconds[k];

@@ -242,6 +242,60 @@ const METHODS: [(&str, &str); 7] = [
 /// Limits of relative L2 of u, of ε_xx, and of the slit opening for blending against full peridynamics.
 const LIMITS: [f64; 3] = [3e-4, 1.2e-2, 5e-3];
 
+/// The opening of the slit on a mesh of Gmsh against that on a generated one.
+fn push_gmsh(accuracy: &mut Table, n: usize, progress: &dyn Progress) -> Result<(), Failure> {
+    let gmsh = solve(
+        *load("slit_plate_gmsh.toml", &["output.vtu=false".into()])?,
+        n,
+        progress,
+        None,
+    )?;
+    let generated = solve(
+        *load("slit_plate.toml", &["output.vtu=false".into()])?,
+        n,
+        progress,
+        None,
+    )?;
+    accuracy.push(Row::at_most(
+        "blending on the graded Gmsh mesh against the generated one",
+        "slit opening, relative",
+        (gmsh.lattice.opening() / generated.lattice.opening() - 1.0).abs(),
+        1e-2,
+    ));
+    Ok(())
+}
+
+/// The plate with bonds across the slit left whole.
+fn push_uncut(accuracy: &mut Table, n: usize, progress: &dyn Progress) -> Result<(), Failure> {
+    let cut_opening = solve(
+        *load("slit_plate.toml", &["output.vtu=false".into()])?,
+        n,
+        progress,
+        None,
+    )?
+    .lattice
+    .opening();
+    let uncut: Vec<String> = vec![
+        "peridynamics.surfaces=uncut".into(),
+        "output.vtu=false".into(),
+    ];
+    let coupled = solve(*load("slit_plate.toml", &uncut)?, n, progress, None)?;
+    let pd = full(n, &uncut[..1], &coupled.lattice, progress)?;
+    compare(
+        accuracy,
+        "blending, constant, bonds across the slit uncut",
+        &coupled,
+        &pd,
+        Some(LIMITS),
+    );
+    accuracy.push(Row::info(
+        "bonds across the slit cut / uncut",
+        "slit opening, ratio",
+        cut_opening / coupled.lattice.opening(),
+    ));
+    Ok(())
+}
+
 /// Table 3.1 on one lattice: accuracy and cost of each method.
 fn same_lattice(progress: &dyn Progress, figures: Option<&Path>) -> Result<Vec<Table>, Failure> {
     let n = 120;
@@ -295,73 +349,13 @@ fn same_lattice(progress: &dyn Progress, figures: Option<&Path>) -> Result<Vec<T
         &pd,
         Some(LIMITS),
     );
-    let cut_opening = solve(
-        *load("slit_plate.toml", &["output.vtu=false".into()])?,
-        n,
-        progress,
-        None,
-    )?
-    .lattice
-    .opening();
-    let uncut: Vec<String> = vec![
-        "peridynamics.surfaces=uncut".into(),
-        "output.vtu=false".into(),
-    ];
-    let coupled = solve(*load("slit_plate.toml", &uncut)?, n, progress, None)?;
-    let pd = full(n, &uncut[..1], &coupled.lattice, progress)?;
-    compare(
-        &mut accuracy,
-        "blending, constant, bonds across the slit uncut",
-        &coupled,
-        &pd,
-        Some(LIMITS),
-    );
-    accuracy.push(Row::info(
-        "bonds across the slit cut / uncut",
-        "slit opening, ratio",
-        cut_opening / coupled.lattice.opening(),
-    ));
-    let gmsh = solve(
-        *load("slit_plate_gmsh.toml", &["output.vtu=false".into()])?,
-        n,
-        progress,
-        None,
-    )?;
-    let generated = solve(
-        *load("slit_plate.toml", &["output.vtu=false".into()])?,
-        n,
-        progress,
-        None,
-    )?;
-    accuracy.push(Row::at_most(
-        "blending on the graded Gmsh mesh against the generated one",
-        "slit opening, relative",
-        (gmsh.lattice.opening() / generated.lattice.opening() - 1.0).abs(),
-        1e-2,
-    ));
+    push_uncut(&mut accuracy, n, progress)?;
+    push_gmsh(&mut accuracy, n, progress)?;
     Ok(vec![accuracy, cost])
 }
 
-/// Finite elements that coarsen away from the slit: how much faster at what error.
-///
-/// Both are solved `rounds` times in turn.
-fn graded(
-    n: usize,
-    least_ratio: f64,
-    rounds: usize,
-    progress: &dyn Progress,
-) -> Result<Table, Failure> {
-    let mut table = Table::new(
-        format!("Finite elements graded away from the slit, h = 1/{n}, horizon 6 h"),
-        Columns::ByQuantity,
-    );
-    let spacing = [
-        format!("peridynamics.points.lattice.spacing=\"1/{n}\""),
-        format!("peridynamics.horizon=\"6/{n}\""),
-        format!("mesh.rectangle.x={{cells={n}}}"),
-        format!("mesh.rectangle.y={{cells={n}}}"),
-    ];
-    // one horizon of peridynamics around the slit, then cells that grow
+/// Keys of a mesh that is fine around the slit: one horizon of peridynamics, then cells that grow.
+fn graded_overrides(n: usize, spacing: &[String]) -> Vec<String> {
     let (half_x, half_y) = (SLIT[0] + 6.0 / n as f64, SLIT[1] + 6.0 / n as f64);
     let axis = |half: f64| {
         format!(
@@ -390,13 +384,38 @@ fn graded(
             "output.vtu=false".into(),
         ])
         .collect();
-    let best = |overrides: &[String], method: &str| -> Vec<String> {
-        overrides
-            .iter()
-            .cloned()
-            .chain([format!("solver.method={method}")])
-            .collect()
-    };
+    coupled
+}
+
+/// Keys with a method of the solver.
+fn best(overrides: &[String], method: &str) -> Vec<String> {
+    overrides
+        .iter()
+        .cloned()
+        .chain([format!("solver.method={method}")])
+        .collect()
+}
+
+/// Finite elements that coarsen away from the slit: how much faster at what error.
+///
+/// Both are solved `rounds` times in turn.
+fn graded(
+    n: usize,
+    least_ratio: f64,
+    rounds: usize,
+    progress: &dyn Progress,
+) -> Result<Table, Failure> {
+    let mut table = Table::new(
+        format!("Finite elements graded away from the slit, h = 1/{n}, horizon 6 h"),
+        Columns::ByQuantity,
+    );
+    let spacing = [
+        format!("peridynamics.points.lattice.spacing=\"1/{n}\""),
+        format!("peridynamics.horizon=\"6/{n}\""),
+        format!("mesh.rectangle.x={{cells={n}}}"),
+        format!("mesh.rectangle.y={{cells={n}}}"),
+    ];
+    let coupled = graded_overrides(n, &spacing);
     let both = || -> Result<_, Failure> {
         let a = solve(
             *load("slit_plate.toml", &best(&coupled, "direct"))?,

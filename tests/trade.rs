@@ -42,6 +42,62 @@ fn json(path: &Path) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
+/// A second call has nothing left to run; after half a line, as a killed study leaves it, one case is run again.
+fn check_second_call(folder: &Path, study: &[&str], out: &Path, found: &serde_json::Value) {
+    let cases = found["cases"].as_array().unwrap();
+    let record = std::fs::read(out.join("cases.jsonl")).unwrap();
+    let second = bondline(folder, study);
+    assert!(second.status.success(), "{}", text(&second.stderr));
+    let settings = |study: &serde_json::Value| -> Vec<String> {
+        let cases = study["cases"].as_array().unwrap();
+        cases.iter().map(|c| c["settings"].to_string()).collect()
+    };
+    let again = json(&out.join("trade.json"));
+    assert_eq!(settings(&again), settings(found));
+    assert_eq!(again["front"], found["front"]);
+    // half a line, as a killed study leaves it, is done again
+    std::fs::write(out.join("cases.jsonl"), &record[..record.len() - 7]).unwrap();
+    assert!(bondline(folder, study).status.success());
+    assert_eq!(
+        json(&out.join("trade.json"))["cases"]
+            .as_array()
+            .unwrap()
+            .len(),
+        cases.len()
+    );
+}
+
+/// The scene for the wanted error runs, with the bonds that the front says.
+fn check_wanted_scene(folder: &Path, out: &Path, cases: &[serde_json::Value]) {
+    let scene = out.join("plate-0.05.toml");
+    let text_of_scene = std::fs::read_to_string(&scene).unwrap();
+    assert!(text_of_scene.starts_with("# "), "{text_of_scene}");
+    let run = bondline(
+        folder,
+        &[
+            "run",
+            scene.to_str().unwrap(),
+            "--json",
+            "--output",
+            "again",
+        ],
+    );
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    let bonds = summary["sizes"]["bonds"].as_f64().unwrap();
+    let name = text_of_scene.lines().next().unwrap();
+    let meets = |c: &&serde_json::Value| {
+        let ran = &c["outcome"]["ran"];
+        ran["errors"][0].as_f64().is_some_and(|e| e <= 0.05)
+    };
+    let cheapest = cases
+        .iter()
+        .filter(meets)
+        .map(|c| c["outcome"]["ran"]["cost"]["bond_visits"].as_f64().unwrap())
+        .fold(f64::INFINITY, f64::min);
+    assert_eq!(bonds, cheapest, "{name}");
+}
+
 #[test]
 fn a_study_finds_a_front_goes_on_and_writes_the_scene_for_a_wanted_error() {
     let folder = tempfile::tempdir().unwrap();
@@ -84,55 +140,8 @@ fn a_study_finds_a_front_goes_on_and_writes_the_scene_for_a_wanted_error() {
     // nothing on the front is beaten
     let front = found["front"].as_array().unwrap();
     assert!(!front.is_empty() && out.join("trade.svg").exists() && out.join("trade.png").exists());
-    // a second call has nothing left to run
-    let record = std::fs::read(out.join("cases.jsonl")).unwrap();
-    let second = bondline(folder.path(), &study);
-    assert!(second.status.success(), "{}", text(&second.stderr));
-    let settings = |study: &serde_json::Value| -> Vec<String> {
-        let cases = study["cases"].as_array().unwrap();
-        cases.iter().map(|c| c["settings"].to_string()).collect()
-    };
-    let again = json(&out.join("trade.json"));
-    assert_eq!(settings(&again), settings(&found));
-    assert_eq!(again["front"], found["front"]);
-    // half a line, as a killed study leaves it, is done again
-    std::fs::write(out.join("cases.jsonl"), &record[..record.len() - 7]).unwrap();
-    assert!(bondline(folder.path(), &study).status.success());
-    assert_eq!(
-        json(&out.join("trade.json"))["cases"]
-            .as_array()
-            .unwrap()
-            .len(),
-        cases.len()
-    );
-    // the scene for the wanted error runs, with the bonds that the front says
-    let scene = out.join("plate-0.05.toml");
-    let text_of_scene = std::fs::read_to_string(&scene).unwrap();
-    assert!(text_of_scene.starts_with("# "), "{text_of_scene}");
-    let run = bondline(
-        folder.path(),
-        &[
-            "run",
-            scene.to_str().unwrap(),
-            "--json",
-            "--output",
-            "again",
-        ],
-    );
-    assert!(run.status.success(), "{}", text(&run.stderr));
-    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
-    let bonds = summary["sizes"]["bonds"].as_f64().unwrap();
-    let name = text_of_scene.lines().next().unwrap();
-    let meets = |c: &&serde_json::Value| {
-        let ran = &c["outcome"]["ran"];
-        ran["errors"][0].as_f64().is_some_and(|e| e <= 0.05)
-    };
-    let cheapest = cases
-        .iter()
-        .filter(meets)
-        .map(|c| c["outcome"]["ran"]["cost"]["bond_visits"].as_f64().unwrap())
-        .fold(f64::INFINITY, f64::min);
-    assert_eq!(bonds, cheapest, "{name}");
+    check_second_call(folder.path(), &study, &out, &found);
+    check_wanted_scene(folder.path(), &out, cases);
     // another quantity is another study
     let other = bondline(
         folder.path(),

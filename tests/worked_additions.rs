@@ -92,16 +92,11 @@ fn rows(path: &Path) -> Vec<Vec<f64>> {
         .collect()
 }
 
-#[test]
-fn the_additions_of_the_page_build_and_run() {
-    let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
-    let page = fs::read_to_string(root.join("docs/extending.md")).unwrap();
-    let copied = Path::new(env!("CARGO_TARGET_TMPDIR")).join("worked_additions");
-    let _ = fs::remove_dir_all(&copied);
+/// Copies what the program needs, without tests and suites.
+fn copy_packages(root: &Path, copied: &Path) {
     for folder in ["src", "crates"] {
         copy(&root.join(folder), &copied.join(folder));
     }
-    // what the program needs, without tests and suites
     let manifest = fs::read_to_string(root.join("Cargo.toml")).unwrap();
     let packages = manifest.find("[workspace.package]").unwrap();
     let (needed, tests) = manifest[packages..]
@@ -121,8 +116,11 @@ fn the_additions_of_the_page_build_and_run() {
         fs::write(&path, renamed).unwrap();
     }
     fs::copy(root.join("Cargo.lock"), copied.join("Cargo.lock")).unwrap();
+}
 
-    for block in blocks(&page) {
+/// Applies the blocks of the page to the copy.
+fn apply(page: &str, copied: &Path) {
+    for block in blocks(page) {
         let path = copied.join(block.file);
         match block.language {
             "diff" => {
@@ -136,7 +134,10 @@ fn the_additions_of_the_page_build_and_run() {
             other => panic!("{other}: {}", block.file),
         }
     }
+}
 
+/// Builds the copy; returns the program.
+fn build(copied: &Path) -> PathBuf {
     // the dependencies are those that are built already; the copy itself is not optimised, which is faster
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
     let output = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
@@ -151,14 +152,27 @@ fn the_additions_of_the_page_build_and_run() {
         .args(PACKAGES.map(|p| format!("--config=profile.release.package.{p}.opt-level=0")))
         .arg("--target-dir")
         .arg(target)
-        .current_dir(&copied)
+        .current_dir(copied)
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     assert!(!said.contains("warning: unused"), "{said}");
 
-    let program = target.join("release").join(NAME);
+    target.join("release").join(NAME)
+}
+
+#[test]
+fn the_additions_of_the_page_build_and_run() {
+    let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let page = fs::read_to_string(root.join("docs/extending.md")).unwrap();
+    let copied = Path::new(env!("CARGO_TARGET_TMPDIR")).join("worked_additions");
+    let _ = fs::remove_dir_all(&copied);
+    copy_packages(&root, &copied);
+
+    apply(&page, &copied);
+
+    let program = build(&copied);
     let run = |scene: &str, overrides: &[&str]| {
         let mut command = Command::new(&program);
         command.arg("run").arg(scene).current_dir(&copied);

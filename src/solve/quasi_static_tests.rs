@@ -332,7 +332,7 @@ fn a_bundle_under_dead_load_breaks_at_its_strength() {
 }
 
 #[test]
-fn runs_resume_and_trouble_is_named() {
+fn runs_resume() {
     let times: Vec<f64> = (1..=60).map(|k| f64::from(k) / 80.0).collect();
     let whole = {
         let (mut bundle, mut state) = (Bundle::new(30, 10.0), LoadState::at_rest(3));
@@ -370,7 +370,10 @@ fn runs_resume_and_trouble_is_named() {
         .expect("equilibrium");
     }
     assert_eq!(whole, (state, bundle.intact));
+}
 
+#[test]
+fn trouble_is_named() {
     let mut bundle = Bundle::new(4, 1.0);
     let mut short = LoadState::at_rest(2);
     let params = QuasiStaticParams {

@@ -330,9 +330,9 @@ struct Run {
     missing: f64,
 }
 
-/// Opens a crack along `y = −0.09` in a block under tension and lets it run; the outer rows are held.
-fn crack_beside_the_seam(coupling: &str) -> Run {
-    let case = Case {
+/// A block with ten rows of points and eight of elements.
+fn crack_case() -> Case {
+    Case {
         cells: Cells::Matching,
         widths: Widths {
             nonlocal: 10,
@@ -341,7 +341,23 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
         },
         ratio: 3,
         ..breaking_at_the_seam()
-    };
+    }
+}
+
+/// An opening along a line, that stretches no bond to its limit but those that cross the crack.
+fn opening(x: &[Vector<2>], line: f64, critical: f64) -> Vec<f64> {
+    x.iter()
+        .flat_map(|x| {
+            let along = (1.0 - ((x[0] + 0.04).abs() - 0.04).max(0.0) / 0.04).max(0.0);
+            let away = (1.0 - (x[1] - line).abs() / 0.09).max(0.0);
+            [0.0, 0.03 * critical * (x[1] - line).signum() * along * away]
+        })
+        .collect()
+}
+
+/// Opens a crack along `y = −0.09` in a block under tension and lets it run; the outer rows are held.
+fn crack_beside_the_seam(coupling: &str) -> Run {
+    let case = crack_case();
     let (critical, line) = (0.002, -0.09);
     let typed = Otherwise {
         coupling: Some(coupling),
@@ -369,15 +385,7 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
     )
     .unwrap();
     let x: Vec<Vector<2>> = e.positions().copied().collect();
-    // an opening that stretches no bond to its limit but those that cross the crack
-    let jump: Vec<f64> = x
-        .iter()
-        .flat_map(|x| {
-            let along = (1.0 - ((x[0] + 0.04).abs() - 0.04).max(0.0) / 0.04).max(0.0);
-            let away = (1.0 - (x[1] - line).abs() / 0.09).max(0.0);
-            [0.0, 0.03 * critical * (x[1] - line).signum() * along * away]
-        })
-        .collect();
+    let jump = opening(&x, line, critical);
     let mut force = vec![0.0; jump.len()];
     assert!(
         motion.internal_force_into(&jump, &mut force, Interval::AT_ONCE, FailureUpdate::Update) > 0

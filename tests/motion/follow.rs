@@ -45,6 +45,26 @@ tips.front = { direction = [1, 0] }
 probes.above = { at = [20, 20] }
 "#;
 
+/// A change of the zone keeps energy and momentum.
+fn check_switch(s: &serde_json::Value) {
+    let text = |v: &serde_json::Value| v.to_string();
+    let of = |key: &str| s[key].as_f64().unwrap();
+    let jump = of("kinetic_jump") + of("stored_jump");
+    assert!(jump.abs() < 3e-3 * of("energy"), "{}", text(s));
+    assert!(
+        (jump + of("energy_restored")).abs() < 1e-9 * of("energy"),
+        "{}",
+        text(s)
+    );
+    assert!(
+        of("momentum_restored") < 1e-3 * of("momentum_scale"),
+        "{}",
+        text(s)
+    );
+    // one that grows, to less than twice of what is wanted, gives nothing up
+    assert!(s["added"] == 0 || s["removed"] == 0, "{}", text(s));
+}
+
 #[test]
 fn a_crack_that_leaves_its_first_zone_runs_as_in_full_peridynamics() {
     let folder = tempfile::tempdir().unwrap();
@@ -59,23 +79,7 @@ fn a_crack_that_leaves_its_first_zone_runs_as_in_full_peridynamics() {
     assert_eq!(motion["ended"], "finished", "{}", text(motion));
     let switches = motion["switches"].as_array().unwrap();
     assert!(switches.len() >= 2, "{}", text(motion));
-    for s in switches {
-        let of = |key: &str| s[key].as_f64().unwrap();
-        let jump = of("kinetic_jump") + of("stored_jump");
-        assert!(jump.abs() < 3e-3 * of("energy"), "{}", text(s));
-        assert!(
-            (jump + of("energy_restored")).abs() < 1e-9 * of("energy"),
-            "{}",
-            text(s)
-        );
-        assert!(
-            of("momentum_restored") < 1e-3 * of("momentum_scale"),
-            "{}",
-            text(s)
-        );
-        // one that grows, to less than twice of what is wanted, gives nothing up
-        assert!(s["added"] == 0 || s["removed"] == 0, "{}", text(s));
-    }
+    switches.iter().for_each(check_switch);
     let most = motion["nonlocal_share"][1].as_f64().unwrap();
     assert!(most < 0.45, "{most}");
     let ahead = ["plate.toml", "--output", "ahead", "--json"];

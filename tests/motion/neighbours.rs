@@ -152,6 +152,16 @@ fn a_name_that_is_that_of_a_file_of_another_scene_is_refused() {
     );
 }
 
+/// No file of a run that did not end is left.
+fn none_left_behind(out: &Path) {
+    for file in files(out).keys() {
+        assert!(
+            !file.ends_with(".part") && !file.ends_with(".lock"),
+            "{file}"
+        );
+    }
+}
+
 /// Pairs of runs into one folder, begun in random order and killed at random: every run ends right or with a refusal by name, and no file of one is
 /// touched by another. `BONDLINE_PAIRS` says how many.
 #[test]
@@ -228,12 +238,7 @@ fn random_pairs_leave_each_other_alone() {
         run(folder.path(), &[&format!("{name}.toml")]);
         assert!(of(&files(&out), name) == wanted[k], "{name} differs");
     }
-    for file in files(&out).keys() {
-        assert!(
-            !file.ends_with(".part") && !file.ends_with(".lock"),
-            "{file}"
-        );
-    }
+    none_left_behind(&out);
     println!("{pairs} pairs: {right} runs right, {refused} refused, {killed} killed");
 }
 

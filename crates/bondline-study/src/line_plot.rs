@@ -10,7 +10,7 @@ use plotters::coord::{
     ranged1d::{AsRangedCoord, Ranged, ValueFormatter},
 };
 use plotters::prelude::{
-    BitMapBackend, ChartBuilder, Circle, DashedLineSeries, DrawingArea, DrawingBackend,
+    BitMapBackend, Cartesian2d, ChartBuilder, ChartContext, Circle, DashedLineSeries, DrawingArea, DrawingBackend,
     EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor, SVGBackend,
     SeriesLabelPosition, WHITE,
 };
@@ -306,6 +306,32 @@ impl LinePlot {
             .y_label_formatter(&|v| tick(rounded(*v, zero_y)))
             .draw()
             .map_err(|e| e.to_string())?;
+        self.draw_series(&mut chart, scale)?;
+        chart
+            .configure_series_labels()
+            .position(self.emptiest_corner())
+            .legend_area_size(pixels(30))
+            .margin(pixels(10))
+            .background_style(WHITE.mix(0.85))
+            .border_style(RGBColor(200, 200, 200))
+            .label_font(text(14))
+            .draw()
+            .map_err(|e| e.to_string())?;
+        root.present().map_err(|e| e.to_string())
+    }
+
+    /// Draws each series in its colour, and names it in the legend.
+    fn draw_series<'a, B, X, Y>(
+        &self,
+        chart: &mut ChartContext<'a, B, Cartesian2d<X, Y>>,
+        scale: u32,
+    ) -> Result<(), String>
+    where
+        B: DrawingBackend + 'a,
+        X: Ranged<ValueType = f64>,
+        Y: Ranged<ValueType = f64>,
+    {
+        let pixels = |n: u32| n * scale;
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let line = colour.stroke_width(pixels(2));
@@ -341,17 +367,7 @@ impl LinePlot {
                 }
             }
         }
-        chart
-            .configure_series_labels()
-            .position(self.emptiest_corner())
-            .legend_area_size(pixels(30))
-            .margin(pixels(10))
-            .background_style(WHITE.mix(0.85))
-            .border_style(RGBColor(200, 200, 200))
-            .label_font(text(14))
-            .draw()
-            .map_err(|e| e.to_string())?;
-        root.present().map_err(|e| e.to_string())
+        Ok(())
     }
 }
 

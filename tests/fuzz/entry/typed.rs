@@ -64,6 +64,78 @@ macro_rules! line {
     }};
 }
 
+/// Points, their horizon, weights and volumes; whether these keep the typed stiffness: points without a correction have one of their own.
+fn peridynamics(
+    u: &mut Unstructured<'_>,
+    frame: &Frame,
+    horizon: f64,
+    rest: &mut String,
+) -> Result<bool> {
+    line!(rest, "[peridynamics]\nhorizon = {horizon:?}");
+    match u.int_in_range(0..=9)? {
+        0..=5 => {}
+        6 => line!(rest, "points = 'cells'"),
+        7 if frame.d < 3 => line!(rest, "points.lattice.spacing = {:?}", 0.5 * frame.h),
+        _ => line!(rest, "points.lattice.spacing = {:?}", round(0.93 * frame.h)),
+    }
+    let mut is_typed = true;
+    match u.int_in_range(0..=11)? {
+        0 => {
+            line!(rest, "weights = 'plain'");
+            is_typed = false;
+        }
+        1 => line!(rest, "weights = 'fitted'"),
+        2 => line!(rest, "influence = {{ degree = 1, alpha = 1 }}"),
+        3 => {
+            line!(rest, "volumes = 'hhb'\nweights = 'plain'");
+            is_typed = false;
+        }
+        _ => {}
+    }
+    Ok(is_typed)
+}
+
+/// How the scene is solved.
+fn solution(frame: &Frame, rest: &mut String) {
+    match frame.kind {
+        Kind::Static => {}
+        Kind::Explicit => {
+            let crossing = frame.h / frame.modulus.sqrt();
+            line!(
+                rest,
+                "[solve.explicit]\nduration = {:e}\noutputs = 2",
+                round(12.0 * crossing)
+            );
+        }
+        Kind::LoadSteps => line!(rest, "[solve.quasi-static]\nsteps = 2"),
+    }
+}
+
+/// Lines of a static scene, a probe of one that moves.
+fn outputs(frame: &Frame, rest: &mut String) {
+    line!(rest, "[output]\nvtu = false");
+    if frame.kind == Kind::Static {
+        let (from, to) = ([0.0, 0.37, 0.43], [1.0, 0.37, 0.43]);
+        line!(
+            rest,
+            "lines.across = {{ from = {}, to = {}, samples = 41 }}",
+            frame.place(from),
+            frame.place(to)
+        );
+        let (from, to) = ([0.55, 0.0, 0.43], [0.55, 1.0, 0.43]);
+        if frame.d > 1 {
+            line!(
+                rest,
+                "lines.up = {{ from = {}, to = {}, samples = 41 }}",
+                frame.place(from),
+                frame.place(to)
+            );
+        }
+    } else {
+        line!(rest, "probes.middle.at = {}", frame.place([0.5; 3]));
+    }
+}
+
 /// A scene.
 ///
 /// # Errors
@@ -103,67 +175,15 @@ pub fn typed(u: &mut Unstructured<'_>) -> Result<Typed> {
     let mut rest = String::new();
     let law = *u.choose(&["lps", "bond-based", "lps", "correspondence"])?;
     materials(u, &frame, law, &mut rest)?;
-    line!(rest, "[peridynamics]\nhorizon = {horizon:?}");
-    match u.int_in_range(0..=9)? {
-        0..=5 => {}
-        6 => line!(rest, "points = 'cells'"),
-        7 if d < 3 => line!(rest, "points.lattice.spacing = {:?}", 0.5 * frame.h),
-        _ => line!(rest, "points.lattice.spacing = {:?}", round(0.93 * frame.h)),
-    }
-    // points without a correction have a stiffness of their own
-    let mut is_typed = true;
-    match u.int_in_range(0..=11)? {
-        0 => {
-            line!(rest, "weights = 'plain'");
-            is_typed = false;
-        }
-        1 => line!(rest, "weights = 'fitted'"),
-        2 => line!(rest, "influence = {{ degree = 1, alpha = 1 }}"),
-        3 => {
-            line!(rest, "volumes = 'hhb'\nweights = 'plain'");
-            is_typed = false;
-        }
-        _ => {}
-    }
+    let is_typed = peridynamics(u, &frame, horizon, &mut rest)?;
     zone(u, &frame, meets, horizon, &mut rest)?;
     let cut = frame.kind != Kind::Static || u.ratio(1, 6)?;
     if cut && u.ratio(1, 2)? {
         crack(&frame, &mut rest);
     }
     conditions(u, &frame, &mut rest)?;
-    match frame.kind {
-        Kind::Static => {}
-        Kind::Explicit => {
-            let crossing = frame.h / frame.modulus.sqrt();
-            line!(
-                rest,
-                "[solve.explicit]\nduration = {:e}\noutputs = 2",
-                round(12.0 * crossing)
-            );
-        }
-        Kind::LoadSteps => line!(rest, "[solve.quasi-static]\nsteps = 2"),
-    }
-    line!(rest, "[output]\nvtu = false");
-    if frame.kind == Kind::Static {
-        let (from, to) = ([0.0, 0.37, 0.43], [1.0, 0.37, 0.43]);
-        line!(
-            rest,
-            "lines.across = {{ from = {}, to = {}, samples = 41 }}",
-            frame.place(from),
-            frame.place(to)
-        );
-        let (from, to) = ([0.55, 0.0, 0.43], [0.55, 1.0, 0.43]);
-        if d > 1 {
-            line!(
-                rest,
-                "lines.up = {{ from = {}, to = {}, samples = 41 }}",
-                frame.place(from),
-                frame.place(to)
-            );
-        }
-    } else {
-        line!(rest, "probes.middle.at = {}", frame.place([0.5; 3]));
-    }
+    solution(&frame, &mut rest);
+    outputs(&frame, &mut rest);
     let kinematics = match d {
         1 => "bar",
         2 => *u.choose(&["plane-stress", "plane-strain"])?,
@@ -233,6 +253,104 @@ fn mesh(
     }))
 }
 
+/// The elements of a file of Gmsh, over a grid of `many` cells.
+struct GmshElements {
+    d: usize,
+    many: [usize; 3],
+    text: String,
+    count: usize,
+}
+
+/// The node that lies one further along each of the axes.
+fn step(mut at: [usize; 3], along: &[usize]) -> [usize; 3] {
+    along.iter().for_each(|&k| at[k] += 1);
+    at
+}
+
+impl GmshElements {
+    /// The number of a node.
+    fn number(&self, at: [usize; 3]) -> usize {
+        (at[2] * (self.many[1] + 1) + at[1]) * (self.many[0] + 1) + at[0] + 1
+    }
+
+    /// An element of a kind and a group.
+    fn push(&mut self, kind: usize, group: usize, corners: &[[usize; 3]]) {
+        self.count += 1;
+        let count = self.count;
+        let corners: Vec<String> = corners
+            .iter()
+            .map(|&c| self.number(c).to_string())
+            .collect();
+        line!(
+            self.text,
+            "{count} {kind} 2 {group} {group} {}",
+            corners.join(" ")
+        );
+    }
+
+    /// The four sides.
+    fn push_sides(&mut self) {
+        let many = self.many;
+        for (group, axis, end) in [(1, 0, false), (2, 0, true), (3, 1, false), (4, 1, true)] {
+            let fixed = if end { many[axis] } else { 0 };
+            let (a, b) = (1 - axis, 2);
+            for j in 0..many[b].max(1) {
+                for i in 0..many[a] {
+                    let mut at = [0; 3];
+                    (at[axis], at[a], at[b]) = (fixed, i, j);
+                    match self.d {
+                        2 => self.push(1, group, &[at, step(at, &[a])]),
+                        _ => {
+                            let far = step(at, &[a, b]);
+                            self.push(2, group, &[at, step(at, &[a]), far]);
+                            self.push(2, group, &[at, far, step(at, &[b])]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The cells of the body: boxes or simplices.
+    fn push_cells(&mut self, simplices: bool) {
+        let many = self.many;
+        for z in 0..many[2].max(1) {
+            for y in 0..many[1] {
+                for x in 0..many[0] {
+                    let at = [x, y, z];
+                    let far = step(at, &[0, 1]);
+                    match (self.d, simplices) {
+                        (2, true) => {
+                            self.push(2, 5, &[at, step(at, &[0]), far]);
+                            self.push(2, 5, &[at, far, step(at, &[1])]);
+                        }
+                        (2, false) => self.push(3, 5, &[at, step(at, &[0]), far, step(at, &[1])]),
+                        _ => {
+                            let far = step(at, &[0, 1, 2]);
+                            for (a, b, c) in [
+                                (0, 1, 2),
+                                (1, 2, 0),
+                                (2, 0, 1),
+                                (1, 0, 2),
+                                (2, 1, 0),
+                                (0, 2, 1),
+                            ] {
+                                let (first, second) = (step(at, &[a]), step(at, &[a, b]));
+                                // even orders of the axes are right-handed
+                                let even = (b + 3 - a) % 3 == 1 && (c + 3 - b) % 3 == 1;
+                                match even {
+                                    true => self.push(4, 5, &[at, first, second, far]),
+                                    false => self.push(4, 5, &[at, second, first, far]),
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// A body in Gmsh 2.2 with groups `left`, `right`, `bottom`, `top` and `body`, each edge divided into `times`.
 fn gmsh(
     frame: &Frame,
@@ -271,83 +389,28 @@ fn gmsh(
         let high = coarse(at.map(|i| i.div_ceil(times)));
         [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]))
     };
-    let number = |at: [usize; 3]| (at[2] * (many[1] + 1) + at[1]) * (many[0] + 1) + at[0] + 1;
+    let mut file = GmshElements {
+        d,
+        many,
+        text: String::new(),
+        count: 0,
+    };
     let mut nodes = String::new();
     for z in 0..=many[2] {
         for y in 0..=many[1] {
             for x in 0..=many[0] {
                 let [a, b, c] = node([x, y, z]);
-                line!(nodes, "{} {a} {b} {c}", number([x, y, z]));
+                line!(nodes, "{} {a} {b} {c}", file.number([x, y, z]));
             }
         }
     }
-    let (mut elements, mut count) = (String::new(), 0);
-    let mut push = |kind: usize, group: usize, corners: &[[usize; 3]]| {
-        count += 1;
-        let corners: Vec<String> = corners.iter().map(|&c| number(c).to_string()).collect();
-        line!(
-            elements,
-            "{count} {kind} 2 {group} {group} {}",
-            corners.join(" ")
-        );
-    };
-    let step = |at: [usize; 3], along: &[usize]| {
-        let mut at = at;
-        along.iter().for_each(|&k| at[k] += 1);
-        at
-    };
-    for (group, axis, end) in [(1, 0, false), (2, 0, true), (3, 1, false), (4, 1, true)] {
-        let fixed = if end { many[axis] } else { 0 };
-        let (a, b) = (1 - axis, 2);
-        for j in 0..many[b].max(1) {
-            for i in 0..many[a] {
-                let mut at = [0; 3];
-                (at[axis], at[a], at[b]) = (fixed, i, j);
-                match d {
-                    2 => push(1, group, &[at, step(at, &[a])]),
-                    _ => {
-                        let far = step(at, &[a, b]);
-                        push(2, group, &[at, step(at, &[a]), far]);
-                        push(2, group, &[at, far, step(at, &[b])]);
-                    }
-                }
-            }
-        }
-    }
-    for z in 0..many[2].max(1) {
-        for y in 0..many[1] {
-            for x in 0..many[0] {
-                let at = [x, y, z];
-                let far = step(at, &[0, 1]);
-                match (d, simplices) {
-                    (2, true) => {
-                        push(2, 5, &[at, step(at, &[0]), far]);
-                        push(2, 5, &[at, far, step(at, &[1])]);
-                    }
-                    (2, false) => push(3, 5, &[at, step(at, &[0]), far, step(at, &[1])]),
-                    _ => {
-                        let far = step(at, &[0, 1, 2]);
-                        for (a, b, c) in [
-                            (0, 1, 2),
-                            (1, 2, 0),
-                            (2, 0, 1),
-                            (1, 0, 2),
-                            (2, 1, 0),
-                            (0, 2, 1),
-                        ] {
-                            let (first, second) = (step(at, &[a]), step(at, &[a, b]));
-                            // even orders of the axes are right-handed
-                            let even = (b + 3 - a) % 3 == 1 && (c + 3 - b) % 3 == 1;
-                            match even {
-                                true => push(4, 5, &[at, first, second, far]),
-                                false => push(4, 5, &[at, second, first, far]),
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
+    file.push_sides();
+    file.push_cells(simplices);
+    let GmshElements {
+        text: elements,
+        count,
+        ..
+    } = file;
     let total = nodes.lines().count();
     let sides = d - 1;
     format!(

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::estimate::{CHOICES, SPREAD};
 use super::free_parameters::{AccuracyRequest, Family};
-use super::refinement_sequence::{AFFORDABLE, Ladder};
+use super::refinement_sequence::{AFFORDABLE, Found, Ladder};
 use super::sample_run::Bench;
 use super::{ErrorPrediction, ErrorReference};
 use bondline::observe::summary::Decision;
@@ -74,6 +74,48 @@ fn error(source: &Source, asked: &AccuracyRequest, why: &str) -> SceneError {
     .shown_in(source)
 }
 
+/// Why a candidate is chosen, and the error that is predicted for it.
+fn explained(
+    asked: &AccuracyRequest,
+    ladder: &Ladder,
+    found: &Found,
+    families: usize,
+    bench: &Bench,
+) -> (Vec<Decision>, ErrorPrediction) {
+    let mut choices = coupling(asked, &ladder.family);
+    choices.push(Decision {
+                choice: asked.words(&ladder.family, found.cells),
+                why: format!(
+                    "error {:.1e} predicted, within a factor of {SPREAD} in {CHOICES} that were measured (order {:.1}), for {:.1e} wanted; the least work of {} kinds, counted in pilots of {:.2} s{}",
+                    found.error,
+                    ladder.fit.order,
+                    asked.accuracy,
+                    families,
+                    bench.seconds,
+                    if ladder.reaches(found.cells as f64) {
+                        ""
+                    } else {
+                        "; a finer pilot would take too long"
+                    },
+                ),
+            });
+    let prediction = ErrorPrediction {
+        quantities: bench.quantities.iter().map(|q| q.name()).collect(),
+        error: found.error,
+        against: if asked.breaks {
+            ErrorReference::Peridynamics
+        } else {
+            ErrorReference::Elasticity
+        },
+        spread: SPREAD,
+        share: CHOICES,
+        order: ladder.fit.order,
+        pilots: ladder.pilots(),
+        seconds: bench.seconds,
+    };
+    (choices, prediction)
+}
+
 /// Chooses.
 pub(super) fn choose(
     asked: &AccuracyRequest,
@@ -132,37 +174,8 @@ pub(super) fn choose(
         };
         let ladder = &mut ladders[k];
         if let Some(found) = ladder.found {
-            let mut choices = coupling(asked, &ladder.family);
-            choices.push(Decision {
-                choice: asked.words(&ladder.family, found.cells),
-                why: format!(
-                    "error {:.1e} predicted, within a factor of {SPREAD} in {CHOICES} that were measured (order {:.1}), for {:.1e} wanted; the least work of {} kinds, counted in pilots of {:.2} s{}",
-                    found.error,
-                    ladder.fit.order,
-                    asked.accuracy,
-                    families.len(),
-                    bench.seconds,
-                    if ladder.reaches(found.cells as f64) {
-                        ""
-                    } else {
-                        "; a finer pilot would take too long"
-                    },
-                ),
-            });
-            let prediction = Some(ErrorPrediction {
-                quantities: bench.quantities.iter().map(|q| q.name()).collect(),
-                error: found.error,
-                against: if asked.breaks {
-                    ErrorReference::Peridynamics
-                } else {
-                    ErrorReference::Elasticity
-                },
-                spread: SPREAD,
-                share: CHOICES,
-                order: ladder.fit.order,
-                pilots: ladder.pilots(),
-                seconds: bench.seconds,
-            });
+            let (choices, prediction) = explained(asked, ladder, &found, families.len(), &bench);
+            let prediction = Some(prediction);
             return Ok(done(
                 &ladder.family,
                 found.cells,

@@ -33,17 +33,160 @@ pub use parameters::{
 pub use surrogate::front;
 
 use crate::accuracy;
-use crate::variants::{Base, measured_keys};
+use crate::variants::{Base, Measured, measured_keys};
 use bondline::observe::claim::{Claim, Files};
 use bondline::progress::Progress;
 use bondline::regular_file;
 use bondline::scene::{SceneError, SceneSpec, Source};
 use record::{Head, kept, new_record, read_record};
 use study::Study;
-use trial::{Attempt, Runner};
+use trial::{Attempt, Ran, Runner};
 
 /// A case that takes longer than so many times the reference is of no use to anyone.
 const PATIENCE: f64 = 4.0;
+
+/// A scene whose knobs are turned, as every case finds it.
+struct Prepared {
+    text: String,
+    plain: Source,
+    base: Base,
+    knobs: Vec<Knob>,
+    /// Keys that all cases have.
+    common: Vec<String>,
+    /// Keys of the reference.
+    keys: Vec<String>,
+}
+
+impl Prepared {
+    /// Reads the scene and chooses what it leaves open.
+    fn of(params: &TradeParams) -> Result<Self, TradeError> {
+        let text = regular_file::read_scene(&params.scene).map_err(|source| TradeError::File {
+            path: params.scene.clone(),
+            source,
+        })?;
+        let scene_error = |e: SceneError| TradeError::Scene(Box::new(e));
+        let plain = Source::new(params.scene.display().to_string(), text.clone());
+        let mut source = plain.clone();
+        for o in &params.overrides {
+            source.push_override(o).map_err(scene_error)?;
+        }
+        let directory = params.scene.parent().unwrap_or(Path::new(""));
+        let chosen = accuracy::completed(&source, directory).map_err(scene_error)?;
+        let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
+        let spec = SceneSpec::parse(complete).map_err(scene_error)?;
+        let base = Base::of(&spec);
+        let knobs = chosen_knobs(&base, params)?;
+        let mut common = params.overrides.clone();
+        common.extend(chosen.into_iter().flat_map(|c| c.1.overrides));
+        common.extend(measured_keys(&spec));
+        let keys = match &params.reference {
+            Reference::Auto if base.breaks && base.moves => vec!["coupling=nonlocal".to_owned()],
+            Reference::FullPd => vec!["coupling=nonlocal".to_owned()],
+            Reference::Auto | Reference::Finer => base.overrides(&base.finer()),
+            Reference::Keys(keys) => keys.clone(),
+        };
+        Ok(Self {
+            text,
+            plain,
+            base,
+            knobs,
+            common,
+            keys,
+        })
+    }
+
+    /// The reference and the cases so far: those of a study that goes on, or a new one.
+    ///
+    /// # Errors
+    /// [`TradeError`] if the folder holds another study, or the reference does not run.
+    fn reference(
+        &self,
+        runner: &Runner<'_>,
+        params: &TradeParams,
+        record_path: &Path,
+        progress: &dyn Progress,
+    ) -> Result<(Measured, Head, Vec<Case>), TradeError> {
+        let directory = params.scene.parent().unwrap_or(Path::new(""));
+        let program = record::program(runner.program)?;
+        let with =
+            |keys: &[String]| -> Vec<String> { self.common.iter().chain(keys).cloned().collect() };
+        let mesh = record::mesh(&self.plain, directory, &with(&self.keys));
+        let head_of = |quantities: Vec<Quantity>, cost| Head {
+            program: program.clone(),
+            scene: self.text.clone(),
+            mesh,
+            overrides: self.common.clone(),
+            reference: self.keys.clone(),
+            quantities,
+            cost,
+        };
+        let folder = params.output.join("reference");
+        let old = read_record(record_path)?;
+        match old {
+            Some((head, cases)) => {
+                let wanted = if params.quantities.is_empty() {
+                    head.quantities.clone()
+                } else {
+                    params.quantities.clone()
+                };
+                if head != head_of(wanted, head.cost) {
+                    return Err(TradeError::Another {
+                        path: record_path.to_path_buf(),
+                    });
+                }
+                Ok((kept(&folder)?, head, cases))
+            }
+            None => {
+                progress.stage("reference", None);
+                let ran = self.measure(runner, &with(&self.keys), &folder, params)?;
+                let quantities = quantities_of(&ran.measured, params)?;
+                let head = head_of(quantities, ran.cost);
+                Ok((ran.measured, head, Vec::new()))
+            }
+        }
+    }
+
+    /// Runs the reference.
+    fn measure(
+        &self,
+        runner: &Runner<'_>,
+        keys: &[String],
+        folder: &Path,
+        params: &TradeParams,
+    ) -> Result<Ran, TradeError> {
+        match runner.run(keys, folder, params.budget)? {
+            Attempt::Ran(ran) => Ok(ran),
+            Attempt::Refused(why) => Err(TradeError::Base {
+                what: "the reference",
+                why,
+                remedy: "choose another one with --reference",
+            }),
+            Attempt::OverTime | Attempt::Interrupted => Err(TradeError::Base {
+                what: "the reference",
+                why: "it used up the time".to_owned(),
+                remedy: "give more with --budget, or another one with --reference",
+            }),
+        }
+    }
+}
+
+/// What is compared: what is asked for, or all that the reference has.
+fn quantities_of(measured: &Measured, params: &TradeParams) -> Result<Vec<Quantity>, TradeError> {
+    let quantities = if params.quantities.is_empty() {
+        measured.quantities()
+    } else {
+        params.quantities.clone()
+    };
+    for quantity in &quantities {
+        if measured.error(measured, quantity).is_none() {
+            return Err(TradeError::Quantity {
+                quantity: quantity.name(),
+            });
+        }
+    }
+
+    Ok(quantities)
+}
 
 /// Runs a study with `program`, which must be this command line; `interrupt` ends it between and within cases.
 ///
@@ -55,31 +198,8 @@ pub fn trade(
     interrupt: Option<&AtomicBool>,
     progress: &dyn Progress,
 ) -> Result<Trade, TradeError> {
-    let text = regular_file::read_scene(&params.scene).map_err(|source| TradeError::File {
-        path: params.scene.clone(),
-        source,
-    })?;
-    let scene_error = |e: SceneError| TradeError::Scene(Box::new(e));
-    let plain = Source::new(params.scene.display().to_string(), text.clone());
-    let mut source = plain.clone();
-    for o in &params.overrides {
-        source.push_override(o).map_err(scene_error)?;
-    }
+    let prepared = Prepared::of(params)?;
     let directory = params.scene.parent().unwrap_or(Path::new(""));
-    let chosen = accuracy::completed(&source, directory).map_err(scene_error)?;
-    let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
-    let spec = SceneSpec::parse(complete).map_err(scene_error)?;
-    let base = Base::of(&spec);
-    let knobs = chosen_knobs(&base, params)?;
-    let mut common = params.overrides.clone();
-    common.extend(chosen.into_iter().flat_map(|c| c.1.overrides));
-    common.extend(measured_keys(&spec));
-    let keys = match &params.reference {
-        Reference::Auto if base.breaks && base.moves => vec!["coupling=nonlocal".to_owned()],
-        Reference::FullPd => vec!["coupling=nonlocal".to_owned()],
-        Reference::Auto | Reference::Finer => base.overrides(&base.finer()),
-        Reference::Keys(keys) => keys.clone(),
-    };
     let runner = Runner {
         program,
         scene: &params.scene,
@@ -91,68 +211,16 @@ pub fn trade(
         &params.scene.display().to_string(),
         &files(),
     )?;
-    let program = record::program(program)?;
-    let with = |keys: &[String]| -> Vec<String> { common.iter().chain(keys).cloned().collect() };
-    let mesh = record::mesh(&plain, directory, &with(&keys));
-    let head_of = |quantities: Vec<Quantity>, cost| Head {
-        program: program.clone(),
-        scene: text.clone(),
-        mesh,
-        overrides: common.clone(),
-        reference: keys.clone(),
-        quantities,
-        cost,
-    };
     let record_path = params.output.join("cases.jsonl");
-    let folder = params.output.join("reference");
-    let old = read_record(&record_path)?;
-    let (reference, head, cases) = match old {
-        Some((head, cases)) => {
-            let wanted = if params.quantities.is_empty() {
-                head.quantities.clone()
-            } else {
-                params.quantities.clone()
-            };
-            if head != head_of(wanted, head.cost) {
-                return Err(TradeError::Another { path: record_path });
-            }
-            (kept(&folder)?, head, cases)
-        }
-        None => {
-            progress.stage("reference", None);
-            let ran = match runner.run(&with(&keys), &folder, params.budget)? {
-                Attempt::Ran(ran) => ran,
-                Attempt::Refused(why) => {
-                    return Err(TradeError::Base {
-                        what: "the reference",
-                        why,
-                        remedy: "choose another one with --reference",
-                    });
-                }
-                Attempt::OverTime | Attempt::Interrupted => {
-                    return Err(TradeError::Base {
-                        what: "the reference",
-                        why: "it used up the time".to_owned(),
-                        remedy: "give more with --budget, or another one with --reference",
-                    });
-                }
-            };
-            let quantities = if params.quantities.is_empty() {
-                ran.measured.quantities()
-            } else {
-                params.quantities.clone()
-            };
-            for quantity in &quantities {
-                if ran.measured.error(&ran.measured, quantity).is_none() {
-                    return Err(TradeError::Quantity {
-                        quantity: quantity.name(),
-                    });
-                }
-            }
-            let head = head_of(quantities, ran.cost);
-            (ran.measured, head, Vec::new())
-        }
-    };
+    let (reference, head, cases) = prepared.reference(&runner, params, &record_path, progress)?;
+    let Prepared {
+        plain,
+        base,
+        knobs,
+        common,
+        ..
+    } = prepared;
+    let with = |keys: &[String]| -> Vec<String> { common.iter().chain(keys).cloned().collect() };
     // what was found with another mesh is found again
     let is_known =
         |case: &Case| case.mesh == record::mesh(&plain, directory, &with(&case.overrides));
