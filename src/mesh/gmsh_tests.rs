@@ -246,6 +246,7 @@ fn unnamed_groups_repeated_elements_and_unused_nodes() {
     assert_eq!(mesh.facet_sets["physical_5"], vec![vec![0, 1]]);
 }
 
+// One function: the cases are a table and share nothing.
 #[test]
 fn wrong_files_name_place_value_and_remedy() {
     for (from, to, wanted) in [

@@ -1,5 +1,6 @@
-//! The house: a module imports from the floors below it and from nothing else, files need each other in one direction, and none is too long.
+//! The house: a module imports from the floors below it and from nothing else, files need each other in one direction, and neither files nor functions are too long.
 
+mod functions;
 mod imports;
 
 use std::fs;
@@ -40,6 +41,12 @@ const APART: [&str; 3] = ["verify", "cli", "python"];
 
 /// The most lines that a file has.
 const MOST_LINES: usize = 600;
+
+/// The most lines of a function without a reason above it, from `fn` to its closing brace.
+const MOST_LINES_OF_A_FUNCTION: usize = 80;
+
+/// The most functions that are longer, each with its reason.
+const MOST_LONG_FUNCTIONS: usize = 20;
 
 /// All `.rs` files below a folder, without those of tests.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -263,4 +270,66 @@ fn no_file_is_longer_than_it_should_be() {
         .map(|(path, lines)| format!("{}: {lines}", path.display()))
         .collect();
     assert!(long.is_empty(), "{long:#?}");
+}
+
+#[test]
+fn long_functions_are_few_and_say_why() {
+    let long = functions::longer_than(MOST_LINES_OF_A_FUNCTION);
+    let told = |(path, f): &(PathBuf, functions::Function)| {
+        format!(
+            "{}:{} {}, {} lines",
+            path.display(),
+            f.line,
+            f.name,
+            f.lines
+        )
+    };
+    let unexplained = long.iter().filter(|(_, f)| f.reason.is_none());
+    let unexplained: Vec<String> = unexplained.map(told).collect();
+    assert!(
+        unexplained.is_empty(),
+        "over {MOST_LINES_OF_A_FUNCTION} lines without a line `{}...` above: {unexplained:#?}",
+        functions::REASON
+    );
+    let long: Vec<String> = long.iter().map(told).collect();
+    assert!(long.len() <= MOST_LONG_FUNCTIONS, "{long:#?}");
+}
+
+#[test]
+fn functions_are_counted_from_fn_to_brace() {
+    let text = "\
+trait T {
+    /// Without a body.
+    fn declared(
+        &self,
+    ) -> usize;
+
+    // One function: its steps share all they have.
+    /// Documented.
+    #[inline]
+    pub(crate) const unsafe fn long<const D: usize>(
+        a: usize,
+    ) -> usize {
+        let f = |x| {
+            x + 1
+        };
+        f(a)
+    }
+}
+
+fn short() {
+}
+";
+    let found = functions::functions(text);
+    let told: Vec<_> = found
+        .iter()
+        .map(|f| (f.name.as_str(), f.line, f.lines, f.reason.as_deref()))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("long", 10, 8, Some("its steps share all they have.")),
+            ("short", 20, 2, None)
+        ]
+    );
 }

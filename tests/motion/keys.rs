@@ -17,6 +17,7 @@ fn wrong(scene: &str, from: &str, to: &str) -> SceneError {
     AnyScene::from_source(&source, folder, "bar").expect_err("this scene is wrong")
 }
 
+// One function: the cases are a table and share nothing.
 #[test]
 fn every_key_says_what_is_wrong_with_it() {
     use SceneErrorKind::{Choice, Conflict, Dimension, Missing, UnknownKey, WrongType, WrongValue};

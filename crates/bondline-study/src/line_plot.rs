@@ -10,9 +10,9 @@ use plotters::coord::{
     ranged1d::{AsRangedCoord, Ranged, ValueFormatter},
 };
 use plotters::prelude::{
-    BitMapBackend, Cartesian2d, ChartBuilder, ChartContext, Circle, DashedLineSeries, DrawingArea, DrawingBackend,
-    EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor, SVGBackend,
-    SeriesLabelPosition, WHITE,
+    BitMapBackend, Cartesian2d, ChartBuilder, ChartContext, Circle, DashedLineSeries, DrawingArea,
+    DrawingBackend, EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor,
+    SVGBackend, SeriesLabelPosition, WHITE,
 };
 use plotters::style::{Color, FontStyle, ShapeStyle, register_font};
 

@@ -10,11 +10,7 @@ mod construction;
 
 use rayon::prelude::*;
 
-use super::{
-    bond_kinematics::Part,
-    dilatation::Functional,
-    dilatation_state::States,
-};
+use super::{bond_kinematics::Part, dilatation::Functional, dilatation_state::States};
 use crate::{
     assembly::{Row, Transfer},
     peridynamics::{

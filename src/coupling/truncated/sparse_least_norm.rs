@@ -428,19 +428,19 @@ impl Conditions {
         floor: f64,
         (mut reached, mut z): (f64, Vec<f64>),
     ) -> (f64, Vec<f64>) {
-            for _ in 0..MOST_CORRECTIONS {
-                let correction = self.transposed(&solved(
-                    factors,
-                    &self.left(target, &self.lifted(&z, floor)),
-                ));
-                let next: Vec<f64> = z.iter().zip(correction).map(|(z, c)| z + c).collect();
-                let remaining = norm(&self.left(target, &self.lifted(&next, floor)));
-                if remaining < STALLED * reached {
-                    (reached, z) = (remaining, next);
-                } else {
-                    break;
-                }
+        for _ in 0..MOST_CORRECTIONS {
+            let correction = self.transposed(&solved(
+                factors,
+                &self.left(target, &self.lifted(&z, floor)),
+            ));
+            let next: Vec<f64> = z.iter().zip(correction).map(|(z, c)| z + c).collect();
+            let remaining = norm(&self.left(target, &self.lifted(&next, floor)));
+            if remaining < STALLED * reached {
+                (reached, z) = (remaining, next);
+            } else {
+                break;
             }
+        }
         (reached, z)
     }
 

@@ -142,6 +142,7 @@ unsafe fn stretched<L: Lanes, const D: usize, const EXACT: bool>(
     (t, eta)
 }
 
+// One function: the kernel of one bond, unrolled for each law; its parts share the registers of a group.
 /// The sums of one group. Without `MASK` all bits count as set, without `VARY` all volumes as the lattice's own; with `CAREFUL`, any `t` is right.
 ///
 /// # Safety

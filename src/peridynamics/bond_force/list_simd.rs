@@ -124,6 +124,7 @@ fn extension<L: Lanes, const EXACT: bool>(l: L, t: L::V) -> L::V {
 impl<const D: usize, const EXACT: bool> Work for Points<'_, D, EXACT> {
     type Output = Vec<(u32, usize)>;
 
+    // One function: closures and calls would leave the instruction set that the loop is compiled for, and all of it shares the registers of a point.
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Vec<(u32, usize)> {
         let Self {

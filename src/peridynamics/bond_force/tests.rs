@@ -167,10 +167,143 @@ fn a_large_rotation_turns_the_forces() {
     }
 }
 
+/// Which bonds stand, by the numbers of their points.
+type Standing<'a> = &'a dyn Fn(usize, usize) -> bool;
+
+/// What broke took what was stored before less what is stored after, wherever points are.
+fn check_lost_energy<const D: usize>(
+    case: &Case<D>,
+    law: Law,
+    pass: &dyn BondPass<D>,
+    states: [&[f64]; 2],
+    stands: Standing<'_>,
+    name: &str,
+) {
+    let energy = naive(case, law, Kinematics::Exact, states[0], stands).1;
+    for u in states {
+        let of = |stands: Standing<'_>| naive(case, law, Kinematics::Exact, u, stands).1;
+        let taken = of(&|_, _| true) - of(stands);
+        let found = pass.lost_energy(&|i| std::array::from_fn(|a| u[i * D + a]));
+        assert!((found - taken).abs() < 1e-11 * energy, "{name}");
+    }
+}
+
+/// A pass bonds the points whose bonds stand, and counts the others.
+fn check_bonds<const D: usize>(
+    case: &Case<D>,
+    pass: &dyn BondPass<D>,
+    stands: Standing<'_>,
+    name: &str,
+) -> u64 {
+    let points = case.position.len();
+    let count = (0..points)
+        .flat_map(|i| case.families.of(i).iter().map(move |&j| (i, j as usize)))
+        .filter(|&(i, j)| !stands(i, j))
+        .count() as u64;
+    for i in (0..points).step_by(5) {
+        for j in 0..points {
+            let bond = case.families.of(i).binary_search(&(j as u32)).is_ok();
+            assert_eq!(pass.bonded(i, j), bond && stands(i, j), "{name} {i} {j}");
+        }
+    }
+    count
+}
+
+/// Damage is the volume of the bonds that have broken over that of all.
+fn check_damage<const D: usize>(
+    case: &Case<D>,
+    pass: &dyn BondPass<D>,
+    stands: Standing<'_>,
+    name: &str,
+) {
+    let points = case.position.len();
+    let mut damage = vec![0.0; points];
+    pass.damage_into(&mut damage);
+    for i in 0..points {
+        let volume = |all: bool| {
+            case.families
+                .of(i)
+                .iter()
+                .filter(|&&j| all || stands(i, j as usize))
+                .map(|&j| case.volume[j as usize])
+                .sum::<f64>()
+        };
+        assert!(
+            (damage[i] - (1.0 - volume(false) / volume(true))).abs() < 1e-14,
+            "{name}"
+        );
+        assert_eq!(pass.is_damaged(i), damage[i] > 0.0, "{name}");
+    }
+}
+
+/// Breaks bonds in one state, then more in another, and puts the damage back.
+fn break_twice<const D: usize>(
+    case: &Case<D>,
+    law: Law,
+    pass: &mut dyn BondPass<D>,
+    breaks: &dyn Fn(&[f64], usize, usize) -> bool,
+    [first, second]: [&[f64]; 2],
+) {
+    let n = case.position.len() * D;
+    let name = format!("{D}D {law:?} {}", pass.name());
+    let mut force = vec![0.0; n];
+    let fresh = pass.damage_state();
+    assert_eq!(
+        pass.force_into(first, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen),
+        0
+    );
+    let whole = force.clone();
+    let mut lost = pass.force_into(first, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
+    let (expected, energy) = naive(case, law, Kinematics::Exact, first, &|i, j| {
+        !breaks(first, i, j)
+    });
+    assert!(
+        difference(&force, &expected) < 1e-13 * largest(&expected),
+        "{name}"
+    );
+    assert!(
+        (pass.stored_energy(first) - energy).abs() < 1e-13 * energy,
+        "{name}"
+    );
+    assert!(lost > 0 && lost < pass.bonds() && lost % 2 == 0);
+    // what broke took what was stored before less what is stored after, wherever points are
+    let last = pass.last_broken();
+    assert_eq!(last.len() as u64, lost, "{name}");
+    assert!(
+        last.iter()
+            .all(|&(i, j)| breaks(first, i as usize, j as usize))
+    );
+    check_lost_energy(
+        case,
+        law,
+        pass,
+        [first, second],
+        &|i, j| !breaks(first, i, j),
+        &name,
+    );
+    // once broken, a bond stays so
+    let state = pass.damage_state();
+    lost += pass.force_into(second, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
+    let stands = |i: usize, j: usize| !breaks(first, i, j) && !breaks(second, i, j);
+    let (expected, _) = naive(case, law, Kinematics::Exact, second, &stands);
+    assert!(
+        difference(&force, &expected) < 1e-13 * largest(&expected),
+        "{name}"
+    );
+    let count = check_bonds(case, pass, &stands, &name);
+    assert_eq!((lost, pass.broken()), (count, count), "{name}");
+    check_damage(case, pass, &stands, &name);
+    // and comes back only with a saved state
+    assert!(pass.restore_damage(&state) && !pass.restore_damage(&state[1..]));
+    assert_eq!(pass.damage_state(), state);
+    assert!(pass.restore_damage(&fresh) && pass.broken() == 0);
+    pass.force_into(first, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
+    assert_eq!(force, whole);
+}
+
 fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
     let case = case(counts, jitter, false);
-    let points = case.position.len();
-    let n = points * D;
+    let n = case.position.len() * D;
     let critical = 0.1;
     let no_fail: Vec<bool> = case
         .position
@@ -198,102 +331,7 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
                 Some(failure),
                 layout,
                 |mut pass| {
-                    let name = format!("{D}D {law:?} {}", pass.name());
-                    let mut force = vec![0.0; n];
-                    let fresh = pass.damage_state();
-                    assert_eq!(
-                        pass.force_into(
-                            &first,
-                            &mut force,
-                            Interval::AT_ONCE,
-                            FailureUpdate::Frozen
-                        ),
-                        0
-                    );
-                    let whole = force.clone();
-                    let mut lost = pass.force_into(
-                        &first,
-                        &mut force,
-                        Interval::AT_ONCE,
-                        FailureUpdate::Update,
-                    );
-                    let (expected, energy) =
-                        naive(&case, law, Kinematics::Exact, &first, &|i, j| {
-                            !breaks(&first, i, j)
-                        });
-                    assert!(
-                        difference(&force, &expected) < 1e-13 * largest(&expected),
-                        "{name}"
-                    );
-                    assert!(
-                        (pass.stored_energy(&first) - energy).abs() < 1e-13 * energy,
-                        "{name}"
-                    );
-                    assert!(lost > 0 && lost < pass.bonds() && lost % 2 == 0);
-                    // what broke took what was stored before less what is stored after, wherever points are
-                    let last = pass.last_broken();
-                    assert_eq!(last.len() as u64, lost, "{name}");
-                    assert!(
-                        last.iter()
-                            .all(|&(i, j)| breaks(&first, i as usize, j as usize))
-                    );
-                    for u in [&first, &second] {
-                        let of = |stands: &dyn Fn(usize, usize) -> bool| {
-                            naive(&case, law, Kinematics::Exact, u, stands).1
-                        };
-                        let taken = of(&|_, _| true) - of(&|i, j| !breaks(&first, i, j));
-                        let found = pass.lost_energy(&|i| std::array::from_fn(|a| u[i * D + a]));
-                        assert!((found - taken).abs() < 1e-11 * energy, "{name}");
-                    }
-                    // once broken, a bond stays so
-                    let state = pass.damage_state();
-                    lost += pass.force_into(
-                        &second,
-                        &mut force,
-                        Interval::AT_ONCE,
-                        FailureUpdate::Update,
-                    );
-                    let stands =
-                        |i: usize, j: usize| !breaks(&first, i, j) && !breaks(&second, i, j);
-                    let (expected, _) = naive(&case, law, Kinematics::Exact, &second, &stands);
-                    assert!(
-                        difference(&force, &expected) < 1e-13 * largest(&expected),
-                        "{name}"
-                    );
-                    let count = (0..points)
-                        .flat_map(|i| case.families.of(i).iter().map(move |&j| (i, j as usize)))
-                        .filter(|&(i, j)| !stands(i, j))
-                        .count() as u64;
-                    assert_eq!((lost, pass.broken()), (count, count), "{name}");
-                    for i in (0..points).step_by(5) {
-                        for j in 0..points {
-                            let bond = case.families.of(i).binary_search(&(j as u32)).is_ok();
-                            assert_eq!(pass.bonded(i, j), bond && stands(i, j), "{name} {i} {j}");
-                        }
-                    }
-                    let mut damage = vec![0.0; points];
-                    pass.damage_into(&mut damage);
-                    for i in 0..points {
-                        let volume = |all: bool| {
-                            case.families
-                                .of(i)
-                                .iter()
-                                .filter(|&&j| all || stands(i, j as usize))
-                                .map(|&j| case.volume[j as usize])
-                                .sum::<f64>()
-                        };
-                        assert!(
-                            (damage[i] - (1.0 - volume(false) / volume(true))).abs() < 1e-14,
-                            "{name}"
-                        );
-                        assert_eq!(pass.is_damaged(i), damage[i] > 0.0, "{name}");
-                    }
-                    // and comes back only with a saved state
-                    assert!(pass.restore_damage(&state) && !pass.restore_damage(&state[1..]));
-                    assert_eq!(pass.damage_state(), state);
-                    assert!(pass.restore_damage(&fresh) && pass.broken() == 0);
-                    pass.force_into(&first, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
-                    assert_eq!(force, whole);
+                    break_twice(&case, law, pass.as_mut(), &breaks, [&first, &second]);
                 },
             );
         }

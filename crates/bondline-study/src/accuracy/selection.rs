@@ -175,12 +175,11 @@ pub(super) fn choose(
         let ladder = &mut ladders[k];
         if let Some(found) = ladder.found {
             let (choices, prediction) = explained(asked, ladder, &found, families.len(), &bench);
-            let prediction = Some(prediction);
             return Ok(done(
                 &ladder.family,
                 found.cells,
                 choices,
-                prediction,
+                Some(prediction),
                 bench.seconds,
             ));
         }
