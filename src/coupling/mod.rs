@@ -10,7 +10,7 @@
 //! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
-//! | `multi_lattice.rs`, `lattice_axes.rs` | shared: one lattice of points, or several that elements keep apart; its axes | |
+//! | `multi_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
 //! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
 //! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |

@@ -24,7 +24,7 @@ pub mod quasi_static;
 pub(crate) mod rezoning;
 pub(crate) mod seen;
 pub mod setup;
-pub mod step_observer;
+pub(crate) mod step_observer;
 pub mod time_dependent_loads;
 pub mod time_step;
 pub mod writer;
