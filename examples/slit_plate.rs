@@ -369,7 +369,7 @@ fn graded_overrides(n: usize, spacing: &[String]) -> Vec<String> {
             -half_x, -half_y
         )
     };
-    let coupled: Vec<String> = spacing[..2]
+    spacing[..2]
         .iter()
         .cloned()
         .chain([
@@ -383,8 +383,7 @@ fn graded_overrides(n: usize, spacing: &[String]) -> Vec<String> {
             "coupling=splice".into(),
             "output.vtu=false".into(),
         ])
-        .collect();
-    coupled
+        .collect()
 }
 
 /// Keys with a method of the solver.

@@ -139,15 +139,13 @@ fn free_dofs(system: &dyn SemiDiscrete, prescribed: &[u32]) -> Vec<bool> {
 fn rates(system: &dyn SemiDiscrete, is_free: &[bool]) -> Vec<f64> {
     let (d, mass) = (system.block().max(1), system.mass());
     let sums = system.row_sums();
-    let rates: Vec<f64> = mass
-        .iter()
+    mass.iter()
         .enumerate()
         .map(|(site, m)| {
             let free = (site * d..(site + 1) * d).filter(|&k| is_free[k]);
             free.map(|k| sums[k] / m).fold(0.0, f64::max)
         })
-        .collect();
-    rates
+        .collect()
 }
 
 impl FineSites {

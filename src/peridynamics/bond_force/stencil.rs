@@ -355,7 +355,7 @@ fn offsets_of<const D: usize>(
     spacing: [f64; D],
     volume: f64,
 ) -> Vec<Offset<D>> {
-    let offsets: Vec<Offset<D>> = steps
+    steps
         .iter()
         .map(|s| {
             let mirror = s.map(|s| -s);
@@ -363,8 +363,7 @@ fn offsets_of<const D: usize>(
             let (weight, limit) = found.of(&key).or(found.of(s)).unwrap_or_default();
             Offset::new(*s, spacing, cells.delta(s), weight * volume, limit)
         })
-        .collect();
-    offsets
+        .collect()
 }
 
 impl<const D: usize> Stencil<D> {
