@@ -11,7 +11,7 @@ pub trait Progress: Sync {
     /// Begins a stage; `total` is the number of steps it will `advance` by, where that is known.
     fn stage(&self, name: &str, total: Option<u64>);
 
-    /// Reports `by` further steps of the current stage.
+    /// Reports `by` further steps of the current stage; zero within a long step. A listener may end the computation here, by unwinding.
     fn advance(&self, by: u64);
 
     /// Says how the current stage stands, in a few words; for whoever watches.

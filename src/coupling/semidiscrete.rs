@@ -136,8 +136,12 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     pub fn with_local_laws(mut self, laws: &[Option<Arc<dyn LocalLaw<D>>>]) -> Self {
         self.elements = LocalElements::new(self.model, laws);
         if self.elements.is_some() && self.difference_length.is_none() {
-            self.difference_length =
-                Some(DIFFERENCED * self.model.typical_volume().powf(1.0 / D as f64));
+            // there may be no points, and no spacing
+            let mesh = &self.model.mesh;
+            let cells = 0..mesh.cell_count();
+            let volume: f64 = cells.map(|c| mesh.cell_volume(c).abs()).sum();
+            let size = (volume / mesh.cell_count() as f64).powf(1.0 / D as f64);
+            self.difference_length = Some(DIFFERENCED * size);
         }
         self
     }

@@ -1,13 +1,13 @@
 //! Finite elements whose stress is not linear in the displacement gradient, as what they add to the elements of the tangent at rest.
 //!
 //! ```text
-//!   f_a = Σ_b K_ab u_b + ∫ (σ(∇u, history) − C : ∇u) · ∂N_a/∂x dV
+//!   f_a = Σ_b K_ab u_b + ∫ (P(∇u, history) − C : ∇u) · ∂N_a/∂X dV
 //! ```
 //!
 //! Where a law flows at constant volume, cells with several quadrature points take the mean of their dilatation, `∇u + (θ̄ − θ)/D I`, in stress and virtual work alike (the B̄ method, \[Hughes1987\] section 4.5):
 //! with the dilatation of each point they would resist the flow. Under affine fields the two are the same.
 //!
-//! The first term is that of the rows, as if all elements were linear; the integral is a sum over the quadrature points of the stiffness, each with what its law remembers. Elements that are linear do not appear here.
+//! All integrals are over the undeformed body (total Lagrangian); P is the first Piola–Kirchhoff stress, which for small strains is σ. The first term is that of the rows, as if all elements were linear; the integral is a sum over the quadrature points of the stiffness, each with what its law remembers. Elements that are linear do not appear here.
 
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ struct Excess<const D: usize> {
     stored: f64,
     /// Energy dissipated within the interval \[J\].
     dissipated: f64,
-    /// ∫ σ dV.
+    /// Integral of the Cauchy stress over the undeformed cell.
     stress: Tensor<D>,
     /// Its volume.
     volume: f64,
@@ -203,7 +203,7 @@ impl<const D: usize> NonlinearElements<D> {
         counted.iter().map(|(_, excess)| excess.stored).sum()
     }
 
-    /// The mean stress of each cell \[Pa\], likewise.
+    /// The mean Cauchy stress of each cell \[Pa\], likewise.
     pub fn stresses(
         &self,
         mesh: &Mesh<D>,
@@ -304,6 +304,7 @@ fn excess<const D: usize>(
     let mut point = 0;
     // means of the gradients of the shape functions
     let mut mean = [Vector::<D>::zeros(); 8];
+    let is_objective = law.is_objective();
     let has_mean_dilatation = law.flows_at_constant_volume();
     if has_mean_dilatation {
         let mut volume = 0.0;
@@ -340,7 +341,7 @@ fn excess<const D: usize>(
         }
         sum.stored += p.weight * (found.stored - 0.5 * linear.dot(&gradient));
         sum.dissipated += p.weight * found.dissipated;
-        sum.stress += found.stress * p.weight;
+        sum.stress += found.cauchy(&taken, is_objective) * p.weight;
         sum.volume += p.weight;
         point += 1;
     });

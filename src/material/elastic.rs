@@ -138,6 +138,14 @@ impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
         true
     }
 
+    fn is_objective(&self) -> bool {
+        false
+    }
+
+    fn flows_at_constant_volume(&self) -> bool {
+        false
+    }
+
     fn history(&self) -> &'static [&'static str] {
         &[]
     }
@@ -152,6 +160,7 @@ impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
         let stress = self.stiffness.contract(gradient);
         LocalResponse {
             stress,
+            volume_ratio: 1.0,
             stored: 0.5 * stress.dot(gradient),
             dissipated: 0.0,
         }

@@ -59,6 +59,10 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         false
     }
 
+    fn is_objective(&self) -> bool {
+        false
+    }
+
     fn flows_at_constant_volume(&self) -> bool {
         // a bar is in uniaxial stress: its sides are free
         D > 1
@@ -133,6 +137,7 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         }
         LocalResponse {
             stress,
+            volume_ratio: 1.0,
             stored: stored + 0.5 * self.hardening * alpha * alpha,
             dissipated: self.yield_stress * flow,
         }

@@ -3,7 +3,10 @@
 //! A law gives the force state `T⟨ξ⟩` of one family at a time, [SAND2015-7998] eq. (2.3). [`crate::peridynamics::bond_force`] passes over all families, adds `T_i⟨ξ⟩ − T_j⟨−ξ⟩` up,
 //! breaks bonds, and keeps the history. So a law that is written here runs in load steps and in explicit motion, beside every seam, with damage, energies and checkpoints.
 
-use crate::{peridynamics::StatePart, tensor::Vector};
+use crate::{
+    peridynamics::StatePart,
+    tensor::{Tensor, Vector},
+};
 
 /// The numbers that a law keeps from step to step, by their names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,6 +108,20 @@ pub trait ForceState<const D: usize>: Send + Sync {
         present: Present<'_>,
         force: &mut [Vector<D>],
     ) -> EnergyDensity;
+
+    /// The stress of a point whose force state is `force` \[Pa\], as results show it: the partial stress `Σ T⟨ξ⟩ ⊗ ξ V`, [SAND2015-7998] eq. (2.19), and of laws for strains of any size
+    /// the Cauchy stress.
+    fn stress(
+        &self,
+        family: &DeformedFamily<'_, D>,
+        _past: Past<'_>,
+        force: &[Vector<D>],
+    ) -> Tensor<D> {
+        let bonds = force.iter().zip(family.bonds).zip(family.volumes);
+        bonds.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
+            sum + force * xi.transpose() * *volume
+        })
+    }
 
     /// Whether a rotation of the family rotates its force state: only such a law takes geometrically exact bonds.
     fn is_objective(&self) -> bool;

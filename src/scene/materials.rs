@@ -212,6 +212,7 @@ fn law_and_cells<'a, const D: usize>(
                 lambda,
                 shear: mu,
                 influence,
+                kinematics,
             };
             (m.law.build(constants, &values), m.cells.as_ref())
         }

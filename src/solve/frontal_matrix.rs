@@ -2,8 +2,10 @@
 //!
 //! A front of `p` pivots and `r` rows is held as `panel` (`(p + r) × p`), `upper` (`p × r`, LU only) and `schur`
 //! (`r × r`), all column-major. Tiles do not depend on the number of threads and every tile is computed by one
-//! thread, so that the factors have the same bits on any machine with the same instruction set.
+//! thread, so that the factors have the same bits on any machine with the same instruction set. Progress is told of
+//! every tile of columns: a large front takes seconds, and a listener may end the computation there.
 
+use crate::progress::Progress;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor as llt;
 use faer::linalg::lu::partial_pivoting::factor as lu;
@@ -38,9 +40,11 @@ pub(crate) fn cholesky(
     schur: &mut [f64],
     p: usize,
     r: usize,
+    progress: &dyn Progress,
 ) -> Result<(), BadPivot> {
     let height = p + r;
     for k in (0..p).step_by(TILE) {
+        progress.advance(0);
         let width = TILE.min(p - k);
         let (head, tail) = panel.split_at_mut((k + width) * height);
         let column = view_mut(&mut head[k * height..], height, width);
@@ -85,6 +89,7 @@ pub(crate) fn cholesky(
             .par_chunks_mut(TILE * r)
             .enumerate()
             .for_each(|(t, columns)| {
+                progress.advance(0);
                 let start = t * TILE;
                 let count = columns.len() / r;
                 let target = view_mut(columns, r, count);
@@ -134,6 +139,7 @@ fn eliminate(
     permutation: &[u32],
     p: usize,
     r: usize,
+    progress: &dyn Progress,
 ) {
     let height = p + r;
     if r == 0 || p == 0 {
@@ -150,6 +156,7 @@ fn eliminate(
         .par_chunks_mut(TILE * p)
         .zip(schur.par_chunks_mut(TILE * r))
         .for_each(|(columns, target)| {
+            progress.advance(0);
             let mut scratch = Vec::with_capacity(p);
             columns.chunks_mut(p).for_each(|column| {
                 scratch.clear();
@@ -184,12 +191,14 @@ pub(crate) fn lu(
     permutation: &mut [u32],
     p: usize,
     r: usize,
+    progress: &dyn Progress,
 ) {
     let height = p + r;
     for (k, q) in permutation.iter_mut().enumerate() {
         *q = k as u32;
     }
     for k in (0..p).step_by(TILE) {
+        progress.advance(0);
         let width = TILE.min(p - k);
         let size = p - k;
         let (left, rest) = panel.split_at_mut(k * height);
@@ -250,12 +259,13 @@ pub(crate) fn lu(
             }
         });
     }
-    eliminate(panel, upper, schur, permutation, p, r);
+    eliminate(panel, upper, schur, permutation, p, r, progress);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::Silent;
     use nalgebra::DMatrix;
 
     /// A full front of pseudo-random entries in ±0.5 and a constant on the diagonal.
@@ -291,7 +301,7 @@ mod tests {
         for (p, r) in [(5, 0), (7, 4), (300, 130), (520, 270)] {
             let a = front(p + r, (p + r) as f64, true);
             let (mut panel, _, mut schur) = parts(&a, p);
-            cholesky(&mut panel, &mut schur, p, r).expect("positive definite");
+            cholesky(&mut panel, &mut schur, p, r, &Silent).expect("positive definite");
             let l = DMatrix::from_fn(
                 p + r,
                 p,
@@ -321,7 +331,15 @@ mod tests {
             let a = front(p + r, 0.0, false);
             let (mut panel, mut upper, mut schur) = parts(&a, p);
             let mut permutation = vec![0; p];
-            lu(&mut panel, &mut upper, &mut schur, &mut permutation, p, r);
+            lu(
+                &mut panel,
+                &mut upper,
+                &mut schur,
+                &mut permutation,
+                p,
+                r,
+                &Silent,
+            );
             let l = DMatrix::from_fn(p + r, p, |i, j| match i.cmp(&j) {
                 std::cmp::Ordering::Less => 0.0,
                 std::cmp::Ordering::Equal => 1.0,
@@ -362,6 +380,9 @@ mod tests {
         let mut a = front(400, 400.0, true);
         a[(290, 290)] = -1e4;
         let (mut panel, _, mut schur) = parts(&a, 400);
-        assert_eq!(cholesky(&mut panel, &mut schur, 400, 0), Err(BadPivot(290)));
+        assert_eq!(
+            cholesky(&mut panel, &mut schur, 400, 0, &Silent),
+            Err(BadPivot(290))
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Numerical factorisation over the tree of supernodes: assembly of fronts, contribution blocks, scheduling.
 
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::solve::FreeDofs;
 use crate::solve::direct_params::{DirectError, DirectParams};
 use crate::solve::frontal_matrix::{self, BadPivot};
@@ -195,11 +195,10 @@ impl<'a> Assembly<'a> {
         }
         let mut permutation = vec![0; if symmetric { 0 } else { p }];
         if symmetric {
-            frontal_matrix::cholesky(&mut front.panel, &mut front.schur, p, r).map_err(
-                |BadPivot(k)| DirectError::NotPositive {
+            frontal_matrix::cholesky(&mut front.panel, &mut front.schur, p, r, self.progress)
+                .map_err(|BadPivot(k)| DirectError::NotPositive {
                     site: self.pivot(s, k).0,
-                },
-            )?;
+                })?;
         } else {
             frontal_matrix::lu(
                 &mut front.panel,
@@ -208,6 +207,7 @@ impl<'a> Assembly<'a> {
                 &mut permutation,
                 p,
                 r,
+                self.progress,
             );
         }
         self.check_pivots(s, &front.panel, p, r)?;
@@ -373,7 +373,7 @@ pub(crate) fn trial_front(p: usize, r: usize, rows: &[usize], symmetry: Symmetry
     let mut permutation = vec![0; if symmetric { 0 } else { p }];
     if symmetric {
         // the diagonal dominates
-        let _ = frontal_matrix::cholesky(&mut front.panel, &mut front.schur, p, r);
+        let _ = frontal_matrix::cholesky(&mut front.panel, &mut front.schur, p, r, &Silent);
     } else {
         let Front {
             panel,
@@ -381,7 +381,7 @@ pub(crate) fn trial_front(p: usize, r: usize, rows: &[usize], symmetry: Symmetry
             schur,
             ..
         } = &mut front;
-        frontal_matrix::lu(panel, upper, schur, &mut permutation, p, r);
+        frontal_matrix::lu(panel, upper, schur, &mut permutation, p, r, &Silent);
     }
     std::hint::black_box(&front.panel);
 }

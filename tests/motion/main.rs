@@ -9,6 +9,7 @@ mod driven;
 mod faults;
 mod follow;
 mod growth;
+mod hyperelastic;
 mod indefinite;
 mod keys;
 mod laws;

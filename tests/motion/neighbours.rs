@@ -41,7 +41,7 @@ fn ended(child: Child) -> (Option<i32>, String) {
 
 /// Waits until a file is there.
 fn wait_for(path: &Path) {
-    for _ in 0..1000 {
+    for _ in 0..12_000 {
         if path.exists() {
             return;
         }
@@ -293,7 +293,7 @@ fn a_pipe_in_place_of_a_checkpoint_is_refused() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    for _ in 0..1000 {
+    for _ in 0..12_000 {
         if child.try_wait().unwrap().is_some() {
             break;
         }

@@ -75,6 +75,37 @@ struct Scratch<const D: usize> {
     force: Vec<Vector<D>>,
 }
 
+/// What a law reads of a family, and what it overwrites.
+struct Parts<'a, const D: usize> {
+    family: DeformedFamily<'a, D>,
+    past: &'a [f64],
+    present: Present<'a>,
+    force: &'a mut [Vector<D>],
+}
+
+impl<const D: usize> Scratch<D> {
+    fn split<'a>(&'a mut self, state: Option<&'a StatePart<D>>) -> Parts<'a, D> {
+        Parts {
+            family: DeformedFamily {
+                bonds: &self.bonds,
+                volumes: &self.volumes,
+                pair: &self.pair,
+                omega: &self.omega,
+                state,
+                difference: &self.difference,
+                extension: &self.extension,
+                direction: &self.direction,
+            },
+            past: &self.past,
+            present: Present {
+                point: &mut self.point,
+                bonds: &mut self.present,
+            },
+            force: &mut self.force,
+        }
+    }
+}
+
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
         Self {
@@ -244,29 +275,12 @@ impl<const D: usize> Generic<D> {
         let Some(law) = self.law.force_state() else {
             return EnergyDensity::default();
         };
-        let family = DeformedFamily {
-            bonds: &s.bonds,
-            volumes: &s.volumes,
-            pair: &s.pair,
-            omega: &s.omega,
-            state: self.state[i].as_ref(),
-            difference: &s.difference,
-            extension: &s.extension,
-            direction: &s.direction,
+        let parts = s.split(self.state[i].as_ref());
+        let past = Past {
+            point: &past.point[own],
+            bonds: parts.past,
         };
-        law.respond(
-            &family,
-            step,
-            Past {
-                point: &past.point[own],
-                bonds: &s.past,
-            },
-            Present {
-                point: &mut s.point,
-                bonds: &mut s.present,
-            },
-            &mut s.force,
-        )
+        law.respond(&parts.family, step, past, parts.present, parts.force)
     }
 
     /// Force states of all families at the end of a step, and the history there.
@@ -537,9 +551,15 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
             &self.past,
             &mut s,
         );
-        let bonds = s.force.iter().zip(&s.bonds).zip(&s.volumes);
-        bonds.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
-            sum + force * xi.transpose() * *volume
+        let own = i * self.layout.point.len()..(i + 1) * self.layout.point.len();
+        let parts = s.split(self.state[i].as_ref());
+        let past = Past {
+            point: &self.past.point[own],
+            bonds: parts.past,
+        };
+        let law = self.law.force_state();
+        law.map_or_else(Tensor::zeros, |law| {
+            law.stress(&parts.family, past, parts.force)
         })
     }
 

@@ -7,16 +7,21 @@
 //! | `correspondence.rs` | elastic correspondence, to first order | section 7.2 |
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
-//! | `plastic.rs` | correspondence with J2 plasticity | section 7.2 |
+//! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
+//! | `plastic.rs` | its stress that of J2 plasticity | |
+//! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | its stress hyperelastic, for large deformations | |
 //!
 //! A law that implements [`NamedLaw`] and has its line in the list at the end of this file is a material of scenes, by its key.
 
 mod bond_based;
 mod correspondence;
 mod hardening;
+mod local_correspondence;
 mod lps;
 mod maxwell;
+mod neo_hooke;
 mod plastic;
+mod st_venant_kirchhoff;
 
 use std::sync::Arc;
 
@@ -26,9 +31,12 @@ use crate::peridynamics::{Influence, Law};
 pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
 pub use hardening::Hardening;
+pub use local_correspondence::LocalCorrespondence;
 pub use lps::LinearPeridynamicSolid;
 pub use maxwell::Maxwell;
+pub use neo_hooke::NeoHookeSolid;
 pub use plastic::PlasticCorrespondence;
+pub use st_venant_kirchhoff::StVenantKirchhoffSolid;
 
 /// A number that a law takes beside the elastic constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,10 +73,28 @@ pub struct Constants {
     pub shear: f64,
     /// The influence function ω of the scene, for laws that have one \[1\].
     pub influence: Influence,
+    /// What the dimension stands for.
+    pub kinematics: Kinematics,
+}
+
+impl Constants {
+    /// Lamé's λ of the solid of which the body is made \[Pa\].
+    pub fn solid_lambda(&self) -> f64 {
+        let (lambda, shear) = (self.lambda, self.shear);
+        match self.kinematics {
+            // λ + 2 μ is Young's modulus E, and ν = E/(2 μ) − 1
+            Kinematics::Bar => {
+                let poisson = 0.5 * lambda / shear;
+                2.0 * shear * poisson / (1.0 - 2.0 * poisson)
+            }
+            Kinematics::PlaneStress => 2.0 * shear * lambda / (2.0 * shear - lambda),
+            Kinematics::PlaneStrain | Kinematics::Solid => lambda,
+        }
+    }
 }
 
 /// A law as scenes name it: its key, its numbers, and how it is made of them.
-pub trait NamedLaw<const D: usize>: Law<D> {
+pub trait NamedLaw<const D: usize> {
     /// The key of the material.
     const KEY: &'static str;
     /// What it is, in a sentence.
@@ -92,6 +118,11 @@ pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
         lambda: 1.7,
         shear: 1.3,
         influence: Influence::Gaussian,
+        kinematics: match D {
+            1 => Kinematics::Bar,
+            2 => Kinematics::PlaneStrain,
+            _ => Kinematics::Solid,
+        },
     };
     let Constants { lambda, shear, .. } = constants;
     let typed: [Arc<dyn Law<D>>; 3] = [
@@ -156,6 +187,7 @@ macro_rules! named_laws {
                     lambda: 1.0,
                     shear: 1.0,
                     influence: Influence::Gaussian,
+                    kinematics: Kinematics::Bar,
                 };
                 let values: Vec<f64> = self.parameters().iter().map(|p| p.usual).collect();
                 self.build::<1>(constants, &values).bond_energy(1.0).is_some()
@@ -173,4 +205,6 @@ named_laws! {
     Hardening,
     Maxwell,
     PlasticCorrespondence,
+    NeoHookeSolid,
+    StVenantKirchhoffSolid,
 }

@@ -1,0 +1,259 @@
+//! A law of solids in bodies of fewer dimensions.
+
+use std::sync::Arc;
+
+use super::{Kinematics, LocalLaw, LocalResponse};
+use crate::tensor::{Tensor, Tensor4};
+
+/// Most corrections of the strain out of the body.
+const ITERATIONS: usize = 60;
+
+/// A law of solids as a bar, a plate or a long body has it: strains out of the body are zero (plane strain), or such that no stress acts there (plane stress, and bars, whose two sides
+/// contract alike).
+///
+/// The strain that no stress goes with is found by Newton's method at each response, to round-off; it is a function of the gradient and of the history alone.
+#[derive(Clone, Debug)]
+pub struct Reduced<const D: usize> {
+    law: Arc<dyn LocalLaw<3>>,
+    /// The first direction whose strain follows from the stress being zero; 3 if there is none.
+    free: usize,
+    tangent: Tensor4<D>,
+}
+
+impl<const D: usize> Reduced<D> {
+    /// The law in these kinematics, which are of `D` dimensions.
+    pub fn new(law: Arc<dyn LocalLaw<3>>, kinematics: Kinematics) -> Self {
+        debug_assert_eq!(kinematics.dimension(), D);
+        let free = match kinematics {
+            Kinematics::Bar | Kinematics::PlaneStress => D,
+            Kinematics::PlaneStrain | Kinematics::Solid => 3,
+        };
+        let solid = law.tangent();
+        // the free strains of a unit gradient: those of two sides are alike
+        let resistance: f64 = (free..3).map(|g| solid.get(2, 2, g, g)).sum();
+        let mut tangent = Tensor4::zeros();
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            let across: f64 = (free..3).map(|f| solid.get(i, j, f, f)).sum();
+            tangent.0[i][j] = Tensor::from_fn(|k, l| {
+                let yielded = match free {
+                    3 => 0.0,
+                    _ => across * solid.get(2, 2, k, l) / resistance,
+                };
+                solid.get(i, j, k, l) - yielded
+            });
+        }
+        Self { law, free, tangent }
+    }
+
+    fn at(
+        &self,
+        gradient: &Tensor<D>,
+        out: f64,
+        step: f64,
+        past: &[f64],
+        present: &mut [f64],
+    ) -> LocalResponse<3> {
+        let mut whole = Tensor::<3>::zeros();
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            whole[(i, j)] = gradient[(i, j)];
+        }
+        (self.free..3).for_each(|f| whole[(f, f)] = out);
+        self.law.respond(&whole, step, past, present)
+    }
+
+    /// The strain out of the body at which no stress acts there; not a number where none is found.
+    fn strain_out(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> f64 {
+        let solid = self.law.tangent();
+        let resistance: f64 = (self.free..3).map(|g| solid.get(2, 2, g, g)).sum();
+        let mut present = vec![0.0; past.len()];
+        let mut stress = |out: f64| self.at(gradient, out, step, past, &mut present).stress[(2, 2)];
+        let along: f64 = (0..D)
+            .map(|k| solid.get(2, 2, k, k) * gradient[(k, k)])
+            .sum();
+        let mut out = (-along / resistance).max(-0.9);
+        let size = gradient.amax().max(f64::MIN_POSITIVE);
+        for _ in 0..ITERATIONS {
+            let here = stress(out);
+            let by = 1e-7 * size.max(out.abs());
+            let slope = (stress(out + by) - stress(out - by)) / (2.0 * by);
+            let mut change = -here / slope;
+            if self.law.is_objective() {
+                // the material keeps a positive thickness
+                change = change.max(-0.5 * (1.0 + out));
+            }
+            out += change;
+            if change.abs() <= 1e-15 * size.max(out.abs()) || !change.is_finite() {
+                break;
+            }
+        }
+        // the last change may go to and fro by round-off; a stress that stays is none
+        let left = stress(out).abs();
+        match left <= 1e-11 * resistance * size.max(out.abs()) {
+            true => out,
+            false => f64::NAN,
+        }
+    }
+}
+
+impl<const D: usize> LocalLaw<D> for Reduced<D> {
+    fn tangent(&self) -> &Tensor4<D> {
+        &self.tangent
+    }
+
+    fn is_linear(&self) -> bool {
+        self.law.is_linear()
+    }
+
+    fn is_objective(&self) -> bool {
+        self.law.is_objective()
+    }
+
+    fn flows_at_constant_volume(&self) -> bool {
+        // the thickness, or the sides, make up for the rest
+        self.free == 3 && self.law.flows_at_constant_volume()
+    }
+
+    fn history(&self) -> &'static [&'static str] {
+        self.law.history()
+    }
+
+    fn respond(
+        &self,
+        gradient: &Tensor<D>,
+        step: f64,
+        past: &[f64],
+        present: &mut [f64],
+    ) -> LocalResponse<D> {
+        let out = match self.free {
+            3 => 0.0,
+            _ if gradient.amax() == 0.0 && past.iter().all(|x| *x == 0.0) => 0.0,
+            _ => self.strain_out(gradient, step, past),
+        };
+        let found = self.at(gradient, out, step, past, present);
+        LocalResponse {
+            stress: Tensor::from_fn(|i, j| found.stress[(i, j)]),
+            volume_ratio: found.volume_ratio,
+            stored: found.stored,
+            dissipated: found.dissipated,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{J2, LinearElastic, NeoHooke, StVenantKirchhoff};
+
+    const LAME: (f64, f64) = (600.0, 400.0);
+
+    fn plastic() -> Arc<dyn LocalLaw<3>> {
+        Arc::new(J2::<3>::new(LAME.0, LAME.1, 2.0, 50.0))
+    }
+
+    /// Responds to gradients one after another; the last response.
+    fn along<const D: usize>(law: &dyn LocalLaw<D>, path: &[Tensor<D>]) -> LocalResponse<D> {
+        let mut past = vec![0.0; law.history().len()];
+        let mut present = past.clone();
+        let mut last = law.respond(&Tensor::zeros(), 0.0, &past, &mut present);
+        for g in path {
+            last = law.respond(g, 1.0, &past, &mut present);
+            past.clone_from(&present);
+        }
+        last
+    }
+
+    #[test]
+    fn a_reduced_law_is_the_one_written_for_the_body() {
+        let path: Vec<Tensor<2>> = [(0.01, 0.004), (0.02, -0.01), (-0.01, 0.003)]
+            .map(|(a, b)| Tensor::<2>::new(a, b, 0.3 * b, -0.2 * a))
+            .to_vec();
+        let own = along(&J2::<2>::new(LAME.0, LAME.1, 2.0, 50.0), &path);
+        let reduced = along(&Reduced::new(plastic(), Kinematics::PlaneStrain), &path);
+        assert!((own.stress - reduced.stress).amax() < 1e-12);
+        assert!((own.stored - reduced.stored).abs() < 1e-12);
+
+        // a bar: λ of one dimension is E − 2 μ
+        let young = LAME.1 * (3.0 * LAME.0 + 2.0 * LAME.1) / (LAME.0 + LAME.1);
+        let path = [0.01, 0.03, -0.02].map(Tensor::<1>::new);
+        let own = along(
+            &J2::<1>::new(young - 2.0 * LAME.1, LAME.1, 2.0, 50.0),
+            &path,
+        );
+        let reduced = along(&Reduced::new(plastic(), Kinematics::Bar), &path);
+        assert!((own.stress - reduced.stress).amax() < 1e-11 * young);
+        assert!((own.stored - reduced.stored).abs() < 1e-10);
+    }
+
+    #[test]
+    fn tangents_are_those_of_linear_elasticity() {
+        let poisson = 0.5 * LAME.0 / (LAME.0 + LAME.1);
+        let young = 2.0 * LAME.1 * (1.0 + poisson);
+        let elastic = crate::material::Elastic::new(young, poisson, 0.0).unwrap();
+        fn differs<const D: usize>(a: &Tensor4<D>, b: &Tensor4<D>) -> f64 {
+            let mut difference = a.clone();
+            difference.add_scaled(-1.0, b);
+            difference.amax()
+        }
+        for kinematics in [Kinematics::PlaneStress, Kinematics::PlaneStrain] {
+            let linear = LinearElastic::<2>::new(&elastic, kinematics).unwrap();
+            let reduced = Reduced::<2>::new(plastic(), kinematics);
+            assert!(differs(reduced.tangent(), linear.tangent()) < 1e-12 * young);
+        }
+        let linear = LinearElastic::<1>::new(&elastic, Kinematics::Bar).unwrap();
+        let reduced = Reduced::<1>::new(plastic(), Kinematics::Bar);
+        assert!(differs(reduced.tangent(), linear.tangent()) < 1e-12 * young);
+    }
+
+    #[test]
+    fn a_bar_of_a_hyperelastic_solid_has_its_closed_form() {
+        let young = LAME.1 * (3.0 * LAME.0 + 2.0 * LAME.1) / (LAME.0 + LAME.1);
+        for stretch in [0.8, 1.1, 1.6f64] {
+            // S = E_young E_xx where the sides carry none
+            let solid = StVenantKirchhoff::new(LAME.0, LAME.1);
+            let law = Reduced::<1>::new(Arc::new(solid), Kinematics::Bar);
+            let found = along(&law, &[Tensor::<1>::new(stretch - 1.0)]).stress[0];
+            let expected = young * 0.5 * (stretch * stretch - 1.0) * stretch;
+            assert!(
+                (found - expected).abs() < 1e-11 * young,
+                "{found} {expected}"
+            );
+            // μ (λ_t² − 1) + λ ln J = 0 gives ln J, and with it P = μ (λ − 1/λ) + λ ln J/λ, by bisection of λ_t
+            let (mut low, mut high) = (0.1, 3.0f64);
+            for _ in 0..200 {
+                let side = 0.5 * (low + high);
+                let out = LAME.1 * (side * side - 1.0) + LAME.0 * (stretch * side * side).ln();
+                if out > 0.0 { high = side } else { low = side }
+            }
+            let expected =
+                LAME.1 * (stretch - 1.0 / stretch) + LAME.0 * (stretch * low * low).ln() / stretch;
+            let solid = NeoHooke::new(LAME.0, LAME.1);
+            let law = Reduced::<1>::new(Arc::new(solid), Kinematics::Bar);
+            let found = along(&law, &[Tensor::<1>::new(stretch - 1.0)]).stress[0];
+            assert!(
+                (found - expected).abs() < 1e-11 * young,
+                "{found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_plate_that_flows_in_tension_has_its_closed_form() {
+        // plane stress, pulled along x with free sides: the sides' strain is that at which σ_yy = 0, by bisection
+        let law = Reduced::<2>::new(plastic(), Kinematics::PlaneStress);
+        let young = LAME.1 * (3.0 * LAME.0 + 2.0 * LAME.1) / (LAME.0 + LAME.1);
+        let (mut low, mut high) = (-0.05, 0.0);
+        let at = |side: f64| along(&law, &[Tensor::<2>::new(0.02, 0.0, 0.0, side)]).stress;
+        for _ in 0..100 {
+            let side = 0.5 * (low + high);
+            if at(side)[(1, 1)] > 0.0 {
+                high = side
+            } else {
+                low = side
+            }
+        }
+        let tangent = young * 50.0 / (young + 50.0);
+        let expected = 2.0 + tangent * (0.02 - 2.0 / young);
+        // one step in a direction that the plastic flow keeps
+        assert!((at(low)[(0, 0)] - expected).abs() < 1e-9 * expected);
+    }
+}

@@ -1,0 +1,34 @@
+//! Correspondence whose classical stress is that of a Neo-Hooke solid.
+
+use std::sync::Arc;
+
+use super::{Constants, Correspondence, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use crate::{
+    material::{Kinematics, NeoHooke, Reduced},
+    peridynamics::Law,
+};
+
+/// [`LocalCorrespondence`] with the stress of [`NeoHooke`].
+#[derive(Clone, Copy, Debug)]
+pub struct NeoHookeSolid<const D: usize>;
+
+impl<const D: usize> NamedLaw<D> for NeoHookeSolid<D> {
+    const KEY: &'static str = "neo-hooke";
+    const ABOUT: &'static str =
+        "Correspondence with a compressible Neo-Hooke solid, for large rotations and strains.";
+    const RATIO: Ratio = Ratio::Any;
+    const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
+    const PARAMETERS: &'static [Parameter] = &[LocalCorrespondence::<D>::STABILISATION];
+
+    fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
+        let shear = constants.shear;
+        let solid = Arc::new(NeoHooke::new(constants.solid_lambda(), shear));
+        let local = Arc::new(Reduced::new(solid, constants.kinematics));
+        let linear = Correspondence::new(constants.influence, constants.lambda, shear, values[0]);
+        Arc::new(LocalCorrespondence::new(
+            "Neo-Hooke correspondence",
+            linear,
+            local,
+        ))
+    }
+}
