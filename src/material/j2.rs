@@ -1,29 +1,37 @@
-//! Von Mises plasticity with linear isotropic hardening, for small strains.
+//! Von Mises plasticity with isotropic hardening, for small strains.
 
-use super::{Kinematics, LocalLaw, LocalResponse};
+use super::{Hardening, Kinematics, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, strain};
 
-/// Rate-independent J2 plasticity: `σ = C : (ε − ε_p)`, `f = √(3/2) |dev σ| − (σ_y + H α) ≤ 0`, `ε̇_p = α̇ √(3/2) dev σ/|dev σ|`.
+/// J2 plasticity: `σ = C : (ε − ε_p)`, `f = √(3/2) |dev σ| − σ_y(α) ≤ 0`, `ε̇_p = α̇ √(3/2) dev σ/|dev σ|`, with the yield stress of [`Hardening`].
 ///
-/// The stress at the end of a step is found by radial return (\[SimoHughes1998\] box 3.1), which is exact for loads that keep their direction. α is the equivalent plastic strain; the plastic work
-/// beyond `½ H α²`, which is stored, is dissipated: `σ_y α`.
+/// The stress at the end of a step is found by radial return (\[SimoHughes1998\] box 3.1), which is exact for loads that keep their direction. α is the equivalent plastic strain; what hardening stores and what flow dissipates is said there.
 ///
 /// In a bar the stress is uniaxial; plane bodies are in plane strain.
 #[derive(Clone, Debug)]
 pub struct J2<const D: usize> {
     elastic: Tensor4<D>,
     shear: f64,
-    yield_stress: f64,
-    hardening: f64,
+    hardening: Hardening,
 }
 
 impl<const D: usize> J2<D> {
-    /// A material of the Lamé parameters of `D` dimensions, the yield stress σ_y and the hardening modulus H \[Pa\].
-    pub fn new(lambda: f64, shear: f64, yield_stress: f64, hardening: f64) -> Self {
+    /// A material of the Lamé parameters of `D` dimensions, the yield stress σ_y and the modulus H of linear hardening \[Pa\].
+    pub fn new(lambda: f64, shear: f64, yield_stress: f64, modulus: f64) -> Self {
+        let hardening = Hardening::Voce {
+            yield_stress,
+            modulus,
+            saturation: 0.0,
+            rate: 0.0,
+        };
+        Self::with_hardening(lambda, shear, hardening)
+    }
+
+    /// A material of the Lamé parameters of `D` dimensions \[Pa\] and any hardening.
+    pub fn with_hardening(lambda: f64, shear: f64, hardening: Hardening) -> Self {
         Self {
             elastic: Tensor4::isotropic(lambda, shear),
             shear,
-            yield_stress,
             hardening,
         }
     }
@@ -92,7 +100,7 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
     fn respond(
         &self,
         gradient: &Tensor<D>,
-        _step: f64,
+        step: f64,
         past: &[f64],
         present: &mut [f64],
     ) -> LocalResponse<D> {
@@ -113,8 +121,7 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
             1 => (norm, self.elastic.get(0, 0, 0, 0)),
             _ => (1.5f64.sqrt() * norm, 3.0 * self.shear),
         };
-        let excess = equivalent - (self.yield_stress + self.hardening * before);
-        let flow = (excess / (stiffness + self.hardening)).max(0.0);
+        let flow = self.hardening.flow(equivalent, stiffness, before, step);
         if flow > 0.0 {
             let along = if D == 1 { 1.0 } else { 1.5f64.sqrt() };
             plastic += dev * (flow * along / norm);
@@ -138,8 +145,8 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         LocalResponse {
             stress,
             volume_ratio: 1.0,
-            stored: stored + 0.5 * self.hardening * alpha * alpha,
-            dissipated: self.yield_stress * flow,
+            stored: stored + self.hardening.stored(alpha),
+            dissipated: self.hardening.dissipated(alpha, flow, step),
         }
     }
 }

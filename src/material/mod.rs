@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `elastic.rs` | isotropic linear elasticity of a bar, in plane stress, plane strain and of a solid |
 //! | `j2.rs` | von Mises plasticity with isotropic hardening, for small strains |
+//! | `hardening.rs` | its yield stress: linear, Voce, Johnson–Cook |
 //! | `hyperelastic.rs` | St Venant–Kirchhoff and Neo-Hooke, for strains of any size |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
 //!
@@ -13,11 +14,13 @@
 //! (linearised, where the law is for small strains) stresses nothing.
 
 mod elastic;
+mod hardening;
 mod hyperelastic;
 mod j2;
 mod reduction;
 
 pub use elastic::{Elastic, LinearElastic};
+pub use hardening::{Hardening, JohnsonCook};
 pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
 pub use j2::J2;
 pub use reduction::Reduced;

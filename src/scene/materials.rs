@@ -192,22 +192,7 @@ fn law_and_cells<'a, const D: usize>(
                 .label(name.span.clone(), "its stress out of the plane is not known")
                 .help(format!("it holds for {}", others.join(", "))));
             }
-            let mut values = Vec::with_capacity(m.parameters.len());
-            for (parameter, typed) in m.law.parameters().iter().zip(&m.parameters) {
-                values.push(match typed {
-                    Some(typed) => bounds_checks::within(
-                        &format!("materials.{name}.{}.{}", m.law.key(), parameter.key),
-                        typed,
-                        typed.value >= parameter.least && typed.value <= parameter.most,
-                        &format!(
-                            "must lie between {:e} and {:e}",
-                            parameter.least, parameter.most
-                        ),
-                        parameter.about,
-                    )?,
-                    None => parameter.default.unwrap_or_default(),
-                });
-            }
+            let values = named_values(name, m)?;
             let constants = Constants {
                 lambda,
                 shear: mu,
@@ -217,6 +202,44 @@ fn law_and_cells<'a, const D: usize>(
             (m.law.build(constants, &values), m.cells.as_ref())
         }
     })
+}
+
+/// The numbers of a law that is known by its key.
+fn named_values(
+    name: &Text,
+    m: &super::spec::named_law::NamedSpec,
+) -> Result<Vec<f64>, SceneError> {
+    let parameters = m.law.parameters().iter().zip(&m.parameters);
+    let mut values = Vec::with_capacity(m.parameters.len());
+    for (parameter, typed) in parameters.clone() {
+        values.push(match typed {
+            Some(typed) => bounds_checks::within(
+                &format!("materials.{name}.{}.{}", m.law.key(), parameter.key),
+                typed,
+                typed.value >= parameter.least && typed.value <= parameter.most,
+                &format!(
+                    "must lie between {:e} and {:e}",
+                    parameter.least, parameter.most
+                ),
+                parameter.about,
+            )?,
+            None => parameter.default.unwrap_or_default(),
+        });
+    }
+    let Some((key, must)) = m.law.conflict(&values) else {
+        return Ok(values);
+    };
+    let of_key = parameters.zip(&values).find(|((p, _), _)| p.key == key);
+    let (span, value) = of_key.map_or((name.span.clone(), 0.0), |((_, typed), value)| {
+        let span = typed.as_ref().map_or(name.span.clone(), |t| t.span.clone());
+        (span, *value)
+    });
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!("`materials.{name}.{}.{key}` is {value}", m.law.key()),
+    )
+    .label(span, must)
+    .help("see docs/scene.md, materials"))
 }
 
 fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneError> {

@@ -220,4 +220,118 @@ fn what_cannot_yield_on_both_sides_is_refused() {
     refused(&still("local"), "a static scene has no time");
     refused(&still("nonlocal"), "a static scene has no time");
     refused(&scene("balanced", &law(), STEPS), "does not balance");
+    // no temperature, or one at which nothing is solid
+    let cook = "johnson-cook]\npoisson-ratio = 0.3\nyield-stress = 5\nhardening-modulus = 40\nhardening-exponent = 0.5\nreference-temperature = 300\nmelting-temperature = 1300";
+    refused(&scene("local", cook, STEPS), "`temperature`");
+    let melted = format!("{cook}\ntemperature = 1400");
+    refused(
+        &scene("local", &melted, STEPS),
+        "must lie above the temperature 1400",
+    );
+}
+
+#[test]
+fn a_bar_that_saturates_or_flows_at_a_rate_follows_its_curve() {
+    let voce = "plastic-correspondence]\npoisson-ratio = 0.3\nyield-stress = 5\nhardening-modulus = 50\nsaturation-stress = 2\nsaturation-rate = 300";
+    let cook = "johnson-cook]\npoisson-ratio = 0.3\nyield-stress = 5\nhardening-modulus = 40\nhardening-exponent = 0.5\ntemperature = 500\nreference-temperature = 300\nmelting-temperature = 1300\nsoftening-exponent = 2";
+    let of_voce = |a: f64| 5.0 + 50.0 * a + 2.0 * (1.0 - (-300.0 * a).exp());
+    let of_cook = |a: f64| (5.0 + 40.0 * a.sqrt()) * (1.0 - 0.04);
+    let faster = format!("{cook}\nrate-coefficient = 0.1\nreference-rate = 1e-4");
+    for coupling in ["nonlocal", "local", "splice"] {
+        for (law, curve) in [(voce, &of_voce as &dyn Fn(f64) -> f64), (cook, &of_cook)] {
+            let found = bar(coupling, law);
+            for k in 1..=10 {
+                let strain = (found[1][k] - found[0][k]) / 0.9;
+                // σ = E (ε − α) and σ = σ_y(α), by bisection
+                let (mut low, mut high) = (0.0, strain);
+                for _ in 0..200 {
+                    let a = 0.5 * (low + high);
+                    match YOUNG * (strain - a) > curve(a) {
+                        true => low = a,
+                        false => high = a,
+                    }
+                }
+                let stress = YOUNG * (strain - low);
+                assert!(
+                    (found[2][k] - stress).abs() < 1e-6 * stress,
+                    "{coupling}, {k}: {} {stress}",
+                    found[2][k]
+                );
+            }
+            assert!(found[2][10] > 1.05 * curve(0.0));
+        }
+        let (slow, fast) = (bar(coupling, cook), bar(coupling, &faster));
+        let strains = |f: &[Vec<f64>], k: usize| (f[1][k] - f[0][k]) / 0.9;
+        for k in 2..=10 {
+            let alpha = |k: usize| strains(&fast, k) - fast[2][k] / YOUNG;
+            let rate = (alpha(k) - alpha(k - 1)) / 0.1;
+            if rate < 1e-3 {
+                continue;
+            }
+            let stress = of_cook(alpha(k)) * (1.0 + 0.1 * (rate / 1e-4).ln());
+            assert!(
+                (fast[2][k] - stress).abs() < 1e-5 * stress,
+                "{coupling}, {k}: {} {stress}",
+                fast[2][k]
+            );
+        }
+        assert!(fast[2][10] > 1.2 * slow[2][10]);
+    }
+}
+
+/// Displacements of the probes and the reaction of a bar that is pulled to a mean strain of 2 % in ten steps.
+fn bar(coupling: &str, law: &str) -> Vec<Vec<f64>> {
+    let folder = tempfile::tempdir().unwrap();
+    let steps = STEPS.replace("steps = 5", "steps = 10");
+    let typed = scene(coupling, law, &steps).replace("0.1*t", "0.2*t");
+    history(folder.path(), &typed, &["a_ux", "b_ux", "right_reaction_x"])
+}
+
+#[test]
+fn a_plate_in_plane_stress_yields_at_its_yield_stress() {
+    // pulled along x, free along y and out of the plane: the bilinear curve of a bar
+    let folder = tempfile::tempdir().unwrap();
+    let typed = r#"
+kinematics = "plane-stress"
+coupling = "local"
+mesh.rectangle = { min = [0, 0], max = [4, 4], x = { cells = 4 }, y = { cells = 4 } }
+[materials.m.plastic-correspondence]
+youngs-modulus = 1000
+poisson-ratio = 0.3
+yield-stress = 5
+hardening-modulus = 250
+[conditions.left.displacement]
+on = "left"
+x = 0
+[conditions.low.displacement]
+on = "bottom"
+y = 0
+[conditions.right.displacement]
+on = "right"
+x = "0.04*t"
+[output]
+probes.a = { at = [4, 4] }
+[solve.quasi-static]
+duration = 1
+steps = 8
+tolerance = 1e-11
+"#;
+    let found = history(folder.path(), typed, &["right_reaction_x", "a_uy"]);
+    let tangent = YOUNG * HARDENING / (YOUNG + HARDENING);
+    for k in 1..=8 {
+        let strain = 0.01 * k as f64 / 8.0;
+        let stress = (YOUNG * strain).min(YIELD + tangent * (strain - YIELD / YOUNG));
+        assert!(
+            (found[0][k] - 4.0 * stress).abs() < 1e-7 * stress,
+            "{k}: {} {stress}",
+            found[0][k]
+        );
+        // the plastic strain keeps its volume
+        let across = -0.3 * stress / YOUNG - 0.5 * (strain - stress / YOUNG);
+        assert!(
+            (found[1][k] - 4.0 * across).abs() < 1e-8,
+            "{k}: {} {across}",
+            found[1][k]
+        );
+    }
 }

@@ -8,7 +8,7 @@
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
-//! | `plastic.rs` | its stress that of J2 plasticity | |
+//! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
 //! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | its stress hyperelastic, for large deformations | |
 //!
 //! A law that implements [`NamedLaw`] and has its line in the list at the end of this file is a material of scenes, by its key.
@@ -16,6 +16,7 @@
 mod bond_based;
 mod correspondence;
 mod hardening;
+mod johnson_cook;
 mod local_correspondence;
 mod lps;
 mod maxwell;
@@ -31,6 +32,7 @@ use crate::peridynamics::{Influence, Law};
 pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
 pub use hardening::Hardening;
+pub use johnson_cook::JohnsonCookCorrespondence;
 pub use local_correspondence::LocalCorrespondence;
 pub use lps::LinearPeridynamicSolid;
 pub use maxwell::Maxwell;
@@ -105,6 +107,11 @@ pub trait NamedLaw<const D: usize> {
     const KINEMATICS: &'static [Kinematics];
     /// What it takes beside the elastic constants.
     const PARAMETERS: &'static [Parameter];
+
+    /// What stands against these numbers together, each within its limits, and the remedy; the first is the key of the one to change.
+    fn conflict(_values: &[f64]) -> Option<(&'static str, String)> {
+        None
+    }
 
     /// The law; `values` are those of [`NamedLaw::PARAMETERS`], each within its limits.
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>>;
@@ -181,6 +188,11 @@ macro_rules! named_laws {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::PARAMETERS,)* }
             }
 
+            /// See [`NamedLaw::conflict`].
+            pub fn conflict(self, values: &[f64]) -> Option<(&'static str, String)> {
+                match self { $(Self::$law => <$law<1> as NamedLaw<1>>::conflict(values),)* }
+            }
+
             /// Whether its bonds can break: what that costs is known ([`Law::bond_energy`]).
             pub fn has_breakable_bonds(self) -> bool {
                 let constants = Constants {
@@ -205,6 +217,7 @@ named_laws! {
     Hardening,
     Maxwell,
     PlasticCorrespondence,
+    JohnsonCookCorrespondence,
     NeoHookeSolid,
     StVenantKirchhoffSolid,
 }

@@ -8,7 +8,7 @@ mod coupling;
 mod material;
 mod mesh;
 mod motion;
-mod named_law;
+pub(super) mod named_law;
 mod region;
 
 pub use condition::{
