@@ -13,6 +13,7 @@
 use crate::coupling::{Model, SiteKind};
 use crate::fem;
 use crate::observe::summary::Rotation;
+use crate::run::setup::RunSettings;
 use crate::tensor::{Tensor, padded};
 
 /// Rotation in degrees from which on it is told.
@@ -36,13 +37,13 @@ pub(crate) struct Largest {
 }
 
 impl<'m, const D: usize> Rotations<'m, D> {
-    /// Of all elements of a model, none in one dimension; `is_linear` tells that bonds are linear too.
-    pub fn new(model: &'m Model<D>, is_linear: bool) -> Self {
+    /// Of all elements of a model that are for small strains, none in one dimension; `is_linear` tells that bonds are linear too.
+    pub fn new(model: &'m Model<D>, rest: &RunSettings<D>, is_linear: bool) -> Self {
         let all = 0..model.mesh.cell_count();
         let cells: Vec<u32> = match D {
             1 => Vec::new(),
             _ => all
-                .filter(|&c| model.is_element(c))
+                .filter(|&c| model.is_element(c) && !rest.is_objective(model, c))
                 .map(|c| c as u32)
                 .collect(),
         };

@@ -60,6 +60,12 @@ impl<const D: usize> RunSettings<D> {
             && (0..model.mesh.cell_count()).any(|c| model.is_element(c) && bends(c))
     }
 
+    /// Whether the element of a cell follows a law for strains and rotations of any size.
+    pub fn is_objective(&self, model: &Model<D>, cell: usize) -> bool {
+        let law = self.local_laws.get(model.material_of_cell(cell) as usize);
+        law.is_some_and(|law| law.as_ref().is_some_and(|law| law.is_objective()))
+    }
+
     /// What makes the forces of bonds that are intact, or of elements, depend on the displacement otherwise than linearly, as a choice; none where they do not.
     pub fn nonlinear(&self, model: &Model<D>) -> Option<Decision> {
         let body = model

@@ -127,6 +127,7 @@ fn points_and_elements_agree_at_a_large_stretch_and_rotation() {
             );
             // at rest at once, by Newton's method; the rows of a splice have no energy
             let told = summary(folder.path(), &turned(coupling, law, false));
+            assert!(told["rotation"].is_null(), "{told}");
             let residual = told["residual"].as_f64().unwrap();
             assert!(residual < 1e-9, "{law}, {coupling}: {residual}");
             if coupling == "splice" {

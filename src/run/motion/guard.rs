@@ -13,6 +13,7 @@ use super::writer::{Moment, Row};
 use crate::coupling::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::rotation::Rotations;
+use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit as Spec;
 
 /// Steps between two looks, at least.
@@ -48,6 +49,7 @@ impl<'m, const D: usize> Guard<'m, D> {
     pub fn new(
         model: &'m Model<D>,
         balance: Balance,
+        rest: &RunSettings<D>,
         spec: &Spec,
         is_linear: bool,
         steps: u64,
@@ -58,7 +60,7 @@ impl<'m, const D: usize> Guard<'m, D> {
             largest_gain: spec.largest_energy_gain,
             largest_rotation: spec.largest_rotation.unwrap_or(f64::INFINITY),
             every: STEPS.max(steps / LOOKS),
-            rotations: Rotations::new(model, is_linear),
+            rotations: Rotations::new(model, rest, is_linear),
             seen,
         }
     }

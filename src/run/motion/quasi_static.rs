@@ -98,7 +98,7 @@ fn load_steps<const D: usize>(
         drive: &drive,
         fields: FieldOutput::new(model, operator),
         recorder,
-        rotations: Rotations::new(model, laid_out.moving.is_linear),
+        rotations: Rotations::new(model, rest, laid_out.moving.is_linear),
         state,
         edge,
         ended: Ended::Finished,

@@ -144,7 +144,15 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             zone,
         } = watched;
         let is_linear = segment.is_linear;
-        let guard = Guard::new(model, balance, segment.spec, is_linear, pace.steps, seen);
+        let guard = Guard::new(
+            model,
+            balance,
+            rest,
+            segment.spec,
+            is_linear,
+            pace.steps,
+            seen,
+        );
         let monitor = match &rest.follow {
             Some(follow) => {
                 critical_stretch(model, rest)?
