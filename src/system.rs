@@ -196,6 +196,11 @@ pub trait SemiDiscrete: Send + Sync {
         Vec::new()
     }
 
+    /// The energy density \[J/m^D\] of each site, zero but at points; none if it follows from the displacements by the linear force states.
+    fn energy_densities(&self, _u: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
     /// What the law remembers of each site, by name; zero for a site that remembers nothing.
     fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
         Vec::new()

@@ -282,11 +282,11 @@ pub(super) struct WholeFamily<const D: usize> {
 impl<const D: usize> WholeFamily<D> {
     /// `G0/s_c²` of a plane between two layers, [`plane_energy`].
     pub fn plane_energy(&self) -> f64 {
-        let state = self
+        let (state, deviator) = self
             .state
             .as_ref()
-            .map_or(0.0, |s| s.modulus.get(0, 0, 0, 0));
-        plane_energy(self.spacing, &self.bonds, state)
+            .map_or((0.0, 0.0), |s| (s.modulus.get(0, 0, 0, 0), s.deviator));
+        plane_energy(self.spacing, &self.bonds, state, deviator)
     }
 
     /// All bonds by their integer offsets, in their order, with `p` and `ω`.

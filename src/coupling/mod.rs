@@ -131,6 +131,11 @@ pub trait Coupling<const D: usize>: Send + Sync {
         }
     }
 
+    /// Whether its rows hold the products of dilatations and deviatoric extensions that a law with [`LinearForceState::has_deviators`] has; any other coupling is refused for such a law.
+    fn takes_deviators(&self) -> bool {
+        false
+    }
+
     /// The treatment of nodes at the seam.
     fn interface(&self) -> Interface {
         Interface::Overlap

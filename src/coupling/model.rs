@@ -107,6 +107,15 @@ impl<const D: usize> Model<D> {
             peridynamics,
             coupling,
         } = problem;
+        if let Some(p) = &peridynamics
+            && p.law.linearised().has_deviators()
+            && !coupling.takes_deviators()
+        {
+            return Err(ModelError::Deviators {
+                law: p.law.name(),
+                coupling: coupling.name(),
+            });
+        }
         let largest = peridynamics.as_ref().map_or(0.0, |p| {
             (0..mesh.cell_count())
                 .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))

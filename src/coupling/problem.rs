@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::{
     coupling::{Coupling, Zone},
     mesh::Mesh,
-    peridynamics::{BondWeights, BoxCell, Law, PartialVolume, PointError},
+    peridynamics::{Accelerator, BondWeights, BoxCell, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
     tensor::{Tensor4, Vector},
 };
@@ -68,6 +68,14 @@ pub struct Peridynamics<const D: usize> {
 }
 
 impl<const D: usize> Peridynamics<D> {
+    /// The fast pass of the law, where the weights of a bond are the same from both ends; fitted ones are not, so that every family has its own force state.
+    pub fn accelerator(&self) -> Option<Accelerator> {
+        match self.weights {
+            BondWeights::Plain | BondWeights::Isotropic => self.law.accelerator(),
+            BondWeights::Fitted => None,
+        }
+    }
+
     /// How far a family of that horizon reaches \[m\]: with partial volumes farther than the horizon, since cells count whose points lie beyond it.
     pub fn reach(&self, horizon: f64) -> f64 {
         let spacing = match self.points {
@@ -216,6 +224,16 @@ pub enum ModelError {
         operations: f64,
         /// The most that it may take.
         most: f64,
+    },
+    /// A law whose dilatation and deviator have influence functions of their own, in a coupling without a place for their products.
+    #[error(
+        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, and the products of the two have no place in that seam; use coupling.splice or coupling.nonlocal, or the law lps"
+    )]
+    Deviators {
+        /// The law.
+        law: &'static str,
+        /// The coupling.
+        coupling: &'static str,
     },
     /// A combination that is not offered.
     #[error("{what} is not offered: {remedy}")]

@@ -63,7 +63,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// `density` gives ρ [kg/m^D] of a material's number; `symmetry` is that of the assembled stiffness.
     ///
     /// # Errors
-    /// [`SystemError`] if the bonds cannot be passed over: a horizon that varies, fitted weights, a law without a kernel. A model in which nothing breaks moves as
+    /// [`SystemError`] if the bonds cannot be passed over: a horizon that varies, a law without a kernel. A model in which nothing breaks moves as
     /// [`crate::system::LinearMotion`] instead.
     pub fn new(
         model: &'a Model<D>,
@@ -78,7 +78,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             && behaviour.kinematics == Kinematics::Linear
             && law.is_none_or(|law| law.is_linear());
         // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear
-        let follows = law.is_some_and(|law| law.accelerator().is_some());
+        let follows = (model.peridynamics.as_ref()).is_some_and(|p| p.accelerator().is_some());
         let mut seam = if is_linear || !follows {
             None
         } else {
@@ -454,6 +454,10 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
 
     fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
         self.stresses_of_points(u)
+    }
+
+    fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
+        self.energy_densities_of_points(u)
     }
 
     fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {

@@ -28,6 +28,10 @@ impl<const D: usize> Coupling<D> for Splice {
             .collect()
     }
 
+    fn takes_deviators(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(Box::new(OwnModel { model }))
     }

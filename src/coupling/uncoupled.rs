@@ -28,6 +28,10 @@ impl<const D: usize> Coupling<D> for Local {
         vec![CellRole::Element; mesh.cell_count()]
     }
 
+    fn takes_deviators(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(Box::new(OwnModel { model }))
     }
@@ -44,6 +48,10 @@ impl<const D: usize> Coupling<D> for Nonlocal {
 
     fn roles(&self, mesh: &Mesh<D>, _zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
         vec![CellRole::Points; mesh.cell_count()]
+    }
+
+    fn takes_deviators(&self) -> bool {
+        true
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {

@@ -263,6 +263,8 @@ impl<const D: usize> PdBody<D> {
         let q = self.state(i).map_or(0.0, |s| s.stabilisation);
         let mut own = Tensor::zeros();
         let mut first = Vector::<D>::zeros();
+        let deviator = self.state(i).map_or(0.0, |s| s.deviator);
+        let mut second = Vector::<D>::zeros();
         let family = if counts(i) { self.families.of(i) } else { &[] };
         for (k, &j) in family.iter().enumerate() {
             let j = j as usize;
@@ -275,6 +277,9 @@ impl<const D: usize> PdBody<D> {
             if !self.pairwise {
                 block += Tensor::identity() * (q * omega[k] * vv);
                 first += xi * (omega[k] * of_state);
+                if deviator != 0.0 {
+                    second += xi * (pair[k] * xi.norm_squared() * of_state);
+                }
             }
             own += block;
             row.gather(transfer, j, &(-block));
@@ -283,6 +288,9 @@ impl<const D: usize> PdBody<D> {
             // a full family has Σ ω ξ V = 0; what is left of it is a surface or a weight that changes in space
             if first.amax() > 1e-15 * volume * state.shape.trace() {
                 self.add_weighted_gradient(i, &along(&state.modulus, &first, -1.0), row);
+            }
+            if deviator != 0.0 {
+                self.add_deviators(i, &(first * deviator), &(second * deviator), row);
             }
         }
         if let Some(reversed) = &self.reversed {
@@ -299,6 +307,11 @@ impl<const D: usize> PdBody<D> {
                     block += Tensor::identity() * (state.stabilisation * omega * vv);
                     let c = along(&state.modulus, &(xi * (omega * of_state)), 1.0);
                     self.add_weighted_gradient(j, &c, row);
+                    if state.deviator != 0.0 {
+                        let s = self.pair[bond] * xi.norm_squared();
+                        let along = xi * (-state.deviator * of_state);
+                        self.add_deviators(j, &(along * omega), &(along * s), row);
+                    }
                 }
                 own += block;
                 row.gather(transfer, j, &(-block));
@@ -323,6 +336,33 @@ impl<const D: usize> PdBody<D> {
             row.gather(&self.cloud.transfer, l, &block);
         }
         row.gather(&self.cloud.transfer, j, &own);
+    }
+
+    /// Gathers the row of `a Σ p |ξ|² ξ·η V + b tr Ḡ_j`, [`StatePart::deviator`].
+    fn add_deviators(&self, j: usize, a: &Vector<D>, b: &Vector<D>, row: &mut Row<D>) {
+        let (pair, omega) = self.kernel(j);
+        let mut own = Tensor::zeros();
+        for (k, &l) in self.families.of(j).iter().enumerate() {
+            let l = l as usize;
+            let xi = self.bond(j, l);
+            let v = self.cloud.volume[l];
+            let weighted = a * (pair[k] * xi.norm_squared() * v) + b * (omega[k] * v);
+            let block = weighted * xi.transpose();
+            own -= block;
+            row.gather(&self.cloud.transfer, l, &block);
+        }
+        row.gather(&self.cloud.transfer, j, &own);
+    }
+
+    /// `Σ p |ξ|² ξ ⊗ ξ V` over the neighbours that `stands` names.
+    fn second_moment(&self, j: usize, stands: impl Fn(usize) -> bool) -> Tensor<D> {
+        let (pair, _) = self.kernel(j);
+        let family = self.families.of(j).iter().map(|&l| l as usize).zip(pair);
+        let standing = family.filter(|(l, _)| stands(*l));
+        standing.fold(Tensor::zeros(), |sum, (l, pair)| {
+            let xi = self.bond(j, l);
+            sum + xi * xi.transpose() * (pair * xi.norm_squared() * self.cloud.volume[l])
+        })
     }
 
     /// Adds the row of `Σ ν^ps(x_j) · a`, the partial stresses of points `j` on directions (or shape-function gradients) `a`.
@@ -357,6 +397,16 @@ impl<const D: usize> PdBody<D> {
         row.gather(&self.cloud.transfer, j, &own);
         if let Some(state) = state {
             self.add_weighted_gradient(j, &along(&state.modulus, &(state.shape * a), 1.0), row);
+            if state.deviator != 0.0 {
+                let second = self.second_moment(j, |_| true) * a;
+                let first = state.shape * a;
+                self.add_deviators(
+                    j,
+                    &(first * -state.deviator),
+                    &(second * -state.deviator),
+                    row,
+                );
+            }
         }
     }
 
@@ -385,6 +435,41 @@ impl<const D: usize> PdBody<D> {
         self.stress_of(j, u, is_intact, shape)
     }
 
+    /// The energy density of point `j` under displacements `u` of the sites, by the bonds to neighbours that `stands` names: that whose derivative the linear force state is \[J/m^D\].
+    pub fn energy_density(&self, j: usize, u: &[f64], stands: impl Fn(usize) -> bool) -> f64 {
+        let transfer = &self.cloud.transfer;
+        let (pair, omega) = self.kernel(j);
+        let here: Vector<D> = transfer.displacement(j, u);
+        let (mut pairs, mut squares, mut product) = (0.0, 0.0, 0.0);
+        let mut gradient = Tensor::zeros();
+        for (k, &l) in self.families.of(j).iter().enumerate() {
+            let l = l as usize;
+            if !stands(l) {
+                continue;
+            }
+            let xi = self.bond(j, l);
+            let eta = transfer.displacement::<D>(l, u) - here;
+            let (along, v) = (xi.dot(&eta), self.cloud.volume[l]);
+            pairs += pair[k] * along * along * v;
+            if !self.pairwise {
+                squares += omega[k] * eta.norm_squared() * v;
+                gradient += eta * xi.transpose() * (omega[k] * v);
+                product += pair[k] * xi.norm_squared() * along * v;
+            }
+        }
+        let Some(state) = self.state(j) else {
+            return 0.5 * pairs;
+        };
+        let mut of_state = gradient.dot(&state.modulus.contract(&gradient));
+        if state.deviator != 0.0 {
+            let trace = |stands: &dyn Fn(usize) -> bool| self.second_moment(j, stands).trace();
+            let (d, theta) = (state.deviator, gradient.trace());
+            let lost = trace(&|_| true) - trace(&stands);
+            of_state -= d * theta * (2.0 * product + d * lost * theta);
+        }
+        0.5 * (pairs + state.stabilisation * squares + of_state)
+    }
+
     fn stress_of(
         &self,
         j: usize,
@@ -410,8 +495,17 @@ impl<const D: usize> PdBody<D> {
                 gradient += eta * xi.transpose() * (omega[k] * v);
             }
         }
+        let stress_of_pairs = stress;
         if let (Some(state), Some(shape)) = (self.state(j), shape) {
             stress += gradient * state.stabilisation + state.modulus.contract(&gradient) * shape;
+            if state.deviator != 0.0 {
+                // of the deviatoric extensions those of broken bonds are left out
+                let d = state.deviator;
+                let second = self.second_moment(j, &stands);
+                let lost = self.second_moment(j, |_| true).trace() - second.trace();
+                let (theta, product) = (gradient.trace(), stress_of_pairs.trace());
+                stress -= (shape * (product + d * lost * theta) + second * theta) * d;
+            }
         }
         stress
     }

@@ -62,14 +62,29 @@ pub enum FractureError {
 /// Opened by Δ, a bond ξ across the plane is stretched by `Δ ξ_n/r²` and breaks at `Δ = s_c r²/ξ_n`. What that costs is what is stored just before less what is stored just after. With bonds that act alone that is `p r⁴ s_c²` each. Of an LPS the dilatations
 /// `Σ ω Δ ξ_n V` of the layers that the bond joins change as well, and as bonds break one after another that is not what it would be if all were stretched alike.
 ///
-/// `bonds`: the whole family of a point by integer offsets with `p` and ω of [`crate::peridynamics::linear_force_state`]; `state`: the modulus `𝓜_1111` of `½ 𝓜 (Σ ω ξ·η V)²`, zero without a state. Units: spacing \[m\] → \[J/m²\] (J/m in 2D, J in 1D).
+/// `bonds`: the whole family of a point by integer offsets with `p` and ω of [`crate::peridynamics::linear_force_state`]; `state`: the modulus `𝓜_1111` of `½ 𝓜 (Σ ω ξ·η V)²`, zero without a state; `deviator`: [`crate::peridynamics::StatePart::deviator`]. Units: spacing \[m\] → \[J/m²\] (J/m in 2D, J in 1D).
 pub fn plane_energy<const D: usize>(
     spacing: f64,
     bonds: &[([i32; D], (f64, f64))],
     state: f64,
+    deviator: f64,
 ) -> f64 {
-    let mean = (0..D).map(|axis| plane_normal_to(axis, spacing, bonds, state));
+    let mean = (0..D).map(|axis| plane_normal_to(axis, spacing, bonds, state, deviator));
     mean.sum::<f64>() / D as f64
+}
+
+/// A bond across the plane.
+struct Crossing {
+    /// At which it breaks, in spacings and per critical stretch.
+    opening: f64,
+    /// Layers that it crosses.
+    steps: i32,
+    /// p (ξ_n)² V² of all its parallels per cell's face.
+    pairs: f64,
+    /// ω ξ_n V.
+    dilatation: f64,
+    /// p r² ξ_n V and p r⁴ V.
+    deviator: [f64; 2],
 }
 
 fn plane_normal_to<const D: usize>(
@@ -77,10 +92,10 @@ fn plane_normal_to<const D: usize>(
     h: f64,
     bonds: &[([i32; D], (f64, f64))],
     state: f64,
+    deviator: f64,
 ) -> f64 {
     let volume = h.powi(D as i32);
-    // opening at which it breaks, in spacings and per critical stretch; steps across the plane; p (ξ_n)² V² of all its parallels per cell's face; ω ξ_n V
-    let mut crossing: Vec<(f64, i32, f64, f64)> = bonds
+    let mut crossing: Vec<Crossing> = bonds
         .iter()
         .filter(|(k, _)| k[axis] > 0)
         .map(|(k, (p, omega))| {
@@ -88,29 +103,50 @@ fn plane_normal_to<const D: usize>(
             let xi = f64::from(k[axis]) * h;
             let pairs = f64::from(k[axis]) * p * (xi * volume).powi(2);
             let opening = f64::from(square) / f64::from(k[axis]);
-            (opening, k[axis], pairs, omega * xi * volume)
+            let r2 = f64::from(square) * h * h;
+            Crossing {
+                opening,
+                steps: k[axis],
+                pairs,
+                dilatation: omega * xi * volume,
+                deviator: [p * r2 * xi * volume, p * r2 * r2 * volume],
+            }
         })
         .collect();
-    crossing.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let layers = crossing.iter().map(|b| b.1).max().unwrap_or(0);
+    crossing.sort_by(|a, b| a.opening.total_cmp(&b.opening));
+    let layers = crossing.iter().map(|b| b.steps).max().unwrap_or(0);
     // stored at unit opening, per cell's face, by the bonds that stand
-    let stored = |standing: &[(f64, i32, f64, f64)]| {
-        let pairs: f64 = standing.iter().map(|b| b.2).sum();
+    let stored = |standing: &[Crossing]| {
+        let pairs: f64 = standing.iter().map(|b| b.pairs).sum();
         let of_layer = |layer: i32| {
-            let across = standing.iter().filter(|b| b.1 >= layer);
-            across.map(|b| b.3).sum::<f64>()
+            let across = standing.iter().filter(|b| b.steps >= layer);
+            across.map(|b| b.dilatation).sum::<f64>()
         };
         // a layer on either side: twice ½
         let states: f64 = (1..=layers).map(|layer| of_layer(layer).powi(2)).sum();
-        pairs + state * volume * states
+        let squares = pairs + state * volume * states;
+        if deviator == 0.0 {
+            return squares;
+        }
+        // of each layer −2 d θ Σ p r² ξ_n V, and what θ stored in the deviatoric extensions of bonds that are broken
+        let products = (1..=layers).map(|layer| {
+            let of = |bonds: &[Crossing], k: usize| -> f64 {
+                let across = bonds.iter().filter(|b| b.steps >= layer);
+                across.map(|b| b.deviator[k]).sum()
+            };
+            let theta = of_layer(layer);
+            let lost = of(&crossing, 1) - of(standing, 1);
+            2.0 * deviator * theta * of(standing, 0) + (deviator * theta).powi(2) * lost
+        });
+        squares - volume * products.sum::<f64>()
     };
     let (mut energy, mut first) = (0.0, 0);
     let mut before = stored(&crossing);
     while first < crossing.len() {
-        let opening = crossing[first].0;
+        let opening = crossing[first].opening;
         let alike = crossing[first..]
             .iter()
-            .take_while(|b| b.0 <= opening * (1.0 + 1e-12));
+            .take_while(|b| b.opening <= opening * (1.0 + 1e-12));
         first += alike.count();
         let after = stored(&crossing[first..]);
         energy += (opening * h).powi(2) * (before - after);
@@ -303,7 +339,7 @@ mod tests {
                 micromodulus: Micromodulus::InverseDistance,
                 constant: c,
             };
-            let found = plane_energy::<1>(h, &bonds, 0.0);
+            let found = plane_energy::<1>(h, &bonds, 0.0, 0.0);
             let ratio = found / continuum.per_square::<1>(delta);
             let exact = f64::from((m + 1) * (2 * m + 1)) / f64::from(2 * m * m);
             assert!((ratio - exact).abs() < 1e-9, "{m}: {ratio} {exact}");
@@ -319,7 +355,7 @@ mod tests {
         // the short one breaks at Δ = s, the long ones at 2 s
         let after = 8.0 + state * (4.0 + 4.0);
         let exact = (before - after) + 4.0 * after;
-        let found = plane_energy::<1>(1.0, &bonds, state);
+        let found = plane_energy::<1>(1.0, &bonds, state, 0.0);
         assert!((found - exact).abs() < 1e-14, "{found} {exact}");
     }
 

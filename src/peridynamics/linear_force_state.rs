@@ -6,6 +6,7 @@
 //! T⟨ξ⟩ = p(ξ) ξ (ξ · η)  +  q ω(ξ) η  +  ω(ξ) (𝓜 : Ḡ) ξ ,      Ḡ = Σ ω η ⊗ ξ V
 //! ```
 //!
+//! (and, of a law with [`StatePart::deviator`], `− d [ω B + p |ξ|² tr Ḡ] ξ` with `B = Σ p |ξ|² ξ·η V`):
 //! a pairwise part, an optional stabilising part, and a part through the weighted gradient `Ḡ` of the family. The bond-based material has only the first,
 //! the linear peridynamic solid (LPS) has `𝓜 ∝ I ⊗ I` (its dilatation), correspondence has its stress. One kernel
 //! (`body.rs`) turns these coefficients into rows of the stiffness and into the partial stress for all of them. `T` is the derivative of the energy
@@ -38,6 +39,8 @@ pub struct StatePart<const D: usize> {
     pub modulus: Tensor4<D>,
     /// `q`, the weight of the stabilising part.
     pub stabilisation: f64,
+    /// `d`, of the products `−d tr Ḡ Σ p |ξ|² ξ·η V` in the energy density: `1/D` for a law whose deviatoric extensions `e − θ |ξ|/D` have another influence function than its dilatation θ, else 0.
+    pub deviator: f64,
     /// `K = Σ ω ξ ⊗ ξ V`, the shape tensor of the family.
     pub shape: Tensor<D>,
 }
@@ -49,6 +52,11 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
 
     /// Whether the force of a bond points along it.
     fn is_ordinary(&self) -> bool;
+
+    /// Whether its state parts have a [`StatePart::deviator`], which not every coupling can represent.
+    fn has_deviators(&self) -> bool {
+        false
+    }
 
     /// ω of the divergence of a meshfree partial stress beside this law.
     fn divergence(&self) -> Influence;
@@ -85,7 +93,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
 /// The classical tensor that a family really carries: `ν⁰ = C : G` under `u = G x`.
 ///
 /// Source: [SAND2015-7998] eq. (2.10), for the linear force state above:
-/// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl`.
+/// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl − d (K_ij P_kl + P_ij K_kl)` with `P = Σ p |ξ|² ξ ⊗ ξ V`.
 pub fn collapsed_tensor<const D: usize>(
     family: &Family<'_, D>,
     pair: &[f64],
@@ -96,6 +104,19 @@ pub fn collapsed_tensor<const D: usize>(
         c.add_fourth_power(pair[k] * family.volumes[k], xi);
     }
     if let Some(state) = state {
+        if state.deviator != 0.0 {
+            let mut second = Tensor::<D>::zeros();
+            for (k, xi) in family.bonds.iter().enumerate() {
+                let s = pair[k] * xi.norm_squared() * family.volumes[k];
+                second += xi * xi.transpose() * s;
+            }
+            for i in 0..D {
+                for j in 0..D {
+                    let products = second * state.shape[(i, j)] + state.shape * second[(i, j)];
+                    c.0[i][j] -= products * state.deviator;
+                }
+            }
+        }
         for i in 0..D {
             for j in 0..D {
                 let mut t = Tensor::<D>::zeros();

@@ -8,6 +8,7 @@
 //! | `offset_table.rs` | a value for each bond of a lattice | |
 //! | `shell_weights.rs` | isotropic weights of a lattice, shell by shell | eq. (3.6) as a sum |
 //! | `moment_fitted_weights.rs` | moment-fitted weights of one irregular family | |
+//! | `position_aware_influence.rs` | ω and σ of a position-aware family | section 4.2 |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is | |
 //! | `linear_force_state.rs` | its linearisation at rest | eq. (2.19), (5.16) |
@@ -38,6 +39,7 @@ pub mod linear_force_state;
 pub mod moment_fitted_weights;
 pub(crate) mod offset_table;
 pub mod partial_volume;
+pub mod position_aware_influence;
 pub mod shape_tensor;
 pub mod shell_weights;
 
@@ -48,10 +50,13 @@ pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, Present};
 pub use influence::{Influence, Micromodulus};
 pub use law::{Accelerator, Law};
-pub use laws::{BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell};
+pub use laws::{
+    BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell, PositionAwareSolid,
+};
 pub use linear_force_state::{Family, LinearForceState, StatePart, collapsed_tensor};
 pub use moment_fitted_weights::{Bound, Conditions, FitError};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
+pub use position_aware_influence::{CalibrationFields, NotPositionAware};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shell_weights::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
 
@@ -69,6 +74,9 @@ pub enum PdError {
     /// The shape tensor is singular.
     #[error(transparent)]
     Shape(#[from] ShapeError),
+    /// Its energy cannot be that of elasticity.
+    #[error(transparent)]
+    PositionAware(#[from] NotPositionAware),
 }
 
 /// A [`PdError`] with its point.

@@ -40,7 +40,11 @@ pub(super) fn write_for<const D: usize>(
     let path = |end: &str| output.directory.join(format!("{}{end}", output.name));
     let writes = output.vtu && options.writes();
     if writes || options.observer.is_some() {
-        let shown = snapshot(solved, &[], Shown::All);
+        let energies = energy_densities(output, solved);
+        let more = energies
+            .as_deref()
+            .map(|e| OverSites::Scalar(ENERGY_DENSITY, e));
+        let shown = snapshot(solved, more.as_slice(), Shown::All);
         if writes {
             files.push(path(".vtu"));
             write_vtu(&files[0], &shown, Compression::Zlib)?;
@@ -272,6 +276,29 @@ pub enum OverSites<'a> {
     Vector(&'static str, &'a [f64]),
     /// A number, zero at nodes that are no sites.
     Scalar(&'static str, &'a [f64]),
+}
+
+/// The name of the field of [`energy_densities`].
+pub(super) const ENERGY_DENSITY: &str = "energy-density";
+
+/// The energy density of each site, zero at nodes, if the scene asks for it.
+pub(super) fn energy_densities<const D: usize>(
+    output: &Output<D>,
+    solved: &Solved<'_, D>,
+) -> Option<Vec<f64>> {
+    let u = solved.displacement;
+    let of_site = |intact: &Intact, site: usize| match solved.model.point_of(site) {
+        Some((body, p)) => body.energy_density(p, u, |j| intact.is_intact(p, j)),
+        None => 0.0,
+    };
+    output.energy_density.then(|| {
+        let told = solved.system.and_then(|system| system.energy_densities(u));
+        told.unwrap_or_else(|| {
+            let intact = Intact::of(solved);
+            let sites = (0..solved.model.sites.len()).into_par_iter();
+            sites.map(|site| of_site(&intact, site)).collect()
+        })
+    })
 }
 
 /// Cells and points with the fields of a solution; without a residual, that field is left out.

@@ -4,7 +4,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::source::Span;
-use super::spec::{CouplingSpec, SceneSpec, SolveSpec, ZonesNeeded};
+use super::spec::{BondsSpec, CouplingSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
@@ -108,6 +108,35 @@ pub(crate) fn elastic_elements<const D: usize>(
         "of this material",
     )
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
+}
+
+/// Refuses the energy density of points whose bonds are exact and have a fast pass: that adds energies up without those of single points.
+pub(crate) fn energy_density<const D: usize>(
+    spec: &SceneSpec,
+    material: &Material<D>,
+    bonds: BondsSpec,
+) -> Result<(), SceneError> {
+    let fitted = spec
+        .peridynamics
+        .as_ref()
+        .is_none_or(|p| p.weights == WeightsSpec::Fitted);
+    if spec.output.energy_density != Some(true)
+        || bonds == BondsSpec::Linear
+        || fitted
+        || material.law.accelerator().is_none()
+    {
+        return Ok(());
+    }
+    let name = spec.materials.get_key_value(material.name.as_str());
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!(
+            "`output.energy-density` is not offered for exact bonds of the law `{}`, whose fast pass knows the energy of the whole body only",
+            material.law.name()
+        ),
+    )
+    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
+    .help("use peridynamics.bonds = \"linear\", or the law pals"))
 }
 
 /// The materials that are used and remember, by their points or by their elements.

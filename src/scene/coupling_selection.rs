@@ -139,6 +139,9 @@ fn obstacle<const D: usize>(
         if !law.is_ordinary() {
             return certain(&format!("the {} material `{}`", m.law.name(), m.name));
         }
+        if law.has_deviators() {
+            return certain(&format!("the {} material `{}`", m.law.name(), m.name));
+        }
         if !law.is_pairwise() && lambda < mu * (1.0 - 1e-9) {
             negative = Some(&m.name);
         }

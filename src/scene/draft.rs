@@ -171,6 +171,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         agreement::elastic_elements(spec, &self.materials, &self.cell_material, &zones)?;
         agreement::memory(spec, &self.materials, &self.cell_material, &zones)?;
         let breaking = failure::breaking(spec, &self.materials[peridynamic as usize], mesh)?;
+        agreement::energy_density(spec, &self.materials[peridynamic as usize], breaking.bonds)?;
         let follow = adaptive_zone::follow(
             spec,
             &mut joined,

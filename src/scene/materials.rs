@@ -7,11 +7,11 @@ use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics;
 use super::region::cells_of_set;
-use super::spec::{MaterialSpec, MicromodulusSpec};
+use super::spec::{Given, MaterialSpec, MicromodulusSpec};
 use super::value::Text;
 use crate::material::{Elastic, Kinematics};
 use crate::mesh::Mesh;
-use crate::peridynamics::laws::Constants;
+use crate::peridynamics::laws::{Constants, Parameter};
 use crate::peridynamics::{
     BondBased, Correspondence, Influence, Law, LinearPeridynamicSolid, Micromodulus,
 };
@@ -213,7 +213,8 @@ fn named_values(
     let mut values = Vec::with_capacity(m.parameters.len());
     for (parameter, typed) in parameters.clone() {
         values.push(match typed {
-            Some(typed) => bounds_checks::within(
+            Some(Given::Word(word)) => place_of_word(name, m.law.key(), parameter, word)?,
+            Some(Given::Number(typed)) => bounds_checks::within(
                 &format!("materials.{name}.{}.{}", m.law.key(), parameter.key),
                 typed,
                 typed.value >= parameter.least && typed.value <= parameter.most,
@@ -231,7 +232,10 @@ fn named_values(
     };
     let of_key = parameters.zip(&values).find(|((p, _), _)| p.key == key);
     let (span, value) = of_key.map_or((name.span.clone(), 0.0), |((_, typed), value)| {
-        let span = typed.as_ref().map_or(name.span.clone(), |t| t.span.clone());
+        let span = match typed {
+            Some(Given::Number(typed)) => typed.span.clone(),
+            _ => name.span.clone(),
+        };
         (span, *value)
     });
     Err(SceneError::new(
@@ -240,6 +244,27 @@ fn named_values(
     )
     .label(span, must)
     .help("see docs/scene.md, materials"))
+}
+
+/// The value of a parameter that is a word: its place.
+fn place_of_word(
+    name: &Text,
+    law: &str,
+    parameter: &Parameter,
+    word: &Text,
+) -> Result<f64, SceneError> {
+    let place = parameter.words.iter().position(|w| *w == word.value);
+    place.map(|place| place as f64).ok_or_else(|| {
+        SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!(
+                "`materials.{name}.{law}.{}` is \"{}\"",
+                parameter.key, word.value
+            ),
+        )
+        .label(word.span.clone(), "not one of its words")
+        .help(format!("use one of \"{}\"", parameter.words.join("\", \"")))
+    })
 }
 
 fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneError> {

@@ -104,6 +104,8 @@ pub struct Output<const D: usize> {
     pub name: String,
     /// Whether a VTU is written.
     pub vtu: bool,
+    /// Whether it holds the energy density of points.
+    pub energy_density: bool,
     /// Lines of samples: name and positions.
     pub lines: Vec<(String, Vec<Vector<D>>)>,
     /// Probes: name and position.

@@ -16,6 +16,7 @@ mod laws;
 mod load_steps;
 mod neighbours;
 mod plasticity;
+mod position_aware;
 mod restarts;
 mod sub_steps;
 

@@ -70,6 +70,8 @@ fn contact_of<const D: usize>(
 struct PassInput<'a, const D: usize> {
     body: &'a PdBody<D>,
     law: &'a Arc<dyn Law<D>>,
+    /// The fast pass that the law and its weights have.
+    accelerator: Option<Accelerator>,
     families: &'a Families,
     /// Whether the families are those of the body.
     is_whole: bool,
@@ -105,7 +107,7 @@ impl<const D: usize> PassInput<'_, D> {
             true => body.kernel(i).1[k],
             false => omega_of(body, i, families.of(i)[k]),
         };
-        let force = match (law.accelerator(), law.force_state()) {
+        let force = match (self.accelerator, law.force_state()) {
             (Some(Accelerator::Pairwise), _) => BondForce::Pairwise { coefficient: &pair },
             (Some(Accelerator::Solid { bulk, shear }), _) => BondForce::Solid {
                 omega: &omega,
@@ -246,6 +248,7 @@ impl<const D: usize> MovingBody<D> {
         let pass = PassInput {
             body,
             law: &p.law,
+            accelerator: p.accelerator(),
             families,
             is_whole: all_pass,
             rows: &is_site,

@@ -28,6 +28,21 @@ impl<const D: usize> CoupledSystem<'_, D> {
             .collect()
     }
 
+    /// See [`crate::system::SemiDiscrete::energy_densities`].
+    pub(super) fn energy_densities_of_points(&self, u: &[f64]) -> Option<Vec<f64>> {
+        let moving = self.body.as_ref()?;
+        let states = moving.pass.force_states()?;
+        let mut points = vec![0.0; moving.displacement.len()];
+        moving.spread(u, &mut points);
+        let mut sites = vec![0.0; self.mass.len()];
+        for (p, &site) in moving.site_of_point.iter().enumerate() {
+            if site != NONE {
+                sites[site as usize] = states.energy_density(p, &points);
+            }
+        }
+        Some(sites)
+    }
+
     /// See [`crate::system::SemiDiscrete::remembered`].
     pub(super) fn remembered_by_points(&self) -> Vec<(&'static str, Vec<f64>)> {
         let Some(body) = &self.body else {

@@ -563,6 +563,13 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
         })
     }
 
+    fn energy_density(&self, i: usize, u: &[f64]) -> f64 {
+        let (displaced, intact) = (|j| at(u, j), |bond: usize| self.intact[bond]);
+        let mut s = Scratch::default();
+        self.respond(i, &displaced, intact, 0.0, &self.past, &mut s)
+            .stored
+    }
+
     fn family_size(&self, point: usize) -> usize {
         self.range(point).len()
     }

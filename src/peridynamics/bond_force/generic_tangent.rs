@@ -29,18 +29,42 @@ impl<const D: usize> Generic<D> {
                         gradient += (at::<D>(x, j) - here) * self.xi(i, j).transpose() * w;
                     }
                 }
-                let stress = state.map(|s| s.modulus.contract(&gradient));
+                let mut stress = state.map(|s| s.modulus.contract(&gradient));
+                let deviator = state.map_or(0.0, |s| s.deviator);
+                if let Some(stress) = stress.as_mut().filter(|_| deviator != 0.0) {
+                    let product = self.deviatoric_product(i, x, gradient.trace(), deviator);
+                    *stress -= Tensor::identity() * (deviator * product);
+                }
                 for bond in intact() {
                     let j = self.neighbour(bond);
                     let (xi, eta) = (self.xi(i, j), at::<D>(x, j) - here);
                     let mut t = xi * (self.pair[bond] * xi.dot(&eta));
                     if let (Some(state), Some(stress)) = (state, stress) {
                         t += (eta * state.stabilisation + stress * xi) * self.omega[bond];
+                        if deviator != 0.0 {
+                            let s = self.pair[bond] * xi.norm_squared();
+                            t -= xi * (deviator * gradient.trace() * s);
+                        }
                     }
                     states[bond - start] = t;
                 }
             });
         self.gather(&states, y);
+    }
+
+    /// `Σ p |ξ|² ξ·η V` over intact bonds, and `d θ Σ p |ξ|⁴ V` over broken ones, whose deviatoric extensions no longer count.
+    fn deviatoric_product(&self, i: usize, x: &[f64], theta: f64, deviator: f64) -> f64 {
+        let here: Vector<D> = at(x, i);
+        let term = |bond: usize| {
+            let j = self.neighbour(bond);
+            let xi = self.xi(i, j);
+            let s = self.pair[bond] * xi.norm_squared() * self.volume[j];
+            match self.intact[bond] {
+                true => s * xi.dot(&(at::<D>(x, j) - here)),
+                false => deviator * theta * s * xi.norm_squared(),
+            }
+        };
+        self.range(i).map(term).sum()
     }
 
     /// Per unknown an upper bound of `Σ |K_ab|` of that tangent.
@@ -58,6 +82,7 @@ impl<const D: usize> Generic<D> {
         rows.filter(|(i, _)| self.row[*i]).for_each(|(i, row)| {
             let mut own = Tensor::<D>::zeros();
             let mut first = Vector::<D>::zeros();
+            let mut second = Vector::<D>::zeros();
             for bond in self.range(i).filter(|&bond| self.intact[bond]) {
                 let j = self.neighbour(bond);
                 let xi = self.xi(i, j);
@@ -75,9 +100,12 @@ impl<const D: usize> Generic<D> {
                     let q = |p: usize| self.state[p].as_ref().map_or(0.0, |s| s.stabilisation);
                     block += Tensor::identity() * (both(&self.omega, &q) * vv);
                     first += xi * (self.omega[bond] * vv);
+                    second += xi * (self.pair[bond] * xi.norm_squared() * vv);
                     if self.reverse[bond] != NONE {
                         let omega = self.omega[self.reverse[bond] as usize];
-                        self.add_state_sums(j, &(xi * (omega * vv)), &sums[j], row);
+                        let s = self.pair[self.reverse[bond] as usize] * xi.norm_squared();
+                        let weighted = [xi * (omega * vv), xi * (s * vv)];
+                        self.add_state_sums(j, &weighted, &sums[j], row);
                     }
                 }
                 own += block;
@@ -89,7 +117,7 @@ impl<const D: usize> Generic<D> {
                 *row += own.row(a).iter().map(|k| k.abs()).sum::<f64>();
             }
             if !sums.is_empty() {
-                self.add_state_sums(i, &first, &sums[i], row);
+                self.add_state_sums(i, &[first, second], &sums[i], row);
             }
         });
         result
@@ -109,9 +137,13 @@ impl<const D: usize> Generic<D> {
         std::array::from_fn(|b| others[b] + own[b].abs())
     }
 
-    /// Adds to the row sums of one point what the state part of point `j` gives along `v`.
-    fn add_state_sums(&self, j: usize, v: &Vector<D>, sums: &[f64; D], row: &mut [f64]) {
+    /// Adds to the row sums of one point what the state part of point `j` gives along `v`, or of a law with a deviator along `v` and `w`.
+    fn add_state_sums(&self, j: usize, [v, w]: &[Vector<D>; 2], sums: &[f64; D], row: &mut [f64]) {
         let Some(state) = &self.state[j] else { return };
+        if state.deviator != 0.0 {
+            self.add_deviator_sums(j, v, w, row);
+            return;
+        }
         for (i, row) in row.iter_mut().enumerate() {
             for k in 0..D {
                 for b in 0..D {
@@ -119,6 +151,39 @@ impl<const D: usize> Generic<D> {
                     *row += of.abs() * sums[b];
                 }
             }
+        }
+    }
+
+    /// As [`Self::add_state_sums`] of a law with a deviator, `v` weighted by ω and `w` by `p |ξ|²`: dilatation and deviatoric products of a bond cancel in part, so that bonds are added up one by one.
+    fn add_deviator_sums(&self, j: usize, v: &Vector<D>, w: &Vector<D>, row: &mut [f64]) {
+        let Some(state) = &self.state[j] else { return };
+        let d = state.deviator;
+        let weighted = |bond: usize| {
+            let l = self.neighbour(bond);
+            let xi = self.xi(j, l);
+            (xi, self.pair[bond] * xi.norm_squared(), self.volume[l])
+        };
+        let broken = self.range(j).filter(|&bond| !self.intact[bond]);
+        let lost: f64 = broken
+            .map(|bond| {
+                let (xi, s, volume) = weighted(bond);
+                s * xi.norm_squared() * volume
+            })
+            .sum();
+        let modulus = state.modulus.get(0, 0, 0, 0) - d * d * lost;
+        let mut own = Tensor::<D>::zeros();
+        for bond in self.range(j).filter(|&bond| self.intact[bond]) {
+            let (xi, s, volume) = weighted(bond);
+            let omega = self.omega[bond];
+            let along = (v * (modulus * omega - d * s) - w * (d * omega)) * volume;
+            own += along * xi.transpose();
+            let reach: f64 = xi.iter().map(|x| x.abs()).sum();
+            for (row, along) in row.iter_mut().zip(along.iter()) {
+                *row += along.abs() * reach;
+            }
+        }
+        for (a, row) in row.iter_mut().enumerate() {
+            *row += own.row(a).iter().map(|k| k.abs()).sum::<f64>();
         }
     }
 }

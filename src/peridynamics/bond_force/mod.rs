@@ -132,6 +132,9 @@ pub trait ForceStates<const D: usize> {
     /// The partial stress `Σ T⟨ξ⟩ ⊗ ξ V` of a point at the displacements `u` \[Pa\], [SAND2015-7998] eq. (2.19), by its intact bonds; `u` has `D` numbers per point.
     fn partial_stress(&self, point: usize, u: &[f64]) -> Tensor<D>;
 
+    /// The energy density that a point stores at the displacements `u`, by its intact bonds \[J/m^D\].
+    fn energy_density(&self, point: usize, u: &[f64]) -> f64;
+
     /// Number of bonds of a point's family.
     fn family_size(&self, point: usize) -> usize;
 

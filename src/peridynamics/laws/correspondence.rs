@@ -124,6 +124,7 @@ impl<const D: usize> LinearForceState<D> for Correspondence<D> {
         Ok(Some(StatePart {
             modulus,
             stabilisation: q,
+            deviator: 0.0,
             shape,
         }))
     }

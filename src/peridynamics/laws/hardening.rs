@@ -34,6 +34,7 @@ impl<const D: usize> NamedLaw<D> for Hardening<D> {
         least: -1e6,
         most: 1e12,
         usual: 20.0,
+        words: &[],
     }];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {

@@ -28,6 +28,7 @@ const fn parameter(
         least: limits.0,
         most: limits.1,
         usual,
+        words: &[],
     }
 }
 

@@ -40,6 +40,7 @@ impl<const D: usize> LocalCorrespondence<D> {
         least: 0.0,
         most: 1e6,
         usual: 1.0,
+        words: &[],
     };
 }
 

@@ -38,6 +38,7 @@ impl<const D: usize> NamedLaw<D> for Maxwell<D> {
             least: 0.0,
             most: 1.0,
             usual: 0.4,
+            words: &[],
         },
         Parameter {
             key: "relaxation-time",
@@ -46,6 +47,7 @@ impl<const D: usize> NamedLaw<D> for Maxwell<D> {
             least: 1e-100,
             most: 1e100,
             usual: 0.7,
+            words: &[],
         },
     ];
 

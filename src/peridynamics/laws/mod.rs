@@ -6,6 +6,7 @@
 //! | `lps.rs` | linear peridynamic solid | eq. (5.16) |
 //! | `correspondence.rs` | elastic correspondence, to first order | section 7.2 |
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
+//! | `pals.rs` | position-aware linear solid (PALS) | section 4.2 |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
 //! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
@@ -21,6 +22,7 @@ mod local_correspondence;
 mod lps;
 mod maxwell;
 mod neo_hooke;
+mod pals;
 mod plastic;
 mod st_venant_kirchhoff;
 
@@ -37,10 +39,11 @@ pub use local_correspondence::LocalCorrespondence;
 pub use lps::LinearPeridynamicSolid;
 pub use maxwell::Maxwell;
 pub use neo_hooke::NeoHookeSolid;
+pub use pals::PositionAwareSolid;
 pub use plastic::PlasticCorrespondence;
 pub use st_venant_kirchhoff::StVenantKirchhoffSolid;
 
-/// A number that a law takes beside the elastic constants.
+/// A number, or a word, that a law takes beside the elastic constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Its key in a scene.
@@ -55,6 +58,27 @@ pub struct Parameter {
     pub most: f64,
     /// A usual value, by which every law is tested.
     pub usual: f64,
+    /// The words that it is chosen from; its value is the place of the word. Empty for a number.
+    pub words: &'static [&'static str],
+}
+
+impl Parameter {
+    /// A choice of words, the first if it is left out.
+    pub const fn words(
+        key: &'static str,
+        about: &'static str,
+        words: &'static [&'static str],
+    ) -> Self {
+        Self {
+            key,
+            about,
+            default: Some(0.0),
+            least: 0.0,
+            most: (words.len() - 1) as f64,
+            usual: 0.0,
+            words,
+        }
+    }
 }
 
 /// Which Poisson ratios a law has.
@@ -216,6 +240,7 @@ macro_rules! named_laws {
 named_laws! {
     Hardening,
     Maxwell,
+    PositionAwareSolid,
     PlasticCorrespondence,
     JohnsonCookCorrespondence,
     NeoHookeSolid,

@@ -25,6 +25,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             least: 1e-100,
             most: 1e100,
             usual: 0.1,
+            words: &[],
         },
         Parameter {
             key: "hardening-modulus",
@@ -33,6 +34,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             least: 0.0,
             most: 1e100,
             usual: 0.4,
+            words: &[],
         },
         Parameter {
             key: "saturation-stress",
@@ -41,6 +43,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             least: 0.0,
             most: 1e100,
             usual: 0.2,
+            words: &[],
         },
         Parameter {
             key: "saturation-rate",
@@ -49,6 +52,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             least: 0.0,
             most: 1e12,
             usual: 3.0,
+            words: &[],
         },
         LocalCorrespondence::<D>::STABILISATION,
     ];

@@ -16,7 +16,7 @@ use crate::observe::rezoning_event::Switch;
 use crate::observe::series::Series;
 use crate::run::motion::seen::Seen;
 use crate::run::solution::Solved;
-use crate::run::write::{OverSites, Shown, snapshot};
+use crate::run::write::{ENERGY_DENSITY, OverSites, Shown, energy_densities, snapshot};
 use crate::scene::conditions::Condition;
 use crate::scene::validated::{Output, Tip};
 use crate::solve::explicit::State;
@@ -435,6 +435,12 @@ impl<'a, const D: usize> Recorder<'a, D> {
         for (name, values) in &remembered {
             more.push(OverSites::Scalar(name, values));
         }
+        let energies = energy_densities(self.output, solved);
+        more.extend(
+            energies
+                .iter()
+                .map(|e| OverSites::Scalar(ENERGY_DENSITY, e)),
+        );
         let mut shown = snapshot(solved, &more, Shown::All);
         if writes {
             shown = self.series.push(moment.state.time, shown)?;

@@ -55,6 +55,9 @@ pub struct OutputSpec {
     /// Whether a VTU file is written; true if left out.
     #[serde(default)]
     pub vtu: Option<bool>,
+    /// Whether the VTU has the energy density of peridynamic points; false if left out.
+    #[serde(default)]
+    pub energy_density: Option<bool>,
     /// Straight lines along which a CSV file samples the solution, by name.
     #[serde(default)]
     pub lines: BTreeMap<Text, LineSpec>,

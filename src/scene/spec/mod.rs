@@ -33,6 +33,7 @@ pub use motion::{
     InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec, SolveSpec,
     TipSpec,
 };
+pub use named_law::Given;
 pub use region::{
     AutoSpec, BallSpec, BodySpec, BoxSpec, EdgeSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec,
     SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,

@@ -26,8 +26,17 @@ pub struct NamedSpec {
     pub critical_stretch: Option<Number>,
     /// The set of cells that this material fills.
     pub cells: Option<Text>,
-    /// The law's own numbers, in the order of [`Named::parameters`]; none where one is left out that has a default.
-    pub parameters: Vec<Option<Number>>,
+    /// What the law takes of its own, in the order of [`Named::parameters`]; none where one is left out that has a default.
+    pub parameters: Vec<Option<Given>>,
+}
+
+/// What a scene gives for a parameter of a law.
+#[derive(Clone, Debug)]
+pub enum Given {
+    /// A number.
+    Number(Number),
+    /// A word of those that the parameter is chosen from, or another.
+    Word(Text),
 }
 
 /// Keys that materials of all laws have, with what they are.
@@ -92,13 +101,16 @@ impl<'de> Visitor<'de> for Seed {
         let law = self.0;
         let parameters = law.parameters();
         let mut common: [Option<Number>; 5] = Default::default();
-        let mut own: Vec<Option<Number>> = vec![None; parameters.len()];
+        let mut own: Vec<Option<Given>> = vec![None; parameters.len()];
         let mut cells: Option<Text> = None;
         while let Some(key) = map.next_key_seed(Key(law))? {
             match key {
                 Field::Common(5) => cells = Some(map.next_value()?),
                 Field::Common(k) => common[k] = Some(map.next_value()?),
-                Field::Own(k) => own[k] = Some(map.next_value()?),
+                Field::Own(k) if parameters[k].words.is_empty() => {
+                    own[k] = Some(Given::Number(map.next_value()?));
+                }
+                Field::Own(k) => own[k] = Some(Given::Word(map.next_value()?)),
             }
         }
         let [
@@ -175,7 +187,12 @@ pub(super) fn schema(law: Named, generator: &mut SchemaGenerator) -> Schema {
         add(key, about, if *key == "cells" { &text } else { &number });
     }
     for parameter in law.parameters() {
-        add(parameter.key, parameter.about, &number);
+        if parameter.words.is_empty() {
+            add(parameter.key, parameter.about, &number);
+        } else {
+            let words = json_schema!({ "type": "string", "enum": parameter.words });
+            add(parameter.key, parameter.about, &words);
+        }
         if parameter.default.is_none() {
             required.push(parameter.key);
         }

@@ -1,0 +1,228 @@
+//! The position-aware linear solid (PALS).
+
+use std::sync::Arc;
+
+use super::{Constants, NamedLaw, Parameter, Ratio};
+use crate::{
+    material::Kinematics,
+    peridynamics::{
+        Accelerator, BondEnergy, CalibrationFields, Conditions, DeformedFamily, EnergyDensity,
+        Family, ForceState, HistoryLayout, Influence, Law, LinearForceState, Past, PdError,
+        Present, ShellTarget, StatePart, position_aware_influence,
+    },
+    tensor::{Tensor, Tensor4, Vector},
+};
+
+/// Ordinary state-based solid whose two influence functions are fitted to every family, so that surfaces do not soften it.
+///
+/// Source: [SAND2015-7998] eq. (4.9)–(4.11), for `D` dimensions with κ the bulk modulus of `D` dimensions (`λ + 2μ/D`):
+///
+/// ```text
+/// W = ½ κ θ² + μ Σ σ ε² V ,     θ = Σ ω |ξ| e V ,     ε = e − θ |ξ|/D
+/// T⟨ξ⟩ = [ (κ θ − 2μ/D Σ σ |ξ| ε V) ω |ξ| + 2 μ σ ε ] M
+/// ```
+///
+/// ω and σ are those of [`position_aware_influence::fit`], of the family without cracks in motion: where bonds break, the others keep theirs, and sums go over intact bonds.
+#[derive(Clone, Debug)]
+pub struct PositionAwareSolid<const D: usize> {
+    influence: Influence,
+    fields: CalibrationFields,
+    bulk: f64,
+    shear: f64,
+    tensor: Tensor4<D>,
+}
+
+impl<const D: usize> PositionAwareSolid<D> {
+    /// A position-aware solid with the Lamé parameters of `D` dimensions \[Pa\], its influence functions as near to `influence` as can be.
+    pub fn new(influence: Influence, fields: CalibrationFields, lambda: f64, mu: f64) -> Self {
+        Self {
+            influence,
+            fields,
+            bulk: lambda + 2.0 * mu / D as f64,
+            shear: mu,
+            tensor: Tensor4::isotropic(lambda, mu),
+        }
+    }
+}
+
+impl<const D: usize> NamedLaw<D> for PositionAwareSolid<D> {
+    const KEY: &'static str = "pals";
+    const ABOUT: &'static str =
+        "Position-aware linear solid: an LPS whose energy at surfaces is that of elasticity.";
+    const RATIO: Ratio = Ratio::Any;
+    const KINEMATICS: &'static [Kinematics] = &[
+        Kinematics::PlaneStress,
+        Kinematics::PlaneStrain,
+        Kinematics::Solid,
+    ];
+    const PARAMETERS: &'static [Parameter] = &[Parameter::words(
+        "calibration-fields",
+        "Fields under which the energy of every family is exact: uniaxial strains along the axes and shears between them, or all affine ones.",
+        &["axes", "affine"],
+    )];
+
+    fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
+        let fields = match values[0] {
+            0.0 => CalibrationFields::Axes,
+            _ => CalibrationFields::Affine,
+        };
+        Arc::new(Self::new(
+            constants.influence,
+            fields,
+            constants.lambda,
+            constants.shear,
+        ))
+    }
+}
+
+impl<const D: usize> Law<D> for PositionAwareSolid<D> {
+    fn name(&self) -> &'static str {
+        "position-aware linear solid"
+    }
+
+    fn linearised(&self) -> &dyn LinearForceState<D> {
+        self
+    }
+
+    fn force_state(&self) -> Option<&dyn ForceState<D>> {
+        Some(self)
+    }
+
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
+        // a continuous complete family is that of an LPS
+        Some(BondEnergy::Lps {
+            influence: self.influence,
+            bulk: self.bulk,
+            shear: self.shear,
+        })
+    }
+}
+
+impl<const D: usize> LinearForceState<D> for PositionAwareSolid<D> {
+    fn is_pairwise(&self) -> bool {
+        false
+    }
+
+    fn is_ordinary(&self) -> bool {
+        true
+    }
+
+    fn has_deviators(&self) -> bool {
+        true
+    }
+
+    fn divergence(&self) -> Influence {
+        self.influence
+    }
+
+    fn tensor(&self) -> &Tensor4<D> {
+        &self.tensor
+    }
+
+    fn kernel(&self, r: f64, horizon: f64) -> f64 {
+        self.influence.value(r, horizon) / (r * r)
+    }
+
+    fn shell_target(&self) -> Option<ShellTarget> {
+        None
+    }
+
+    fn moment_conditions(
+        &self,
+        _bonds: &[(Vector<D>, f64)],
+        _horizon: f64,
+    ) -> Option<(Vec<f64>, Conditions<D>)> {
+        None
+    }
+
+    fn coefficients(
+        &self,
+        family: &Family<'_, D>,
+        pair: &mut [f64],
+        omega: &mut [f64],
+    ) -> Result<Option<StatePart<D>>, PdError> {
+        let base: Vec<f64> = (family.bonds.iter().zip(family.factors))
+            .map(|(xi, factor)| factor * self.influence.value(xi.norm(), family.horizon))
+            .collect();
+        let weights = position_aware_influence::fit(family, &base, self.fields)?;
+        omega.copy_from_slice(&weights.omega);
+        let (mut shape, mut second) = (Tensor::<D>::zeros(), 0.0);
+        for (k, xi) in family.bonds.iter().enumerate() {
+            let (r2, v) = (xi.norm_squared(), family.volumes[k]);
+            pair[k] = 2.0 * self.shear * weights.sigma[k] / r2;
+            shape += xi * xi.transpose() * (omega[k] * v);
+            second += weights.sigma[k] * r2 * v;
+        }
+        // ½ θ² (κ + 2μ/D² Σ σ |ξ|² V): what θ stores in ½ κ θ² and in the square of ε
+        let d = D as f64;
+        let factor = self.bulk + 2.0 * self.shear / (d * d) * second;
+        let mut modulus = Tensor4::zeros();
+        for i in 0..D {
+            modulus.0[i][i] = Tensor::identity() * factor;
+        }
+        Ok(Some(StatePart {
+            modulus,
+            stabilisation: 0.0,
+            deviator: 1.0 / d,
+            shape,
+        }))
+    }
+}
+
+impl<const D: usize> ForceState<D> for PositionAwareSolid<D> {
+    fn history(&self) -> HistoryLayout {
+        HistoryLayout::NONE
+    }
+
+    fn respond(
+        &self,
+        family: &DeformedFamily<'_, D>,
+        _step: f64,
+        _past: Past<'_>,
+        _present: Present<'_>,
+        force: &mut [Vector<D>],
+    ) -> EnergyDensity {
+        let d = D as f64;
+        let mut theta = 0.0;
+        for (k, e) in family.extension.iter().enumerate() {
+            theta += family.omega[k] * family.bonds[k].norm() * e * family.volumes[k];
+        }
+        // 2 μ σ = p |ξ|²
+        let deviatoric = |k: usize| {
+            let r = family.bonds[k].norm();
+            let epsilon = family.extension[k] - theta * r / d;
+            (r, epsilon, family.pair[k] * r * r * epsilon)
+        };
+        let (mut product, mut stored) = (0.0, 0.5 * self.bulk * theta * theta);
+        for (k, volume) in family.volumes.iter().enumerate() {
+            let (r, epsilon, t) = deviatoric(k);
+            product += t * r * volume;
+            stored += 0.5 * t * epsilon * volume;
+        }
+        let pressure = self.bulk * theta - product / d;
+        for (k, force) in force.iter_mut().enumerate() {
+            let (r, _, t) = deviatoric(k);
+            *force = family.direction[k] * (pressure * family.omega[k] * r + t);
+        }
+        EnergyDensity {
+            stored,
+            dissipated: 0.0,
+        }
+    }
+
+    fn is_objective(&self) -> bool {
+        true
+    }
+
+    fn energy_ratio(&self, _s: f64) -> f64 {
+        1.0
+    }
+}

@@ -1,0 +1,229 @@
+//! Position-aware solids, and weights that are fitted family by family: at rest, in load steps, in explicit motion, and with breaking bonds.
+
+use crate::laws::{history, refused, summary};
+
+/// A cube of 7 × 7 × 7 points in a field that is prescribed at all of its points but the middle ones; bonds are linear.
+const CUBE: &str = r#"
+kinematics = "solid"
+coupling = "{coupling}"
+[mesh.box]
+min = [0, 0, 0]
+max = [7, 7, 7]
+x = { cells = 7 }
+y = { cells = 7 }
+z = { cells = 7 }
+[materials.m.{law}]
+youngs-modulus = 1000
+poisson-ratio = 0.3
+density = 1
+[peridynamics]
+horizon = 3
+bonds = "linear"
+points.lattice = { spacing = 1, origin = [0.5, 0.5, 0.5] }
+{zone}
+[conditions.strained.displacement]
+inside.without = { from = { box = { min = [0, 0, 0], max = [7, 7, 7] } }, removed = { box = { min = [3.2, 3.2, 3.2], max = [3.8, 3.8, 3.8] } } }
+{field}
+[solver]
+tolerance = 1e-13
+"#;
+
+const VOLUME: f64 = 343.0;
+
+fn cube(coupling: &str, law: &str, field: &str) -> String {
+    CUBE.replace("{coupling}", coupling)
+        .replace("{law}", law)
+        .replace("{field}", field)
+        .replace("{zone}", "")
+}
+
+/// Fields of the strain 1e-3, and the energy density that elasticity gives them: E = 1000, ν = 0.3.
+fn fields() -> [(&'static str, f64); 3] {
+    let shear = 1000.0 / 2.6;
+    let lambda = 1000.0 * 0.3 / (1.3 * 0.4);
+    [
+        ("x = \"1e-3*y\"\ny = 0\nz = 0", 0.5e-6 * shear),
+        (
+            "x = \"1e-3*x\"\ny = 0\nz = 0",
+            0.5e-6 * (lambda + 2.0 * shear),
+        ),
+        (
+            "x = \"1e-3*x\"\ny = \"1e-3*y\"\nz = \"1e-3*z\"",
+            0.5e-6 * (9.0 * lambda + 6.0 * shear),
+        ),
+    ]
+}
+
+#[test]
+fn a_cube_under_the_fields_of_the_paper_stores_what_elasticity_says_where_an_lps_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    for (field, exact) in fields() {
+        let energy = |law: &str| {
+            let found = summary(folder.path(), &cube("nonlocal", law, field));
+            found["energy"].as_f64().unwrap() / (VOLUME * exact) - 1.0
+        };
+        let off = energy("pals");
+        assert!(off.abs() < 1e-12, "{field}: {off:e}");
+        let off = energy("lps");
+        assert!(off.abs() > 1e-2, "{field}: LPS {off:e}");
+    }
+}
+
+#[test]
+fn couplings_whose_seam_has_no_place_for_the_law_refuse_it_and_so_do_families_without_a_solution() {
+    let folder = tempfile::tempdir().unwrap();
+    let zone = "[zones.nonlocal]\nbox = { min = [3, 3, 3], max = [4, 4, 4] }\n[zones.transition]\nbox = { min = [2, 2, 2], max = [5, 5, 5] }\n";
+    for coupling in ["truncated", "blending", "partial-stress"] {
+        let typed = cube(coupling, "pals", fields()[0].0) + zone;
+        let typed = typed.replace(", origin = [0.5, 0.5, 0.5]", "");
+        refused(folder.path(), &typed, "is not offered with the coupling");
+    }
+    let affine = cube("nonlocal", "pals", fields()[0].0).replace(
+        "density = 1",
+        "density = 1\ncalibration-fields = \"affine\"",
+    );
+    refused(folder.path(), &affine, "only with negative weights");
+    let wrong = affine.replace("\"affine\"", "\"afine\"");
+    refused(folder.path(), &wrong, "\"axes\", \"affine\"");
+}
+
+/// A plate that is pulled by its ends.
+const PLATE: &str = r#"
+kinematics = "plane-stress"
+coupling = "nonlocal"
+[mesh.rectangle]
+min = [0, 0]
+max = [12, 6]
+x = { cells = 24 }
+y = { cells = 12 }
+[materials.m.{law}]
+youngs-modulus = 1000
+{ratio}
+density = 1
+{fracture}
+[peridynamics]
+horizon = 1.5
+weights = "{weights}"
+points.lattice = { spacing = 0.5, origin = [0.25, 0.25] }
+[conditions.left.displacement]
+inside.box = { min = [0, 0], max = [1, 6] }
+x = "{held}"
+[conditions.right.displacement]
+inside.box = { min = [11, 0], max = [12, 6] }
+x = "{pulled}"
+[conditions.centre.displacement]
+inside.box = { min = [0, 2.6], max = [12, 3.4] }
+y = 0
+[output]
+vtu = false
+probes.a = { at = [6.25, 1.25] }
+"#;
+
+/// A plate of a law, stretched up to 1 % over `[solve]`.
+fn plate(law: &str, weights: &str, fracture: &str, solve: &str, ramp: &str) -> String {
+    let ratio = match law {
+        "bond-based" => "",
+        _ => "poisson-ratio = 0.25",
+    };
+    PLATE
+        .replace("{law}", law)
+        .replace("{ratio}", ratio)
+        .replace("{weights}", weights)
+        .replace("{fracture}", fracture)
+        .replace("{held}", &format!("-0.06*{ramp}"))
+        .replace("{pulled}", &format!("0.06*{ramp}"))
+        + solve
+}
+
+const KINDS: [(&str, &str); 3] = [
+    ("pals", "isotropic"),
+    ("lps", "fitted"),
+    ("bond-based", "fitted"),
+];
+
+#[test]
+fn load_steps_and_slow_motion_end_where_statics_does() {
+    let folder = tempfile::tempdir().unwrap();
+    for (law, weights) in KINDS {
+        let still = plate(law, weights, "", "[solver]\ntolerance = 1e-12\n", "1");
+        let force = |found: &serde_json::Value| found["reactions"][1]["force"][0].as_f64().unwrap();
+        let still = force(&summary(folder.path(), &still));
+        assert!(still > 0.0, "{law}: {still}");
+        let steps = "[solve.quasi-static]\nduration = 1\nsteps = 2\ntolerance = 1e-11\n";
+        // a fracture that is never reached: the pass over bonds, not the rows
+        let typed = plate(law, weights, "critical-stretch = 10", steps, "t");
+        let stepped = *history(folder.path(), &typed, &["right_reaction_x"])[0]
+            .last()
+            .unwrap();
+        assert!(
+            (stepped / still - 1.0).abs() < 1e-8,
+            "{law}: {stepped} {still}"
+        );
+        // smooth loading over twenty passages of a wave
+        let solve = "[solve.explicit]\nduration = 12\noutputs = 1\nhistory-interval = 1\n";
+        let typed = plate(
+            law,
+            weights,
+            "critical-stretch = 10",
+            solve,
+            "(1 - cos(pi*min(t, 10)/10))/2",
+        );
+        let found = history(
+            folder.path(),
+            &typed,
+            &["right_reaction_x", "kinetic_energy", "stored_energy"],
+        );
+        let last = found[0].len() - 1;
+        assert!(
+            (found[0][last] / still - 1.0).abs() < 1e-2,
+            "{law}: {} {still}",
+            found[0][last]
+        );
+        assert!(found[1][last] < 1e-3 * found[2][last], "{law}");
+    }
+}
+
+#[test]
+fn bonds_break_and_what_is_worked_is_stored_moves_or_is_spent() {
+    let folder = tempfile::tempdir().unwrap();
+    for (law, weights) in KINDS {
+        let solve = "[solve.explicit]\nduration = 4\noutputs = 1\nhistory-interval = 1\n";
+        let ramp = "min(t, 4)/2";
+        let typed = plate(law, weights, "critical-stretch = 0.012", solve, ramp);
+        let columns = [
+            "broken_bonds",
+            "kinetic_energy",
+            "stored_energy",
+            "external_work",
+            "dissipated_energy",
+        ];
+        let found = history(folder.path(), &typed, &columns);
+        let last = found[0].len() - 1;
+        let [broken, kinetic, stored, work, spent] = [0, 1, 2, 3, 4].map(|k| found[k][last]);
+        assert!(broken > 100.0 && spent > 0.0, "{law}: {broken} {spent}");
+        let missing = (kinetic + stored + spent - work) / work;
+        assert!(missing.abs() < 2e-2, "{law}: {missing}");
+    }
+}
+
+#[test]
+fn a_splice_passes_affine_fields_of_position_aware_points() {
+    let zone = "[zones.nonlocal]\nbox = { min = [3, 1.5], max = [9, 4.5] }\n";
+    let field = "\n[conditions.all.displacement]\ninside.without = { from = { box = { min = [0, 0], max = [12, 6] } }, removed = { box = { min = [0.2, 0.2], max = [11.8, 5.8] } } }\nx = \"2e-3*x+1e-3*y\"\ny = \"-5e-4*x+1e-3*y\"\n";
+    let typed = plate("pals", "isotropic", "", zone, "1").replace("nonlocal\"", "splice\"");
+    let begin = typed.find("[conditions.left").unwrap();
+    let end = typed.find("[output]").unwrap();
+    let typed = format!("{}{field}{}", &typed[..begin], &typed[end..])
+        .replace("origin = [0.25, 0.25]", "origin = [0, 0]");
+    let folder = tempfile::tempdir().unwrap();
+    let found = summary(folder.path(), &typed);
+    // ½ σ : ε of plane stress, E = 1000, ν = 1/4, over the plate
+    let (xx, yy, xy) = (2e-3, 1e-3, 0.25e-3);
+    let stiff = 1000.0 / (1.0 - 0.0625);
+    let density = 0.5 * stiff * (xx * xx + yy * yy + 0.5 * xx * yy) + 2.0 * 400.0 * xy * xy;
+    let energy = found["energy"].as_f64().unwrap();
+    assert!(
+        (energy / (72.0 * density) - 1.0).abs() < 1e-9,
+        "{energy} {density}"
+    );
+}
