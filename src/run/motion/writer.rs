@@ -436,11 +436,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
             more.push(OverSites::Scalar(name, values));
         }
         let energies = energy_densities(self.output, solved);
-        more.extend(
-            energies
-                .iter()
-                .map(|e| OverSites::Scalar(ENERGY_DENSITY, e)),
-        );
+        if let Some(energies) = &energies {
+            more.push(OverSites::Scalar(ENERGY_DENSITY, energies));
+        }
         let mut shown = snapshot(solved, &more, Shown::All);
         if writes {
             shown = self.series.push(moment.state.time, shown)?;
