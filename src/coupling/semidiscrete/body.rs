@@ -55,7 +55,7 @@ fn contact_of<const D: usize>(
             position: &body.cloud.position,
             volume: &body.cloud.volume,
             rows: own_row,
-            spacing: spacing,
+            spacing,
             approach: c.approach,
             stiffness: c.stiffness / 15.0
                 * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),

@@ -210,14 +210,17 @@ fn cut_bonds_reach<const D: usize>(model: &Model<D>, site: u32) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// What a row is, the facet that it lies at, and whether no other surface is near.
+type Class = (RowClass, Option<usize>, bool);
+
 /// The rows that are out of balance by what they are, and what the stress at them is predicted with.
 struct Classified<'a, const D: usize> {
     subject: &'a Subject<'a, D>,
     around: &'a Around<'a, D>,
     tensor: &'a Tensor4<D>,
     nodal: &'a dyn Fn(&Tensor<D>, &mut [f64]),
-    /// Rows out of balance, with the class of each, the facet that it lies at, and whether no other surface is near.
-    rows: Vec<(u32, (RowClass, Option<usize>, bool))>,
+    /// Rows out of balance, with the class of each.
+    rows: Vec<(u32, Class)>,
     /// By how much each row is out of balance.
     worst: &'a [f64],
 }
@@ -302,7 +305,7 @@ fn unbalanced<const D: usize>(
         .map(|&s| cut_bonds_reach(model, s))
         .fold(0.0, f64::max);
     let boundary = Boundary::new(model, subject.conditions, reach + widest, (low, high));
-    let classified: Vec<(RowClass, Option<usize>, bool)> = off
+    let classified: Vec<Class> = off
         .par_iter()
         .map_init(
             || Row::<D>::new(model.sites.len()),
