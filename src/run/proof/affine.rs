@@ -371,7 +371,7 @@ fn class<const D: usize>(
     reach: f64,
     site: u32,
     row: &mut Row<D>,
-) -> (RowClass, Option<usize>, bool) {
+) -> Class {
     let model = subject.model;
     let x = &model.sites[site as usize].position;
     let reach = reach + cut_bonds_reach(model, site);
