@@ -146,7 +146,8 @@ pub trait NamedLaw<const D: usize> {
 pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
     use crate::peridynamics::Micromodulus;
     let constants = Constants {
-        lambda: 1.7,
+        // a bar of Poisson's ratio 1/4
+        lambda: if D == 1 { 0.65 } else { 1.7 },
         shear: 1.3,
         influence: Influence::Gaussian,
         kinematics: match D {
@@ -220,7 +221,7 @@ macro_rules! named_laws {
             /// Whether its bonds can break: what that costs is known ([`Law::bond_energy`]).
             pub fn has_breakable_bonds(self) -> bool {
                 let constants = Constants {
-                    lambda: 1.0,
+                    lambda: 0.5,
                     shear: 1.0,
                     influence: Influence::Gaussian,
                     kinematics: Kinematics::Bar,
