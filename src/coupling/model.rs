@@ -89,6 +89,21 @@ pub struct Model<const D: usize> {
     pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
 }
 
+/// Refuses a law whose rows a coupling cannot hold.
+fn takes_law<const D: usize>(
+    coupling: &dyn Coupling<D>,
+    peridynamics: Option<&Peridynamics<D>>,
+) -> Result<(), ModelError> {
+    let law = peridynamics.map(|p| &p.law);
+    match law.filter(|law| law.linearised().has_deviators() && !coupling.takes_deviators()) {
+        Some(law) => Err(ModelError::Deviators {
+            law: law.name(),
+            coupling: coupling.name(),
+        }),
+        None => Ok(()),
+    }
+}
+
 impl<const D: usize> Model<D> {
     /// Lays out sites and families.
     ///
@@ -107,15 +122,7 @@ impl<const D: usize> Model<D> {
             peridynamics,
             coupling,
         } = problem;
-        if let Some(p) = &peridynamics
-            && p.law.linearised().has_deviators()
-            && !coupling.takes_deviators()
-        {
-            return Err(ModelError::Deviators {
-                law: p.law.name(),
-                coupling: coupling.name(),
-            });
-        }
+        takes_law(coupling.as_ref(), peridynamics.as_ref())?;
         let largest = peridynamics.as_ref().map_or(0.0, |p| {
             (0..mesh.cell_count())
                 .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))

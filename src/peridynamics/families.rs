@@ -231,6 +231,58 @@ impl Families {
     }
 }
 
+impl Families {
+    /// The same families with points renumbered (`u32::MAX` for a point that is dropped); only `active` points, by old number, keep theirs,
+    /// without the neighbours that are dropped.
+    pub fn restrict(&self, renumbered: &[u32], active: &[bool]) -> Self {
+        let mut result = Self {
+            offsets: vec![0],
+            neighbours: Vec::new(),
+        };
+        for i in 0..self.len() {
+            if renumbered[i] == u32::MAX {
+                continue;
+            }
+            if active[i] {
+                result.neighbours.extend(
+                    self.of(i)
+                        .iter()
+                        .map(|&j| renumbered[j as usize])
+                        .filter(|&j| j != u32::MAX),
+                );
+            }
+            result.offsets.push(result.neighbours.len());
+        }
+        result
+    }
+
+    /// Appends the families of another cloud, whose points are numbered on from those of this one.
+    pub fn append(&mut self, other: &Self) {
+        let (points, bonds) = (self.len() as u32, self.neighbours.len());
+        self.neighbours
+            .extend(other.neighbours.iter().map(|&j| j + points));
+        self.offsets
+            .extend(other.offsets.iter().skip(1).map(|&o| o + bonds));
+    }
+
+    /// Families of some points of a cloud of `points`, row `r` that of point `centres[r]` (ascending), as families of all points, the rest empty.
+    pub fn spread(&self, centres: &[u32], points: usize) -> Self {
+        let mut offsets = Vec::with_capacity(points + 1);
+        offsets.push(0);
+        let mut row = 0;
+        for i in 0..points {
+            if row < centres.len() && centres[row] as usize == i {
+                row += 1;
+            }
+            offsets.push(self.offsets[row]);
+        }
+        Self {
+            offsets,
+            neighbours: self.neighbours.clone(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
