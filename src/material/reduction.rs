@@ -190,7 +190,7 @@ mod tests {
         let young = 2.0 * LAME.1 * (1.0 + poisson);
         let elastic = crate::material::Elastic::new(young, poisson, 0.0).unwrap();
         fn differs<const D: usize>(a: &Tensor4<D>, b: &Tensor4<D>) -> f64 {
-            let mut difference = a.clone();
+            let mut difference = *a;
             difference.add_scaled(-1.0, b);
             difference.amax()
         }
