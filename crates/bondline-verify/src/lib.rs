@@ -43,6 +43,7 @@ pub mod layers;
 pub mod meshes;
 pub mod partial_volumes;
 pub mod patch;
+pub mod position_aware;
 pub mod reflection;
 pub mod report_page;
 pub mod scale;
@@ -104,6 +105,11 @@ pub const SUITES: &[Suite] = &[
         name: "skin",
         about: "3D bars with free sides, with a skin of elements and without: affine field, Young's modulus, Poisson's ratio",
         run: surface_layer::run,
+    },
+    Suite {
+        name: "pals",
+        about: "SAND2015-7998 section 4.2: energies of a position-aware solid at surfaces, Young's modulus of a tension bar (figure 4.2)",
+        run: position_aware::run,
     },
     Suite {
         name: "layers",
