@@ -91,6 +91,56 @@ fn couplings_whose_seam_has_no_place_for_the_law_refuse_it_and_so_do_families_wi
     refused(folder.path(), &wrong, "\"axes\", \"affine\"");
 }
 
+#[test]
+fn a_viscoelastic_cube_that_is_sheared_and_held_relaxes_as_its_closed_form() {
+    // sheared within 0.1 s and held to 2 s: a spring in an arm keeps q/ε of the extension
+    let (end, ramp, steps) = (2.0, 0.1, 20);
+    let shear = 1000.0 / 2.6;
+    let field = "x = \"1e-3*y*min(10*t, 1)\"\ny = 0\nz = 0";
+    for (share, time) in [
+        (0.01, 2.0),
+        (0.5, 2.0),
+        (0.99, 2.0),
+        (0.5, 10.0),
+        (0.5, 0.1),
+        (0.5, 0.01),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let law = format!(
+            "pave]\nrelaxing-share = {share}\nrelaxation-time = {time}\nrelaxing-share-2 = 0.01\nrelaxation-time-2 = 3"
+        );
+        let typed = cube("nonlocal", &law, field)
+            .replace("-2 = 3]", "-2 = 3")
+            .replace(
+                "[solver]\ntolerance = 1e-13\n",
+                &format!(
+                    "[solve.quasi-static]\nduration = {end}\nsteps = {steps}\ntolerance = 1e-13\n"
+                ),
+            );
+        let names = ["stored_energy", "external_work", "dissipated_energy"];
+        let found = history(folder.path(), &typed, &names);
+        let at_once = 0.5e-6 * shear * VOLUME;
+        let kept = |time: f64, t: f64| {
+            -(-ramp / time).exp_m1() / (ramp / time) * (-(t - ramp) / time).exp()
+        };
+        for k in 1..=steps {
+            let t = end * k as f64 / steps as f64;
+            let (q, slow) = (kept(time, t), kept(3.0, t));
+            let exact = 0.99 - share + share * q * q + 0.01 * slow * slow;
+            let off = found[0][k] / (at_once * exact) - 1.0;
+            assert!(off.abs() < 1e-12, "{share} {time} {k}: {off:e}");
+        }
+        // work of the ramp: ½ (1 − Σ λ) and of each arm ∫ q dε
+        let of = |time: f64| {
+            let x = ramp / time;
+            (1.0 + (-x).exp_m1() / x) / x
+        };
+        let work = 2.0 * at_once * (0.5 * (0.99 - share) + share * of(time) + 0.01 * of(3.0));
+        let lost = found[2][steps] - (work - found[0][steps]);
+        assert!(lost.abs() < 1e-10 * work, "{share} {time}: {lost:e}");
+    }
+}
+
 /// A plate that is pulled by its ends.
 const PLATE: &str = r#"
 kinematics = "plane-stress"

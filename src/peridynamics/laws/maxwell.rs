@@ -87,12 +87,12 @@ impl<const D: usize> Law<D> for Maxwell<D> {
 }
 
 /// `(1 − e^−x)/x`, `1` at zero.
-fn mean_decay(x: f64) -> f64 {
+pub(super) fn mean_decay(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x }
 }
 
 /// `∫₀¹ (1 − e^−xθ)/x dθ = (1 − (1 − e^−x)/x)/x`, `1/2` at zero.
-fn mean_rise(x: f64) -> f64 {
+pub(super) fn mean_rise(x: f64) -> f64 {
     // below this the difference loses what the series leaves out
     const SERIES: f64 = 1e-3;
     if x < SERIES {

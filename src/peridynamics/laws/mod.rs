@@ -6,7 +6,7 @@
 //! | `lps.rs` | linear peridynamic solid | eq. (5.16) |
 //! | `correspondence.rs` | elastic correspondence, to first order | section 7.2 |
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
-//! | `pals.rs` | position-aware linear solid (PALS) | section 4.2 |
+//! | `pals.rs`, `pave.rs` | position-aware solid, linear (PALS) and viscoelastic (PAVE) | sections 4.2, 4.3 |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
 //! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
@@ -23,6 +23,7 @@ mod lps;
 mod maxwell;
 mod neo_hooke;
 mod pals;
+mod pave;
 mod plastic;
 mod st_venant_kirchhoff;
 
@@ -40,6 +41,7 @@ pub use lps::LinearPeridynamicSolid;
 pub use maxwell::Maxwell;
 pub use neo_hooke::NeoHookeSolid;
 pub use pals::PositionAwareSolid;
+pub use pave::PositionAwareViscoelasticSolid;
 pub use plastic::PlasticCorrespondence;
 pub use st_venant_kirchhoff::StVenantKirchhoffSolid;
 
@@ -242,6 +244,7 @@ named_laws! {
     Hardening,
     Maxwell,
     PositionAwareSolid,
+    PositionAwareViscoelasticSolid,
     PlasticCorrespondence,
     JohnsonCookCorrespondence,
     NeoHookeSolid,

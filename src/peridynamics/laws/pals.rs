@@ -43,6 +43,29 @@ impl<const D: usize> PositionAwareSolid<D> {
             tensor: Tensor4::isotropic(lambda, mu),
         }
     }
+
+    /// That of a scene, by the place of its word among `calibration-fields`.
+    pub(super) fn of(constants: Constants, fields: f64) -> Self {
+        let fields = match fields {
+            0.0 => CalibrationFields::Axes,
+            _ => CalibrationFields::Affine,
+        };
+        let Constants { lambda, shear, .. } = constants;
+        Self::new(constants.influence, fields, lambda, shear)
+    }
+
+    /// κ of `D` dimensions \[Pa\].
+    pub(super) fn bulk(&self) -> f64 {
+        self.bulk
+    }
+
+    /// θ of a family.
+    pub(super) fn dilatation(family: &DeformedFamily<'_, D>) -> f64 {
+        let extensions = family.extension.iter().enumerate();
+        extensions.fold(0.0, |theta, (k, e)| {
+            theta + family.omega[k] * family.bonds[k].norm() * e * family.volumes[k]
+        })
+    }
 }
 
 impl<const D: usize> NamedLaw<D> for PositionAwareSolid<D> {
@@ -62,16 +85,7 @@ impl<const D: usize> NamedLaw<D> for PositionAwareSolid<D> {
     )];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
-        let fields = match values[0] {
-            0.0 => CalibrationFields::Axes,
-            _ => CalibrationFields::Affine,
-        };
-        Arc::new(Self::new(
-            constants.influence,
-            fields,
-            constants.lambda,
-            constants.shear,
-        ))
+        Arc::new(Self::of(constants, values[0]))
     }
 }
 
@@ -191,10 +205,7 @@ impl<const D: usize> ForceState<D> for PositionAwareSolid<D> {
         force: &mut [Vector<D>],
     ) -> EnergyDensity {
         let d = D as f64;
-        let mut theta = 0.0;
-        for (k, e) in family.extension.iter().enumerate() {
-            theta += family.omega[k] * family.bonds[k].norm() * e * family.volumes[k];
-        }
+        let theta = Self::dilatation(family);
         // 2 μ σ = p |ξ|²
         let deviatoric = |k: usize| {
             let r = family.bonds[k].norm();
