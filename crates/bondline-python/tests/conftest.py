@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import copy
+import signal
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+# a shell that starts the tests in the background lets them ignore interrupts, which some of them send
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 #: The repository: its examples and meshes are tested through the package too.
 ROOT = Path(__file__).resolve().parents[3]

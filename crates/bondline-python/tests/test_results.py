@@ -149,7 +149,8 @@ def test_a_prediction_comes_true(bar: dict[str, Any]) -> None:
 
 
 def test_progress_is_shown_or_not(pulse: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
-    pulse["solve"]["explicit"]["duration"] = 2000
+    # long enough to be seen on a busy machine too
+    pulse["solve"]["explicit"]["duration"] = 10_000
     scene = bondline.Scene.from_dict(pulse)
     scene.run(progress=False)
     assert capfd.readouterr() == ("", "")
@@ -183,7 +184,7 @@ class Terminal(io.StringIO):
 
 
 def test_a_terminal_shows_one_line(pulse: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    pulse["solve"]["explicit"]["duration"] = 3000
+    pulse["solve"]["explicit"]["duration"] = 15_000
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
     bondline.run(pulse)
