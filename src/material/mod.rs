@@ -6,6 +6,7 @@
 //! | `j2.rs` | von Mises plasticity with isotropic hardening, for small strains |
 //! | `hardening.rs` | its yield stress: linear, Voce, Johnson–Cook |
 //! | `hyperelastic.rs` | St Venant–Kirchhoff and Neo-Hooke, for strains of any size |
+//! | `logarithmic_j2.rs` | the same for strains of any size |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
 //!
 //! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] at the end of a step and what it remembers, and gives the first Piola–Kirchhoff stress `P` \[Pa\] (for small strains there is but one stress),
@@ -17,12 +18,14 @@ mod elastic;
 mod hardening;
 mod hyperelastic;
 mod j2;
+mod logarithmic_j2;
 mod reduction;
 
 pub use elastic::{Elastic, LinearElastic};
 pub use hardening::{Hardening, JohnsonCook};
 pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
 pub use j2::J2;
+pub use logarithmic_j2::LogarithmicJ2;
 pub use reduction::Reduced;
 
 use crate::tensor::{Tensor, Tensor4};
@@ -189,7 +192,17 @@ mod tests {
             laws.push((format!("J2, {}", kinematics.name()), Box::new(law)));
         }
         let (lambda, shear) = elastic().lame::<3>(Kinematics::Solid).unwrap();
-        let solids: [(&str, Arc<dyn LocalLaw<3>>); 3] = [
+        let hardening = Hardening::Voce {
+            yield_stress: 1e10,
+            modulus: 1e9,
+            saturation: 0.0,
+            rate: 0.0,
+        };
+        let solids: [(&str, Arc<dyn LocalLaw<3>>); 4] = [
+            (
+                "J2 in logarithmic strains",
+                Arc::new(LogarithmicJ2::new(lambda, shear, hardening)),
+            ),
             (
                 "J2 of solids",
                 Arc::new(J2::<3>::new(lambda, shear, 1e10, 1e9)),

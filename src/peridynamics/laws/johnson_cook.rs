@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::plastic::plastic;
+use super::plastic::{STRAINS, plastic};
 use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Hardening, JohnsonCook, Kinematics},
@@ -91,6 +91,11 @@ impl<const D: usize> NamedLaw<D> for JohnsonCookCorrespondence<D> {
             1.03,
         ),
         LocalCorrespondence::<D>::STABILISATION,
+        // tests of all laws take it for large strains, and `plastic-correspondence` for small ones
+        Parameter {
+            usual: 1.0,
+            ..STRAINS
+        },
     ];
 
     fn conflict(values: &[f64]) -> Option<(&'static str, String)> {
@@ -120,6 +125,7 @@ impl<const D: usize> NamedLaw<D> for JohnsonCookCorrespondence<D> {
             constants,
             hardening,
             values[9],
+            values[10] != 0.0,
         )
     }
 }

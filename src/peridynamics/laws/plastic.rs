@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Constants, Correspondence, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::{Hardening, J2, Kinematics, LocalLaw, Reduced},
+    material::{Hardening, J2, Kinematics, LocalLaw, LogarithmicJ2, Reduced},
     peridynamics::Law,
 };
 
@@ -14,7 +14,8 @@ pub struct PlasticCorrespondence<const D: usize>;
 
 impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
     const KEY: &'static str = "plastic-correspondence";
-    const ABOUT: &'static str = "Correspondence with von Mises plasticity and isotropic hardening, linear and saturating, for small strains.";
+    const ABOUT: &'static str =
+        "Correspondence with von Mises plasticity and isotropic hardening, linear and saturating.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
     const PARAMETERS: &'static [Parameter] = &[
@@ -55,6 +56,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             words: &[],
         },
         LocalCorrespondence::<D>::STABILISATION,
+        STRAINS,
     ];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
@@ -64,16 +66,30 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             saturation: values[2],
             rate: values[3],
         };
-        plastic("plastic correspondence", constants, hardening, values[4])
+        plastic(
+            "plastic correspondence",
+            constants,
+            hardening,
+            values[4],
+            values[5] != 0.0,
+        )
     }
 }
 
-/// A J2 material at points and in finite elements.
+/// How large strains and rotations may become.
+pub(super) const STRAINS: Parameter = Parameter::words(
+    "strains",
+    "For \"small\" strains and rotations, or \"large\" ones: logarithmic strains and true stresses, slower.",
+    &["small", "large"],
+);
+
+/// A J2 material at points and in finite elements, for small strains or for large ones.
 pub(super) fn plastic<const D: usize>(
     name: &'static str,
     constants: Constants,
     hardening: Hardening,
     stabilisation: f64,
+    is_large: bool,
 ) -> Arc<dyn Law<D>> {
     let Constants {
         lambda,
@@ -81,9 +97,16 @@ pub(super) fn plastic<const D: usize>(
         influence,
         kinematics,
     } = constants;
+    let of_solid = || (constants.solid_lambda(), shear, hardening);
     let local: Arc<dyn LocalLaw<D>> = match kinematics {
+        _ if is_large => {
+            let (lambda, shear, hardening) = of_solid();
+            let solid = LogarithmicJ2::new(lambda, shear, hardening);
+            Arc::new(Reduced::new(Arc::new(solid), kinematics))
+        }
         Kinematics::PlaneStress => {
-            let solid = J2::<3>::with_hardening(constants.solid_lambda(), shear, hardening);
+            let (lambda, shear, hardening) = of_solid();
+            let solid = J2::<3>::with_hardening(lambda, shear, hardening);
             Arc::new(Reduced::new(Arc::new(solid), kinematics))
         }
         _ => Arc::new(J2::<D>::with_hardening(lambda, shear, hardening)),

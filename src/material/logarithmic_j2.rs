@@ -1,0 +1,281 @@
+//! Von Mises plasticity for strains and rotations of any size, in logarithmic strains.
+
+use super::{Hardening, J2, LocalLaw, LocalResponse};
+use crate::tensor::{Tensor, Tensor4, Vector, inverse};
+
+/// J2 plasticity in logarithmic strains: `F = F_e F_p`, `ε_e = ½ ln b_e`, `b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ`, and [`J2`] between the elastic strain `ε_e` and the Kirchhoff stress `τ = C : ε_e`.
+///
+/// With the exponential map the return of small strains holds in the principal directions of the trial state (\[Simo1992\]; \[SimoHughes1998\] section 9.4), so that plastic flow keeps the volume. The elastic response is
+/// that of Hencky: `ψ = ½ ε_e : C : ε_e`, `P = τ F⁻ᵀ`. It remembers `C_p⁻¹ − I` and the equivalent plastic strain.
+#[derive(Clone, Debug)]
+pub struct LogarithmicJ2 {
+    law: J2<3>,
+}
+
+impl LogarithmicJ2 {
+    /// A solid of the Lamé parameters \[Pa\] and any hardening, of the Kirchhoff stress over the logarithmic plastic strain.
+    pub fn new(lambda: f64, shear: f64, hardening: Hardening) -> Self {
+        Self {
+            law: J2::with_hardening(lambda, shear, hardening),
+        }
+    }
+}
+
+/// Components of a symmetric tensor, row by row.
+const COMPONENTS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// `Σ f_a n_a ⊗ n_a` of the principal directions `n_a`, the columns of `directions`.
+fn spectral(directions: &Tensor<3>, values: &Vector<3>) -> Tensor<3> {
+    directions * Tensor::from_diagonal(values) * directions.transpose()
+}
+
+impl LocalLaw<3> for LogarithmicJ2 {
+    fn tangent(&self) -> &Tensor4<3> {
+        self.law.tangent()
+    }
+
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    fn is_objective(&self) -> bool {
+        true
+    }
+
+    fn flows_at_constant_volume(&self) -> bool {
+        true
+    }
+
+    fn history(&self) -> &'static [&'static str] {
+        &[
+            "plastic deformation xx",
+            "plastic deformation xy",
+            "plastic deformation xz",
+            "plastic deformation yy",
+            "plastic deformation yz",
+            "plastic deformation zz",
+            "equivalent plastic strain",
+        ]
+    }
+
+    fn respond(
+        &self,
+        gradient: &Tensor<3>,
+        step: f64,
+        past: &[f64],
+        present: &mut [f64],
+    ) -> LocalResponse<3> {
+        let mut plastic = Tensor::<3>::zeros();
+        for ((i, j), p) in COMPONENTS.into_iter().zip(past) {
+            plastic[(i, j)] = *p;
+            plastic[(j, i)] = *p;
+        }
+        let deformation = Tensor::identity() + gradient;
+        // turned inside out: there is no stress, and solvers see that by the number
+        let Some((reverse, volume_ratio)) = inverse(&deformation).filter(|(_, j)| *j > 0.0) else {
+            return LocalResponse {
+                stress: Tensor::repeat(f64::NAN),
+                volume_ratio: f64::NAN,
+                stored: f64::NAN,
+                dissipated: f64::NAN,
+            };
+        };
+        // b_e − I without the difference of two ones, which would lose small strains
+        let trial = gradient
+            + gradient.transpose()
+            + gradient * gradient.transpose()
+            + deformation * plastic * deformation.transpose();
+        let eigen = trial.symmetric_eigen();
+        let (directions, squares) = (eigen.eigenvectors, eigen.eigenvalues);
+        let total = spectral(&directions, &squares.map(|x| 0.5 * x.ln_1p()));
+        let before = past[6];
+        let mut at_start = [0.0; 7];
+        at_start[6] = before;
+        let mut found = [0.0; 7];
+        let small = self.law.respond(&total, step, &at_start, &mut found);
+        present.copy_from_slice(past);
+        present[6] = found[6];
+        if found[6] > before {
+            let mut flow = Tensor::<3>::zeros();
+            for ((i, j), p) in COMPONENTS.into_iter().zip(found) {
+                flow[(i, j)] = p;
+                flow[(j, i)] = p;
+            }
+            // the flow has the principal directions of the trial state: exp(−2 Δε_p) of each
+            let change = Vector::<3>::from_fn(|a, _| {
+                let n = directions.column(a);
+                (1.0 + squares[a]) * (-2.0 * n.dot(&(flow * n))).exp_m1()
+            });
+            let change = spectral(&directions, &change);
+            let plastic = plastic + reverse * change * reverse.transpose();
+            for ((i, j), p) in COMPONENTS.into_iter().zip(present.iter_mut()) {
+                *p = plastic[(i, j)];
+            }
+        }
+        LocalResponse {
+            stress: small.stress * reverse.transpose(),
+            volume_ratio,
+            stored: small.stored,
+            dissipated: small.dissipated,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::material::{Kinematics, Reduced};
+
+    const LAME: (f64, f64) = (600.0, 400.0);
+    const YIELD: f64 = 2.0;
+    const MODULUS: f64 = 5.0;
+
+    fn law() -> LogarithmicJ2 {
+        LogarithmicJ2::new(
+            LAME.0,
+            LAME.1,
+            Hardening::Voce {
+                yield_stress: YIELD,
+                modulus: MODULUS,
+                saturation: 0.0,
+                rate: 0.0,
+            },
+        )
+    }
+
+    fn young() -> f64 {
+        LAME.1 * (3.0 * LAME.0 + 2.0 * LAME.1) / (LAME.0 + LAME.1)
+    }
+
+    /// Responds to gradients one after another; the last response, its history, and what was dissipated.
+    fn along<const D: usize>(
+        law: &dyn LocalLaw<D>,
+        path: &[Tensor<D>],
+    ) -> (LocalResponse<D>, Vec<f64>, f64) {
+        let mut past = vec![0.0; law.history().len()];
+        let mut present = past.clone();
+        let mut last = law.respond(&Tensor::zeros(), 0.0, &past, &mut present);
+        let mut dissipated = 0.0;
+        for g in path {
+            last = law.respond(g, 1.0, &past, &mut present);
+            past.clone_from(&present);
+            dissipated += last.dissipated;
+        }
+        (last, past, dissipated)
+    }
+
+    /// A path through large strains and a rotation, at `t` from 0 to 1.
+    fn path(t: f64) -> Tensor<3> {
+        let stretch = Tensor::<3>::new(
+            0.4 * t,
+            0.5 * t,
+            -0.2 * t * t,
+            0.1 * t,
+            -0.2 * t,
+            0.0,
+            0.0,
+            0.3 * t * t,
+            0.1 * t,
+        );
+        let (sine, cosine) = (1.3 * t).sin_cos();
+        let turn = Tensor::<3>::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0);
+        turn * (Tensor::identity() + stretch) - Tensor::identity()
+    }
+
+    fn sampled(steps: usize) -> Vec<Tensor<3>> {
+        (1..=steps).map(|k| path(k as f64 / steps as f64)).collect()
+    }
+
+    #[test]
+    fn a_bar_has_the_bilinear_curve_of_true_stress_over_logarithmic_strain() {
+        let bar = Reduced::<1>::new(Arc::new(law()), Kinematics::Bar);
+        let tangent = young() * MODULUS / (young() + MODULUS);
+        for top in [0.01, 0.3, 0.9f64] {
+            let path: Vec<Tensor<1>> = (1..=4)
+                .map(|k| Tensor::<1>::new((top * f64::from(k) / 4.0).exp_m1()))
+                .collect();
+            let (found, ..) = along(&bar, &path);
+            let kirchhoff = YIELD + tangent * (top - YIELD / young());
+            let expected = kirchhoff / top.exp();
+            assert!(
+                (found.stress[0] - expected).abs() < 1e-10 * YIELD,
+                "{top}: {} {expected}",
+                found.stress[0]
+            );
+            // plastic flow keeps the volume: ln J = (1 − 2 ν) τ/E
+            let bulk = LAME.0 + 2.0 / 3.0 * LAME.1;
+            let volume = (kirchhoff / (3.0 * bulk)).exp();
+            assert!((found.volume_ratio - volume).abs() < 1e-10, "{top}");
+        }
+    }
+
+    #[test]
+    fn pure_shear_hardens_as_the_flow_rule_says() {
+        // stretches e^γ/2, e^−γ/2, 1: τ = σ_y/√3 at first, then dτ/dγ = 1/(1/μ + 3/H)
+        let gamma = 0.8f64;
+        let first = YIELD / 3f64.sqrt();
+        let expected = first + (gamma - first / LAME.1) / (1.0 / LAME.1 + 3.0 / MODULUS);
+        let g = Vector::<3>::new((0.5 * gamma).exp_m1(), (-0.5 * gamma).exp_m1(), 0.0);
+        let (found, ..) = along(&law(), &[Tensor::from_diagonal(&g)]);
+        let kirchhoff = found.stress[(0, 0)] * (1.0 + g[0]);
+        assert!((kirchhoff - expected).abs() < 1e-10 * YIELD, "{kirchhoff}");
+    }
+
+    #[test]
+    fn a_rotation_of_the_path_rotates_the_stress_and_leaves_the_history() {
+        let (sine, cosine) = 1.1f64.sin_cos();
+        let turn = Tensor::<3>::new(1.0, 0.0, 0.0, 0.0, cosine, -sine, 0.0, sine, cosine);
+        let turned: Vec<_> = sampled(20)
+            .iter()
+            .map(|g| turn * (Tensor::identity() + g) - Tensor::identity())
+            .collect();
+        let (a, history, lost) = along(&law(), &sampled(20));
+        let (b, same, also) = along(&law(), &turned);
+        assert!((turn * a.stress - b.stress).amax() < 1e-11 * YIELD);
+        assert!(
+            history
+                .iter()
+                .zip(&same)
+                .all(|(a, b)| (a - b).abs() < 1e-12),
+            "{history:?} {same:?}"
+        );
+        assert!((lost - also).abs() < 1e-11 * lost && lost > YIELD * 0.5);
+        // the flow keeps the volume: det C_p⁻¹ = 1
+        let mut plastic = Tensor::<3>::identity();
+        for ((i, j), p) in COMPONENTS.into_iter().zip(&history) {
+            plastic[(i, j)] = f64::from(u8::from(i == j)) + p;
+            plastic[(j, i)] = plastic[(i, j)];
+        }
+        assert!((plastic.determinant() - 1.0).abs() < 1e-11);
+    }
+
+    #[test]
+    fn work_is_what_is_stored_and_dissipated_to_first_order_in_the_step() {
+        let off = |steps: usize| {
+            let path = sampled(steps);
+            let law = law();
+            let (mut past, mut present) = (vec![0.0; 7], vec![0.0; 7]);
+            let (mut work, mut dissipated, mut stored) = (0.0, 0.0, 0.0);
+            let (mut before, mut stress) = (Tensor::<3>::zeros(), Tensor::<3>::zeros());
+            for g in &path {
+                let found = law.respond(g, 1.0, &past, &mut present);
+                past.clone_from(&present);
+                work += 0.5 * (stress + found.stress).dot(&(g - before));
+                (before, stress) = (*g, found.stress);
+                dissipated += found.dissipated;
+                stored = found.stored;
+            }
+            (work - stored - dissipated).abs() / work
+        };
+        let (coarse, fine) = (off(400), off(800));
+        assert!(fine < 2e-3 && fine < 0.6 * coarse, "{coarse} {fine}");
+    }
+
+    #[test]
+    fn a_body_turned_inside_out_has_no_stress() {
+        let g = Tensor::<3>::from_diagonal(&Vector::<3>::new(-2.0, 0.0, 0.0));
+        assert!(along(&law(), &[g]).0.stress[(0, 0)].is_nan());
+    }
+}
