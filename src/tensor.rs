@@ -108,6 +108,16 @@ pub fn padded<const D: usize>(v: &Vector<D>) -> [f64; 3] {
     p
 }
 
+/// The least eigenvalue of a symmetric, positive semidefinite tensor.
+pub fn least_eigenvalue<const D: usize>(t: &Tensor<D>) -> f64 {
+    // beyond D the trace, which is no less than any of them
+    let mut whole = Tensor::<3>::from_diagonal_element(t.trace());
+    for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+        whole[(i, j)] = t[(i, j)];
+    }
+    whole.symmetric_eigenvalues().min()
+}
+
 /// The determinant of a tensor.
 pub fn determinant<const D: usize>(t: &Tensor<D>) -> f64 {
     match D {

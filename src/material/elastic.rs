@@ -115,6 +115,8 @@ impl Elastic {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearElastic<const D: usize> {
     stiffness: Tensor4<D>,
+    /// Stress out of the plane per dilatation \[Pa\].
+    across: f64,
 }
 
 impl<const D: usize> LinearElastic<D> {
@@ -123,8 +125,13 @@ impl<const D: usize> LinearElastic<D> {
     /// # Errors
     /// `MaterialError::Kinematics` if the kinematics belong to another dimension than `D`.
     pub fn new(solid: &Elastic, kinematics: Kinematics) -> Result<Self, MaterialError> {
+        let (lambda, _) = solid.lame::<D>(kinematics)?;
         Ok(Self {
             stiffness: solid.stiffness(kinematics)?,
+            across: match kinematics {
+                Kinematics::PlaneStrain => lambda,
+                _ => 0.0,
+            },
         })
     }
 }
@@ -160,6 +167,7 @@ impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
         let stress = self.stiffness.contract(gradient);
         LocalResponse {
             stress,
+            across: self.across * gradient.trace(),
             volume_ratio: 1.0,
             stored: 0.5 * stress.dot(gradient),
             dissipated: 0.0,

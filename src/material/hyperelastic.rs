@@ -59,6 +59,7 @@ impl LocalLaw<3> for StVenantKirchhoff {
         let second = self.elastic.contract(&green);
         LocalResponse {
             stress: (Tensor::identity() + gradient) * second,
+            across: 0.0,
             volume_ratio: 1.0 + volume_change(gradient),
             stored: 0.5 * second.dot(&green),
             dissipated: 0.0,
@@ -120,6 +121,7 @@ impl LocalLaw<3> for NeoHooke {
         let Some((inverse, _)) = inverse(&deformation).filter(|_| log.is_finite()) else {
             return LocalResponse {
                 stress: Tensor::from_element(f64::NAN),
+                across: 0.0,
                 volume_ratio: f64::NAN,
                 stored: f64::NAN,
                 dissipated: 0.0,
@@ -130,6 +132,7 @@ impl LocalLaw<3> for NeoHooke {
         let kirchhoff = left * self.shear + Tensor::identity() * (self.lambda * log);
         LocalResponse {
             stress: kirchhoff * inverse.transpose(),
+            across: 0.0,
             volume_ratio: log.exp(),
             stored: 0.5 * self.shear * (left.trace() - 2.0 * log) + 0.5 * self.lambda * log * log,
             dissipated: 0.0,

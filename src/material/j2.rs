@@ -136,14 +136,16 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         let mut stress = self.elastic.contract(&elastic);
         let lambda = self.elastic.get(0, 0, 0, 0) - 2.0 * self.shear;
         let mut stored = 0.5 * stress.dot(&elastic);
+        let mut across = 0.0;
         if D == 2 {
             // the strain out of the plane, which is elastic against the plastic one
             stress += Tensor::identity() * (lambda * out);
-            let across = lambda * (elastic.trace() + out) + 2.0 * self.shear * out;
+            across = lambda * (elastic.trace() + out) + 2.0 * self.shear * out;
             stored = 0.5 * (stress.dot(&elastic) + across * out);
         }
         LocalResponse {
             stress,
+            across,
             volume_ratio: 1.0,
             stored: stored + self.hardening.stored(alpha),
             dissipated: self.hardening.dissipated(alpha, flow, step),

@@ -75,6 +75,7 @@ impl LocalLaw<3> for LogarithmicJ2 {
         let Some((reverse, volume_ratio)) = inverse(&deformation).filter(|(_, j)| *j > 0.0) else {
             return LocalResponse {
                 stress: Tensor::repeat(f64::NAN),
+                across: 0.0,
                 volume_ratio: f64::NAN,
                 stored: f64::NAN,
                 dissipated: f64::NAN,
@@ -114,6 +115,7 @@ impl LocalLaw<3> for LogarithmicJ2 {
         }
         LocalResponse {
             stress: small.stress * reverse.transpose(),
+            across: 0.0,
             volume_ratio,
             stored: small.stored,
             dissipated: small.dissipated,

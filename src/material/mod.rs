@@ -121,6 +121,8 @@ pub enum MaterialError {
 pub struct LocalResponse<const D: usize> {
     /// First Piola–Kirchhoff stress at the end of the step \[Pa\], force per undeformed area; symmetric where the law is for small strains.
     pub stress: Tensor<D>,
+    /// Normal Cauchy stress out of the body's plane \[Pa\]; zero in a bar, in plane stress and in a solid.
+    pub across: f64,
     /// Volume over undeformed volume, `J = det F` of the solid; 1 where the law is for small strains.
     pub volume_ratio: f64,
     /// Energy stored then \[J/m^D\]; zero at rest.
@@ -136,6 +138,19 @@ impl<const D: usize> LocalResponse<D> {
             true => self.stress * (Tensor::identity() + gradient).transpose() / self.volume_ratio,
             false => self.stress,
         }
+    }
+
+    /// The principal values of that stress and of the one out of the plane \[Pa\], in any order.
+    pub fn principal_stresses(&self, gradient: &Tensor<D>, is_objective: bool) -> [f64; 3] {
+        let cauchy = self.cauchy(gradient, is_objective);
+        let mut whole = Tensor::<3>::zeros();
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            whole[(i, j)] = 0.5 * (cauchy[(i, j)] + cauchy[(j, i)]);
+        }
+        if D < 3 {
+            whole[(2, 2)] = self.across;
+        }
+        whole.symmetric_eigenvalues().into()
     }
 }
 

@@ -132,6 +132,11 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         let found = self.at(gradient, out, step, past, present);
         LocalResponse {
             stress: Tensor::from_fn(|i, j| found.stress[(i, j)]),
+            // no shear across and no strain: P_zz is the Kirchhoff stress
+            across: match self.free {
+                3 if D < 3 => found.stress[(2, 2)] / found.volume_ratio,
+                _ => 0.0,
+            },
             volume_ratio: found.volume_ratio,
             stored: found.stored,
             dissipated: found.dissipated,
@@ -170,6 +175,7 @@ mod tests {
         let own = along(&J2::<2>::new(LAME.0, LAME.1, 2.0, 50.0), &path);
         let reduced = along(&Reduced::new(plastic(), Kinematics::PlaneStrain), &path);
         assert!((own.stress - reduced.stress).amax() < 1e-12);
+        assert!((own.across - reduced.across).abs() < 1e-12 && own.across != 0.0);
         assert!((own.stored - reduced.stored).abs() < 1e-12);
 
         // a bar: λ of one dimension is E − 2 μ

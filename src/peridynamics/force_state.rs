@@ -51,6 +51,10 @@ pub struct DeformedFamily<'a, const D: usize> {
     pub extension: &'a [f64],
     /// Direction `M = (ξ + η)/|ξ + η|`; with linear kinematics `ξ/|ξ|`.
     pub direction: &'a [Vector<D>],
+    /// Whether no bond of the family is broken.
+    pub is_whole: bool,
+    /// Share of the family's volume whose bonds are broken, the `D = τ • φ` of [SAND2015-7998] eq. (6.28) with `τ = 1/V`.
+    pub damage: f64,
 }
 
 impl<const D: usize> DeformedFamily<'_, D> {
@@ -81,7 +85,12 @@ pub struct Present<'a> {
     pub point: &'a mut [f64],
     /// Of its bonds.
     pub bonds: &'a mut [f64],
+    /// The principal Cauchy stresses of the undamaged material \[Pa\] in any order, where a failure criterion asks for them; a law that remembers [`PLASTIC_STRAIN`] overwrites them.
+    pub principal_stress: Option<&'a mut [f64; 3]>,
 }
+
+/// The name of the equivalent plastic strain among what points remember.
+pub const PLASTIC_STRAIN: &str = "equivalent plastic strain";
 
 /// Energies per volume of a point \[J/m^D\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

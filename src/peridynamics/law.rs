@@ -41,6 +41,9 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     /// Whether the force with linear kinematics is that of [`Law::linearised`], whatever the displacement and the time.
     fn is_linear(&self) -> bool;
 
+    /// Whether bonds can break: [`Law::force_state`] then takes families that have lost some.
+    fn has_breakable_bonds(&self) -> bool;
+
     /// What the bonds of a continuous family store, and what breaking them costs, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy>;
 }

@@ -15,11 +15,12 @@
 //! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.3) |
 //! | `laws/` | the laws, one file each | eq. (3.1), (5.16), section 7.2 |
 //! | `critical_stretch.rs` | critical stretch from the fracture energy | \[Silling2005\] |
+//! | `tearing_parameter.rs` | failure of ductile materials | eq. (6.33) |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
 //! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |
-//! | `kernel/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
+//! | `bond_force/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
 
 pub(crate) mod alike;
 pub mod body;
@@ -42,6 +43,7 @@ pub mod partial_volume;
 pub mod position_aware_influence;
 pub mod shape_tensor;
 pub mod shell_weights;
+mod tearing_parameter;
 
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use crack_area::CrackArea;

@@ -3,6 +3,7 @@
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::failure::Breaking;
+use super::materials::Fracture;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
 use super::source::Span;
@@ -68,6 +69,13 @@ fn supported<'a, const D: usize>(
             "`zones.follow` is set, but no bond breaks".to_owned(),
             "needs a material that breaks",
             "add fracture-energy or critical-stretch to the material, or remove it",
+        ));
+    }
+    if let Some(Fracture::Tearing(_)) = breaking.fracture {
+        return Err(refused(
+            "`zones.follow` is set, and bonds break by a tearing parameter".to_owned(),
+            "follows bonds that are stretched",
+            "draw the nonlocal zone where the part may tear, or give a critical-stretch",
         ));
     }
     if explicit.sub_steps.is_some() {

@@ -62,6 +62,8 @@ pub enum Fracture {
     Energy(f64),
     /// At this stretch.
     Stretch(f64),
+    /// At this tearing parameter.
+    Tearing(f64),
 }
 
 impl<const D: usize> Material<D> {
@@ -268,30 +270,29 @@ fn place_of_word(
 }
 
 fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneError> {
-    let Some((kind, energy, stretch)) = spec.fracture() else {
+    let Some(fracture) = spec.fracture() else {
         return Ok(None);
     };
-    let place = |key: &str| format!("materials.{name}.{kind}.{key}");
-    match (energy, stretch) {
-        (None, None) => Ok(None),
-        (Some(e), None) => {
-            let energy = bounds_checks::positive(&place("fracture-energy"), e)?;
-            Ok(Some(Fracture::Energy(energy)))
-        }
-        (None, Some(s)) => {
-            let stretch = bounds_checks::positive(&place("critical-stretch"), s)?;
-            Ok(Some(Fracture::Stretch(stretch)))
-        }
-        (Some(e), Some(s)) => Err(SceneError::new(
+    let law = fracture.law;
+    let mut typed = (fracture.typed.into_iter()).filter_map(|(key, n)| n.map(|n| (key, n)));
+    let Some((key, number)) = typed.next() else {
+        return Ok(None);
+    };
+    if let Some((other, second)) = typed.next() {
+        return Err(SceneError::new(
             SceneErrorKind::Choice,
-            format!(
-                "`materials.{name}.{kind}` holds `fracture-energy`, `critical-stretch` at once"
-            ),
+            format!("`materials.{name}.{law}` holds `{key}`, `{other}` at once"),
         )
-        .label(e.span.clone(), "one")
-        .label(s.span.clone(), "and another")
-        .help("keep one of them: the critical stretch follows from the energy")),
+        .label(number.span.clone(), "one")
+        .label(second.span.clone(), "and another")
+        .help("keep one of them: bonds break by one criterion"));
     }
+    let value = bounds_checks::positive(&format!("materials.{name}.{law}.{key}"), number)?;
+    Ok(Some(match key {
+        "fracture-energy" => Fracture::Energy(value),
+        "critical-stretch" => Fracture::Stretch(value),
+        _ => Fracture::Tearing(value),
+    }))
 }
 
 /// The largest modulus, whose square times those of lengths still is a number.

@@ -30,10 +30,9 @@ impl<const D: usize> Parts<'_, D> {
     pub fn unused(&self) -> Vec<String> {
         let (mut list, joining) = (Vec::new(), self.scene.coupling.joining());
         for (name, material) in &self.spec.materials {
-            let key = match material.fracture() {
-                Some((_, Some(_), _)) => "fracture-energy",
-                Some((.., Some(_))) => "critical-stretch",
-                _ => continue,
+            let mut typed = material.fracture().into_iter().flat_map(|f| f.typed);
+            let Some((key, _)) = typed.find(|(_, number)| number.is_some()) else {
+                continue;
             };
             if !(0..self.scene.mesh.cell_count()).any(|c| self.holds(c)) {
                 list.push(format!(

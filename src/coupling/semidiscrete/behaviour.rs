@@ -30,20 +30,23 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub broken: Option<&'a BrokenBonds<D>>,
 }
 
-/// The stretch at which bonds break.
+/// What breaks bonds: a stretch, or a tearing parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Critical {
     /// The same everywhere.
     Uniform(f64),
     /// One for each horizon of the model, \[m\] and \[1\]: the same fracture energy takes a larger stretch where the horizon is smaller.
     ByHorizon(Vec<(f64, f64)>),
+    /// No stretch, but this tearing parameter.
+    Tearing(f64),
 }
 
 impl Critical {
-    /// That of bonds of a horizon; infinite for one that is not listed.
+    /// The stretch that breaks bonds of a horizon; infinite for one that is not listed, and where none does.
     pub fn at(&self, horizon: f64) -> f64 {
         match self {
             Self::Uniform(s) => *s,
+            Self::Tearing(_) => f64::INFINITY,
             Self::ByHorizon(list) => {
                 let found = list.iter().find(|(of, _)| *of == horizon);
                 found.map_or(f64::INFINITY, |(_, s)| *s)

@@ -137,6 +137,7 @@ impl<const D: usize> PassInput<'_, D> {
                 critical: match s {
                     Critical::Uniform(s) => CriticalStretch::Uniform(*s),
                     Critical::ByHorizon(_) => CriticalStretch::PerBond(&by_bond),
+                    Critical::Tearing(p) => CriticalStretch::TearingParameter(*p),
                 },
                 no_fail: self.no_fail,
             }),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::{
-    peridynamics::{Families, Law, PdBody},
+    peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
     tensor::Vector,
 };
 
@@ -81,13 +81,15 @@ pub enum BondForce<'a, const D: usize> {
     },
 }
 
-/// The stretch beyond which a bond breaks.
+/// What breaks a bond: the stretch beyond which it does, or a tearing parameter.
 #[derive(Clone, Copy)]
 pub enum CriticalStretch<'a, const D: usize> {
     /// The same for all bonds.
     Uniform(f64),
     /// A number per bond; the same from both ends.
     PerBond(&'a BondFunction<'a, D>),
+    /// No stretch, but this mean of the tearing parameters of a bond's ends, [SAND2015-7998] eq. (6.33); of laws that remember a plastic strain.
+    TearingParameter(f64),
 }
 
 /// When bonds fail.
@@ -183,6 +185,11 @@ pub enum KernelError {
         /// Its name.
         law: &'static str,
     },
+    /// A tearing parameter for a law that does not flow.
+    #[error(
+        "bond pass: points of this law remember no plastic strain, of which a tearing parameter is made; give a critical stretch"
+    )]
+    NoFlow,
     /// The lattice pass was asked for where there is none.
     #[error("bond pass: no lattice pass, {why}; choose the automatic layout")]
     NoLattice {
@@ -192,6 +199,15 @@ pub enum KernelError {
 }
 
 impl<const D: usize> BondSetup<'_, D> {
+    /// Whether points remember a plastic strain.
+    pub(super) fn flows(&self) -> bool {
+        let BondForce::Law { law, .. } = self.force else {
+            return false;
+        };
+        let states = law.force_state();
+        states.is_some_and(|s| s.history().point.contains(&PLASTIC_STRAIN))
+    }
+
     /// `ξ` of the bond from `i` to `j`.
     pub(super) fn bond(&self, i: usize, j: usize) -> Vector<D> {
         self.position[j] - self.position[i]
@@ -220,6 +236,7 @@ impl<const D: usize> BondSetup<'_, D> {
         let s = match failure.critical {
             CriticalStretch::Uniform(s) => s,
             CriticalStretch::PerBond(f) => f(i, k, xi),
+            CriticalStretch::TearingParameter(_) => return f64::INFINITY,
         };
         self.kinematics.limit(s)
     }

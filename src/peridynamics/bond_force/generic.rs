@@ -8,12 +8,13 @@ use rayon::prelude::*;
 
 use super::{
     BondPass, BondSetup, ForceStates, Kinematics,
+    generic_failure::BondFailure,
     list::{extension, ratio, stretched},
 };
 use crate::{
     peridynamics::{
         DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, Law, Past, PdBody,
-        Present, StatePart, body::split_rows,
+        Present, StatePart, body::split_rows, tearing_parameter::Flow,
     },
     system::{FailureUpdate, Interval},
     tensor::{Tensor, Vector},
@@ -24,42 +25,51 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// What points and bonds remember; bonds in the order of the families.
 #[derive(Clone, Default)]
-struct History {
-    point: Vec<f64>,
-    bonds: Vec<f64>,
+pub(super) struct History {
+    pub(super) point: Vec<f64>,
+    pub(super) bonds: Vec<f64>,
+}
+
+/// What a point did in a step.
+#[derive(Clone, Copy, Default)]
+struct Outcome {
+    /// Energy dissipated \[J\].
+    dissipated: f64,
+    flow: Flow,
 }
 
 /// The pass over force states: some hundred bytes per directed bond.
 pub(super) struct Generic<const D: usize> {
     pub(super) law: Arc<dyn Law<D>>,
-    layout: HistoryLayout,
+    pub(super) layout: HistoryLayout,
     pub(super) position: Vec<Vector<D>>,
     pub(super) volume: Vec<f64>,
     pub(super) row: Vec<bool>,
-    no_fail: Vec<bool>,
+    pub(super) no_fail: Vec<bool>,
     pub(super) families: Families,
     /// Of each bond, that of its other end, counted over all families; `NONE` if the far point has no family.
     pub(super) reverse: Vec<u32>,
     pub(super) pair: Vec<f64>,
     pub(super) omega: Vec<f64>,
     pub(super) state: Vec<Option<StatePart<D>>>,
-    /// The value of `t` beyond which each bond breaks; empty for never.
-    limit: Vec<f64>,
+    pub(super) failure: BondFailure,
     kinematics: Kinematics,
     pub(super) intact: Vec<bool>,
+    /// Volume of the far points of each family; empty where no bond can be broken.
+    family_volume: Vec<f64>,
     /// Committed, and at the end of the last force.
-    past: History,
-    present: History,
-    /// Energy that each point dissipated in the last force \[J\].
-    dissipated: Vec<f64>,
+    pub(super) past: History,
+    pub(super) present: History,
+    /// What each point did in the last force.
+    outcome: Vec<Outcome>,
     /// Points and bonds, counted over all families, that the last force broke.
-    last: Vec<(u32, usize)>,
+    pub(super) last: Vec<(u32, usize)>,
     /// `T⟨ξ⟩` of every bond, kept between passes.
     force_state: Vec<Vector<D>>,
 }
 
 /// One deformed family in memory that the next one takes over.
-struct Scratch<const D: usize> {
+pub(super) struct Scratch<const D: usize> {
     bonds: Vec<Vector<D>>,
     volumes: Vec<f64>,
     pair: Vec<f64>,
@@ -71,8 +81,11 @@ struct Scratch<const D: usize> {
     of: Vec<usize>,
     past: Vec<f64>,
     present: Vec<f64>,
-    point: Vec<f64>,
+    pub(super) point: Vec<f64>,
+    pub(super) principal_stress: [f64; 3],
     force: Vec<Vector<D>>,
+    is_whole: bool,
+    damage: f64,
 }
 
 /// What a law reads of a family, and what it overwrites.
@@ -84,7 +97,7 @@ struct Parts<'a, const D: usize> {
 }
 
 impl<const D: usize> Scratch<D> {
-    fn split<'a>(&'a mut self, state: Option<&'a StatePart<D>>) -> Parts<'a, D> {
+    fn split<'a>(&'a mut self, state: Option<&'a StatePart<D>>, stress: bool) -> Parts<'a, D> {
         Parts {
             family: DeformedFamily {
                 bonds: &self.bonds,
@@ -95,11 +108,14 @@ impl<const D: usize> Scratch<D> {
                 difference: &self.difference,
                 extension: &self.extension,
                 direction: &self.direction,
+                is_whole: self.is_whole,
+                damage: self.damage,
             },
             past: &self.past,
             present: Present {
                 point: &mut self.point,
                 bonds: &mut self.present,
+                principal_stress: stress.then_some(&mut self.principal_stress),
             },
             force: &mut self.force,
         }
@@ -120,7 +136,10 @@ impl<const D: usize> Default for Scratch<D> {
             past: Vec::new(),
             present: Vec::new(),
             point: Vec::new(),
+            principal_stress: [f64::NAN; 3],
             force: Vec::new(),
+            is_whole: true,
+            damage: 0.0,
         }
     }
 }
@@ -139,10 +158,9 @@ impl<const D: usize> Generic<D> {
         let bonds = families.neighbours.len();
         let (mut pair, mut omega) = (Vec::with_capacity(bonds), Vec::new());
         let mut reverse = Vec::with_capacity(bonds);
-        let mut limit = Vec::new();
         let mut intact = Vec::with_capacity(bonds);
         for i in 0..points {
-            for (k, &j) in families.of(i).iter().enumerate() {
+            for &j in families.of(i) {
                 let place = body.families.of(i).binary_search(&j);
                 let (p, w) = body.kernel(i);
                 pair.push(place.map_or(0.0, |k| p[k]));
@@ -152,9 +170,6 @@ impl<const D: usize> Generic<D> {
                 let back = families.of(j as usize).binary_search(&(i as u32));
                 let start = families.offsets[j as usize] as u32;
                 reverse.push(back.map_or(NONE, |k| start + k as u32));
-                if setup.failure.is_some() {
-                    limit.push(setup.limit(i, k, &setup.bond(i, j as usize)));
-                }
                 intact.push(!setup.precracked.is_some_and(|cut| cut(i, j as usize)));
             }
         }
@@ -173,12 +188,24 @@ impl<const D: usize> Generic<D> {
             reverse,
             pair,
             omega,
-            limit,
+            failure: BondFailure::new(setup, body),
             kinematics: setup.kinematics,
+            family_volume: match setup.failure.is_some() || setup.precracked.is_some() {
+                true => (0..points)
+                    .map(|i| {
+                        families
+                            .of(i)
+                            .iter()
+                            .map(|j| setup.volume[*j as usize])
+                            .sum()
+                    })
+                    .collect(),
+                false => Vec::new(),
+            },
             intact,
             present: past.clone(),
             past,
-            dissipated: vec![0.0; points],
+            outcome: vec![Outcome::default(); points],
             last: Vec::new(),
             force_state: vec![Vector::zeros(); bonds],
             families,
@@ -198,32 +225,17 @@ impl<const D: usize> Generic<D> {
     }
 
     /// `t` and r² of a bond, and the direction `ξ + η`, or ξ of a linear one.
-    fn stretched(&self, i: usize, j: usize, eta: &Vector<D>) -> super::list::Stretched<D> {
+    pub(super) fn stretched(
+        &self,
+        i: usize,
+        j: usize,
+        eta: &Vector<D>,
+    ) -> super::list::Stretched<D> {
         let (xi, here) = (self.xi(i, j).into(), [0.0; D]);
         match self.kinematics {
             Kinematics::Exact => stretched::<D, true>(&xi, &here, eta.as_slice()),
             Kinematics::Linear => stretched::<D, false>(&xi, &here, eta.as_slice()),
         }
-    }
-
-    /// Bonds beyond their limit; each end finds its own.
-    fn overstretched(&self, u: &[f64]) -> Vec<(u32, usize)> {
-        (0..self.position.len())
-            .into_par_iter()
-            .with_min_len(64)
-            .flat_map_iter(|i| {
-                let free = self.range(i).filter(move |_| !self.no_fail[i]);
-                free.filter(move |&bond| {
-                    let j = self.neighbour(bond);
-                    if !self.intact[bond] || self.no_fail[j] {
-                        return false;
-                    }
-                    let s = self.stretched(i, j, &(at(u, j) - at(u, i)));
-                    s.excess > self.limit[bond] * s.length
-                })
-                .map(move |bond| (i as u32, bond))
-            })
-            .collect()
     }
 
     /// The response of one family, of those of its bonds that count; forces and history lie in the scratch.
@@ -246,6 +258,7 @@ impl<const D: usize> Generic<D> {
         s.of.clear();
         s.past.clear();
         let kept = self.layout.bond.len();
+        let mut intact_volume = 0.0;
         for bond in self.range(i).filter(|&bond| counts(bond)) {
             let j = self.neighbour(bond);
             let eta = displaced(j) - here;
@@ -258,6 +271,7 @@ impl<const D: usize> Generic<D> {
             s.of.push(bond);
             s.bonds.push(self.xi(i, j));
             s.volumes.push(self.volume[j]);
+            intact_volume += self.volume[j];
             s.pair.push(self.pair[bond]);
             s.omega.extend(self.omega.get(bond));
             s.difference.push(eta);
@@ -266,6 +280,12 @@ impl<const D: usize> Generic<D> {
                 .push(Vector::from_column_slice(&stretch.direction) * (shrink / r));
             s.past.extend(&past.bonds[bond * kept..(bond + 1) * kept]);
         }
+        s.principal_stress = [0.0; 3];
+        s.is_whole = s.of.len() == self.range(i).len();
+        s.damage = match s.is_whole {
+            true => 0.0,
+            false => 1.0 - intact_volume / self.family_volume[i],
+        };
         s.force.clear();
         s.force.resize(s.of.len(), Vector::zeros());
         s.present.clone_from(&s.past);
@@ -275,7 +295,8 @@ impl<const D: usize> Generic<D> {
         let Some(law) = self.law.force_state() else {
             return EnergyDensity::default();
         };
-        let parts = s.split(self.state[i].as_ref());
+        let asks = matches!(self.failure, BondFailure::Tearing(_));
+        let parts = s.split(self.state[i].as_ref(), asks);
         let past = Past {
             point: &past.point[own],
             bonds: parts.past,
@@ -287,7 +308,7 @@ impl<const D: usize> Generic<D> {
     fn respond_all(&mut self, u: &[f64], step: f64) {
         let mut force = std::mem::take(&mut self.force_state);
         let mut present = std::mem::take(&mut self.present);
-        let mut dissipated = std::mem::take(&mut self.dissipated);
+        let mut outcome = std::mem::take(&mut self.outcome);
         let offsets = &self.families.offsets;
         let scaled = |n: usize| offsets.iter().map(|o| o * n).collect::<Vec<_>>();
         let kept = [self.layout.point.len(), self.layout.bond.len()];
@@ -299,12 +320,12 @@ impl<const D: usize> Generic<D> {
             .into_par_iter()
             .zip(of_bonds)
             .zip(of_points)
-            .zip(&mut dissipated)
+            .zip(&mut outcome)
             .enumerate()
             .with_min_len(16)
             .for_each_init(
                 Scratch::default,
-                |s, (i, (((force, bonds), point), spent))| {
+                |s, (i, (((force, bonds), point), outcome))| {
                     let range = self.range(i);
                     if range.is_empty() {
                         return;
@@ -312,7 +333,8 @@ impl<const D: usize> Generic<D> {
                     let displaced = |j: usize| at(u, j);
                     let intact = |bond: usize| self.intact[bond];
                     let energy = self.respond(i, &displaced, intact, step, &self.past, s);
-                    *spent = energy.dissipated * self.volume[i];
+                    outcome.dissipated = energy.dissipated * self.volume[i];
+                    outcome.flow = self.flow(i, s);
                     force.fill(Vector::zeros());
                     point.copy_from_slice(&s.point);
                     for (e, &bond) in s.of.iter().enumerate() {
@@ -325,7 +347,7 @@ impl<const D: usize> Generic<D> {
             );
         self.force_state = force;
         self.present = present;
-        self.dissipated = dissipated;
+        self.outcome = outcome;
     }
 
     /// `−V_i Σ V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)` of the points with rows; without a family at the far end a pairwise law has the same bond there, any other no energy.
@@ -351,7 +373,7 @@ impl<const D: usize> Generic<D> {
     }
 
     /// Energy of a point \[J\] at once, from a history.
-    fn energy_of(
+    pub(super) fn energy_of(
         &self,
         i: usize,
         displaced: &dyn Fn(usize) -> Vector<D>,
@@ -390,8 +412,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         breakage: FailureUpdate,
     ) -> u64 {
         self.last.clear();
-        if breakage == FailureUpdate::Update && !self.limit.is_empty() {
-            self.last = self.overstretched(u);
+        if breakage == FailureUpdate::Update {
+            self.last = self.failing(u);
             for &(_, bond) in &self.last {
                 self.intact[bond] = false;
             }
@@ -403,8 +425,15 @@ impl<const D: usize> BondPass<D> for Generic<D> {
 
     fn commit(&mut self) -> f64 {
         self.past.clone_from(&self.present);
-        let own = self.dissipated.iter().zip(&self.row);
-        own.filter(|(_, row)| **row).map(|(d, _)| d).sum()
+        if let BondFailure::Tearing(tearing) = &mut self.failure {
+            let (intact, outcome) = (&self.intact, &self.outcome);
+            let flow = |i: usize| outcome[i].flow;
+            tearing.advance(&self.families, &self.volume, |bond| intact[bond], flow);
+        }
+        let own = self.outcome.iter().zip(&self.row);
+        own.filter(|(_, row)| **row)
+            .map(|(outcome, _)| outcome.dissipated)
+            .sum()
     }
 
     fn remembers(&self) -> bool {
@@ -461,21 +490,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
     }
 
     fn lost_energy(&self, displaced: &dyn Fn(usize) -> [f64; D]) -> f64 {
-        let displaced = |j: usize| Vector::from(displaced(j));
-        let mut scratch = Scratch::default();
-        let mut lost = 0.0;
-        for of_point in self.last.chunk_by(|a, b| a.0 == b.0) {
-            let i = of_point[0].0 as usize;
-            if !self.row[i] {
-                continue;
-            }
-            let broke = |bond: usize| of_point.iter().any(|l| l.1 == bond);
-            let before = |bond: usize| self.intact[bond] || broke(bond);
-            let after = |bond: usize| self.intact[bond];
-            lost += self.energy_of(i, &displaced, before, &self.past, &mut scratch)
-                - self.energy_of(i, &displaced, after, &self.past, &mut scratch);
-        }
-        lost
+        self.lost(displaced)
     }
 
     fn bonded(&self, i: usize, j: usize) -> bool {
@@ -484,42 +499,11 @@ impl<const D: usize> BondPass<D> for Generic<D> {
     }
 
     fn damage_state(&self) -> Vec<u64> {
-        let mut words = Vec::new();
-        if !self.limit.is_empty() {
-            let bits = self.intact.chunks(8).map(|eight| {
-                let set = eight.iter().enumerate();
-                set.fold(0u8, |byte, (k, intact)| byte | u8::from(*intact) << k)
-            });
-            words = super::pack(&bits.collect::<Vec<u8>>(), self.bonds());
-        }
-        let history = self.past.point.iter().chain(&self.past.bonds);
-        words.extend(history.map(|x| x.to_bits()));
-        words
+        self.words()
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
-        let kept = self.past.point.len() + self.past.bonds.len();
-        let Some(words) = state.len().checked_sub(kept) else {
-            return false;
-        };
-        let (words, history) = state.split_at(words);
-        let mut bits = vec![0u8; self.intact.len().div_ceil(8)];
-        match self.limit.is_empty() {
-            true if !words.is_empty() => return false,
-            true => {}
-            false if !super::unpack(words, self.bonds(), &mut bits) => return false,
-            false => {
-                for (bond, intact) in self.intact.iter_mut().enumerate() {
-                    *intact = bits[bond / 8] >> (bond % 8) & 1 == 1;
-                }
-            }
-        }
-        let own = self.past.point.iter_mut().chain(&mut self.past.bonds);
-        for (number, word) in own.zip(history) {
-            *number = f64::from_bits(*word);
-        }
-        self.present.clone_from(&self.past);
-        true
+        self.restore(state)
     }
 
     fn force_states(&self) -> Option<&dyn ForceStates<D>> {
@@ -531,7 +515,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         let vectors = self.position.len() + self.force_state.len();
         let history = 2 * (self.past.point.len() + self.past.bonds.len());
         vectors * D * 8
-            + (self.volume.len() * 2 + self.pair.len() + self.omega.len() + self.limit.len()) * 8
+            + (self.volume.len() * 2 + self.pair.len() + self.omega.len()) * 8
+            + (self.failure.numbers() + self.family_volume.len()) * 8
             + self.state.len() * std::mem::size_of::<Option<StatePart<D>>>()
             + self.families.offsets.len() * 8
             + bonds * 9
@@ -552,7 +537,7 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
             &mut s,
         );
         let own = i * self.layout.point.len()..(i + 1) * self.layout.point.len();
-        let parts = s.split(self.state[i].as_ref());
+        let parts = s.split(self.state[i].as_ref(), false);
         let past = Past {
             point: &self.past.point[own],
             bonds: parts.past,
@@ -581,6 +566,10 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
             points.map(|numbers| numbers[k]).collect()
         };
         let named = names.iter().enumerate();
-        named.map(|(k, name)| (*name, column(k))).collect()
+        let mut found: Vec<_> = named.map(|(k, name)| (*name, column(k))).collect();
+        if let BondFailure::Tearing(tearing) = &self.failure {
+            found.push(("tearing parameter", tearing.values().to_vec()));
+        }
+        found
     }
 }

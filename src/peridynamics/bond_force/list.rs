@@ -116,7 +116,8 @@ impl<const D: usize> List<D> {
             })),
         };
         let limit = match setup.failure.map(|f| f.critical) {
-            None => Limit::Never,
+            // a list has no law that flows
+            None | Some(super::CriticalStretch::TearingParameter(_)) => Limit::Never,
             Some(super::CriticalStretch::Uniform(_)) => {
                 Limit::Uniform(setup.limit(0, 0, &crate::tensor::Vector::zeros()))
             }

@@ -6,6 +6,7 @@
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
+//! | `generic_failure.rs` | what breaks its bonds |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
 //! | `list.rs`, `list_simd.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `compressed_list.rs` | neighbours and weights of a list in few bytes |
@@ -25,6 +26,7 @@ mod breaks;
 mod compressed_list;
 mod force_problem;
 mod generic;
+mod generic_failure;
 mod generic_tangent;
 #[cfg(test)]
 mod generic_tests;
@@ -150,6 +152,11 @@ pub fn bond_pass<const D: usize>(
     setup: &BondSetup<'_, D>,
 ) -> Result<Box<dyn BondPass<D>>, KernelError> {
     setup.check_lists()?;
+    let tears = (setup.failure.as_ref())
+        .is_some_and(|f| matches!(f.critical, CriticalStretch::TearingParameter(_)));
+    if tears && !setup.flows() {
+        return Err(KernelError::NoFlow);
+    }
     if let BondForce::Law { law, body } = setup.force {
         setup.check_bonds()?;
         let states = law

@@ -58,6 +58,10 @@ impl<const D: usize> Law<D> for BondBased<D> {
         true
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        true
+    }
+
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
         let c1111 = self.tensor.get(0, 0, 0, 0);
         Some(BondEnergy::Pairwise {

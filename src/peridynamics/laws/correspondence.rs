@@ -55,6 +55,10 @@ impl<const D: usize> Law<D> for Correspondence<D> {
         true
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        false
+    }
+
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         None
     }

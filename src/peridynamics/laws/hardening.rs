@@ -66,6 +66,10 @@ impl<const D: usize> Law<D> for Hardening<D> {
         false
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        true
+    }
+
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
         self.linear.bond_energy(horizon)
     }

@@ -9,12 +9,15 @@ use crate::{
         Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Past, Present,
     },
-    tensor::{Tensor, Vector, inverse},
+    tensor::{Tensor, Vector, inverse, least_eigenvalue},
 };
 
 /// Correspondence with a [`LocalLaw`]: `F̄ − I = Ḡ K⁻¹`, `T⟨ξ⟩ = ω P(F̄) K⁻¹ ξ + q ω (η − (F̄ − I) ξ)`, the stabilising term elastic.
 ///
-/// Source: [SAND2015-7998] section 7.2 (after \[Silling2007\]), with the first Piola–Kirchhoff stress of any local law. Its linearisation is [`Correspondence`] with the same constants.
+/// Source: [SAND2015-7998] section 7.2 (after \[Silling2007\]) and eq. (6.30), (6.32), with the first Piola–Kirchhoff stress of any local law. Its linearisation is [`Correspondence`] with the same constants.
+///
+/// Broken bonds drop out of `F̄` and K, and the stress falls with the damage, `σ = (1 − D) σ₀` (section 6.3), or what bonds are left would carry more. A family whose intact bonds no longer span the space
+/// ([`SPANNED`]) has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
 #[derive(Clone, Debug)]
 pub struct LocalCorrespondence<const D: usize> {
     name: &'static str,
@@ -69,8 +72,33 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
         false
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        true
+    }
+
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         None
+    }
+}
+
+/// Least share of the second moment K that intact bonds have to keep, along the direction along which they keep the least.
+pub const SPANNED: f64 = 0.05;
+
+/// `K⁻¹` of the intact bonds; none if they do not span the space.
+fn inverse_shape<const D: usize>(family: &DeformedFamily<'_, D>) -> Option<Tensor<D>> {
+    let whole = &family.state?.shape;
+    if family.is_whole {
+        return Some(inverse(whole)?.0);
+    }
+    let mut left = Tensor::<D>::zeros();
+    for (k, xi) in family.bonds.iter().enumerate() {
+        left += xi * xi.transpose() * (family.omega[k] * family.volumes[k]);
+    }
+    // K = L Lᵀ: the least eigenvalue of L⁻¹ K_left L⁻ᵀ
+    let (root, _) = inverse(&whole.cholesky()?.l())?;
+    match least_eigenvalue(&(root * left * root.transpose())) >= SPANNED {
+        true => Some(inverse(&left)?.0),
+        false => None,
     }
 }
 
@@ -78,7 +106,7 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
 fn displacement_gradient<const D: usize>(
     family: &DeformedFamily<'_, D>,
 ) -> Option<(Tensor<D>, Tensor<D>)> {
-    let (shape, _) = inverse(&family.state?.shape)?;
+    let shape = inverse_shape(family)?;
     let mut sum = Tensor::<D>::zeros();
     for (k, eta) in family.difference.iter().enumerate() {
         sum += eta * family.bonds[k].transpose() * (family.omega[k] * family.volumes[k]);
@@ -111,15 +139,19 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
             return energy;
         };
         let local = (self.local).respond(&gradient, step, past.point, present.point);
-        energy.stored = local.stored;
-        energy.dissipated = local.dissipated;
-        let through = local.stress * shape;
+        if let Some(principal) = present.principal_stress {
+            *principal = local.principal_stresses(&gradient, self.local.is_objective());
+        }
+        let left = 1.0 - family.damage;
+        energy.stored = left * local.stored;
+        energy.dissipated = left * local.dissipated;
+        let through = local.stress * shape * left;
         for (k, force) in force.iter_mut().enumerate() {
             let (xi, omega) = (family.bonds[k], family.omega[k]);
-            let left = family.difference[k] - gradient * xi;
-            let stabilising = left * state.stabilisation;
+            let beyond = family.difference[k] - gradient * xi;
+            let stabilising = beyond * state.stabilisation;
             *force = (through * xi + stabilising) * omega;
-            energy.stored += 0.5 * omega * stabilising.dot(&left) * family.volumes[k];
+            energy.stored += 0.5 * omega * stabilising.dot(&beyond) * family.volumes[k];
         }
         energy
     }
@@ -136,7 +168,7 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         };
         let mut present = past.point.to_vec();
         let found = (self.local).respond(&gradient, 0.0, past.point, &mut present);
-        found.cauchy(&gradient, self.local.is_objective())
+        found.cauchy(&gradient, self.local.is_objective()) * (1.0 - family.damage)
     }
 
     fn is_objective(&self) -> bool {

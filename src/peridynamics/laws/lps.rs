@@ -63,6 +63,10 @@ impl<const D: usize> Law<D> for LinearPeridynamicSolid<D> {
         true
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        true
+    }
+
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         Some(BondEnergy::Lps {
             influence: self.influence,

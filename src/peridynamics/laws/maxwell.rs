@@ -81,6 +81,10 @@ impl<const D: usize> Law<D> for Maxwell<D> {
         false
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        true
+    }
+
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
         self.linear.bond_energy(horizon)
     }

@@ -30,7 +30,7 @@ mod st_venant_kirchhoff;
 use std::sync::Arc;
 
 use crate::material::Kinematics;
-use crate::peridynamics::{Influence, Law};
+use crate::peridynamics::{Influence, Law, force_state::PLASTIC_STRAIN};
 
 pub use bond_based::BondBased;
 pub use correspondence::Correspondence;
@@ -220,8 +220,25 @@ macro_rules! named_laws {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::conflict(values),)* }
             }
 
-            /// Whether its bonds can break: what that costs is known ([`Law::bond_energy`]).
+            /// Whether its bonds can break.
             pub fn has_breakable_bonds(self) -> bool {
+                self.usual().has_breakable_bonds()
+            }
+
+            /// Whether what breaking its bonds costs is known ([`Law::bond_energy`]).
+            pub fn has_bond_energy(self) -> bool {
+                self.usual().bond_energy(1.0).is_some()
+            }
+
+            /// Whether its points remember a plastic strain.
+            pub fn flows(self) -> bool {
+                let law = self.usual();
+                let states = law.force_state();
+                states.is_some_and(|states| states.history().point.contains(&PLASTIC_STRAIN))
+            }
+
+            /// The law of a bar, with usual numbers.
+            fn usual(self) -> Arc<dyn Law<1>> {
                 let constants = Constants {
                     lambda: 0.5,
                     shear: 1.0,
@@ -229,7 +246,7 @@ macro_rules! named_laws {
                     kinematics: Kinematics::Bar,
                 };
                 let values: Vec<f64> = self.parameters().iter().map(|p| p.usual).collect();
-                self.build::<1>(constants, &values).bond_energy(1.0).is_some()
+                self.build::<1>(constants, &values)
             }
 
             /// The law; `values` are those of [`Named::parameters`].

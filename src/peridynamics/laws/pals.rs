@@ -110,6 +110,10 @@ impl<const D: usize> Law<D> for PositionAwareSolid<D> {
         true
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        true
+    }
+
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         // a continuous complete family is that of an LPS
         Some(BondEnergy::Lps {

@@ -154,6 +154,10 @@ impl<const D: usize> Law<D> for PositionAwareViscoelasticSolid<D> {
         false
     }
 
+    fn has_breakable_bonds(&self) -> bool {
+        true
+    }
+
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
         self.linear.bond_energy(horizon)
     }
@@ -258,6 +262,8 @@ mod tests {
             difference: &bonds,
             extension: &extension,
             direction: &direction,
+            is_whole: true,
+            damage: 0.0,
         };
         let respond = |law: &dyn ForceState<3>, numbers: usize| {
             let past = vec![0.0; numbers];
@@ -269,6 +275,7 @@ mod tests {
             let present = Present {
                 point: &mut [],
                 bonds: &mut present,
+                principal_stress: None,
             };
             let energy = law.respond(&family, 0.3, past, present, &mut force);
             (force, energy)

@@ -123,6 +123,7 @@ fn failure_text<const D: usize>(critical: Option<&Critical>, breaking: &Breaking
             let each: Vec<String> = each.collect();
             format!("bonds break at the stretch {}", each.join(", "))
         }
+        Critical::Tearing(p) => format!("bonds break at the tearing parameter {p}"),
     });
     match (stretches, breaking.fracture) {
         (Some(s), Some(Fracture::Energy(g))) => {
@@ -262,6 +263,7 @@ pub(crate) fn critical_stretch<const D: usize>(
     };
     let energy = match fracture {
         Fracture::Stretch(s) => return Ok(Some(Critical::Uniform(s))),
+        Fracture::Tearing(p) => return Ok(Some(Critical::Tearing(p))),
         Fracture::Energy(energy) => energy,
     };
     let mut list = Vec::new();
@@ -294,6 +296,11 @@ pub(crate) fn plane_energy<const D: usize>(
     let Some(critical) = critical_stretch(model, rest)? else {
         return Ok(None);
     };
+    let knows_energy =
+        (model.peridynamics.as_ref()).is_some_and(|p| p.law.bond_energy(1.0).is_some());
+    if matches!(critical, Critical::Tearing(_)) || !knows_energy {
+        return Ok(None);
+    }
     let planes = model.plane_energies()?;
     let [(horizon, per_square)] = planes[..] else {
         return Ok(None);

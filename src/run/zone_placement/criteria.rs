@@ -82,6 +82,8 @@ fn micromodulus<const D: usize>(material: &Material<D>, r: f64, horizon: f64) ->
 fn critical_stretch<const D: usize>(material: &Material<D>, horizon: f64) -> Option<f64> {
     match material.fracture? {
         Fracture::Stretch(s) => Some(s),
+        // where the material flows is not known from an elastic solution
+        Fracture::Tearing(_) => None,
         Fracture::Energy(energy) => {
             let bonds = material.law.bond_energy(horizon)?;
             let linear = bonds.critical_stretch::<D>(energy, horizon).ok()?;

@@ -133,15 +133,36 @@ impl JsonSchema for MaterialSpec {
 }
 
 impl MaterialSpec {
-    /// The key of a material whose bonds can break, with its fracture energy and critical stretch; the bonds of all others are known to first order only.
-    pub fn fracture(&self) -> Option<(&'static str, &Option<Number>, &Option<Number>)> {
-        match self {
-            Self::BondBased(m) => Some(("bond-based", &m.fracture_energy, &m.critical_stretch)),
-            Self::Lps(m) => Some(("lps", &m.fracture_energy, &m.critical_stretch)),
-            Self::Named(m) => Some((m.law.key(), &m.fracture_energy, &m.critical_stretch)),
-            Self::Correspondence(_) => None,
-        }
+    /// What breaks bonds of a material whose bonds can break; the bonds of all others are known to first order only.
+    pub fn fracture(&self) -> Option<FractureSpec<'_>> {
+        let (law, energy, stretch, tearing) = match self {
+            Self::BondBased(m) => ("bond-based", &m.fracture_energy, &m.critical_stretch, None),
+            Self::Lps(m) => ("lps", &m.fracture_energy, &m.critical_stretch, None),
+            Self::Named(m) => (
+                m.law.key(),
+                &m.fracture_energy,
+                &m.critical_stretch,
+                m.tearing_parameter.as_ref(),
+            ),
+            Self::Correspondence(_) => return None,
+        };
+        Some(FractureSpec {
+            law,
+            typed: [
+                ("fracture-energy", energy.as_ref()),
+                ("critical-stretch", stretch.as_ref()),
+                ("tearing-parameter", tearing),
+            ],
+        })
     }
+}
+
+/// What a material says of breaking bonds.
+pub struct FractureSpec<'a> {
+    /// The key of the material's law.
+    pub law: &'static str,
+    /// Keys, and what is typed.
+    pub typed: [(&'static str, Option<&'a Number>); 3],
 }
 
 /// The constants of a bond-based material.

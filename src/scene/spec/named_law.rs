@@ -24,6 +24,8 @@ pub struct NamedSpec {
     pub fracture_energy: Option<Number>,
     /// Stretch at which a bond breaks.
     pub critical_stretch: Option<Number>,
+    /// Tearing parameter at which a bond breaks.
+    pub tearing_parameter: Option<Number>,
     /// The set of cells that this material fills.
     pub cells: Option<Text>,
     /// What the law takes of its own, in the order of [`Named::parameters`]; none where one is left out that has a default.
@@ -40,7 +42,7 @@ pub enum Given {
 }
 
 /// Keys that materials of all laws have, with what they are.
-const COMMON: [(&str, &str); 6] = [
+const COMMON: [(&str, &str); 7] = [
     ("youngs-modulus", "Young's modulus E."),
     ("poisson-ratio", "Poisson's ratio."),
     ("density", "Density."),
@@ -51,6 +53,10 @@ const COMMON: [(&str, &str); 6] = [
     (
         "critical-stretch",
         "Stretch at which a bond breaks, instead of `fracture-energy`.",
+    ),
+    (
+        "tearing-parameter",
+        "Tearing parameter at which a bond breaks: the equivalent plastic strain at failure of a bar in tension.",
     ),
     ("cells", "The set of cells that this material fills."),
 ];
@@ -69,7 +75,9 @@ static FIELDS: LazyLock<Vec<Vec<&'static str>>> = LazyLock::new(|| {
 fn takes(law: Named, key: &str) -> bool {
     match key {
         "poisson-ratio" => law.ratio() == Ratio::Any,
-        "fracture-energy" | "critical-stretch" => law.has_breakable_bonds(),
+        "fracture-energy" => law.has_bond_energy(),
+        "critical-stretch" => law.has_breakable_bonds(),
+        "tearing-parameter" => law.flows(),
         _ => true,
     }
 }
@@ -100,12 +108,12 @@ impl<'de> Visitor<'de> for Seed {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<NamedSpec, A::Error> {
         let law = self.0;
         let parameters = law.parameters();
-        let mut common: [Option<Number>; 5] = Default::default();
+        let mut common: [Option<Number>; 6] = Default::default();
         let mut own: Vec<Option<Given>> = vec![None; parameters.len()];
         let mut cells: Option<Text> = None;
         while let Some(key) = map.next_key_seed(Key(law))? {
             match key {
-                Field::Common(5) => cells = Some(map.next_value()?),
+                Field::Common(6) => cells = Some(map.next_value()?),
                 Field::Common(k) => common[k] = Some(map.next_value()?),
                 Field::Own(k) if parameters[k].words.is_empty() => {
                     own[k] = Some(Given::Number(map.next_value()?));
@@ -119,6 +127,7 @@ impl<'de> Visitor<'de> for Seed {
             density,
             fracture_energy,
             critical_stretch,
+            tearing_parameter,
         ] = common;
         let missing = |key| <A::Error as de::Error>::missing_field(key);
         if law.ratio() == Ratio::Any && poisson_ratio.is_none() {
@@ -136,6 +145,7 @@ impl<'de> Visitor<'de> for Seed {
             density,
             fracture_energy,
             critical_stretch,
+            tearing_parameter,
             cells,
             parameters: own,
         })

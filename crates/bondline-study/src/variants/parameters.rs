@@ -104,7 +104,7 @@ impl Base {
         });
         let breaks = |m: &MaterialSpec| {
             let fracture = m.fracture();
-            fracture.is_some_and(|(_, energy, stretch)| energy.is_some() || stretch.is_some())
+            fracture.is_some_and(|f| f.typed.iter().any(|(_, number)| number.is_some()))
         };
         let solve = spec.solve.as_ref().map(|s| s.get_ref());
         let moves = !matches!(solve, None | Some(SolveSpec::Static(_)));

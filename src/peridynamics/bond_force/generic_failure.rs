@@ -1,0 +1,181 @@
+//! Failure of the bonds of the generic pass: what breaks them, what they stored, and how that is saved.
+
+use rayon::prelude::*;
+
+use super::{
+    BondSetup, CriticalStretch,
+    generic::{Generic, Scratch, at},
+};
+use crate::{
+    peridynamics::{
+        PdBody,
+        force_state::PLASTIC_STRAIN,
+        tearing_parameter::{Flow, TearingParameter, tension},
+    },
+    tensor::Vector,
+};
+
+/// What breaks bonds.
+pub(super) enum BondFailure {
+    /// Nothing.
+    Never,
+    /// The value of `t` of each bond.
+    Stretch(Vec<f64>),
+    /// The tearing parameter of its ends.
+    Tearing(TearingParameter),
+}
+
+impl BondFailure {
+    pub(super) fn new<const D: usize>(setup: &BondSetup<'_, D>, body: &PdBody<D>) -> Self {
+        let Some(failure) = setup.failure else {
+            return Self::Never;
+        };
+        let points = setup.position.len();
+        if let CriticalStretch::TearingParameter(critical) = failure.critical {
+            // of whole families: those of the pass may lack bonds that a seam has of its own
+            let whole = (0..points).map(|i| {
+                let far = body.families.of(i).iter();
+                setup.volume[i] + far.map(|j| setup.volume[*j as usize]).sum::<f64>()
+            });
+            let whole: Vec<f64> = whole.collect();
+            let horizon = &body.cloud.horizon;
+            return Self::Tearing(TearingParameter::new(critical, &whole, horizon));
+        }
+        let mut limit = Vec::with_capacity(setup.families.neighbours.len());
+        for i in 0..points {
+            for (k, &j) in setup.families.of(i).iter().enumerate() {
+                limit.push(setup.limit(i, k, &setup.bond(i, j as usize)));
+            }
+        }
+        Self::Stretch(limit)
+    }
+
+    /// Numbers that it keeps \[8 bytes\].
+    pub(super) fn numbers(&self) -> usize {
+        match self {
+            Self::Never => 0,
+            Self::Stretch(limit) => limit.len(),
+            Self::Tearing(tearing) => 2 * tearing.values().len(),
+        }
+    }
+}
+
+impl<const D: usize> Generic<D> {
+    /// Bonds that fail at these displacements; each end finds its own.
+    pub(super) fn failing(&self, u: &[f64]) -> Vec<(u32, usize)> {
+        let fails = |i: usize, bond: usize| match &self.failure {
+            BondFailure::Never => false,
+            BondFailure::Stretch(limit) => {
+                let j = self.neighbour(bond);
+                let s = self.stretched(i, j, &(at(u, j) - at(u, i)));
+                s.excess > limit[bond] * s.length
+            }
+            BondFailure::Tearing(tearing) => tearing.breaks(i, self.neighbour(bond)),
+        };
+        match &self.failure {
+            BondFailure::Never => return Vec::new(),
+            BondFailure::Tearing(tearing) if !tearing.is_reached() => return Vec::new(),
+            _ => {}
+        }
+        (0..self.position.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .flat_map_iter(|i| {
+                let free = self.range(i).filter(move |_| !self.no_fail[i]);
+                free.filter(move |&bond| {
+                    self.intact[bond] && !self.no_fail[self.neighbour(bond)] && fails(i, bond)
+                })
+                .map(move |bond| (i as u32, bond))
+            })
+            .collect()
+    }
+
+    /// Plastic flow of a point in a response that lies in the scratch, where a criterion asks for it.
+    pub(super) fn flow(&self, i: usize, s: &Scratch<D>) -> Flow {
+        let names = self.layout.point;
+        let place = names.iter().position(|name| *name == PLASTIC_STRAIN);
+        let (Some(place), BondFailure::Tearing(_)) = (place, &self.failure) else {
+            return Flow::default();
+        };
+        let strain = s.point[place];
+        Flow {
+            strain,
+            growth: strain - self.past.point[i * names.len() + place],
+            tension: tension(&s.principal_stress),
+        }
+    }
+
+    /// Energy that the points with rows would store less at these displacements, for the bonds that the last pass broke.
+    pub(super) fn lost(&self, displaced: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        let displaced = |j: usize| Vector::from(displaced(j));
+        let mut scratch = Scratch::default();
+        let mut lost = 0.0;
+        for of_point in self.last.chunk_by(|a, b| a.0 == b.0) {
+            let i = of_point[0].0 as usize;
+            if !self.row[i] {
+                continue;
+            }
+            let broke = |bond: usize| of_point.iter().any(|l| l.1 == bond);
+            let before = |bond: usize| self.intact[bond] || broke(bond);
+            let after = |bond: usize| self.intact[bond];
+            lost += self.energy_of(i, &displaced, before, &self.past, &mut scratch)
+                - self.energy_of(i, &displaced, after, &self.past, &mut scratch);
+        }
+        lost
+    }
+
+    /// Bonds that stand, history and tearing parameter.
+    pub(super) fn words(&self) -> Vec<u64> {
+        let mut words = Vec::new();
+        if !matches!(self.failure, BondFailure::Never) {
+            let bits = self.intact.chunks(8).map(|eight| {
+                let set = eight.iter().enumerate();
+                set.fold(0u8, |byte, (k, intact)| byte | u8::from(*intact) << k)
+            });
+            let bonds = self.intact.len() as u64;
+            words = super::pack(&bits.collect::<Vec<u8>>(), bonds);
+        }
+        let torn = match &self.failure {
+            BondFailure::Tearing(tearing) => tearing.values(),
+            _ => &[],
+        };
+        let history = self.past.point.iter().chain(&self.past.bonds).chain(torn);
+        words.extend(history.map(|x| x.to_bits()));
+        words
+    }
+
+    /// Puts them back; false, and nothing changed, if they belong to another pass.
+    pub(super) fn restore(&mut self, state: &[u64]) -> bool {
+        let torn = match &self.failure {
+            BondFailure::Tearing(tearing) => tearing.values().len(),
+            _ => 0,
+        };
+        let kept = self.past.point.len() + self.past.bonds.len() + torn;
+        let Some(words) = state.len().checked_sub(kept) else {
+            return false;
+        };
+        let (words, history) = state.split_at(words);
+        let mut bits = vec![0u8; self.intact.len().div_ceil(8)];
+        let bonds = self.intact.len() as u64;
+        match &self.failure {
+            BondFailure::Never if !words.is_empty() => return false,
+            BondFailure::Never => {}
+            _ if !super::unpack(words, bonds, &mut bits) => return false,
+            _ => {
+                for (bond, intact) in self.intact.iter_mut().enumerate() {
+                    *intact = bits[bond / 8] >> (bond % 8) & 1 == 1;
+                }
+            }
+        }
+        let torn = match &mut self.failure {
+            BondFailure::Tearing(tearing) => tearing.values_mut(),
+            _ => &mut [],
+        };
+        let own = self.past.point.iter_mut().chain(&mut self.past.bonds);
+        for (number, word) in own.chain(torn).zip(history) {
+            *number = f64::from_bits(*word);
+        }
+        self.present.clone_from(&self.past);
+        true
+    }
+}
