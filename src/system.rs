@@ -201,6 +201,11 @@ pub trait SemiDiscrete: Send + Sync {
         None
     }
 
+    /// Number of points whose intact bonds are too few for their law: they carry no stress of their own.
+    fn points_without_response(&self) -> usize {
+        0
+    }
+
     /// What the law remembers of each site, by name; zero for a site that remembers nothing.
     fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
         Vec::new()

@@ -452,6 +452,10 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.spent.area += spent.area;
     }
 
+    fn points_without_response(&self) -> usize {
+        self.count_without_response()
+    }
+
     fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
         self.stresses_of_points(u)
     }

@@ -132,6 +132,11 @@ pub trait ForceState<const D: usize>: Send + Sync {
         })
     }
 
+    /// Whether the intact bonds of a family are enough for a response; if not, its point carries no stress of its own. Runs tell how many do.
+    fn responds(&self, _family: &DeformedFamily<'_, D>) -> bool {
+        true
+    }
+
     /// Whether a rotation of the family rotates its force state: only such a law takes geometrically exact bonds.
     fn is_objective(&self) -> bool;
 

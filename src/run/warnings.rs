@@ -10,7 +10,7 @@ use crate::observe::report::number;
 use crate::scene::spec::CouplingTraits;
 use crate::shape::Barrier;
 use crate::solve::statics::MethodUsed;
-use crate::system::Symmetry;
+use crate::system::{SemiDiscrete, Symmetry};
 
 /// All doubts about a model.
 pub fn doubts<const D: usize>(model: &Model<D>, joining: CouplingTraits) -> Vec<String> {
@@ -26,6 +26,16 @@ pub(crate) fn warnings<const D: usize>(
 ) -> Vec<String> {
     let proved = proof.messages(Severity::Warning).map(str::to_owned);
     proved.chain(doubts(model, joining)).collect()
+}
+
+/// Points of a torn body whose law no longer responds.
+pub(crate) fn without_response(system: &dyn SemiDiscrete) -> Option<String> {
+    let points = system.points_without_response();
+    (points > 0).then(|| {
+        format!(
+            "{points} points have lost so many bonds that what is left does not span their surroundings: they have no deformation gradient, carry no stress of their own, and follow the bonds of their neighbours"
+        )
+    })
 }
 
 /// The out-of-balance force, relative to the sum of all nodal loads and reactions, from which on it is told.

@@ -6,6 +6,7 @@ use std::process::Command;
 
 mod contact;
 mod driven;
+mod ductile;
 mod faults;
 mod follow;
 mod growth;

@@ -210,11 +210,11 @@ fn a_bar_of_elements_goes_on_from_its_checkpoint_with_what_flowed() {
 fn what_cannot_yield_on_both_sides_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |typed: &str, part: &str| refused(folder.path(), typed, part);
-    // its bonds do not break: what that costs is not known
-    let breaking = format!("{}\ncritical-stretch = 0.02", law());
+    // what breaking its bonds costs is not known
+    let breaking = format!("{}\nfracture-energy = 0.02", law());
     refused(
         &scene("nonlocal", &breaking, STEPS),
-        "`critical-stretch` is not known",
+        "`fracture-energy` is not known",
     );
     let still = |coupling: &str| scene(coupling, &law(), "").replace("\"0.1*t\"", "0.1");
     refused(&still("local"), "a static scene has no time");

@@ -43,6 +43,12 @@ impl<const D: usize> CoupledSystem<'_, D> {
         Some(sites)
     }
 
+    /// See [`crate::system::SemiDiscrete::points_without_response`].
+    pub(super) fn count_without_response(&self) -> usize {
+        let states = self.body.as_ref().and_then(|b| b.pass.force_states());
+        states.map_or(0, |s| s.points_without_response())
+    }
+
     /// See [`crate::system::SemiDiscrete::remembered`].
     pub(super) fn remembered_by_points(&self) -> Vec<(&'static str, Vec<f64>)> {
         let Some(body) = &self.body else {

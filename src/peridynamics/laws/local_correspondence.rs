@@ -171,6 +171,10 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         found.cauchy(&gradient, self.local.is_objective()) * (1.0 - family.damage)
     }
 
+    fn responds(&self, family: &DeformedFamily<'_, D>) -> bool {
+        inverse_shape(family).is_some()
+    }
+
     fn is_objective(&self) -> bool {
         self.local.is_objective()
     }

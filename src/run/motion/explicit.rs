@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::loads;
 use crate::run::setup::RunSettings;
-use crate::run::warnings::{locking, warnings};
+use crate::run::warnings::{locking, warnings, without_response};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
@@ -277,6 +277,7 @@ impl SegmentRecord {
         self.proof.parts.extend(self.growth.take());
         let mut told = warnings(model, self.joining, &self.proof);
         told.extend(locking(model, &rest.local_laws));
+        told.extend(without_response(motion.system()));
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
         told.extend(rotation.as_ref().map(Rotation::warning));
         let files = observer.recorder.files();

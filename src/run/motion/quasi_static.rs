@@ -25,7 +25,7 @@ use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
-use crate::run::warnings::{locking, warnings};
+use crate::run::warnings::{locking, warnings, without_response};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
 use crate::scene::validated::Scene;
@@ -116,6 +116,7 @@ fn load_steps<const D: usize>(
     let summary = observer.summary(system.as_ref(), info.iterations, first, seconds)?;
     let mut told = warnings(model, laid_out.joining, &laid_out.proof);
     told.extend(locking(model, &rest.local_laws));
+    told.extend(without_response(system.as_ref()));
     told.extend(summary.rotation.as_ref().map(Rotation::warning));
     Ok(RunSummary {
         scene: laid_out.title,

@@ -1,0 +1,188 @@
+//! Ductile bodies in large strains, and how they tear, through scenes.
+
+use crate::laws::{STEPS, history, refused, scene, summary};
+use crate::{column, run, same, write};
+
+const YOUNG: f64 = 1000.0;
+
+/// A bar of a law for large strains; `rest` is the criterion that breaks its bonds.
+fn law(yields: f64, hardening: f64, rest: &str) -> String {
+    format!(
+        "plastic-correspondence]\npoisson-ratio = 0.3\nyield-stress = {yields}\nhardening-modulus = {hardening}\nstrains = \"large\"\n{rest}"
+    )
+}
+
+#[test]
+fn a_bar_pulled_to_a_third_more_of_its_length_has_the_curve_of_true_stress() {
+    let (yields, hardening) = (5.0, 250.0);
+    let tangent = YOUNG * hardening / (YOUNG + hardening);
+    for coupling in ["local", "splice"] {
+        let folder = tempfile::tempdir().unwrap();
+        let steps = STEPS.replace("steps = 5", "steps = 20");
+        let typed = scene(coupling, &law(yields, hardening, ""), &steps).replace("0.1*t", "3*t");
+        let found = history(folder.path(), &typed, &["a_ux", "b_ux", "right_reaction_x"]);
+        for k in 1..=20 {
+            let stretch = 1.0 + (found[1][k] - found[0][k]) / 0.9;
+            let strain = stretch.ln();
+            let kirchhoff = (YOUNG * strain).min(yields + tangent * (strain - yields / YOUNG));
+            let expected = kirchhoff / stretch;
+            let reaction = found[2][k];
+            assert!(
+                (reaction - expected).abs() < 1e-6 * expected,
+                "{coupling} {k}: {reaction} {expected}"
+            );
+        }
+        assert!(found[2][20] > 40.0);
+    }
+}
+
+/// A bar in motion whose ends are pulled apart; the middle may tear.
+fn torn(criterion: &str) -> String {
+    let rest = "[initial.u.velocity]\nx = \"0.2*(x - 5)\"\n[no-fail.ends]\nany = [{ box = { min = 0, max = 3 } }, { box = { min = 7, max = 10 } }]\n[solve.explicit]\nduration = 1.5\noutputs = 6\nhistory-interval = 0.01\ncheckpoint-every = 100\n";
+    scene("nonlocal", &law(5.0, 5.0, criterion), rest)
+        .replace("x = 0\n[conditions.right", "x = \"-t\"\n[conditions.right")
+        .replace("0.1*t", "t")
+}
+
+#[test]
+fn a_bar_tears_where_its_plastic_strain_reaches_the_tearing_parameter() {
+    // uniaxial tension: P is the equivalent plastic strain
+    const CRITICAL: f64 = 0.12;
+    let folder = tempfile::tempdir().unwrap();
+    write(
+        folder.path(),
+        "bar.toml",
+        &torn(&format!("tearing-parameter = {CRITICAL}")),
+    );
+    let said = run(folder.path(), &["bar.toml"]);
+    assert!(
+        said.contains("bonds break at the tearing parameter 0.12"),
+        "{said}"
+    );
+    let path = folder.path().join("out/bar_history.csv");
+    let [time, broken, a, b] =
+        ["time", "broken_bonds", "a_ux", "b_ux"].map(|name| column(&path, name));
+    let first = broken.iter().position(|b| *b > 0.0).expect("nothing tore");
+    // between the probes the bar is pulled evenly: what is not elastic is plastic
+    let plastic = |k: usize| (1.0 + (b[k] - a[k]) / 0.9).ln() - 5.0 / YOUNG;
+    assert!(
+        plastic(first - 1) < 1.02 * CRITICAL && plastic(first) > 0.98 * CRITICAL,
+        "{} {} {}",
+        time[first],
+        plastic(first - 1),
+        plastic(first)
+    );
+    accounts_for_its_energy(&path, 0.02);
+}
+
+/// What the loads did, and what moved at the start, is stored, moves, or is dissipated, to a part of it.
+fn accounts_for_its_energy(history: &std::path::Path, tolerance: f64) {
+    let [kinetic, stored, work, dissipated] = [
+        "kinetic_energy",
+        "stored_energy",
+        "external_work",
+        "dissipated_energy",
+    ]
+    .map(|name| column(history, name));
+    let last = work.len() - 1;
+    let supplied = kinetic[0] + stored[0] + work[last];
+    let off = supplied - kinetic[last] - stored[last] - dissipated[last];
+    assert!(
+        off.abs() < tolerance * supplied,
+        "{off} of {supplied}, {} dissipated",
+        dissipated[last]
+    );
+}
+
+#[test]
+fn a_bar_that_tears_goes_on_from_its_checkpoint() {
+    let typed = torn("tearing-parameter = 0.12");
+    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for folder in [whole.path(), parts.path()] {
+        write(folder, "bar.toml", &typed);
+        run(folder, &["bar.toml"]);
+    }
+    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
+    let mut files = files.map(|e| e.unwrap().path());
+    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
+    let previous = previous.expect("two checkpoints");
+    std::fs::rename(&previous, previous.with_extension("")).unwrap();
+    let said = run(parts.path(), &["bar.toml", "--resume"]);
+    assert!(said.contains("resumed after step"), "{said}");
+    same(&whole.path().join("out"), &parts.path().join("out"));
+}
+
+/// A plate of Neo-Hooke that is pulled in two by its ends.
+const PLATE: &str = r#"
+kinematics = "plane-strain"
+coupling = "nonlocal"
+mesh.rectangle = { min = [0, 0], max = [12, 4], x = { cells = 24 }, y = { cells = 8 } }
+[materials.m.neo-hooke]
+youngs-modulus = 1000
+poisson-ratio = 0.3
+density = 1
+critical-stretch = 0.1
+[peridynamics]
+horizon = 1.5
+points.lattice = { spacing = 0.5, origin = [0.25, 0.25] }
+[no-fail.ends]
+any = [{ box = { min = [0, 0], max = [2, 4] } }, { box = { min = [10, 0], max = [12, 4] } }]
+[initial.u.velocity]
+x = "2*(x - 6)"
+[conditions.left.velocity]
+inside.box = { min = [0, 0], max = [1.5, 4] }
+x = "2*(x - 6)"
+y = 0
+[conditions.right.velocity]
+inside.box = { min = [10.5, 0], max = [12, 4] }
+x = "2*(x - 6)"
+y = 0
+[solve.explicit]
+duration = 0.5
+outputs = 2
+"#;
+
+#[test]
+fn a_torn_plate_accounts_for_its_energy_and_tells_of_points_without_a_gradient() {
+    let folder = tempfile::tempdir().unwrap();
+    let summary = summary(folder.path(), PLATE);
+    let path = folder.path().join("out/scene_history.csv");
+    assert!(*column(&path, "broken_bonds").last().unwrap() > 100.0);
+    accounts_for_its_energy(&path, 0.02);
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("no deformation gradient"), "{warnings}");
+    // the halves are no longer strained
+    let force = column(&path, "right_reaction_x");
+    let largest = force.iter().fold(0.0f64, |m, f| m.max(f.abs()));
+    assert!(largest > 100.0, "{largest}");
+}
+
+#[test]
+fn criteria_that_a_law_does_not_have_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |typed: &str, part: &str| refused(folder.path(), typed, part);
+    refused(
+        &scene(
+            "nonlocal",
+            "lps]\npoisson-ratio = 0.2\ntearing-parameter = 1",
+            STEPS,
+        ),
+        "`tearing-parameter` is not known",
+    );
+    let elastic = "neo-hooke]\npoisson-ratio = 0.2\ntearing-parameter = 1";
+    refused(
+        &scene("nonlocal", elastic, STEPS),
+        "`tearing-parameter` is not known",
+    );
+    let both = law(5.0, 5.0, "tearing-parameter = 1\ncritical-stretch = 0.1");
+    refused(&scene("nonlocal", &both, STEPS), "at once");
+    let energy = law(5.0, 5.0, "fracture-energy = 1");
+    refused(
+        &scene("nonlocal", &energy, STEPS),
+        "`fracture-energy` is not known",
+    );
+    let zero = law(5.0, 5.0, "tearing-parameter = 0");
+    refused(&scene("nonlocal", &zero, STEPS), "must be positive");
+    let strange = law(5.0, 5.0, "").replace("large", "huge");
+    refused(&scene("nonlocal", &strange, STEPS), "\"small\", \"large\"");
+}
