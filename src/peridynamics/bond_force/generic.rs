@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{
     BondPass, BondSetup, ForceStates, Kinematics,
-    generic_failure::BondFailure,
+    bond_failure::BondFailure,
     list::{extension, ratio, stretched},
 };
 use crate::{

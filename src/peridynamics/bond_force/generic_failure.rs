@@ -1,64 +1,18 @@
-//! Failure of the bonds of the generic pass: what breaks them, what they stored, and how that is saved.
+//! Failure in the generic pass: which bonds break, what they stored, and how that is saved.
 
 use rayon::prelude::*;
 
 use super::{
-    BondSetup, CriticalStretch,
+    bond_failure::BondFailure,
     generic::{Generic, Scratch, at},
 };
 use crate::{
     peridynamics::{
-        PdBody,
         force_state::PLASTIC_STRAIN,
-        tearing_parameter::{Flow, TearingParameter, tension},
+        tearing_parameter::{Flow, tension},
     },
     tensor::Vector,
 };
-
-/// What breaks bonds.
-pub(super) enum BondFailure {
-    /// Nothing.
-    Never,
-    /// The value of `t` of each bond.
-    Stretch(Vec<f64>),
-    /// The tearing parameter of its ends.
-    Tearing(TearingParameter),
-}
-
-impl BondFailure {
-    pub(super) fn new<const D: usize>(setup: &BondSetup<'_, D>, body: &PdBody<D>) -> Self {
-        let Some(failure) = setup.failure else {
-            return Self::Never;
-        };
-        let points = setup.position.len();
-        if let CriticalStretch::TearingParameter(critical) = failure.critical {
-            // of whole families: those of the pass may lack bonds that a seam has of its own
-            let whole = (0..points).map(|i| {
-                let far = body.families.of(i).iter();
-                setup.volume[i] + far.map(|j| setup.volume[*j as usize]).sum::<f64>()
-            });
-            let whole: Vec<f64> = whole.collect();
-            let horizon = &body.cloud.horizon;
-            return Self::Tearing(TearingParameter::new(critical, &whole, horizon));
-        }
-        let mut limit = Vec::with_capacity(setup.families.neighbours.len());
-        for i in 0..points {
-            for (k, &j) in setup.families.of(i).iter().enumerate() {
-                limit.push(setup.limit(i, k, &setup.bond(i, j as usize)));
-            }
-        }
-        Self::Stretch(limit)
-    }
-
-    /// Numbers that it keeps \[8 bytes\].
-    pub(super) fn numbers(&self) -> usize {
-        match self {
-            Self::Never => 0,
-            Self::Stretch(limit) => limit.len(),
-            Self::Tearing(tearing) => 2 * tearing.values().len(),
-        }
-    }
-}
 
 impl<const D: usize> Generic<D> {
     /// Bonds that fail at these displacements; each end finds its own.

@@ -6,7 +6,7 @@
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
-//! | `generic_failure.rs` | what breaks its bonds |
+//! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
 //! | `list.rs`, `list_simd.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `compressed_list.rs` | neighbours and weights of a list in few bytes |
@@ -21,6 +21,7 @@
 //! `s = √(1 + t) − 1` exceeds `s_c` exactly where `t > s_c (2 + s_c)`, without a root. Both ends of a bond compute the same `t` from the same numbers,
 //! hence break together without telling each other. Every method gives the same bits for any number of threads.
 
+mod bond_failure;
 pub(crate) mod bond_list;
 mod breaks;
 mod compressed_list;
