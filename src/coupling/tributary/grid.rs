@@ -119,7 +119,8 @@ impl<'a, const D: usize> Grid<'a, D> {
 
     /// Sites and weights of a place: exact for affine fields, from its own side of cracks. Empty if there is no site around.
     ///
-    /// The cube of lattice points around the place interpolates; where one of its corners is neither a point nor in an element, the nearest whole cube extrapolates.
+    /// The cube of lattice points around the place interpolates; where one of its corners is neither a point nor in an element, the nearest whole cube extrapolates. A point that is a corner of no such cube, as on curved surfaces, takes
+    /// its neighbours along the axes: its own cell is not left to others, or it would stand for nothing.
     pub fn place(&self, x: &Vector<D>) -> Vec<Follows<D>> {
         let h = self.cells.spacing;
         let local: Vector<D> = (x - self.cells.origin) / h;
@@ -139,15 +140,40 @@ impl<'a, const D: usize> Grid<'a, D> {
         let near = self.shifts.iter().filter(|s| is_near(s));
         let mut order: Vec<(f64, &[i32; D])> = near.map(|s| (away(s), s)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1)));
+        let index = self.cells.index(x);
+        let own = self.site(&index).filter(|&site| {
+            let there = self.model.sites[site as usize].position;
+            !self.hides(x, &there)
+        });
         for is_strict in [true, false] {
             for (_, shift) in &order {
                 let from = std::array::from_fn(|i| base[i] + shift[i]);
                 if let Some(found) = self.in_cube(x, &local, &from, is_strict) {
-                    return found;
+                    let has_own = |site: u32| found.iter().any(|f| f.0 == site && f.1 != 0.0);
+                    return match own.filter(|&site| !has_own(site)) {
+                        None => found,
+                        Some(site) => self.along_axes(x, &index, site).unwrap_or(found),
+                    };
                 }
             }
         }
         self.fitted(x)
+    }
+
+    /// The weights of a place in the cell of a point, from this point and its neighbours along the axes; none if it has no neighbour along an axis.
+    fn along_axes(&self, x: &Vector<D>, index: &[i32; D], site: u32) -> Option<Vec<Follows<D>>> {
+        let off = x - self.cells.centre(index);
+        let mut found = self.own(index, site);
+        for axis in 0..D {
+            let has_slope = found.iter().any(|f| f.2[axis] != 0.0);
+            if !has_slope && off[axis].abs() > NO_WEIGHT * self.cells.spacing {
+                return None;
+            }
+        }
+        for (_, weight, gradient) in &mut found {
+            *weight += gradient.dot(&off);
+        }
+        Some(found)
     }
 
     /// The weights that the cube of the lattice from `base` on gives a place; none if a corner is missing or hidden that has one, or with `is_strict` that any gradient needs.
