@@ -32,6 +32,7 @@ pub mod accuracy_control;
 pub mod balance;
 pub mod bar;
 pub mod bobaru;
+pub mod continuum_damage;
 pub mod convergence;
 pub mod emmrich_weckner;
 pub mod enclosed;
@@ -110,6 +111,11 @@ pub const SUITES: &[Suite] = &[
         name: "pals",
         about: "SAND2015-7998 section 4.2: energies of a position-aware solid at surfaces, Young's modulus of a tension bar (figure 4.2)",
         run: position_aware::run,
+    },
+    Suite {
+        name: "damage",
+        about: "SAND2015-7998 section 6.2: continuum damage of a bar, and of the plate with a hole (6.2.5) beside bonds that break by their stretch",
+        run: continuum_damage::run,
     },
     Suite {
         name: "layers",

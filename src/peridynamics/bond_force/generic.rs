@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{
-    BondPass, BondSetup, ForceStates, Kinematics,
+    BondPass, BondSetup, Failure, ForceStates, Kinematics,
     list::{extension, ratio, stretched},
 };
 use crate::{
@@ -24,15 +24,15 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// What points and bonds remember; bonds in the order of the families.
 #[derive(Clone, Default)]
-struct History {
+pub(super) struct History {
     point: Vec<f64>,
-    bonds: Vec<f64>,
+    pub(super) bonds: Vec<f64>,
 }
 
 /// The pass over force states: some hundred bytes per directed bond.
 pub(super) struct Generic<const D: usize> {
     pub(super) law: Arc<dyn Law<D>>,
-    layout: HistoryLayout,
+    pub(super) layout: HistoryLayout,
     pub(super) position: Vec<Vector<D>>,
     pub(super) volume: Vec<f64>,
     pub(super) row: Vec<bool>,
@@ -47,19 +47,22 @@ pub(super) struct Generic<const D: usize> {
     limit: Vec<f64>,
     kinematics: Kinematics,
     pub(super) intact: Vec<bool>,
+    /// Bonds that were told to be broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
+    pub(super) damaged_through: Vec<bool>,
     /// Committed, and at the end of the last force.
-    past: History,
-    present: History,
+    pub(super) past: History,
+    pub(super) present: History,
     /// Energy that each point dissipated in the last force \[J\].
     dissipated: Vec<f64>,
     /// Points and bonds, counted over all families, that the last force broke.
-    last: Vec<(u32, usize)>,
+    pub(super) last: Vec<(u32, usize)>,
     /// `T⟨ξ⟩` of every bond, kept between passes.
     force_state: Vec<Vector<D>>,
 }
 
 /// One deformed family in memory that the next one takes over.
 struct Scratch<const D: usize> {
+    keeps_damage: bool,
     bonds: Vec<Vector<D>>,
     volumes: Vec<f64>,
     pair: Vec<f64>,
@@ -95,6 +98,7 @@ impl<const D: usize> Scratch<D> {
                 difference: &self.difference,
                 extension: &self.extension,
                 direction: &self.direction,
+                keeps_damage: self.keeps_damage,
             },
             past: &self.past,
             present: Present {
@@ -109,6 +113,7 @@ impl<const D: usize> Scratch<D> {
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
         Self {
+            keeps_damage: false,
             bonds: Vec::new(),
             volumes: Vec::new(),
             pair: Vec::new(),
@@ -140,6 +145,8 @@ impl<const D: usize> Generic<D> {
         let (mut pair, mut omega) = (Vec::with_capacity(bonds), Vec::new());
         let mut reverse = Vec::with_capacity(bonds);
         let mut limit = Vec::new();
+        // bonds may break by their damage alone
+        let breaks = setup.failure.filter(Failure::has_limit).is_some();
         let mut intact = Vec::with_capacity(bonds);
         for i in 0..points {
             for (k, &j) in families.of(i).iter().enumerate() {
@@ -152,7 +159,7 @@ impl<const D: usize> Generic<D> {
                 let back = families.of(j as usize).binary_search(&(i as u32));
                 let start = families.offsets[j as usize] as u32;
                 reverse.push(back.map_or(NONE, |k| start + k as u32));
-                if setup.failure.is_some() {
+                if breaks {
                     limit.push(setup.limit(i, k, &setup.bond(i, j as usize)));
                 }
                 intact.push(!setup.precracked.is_some_and(|cut| cut(i, j as usize)));
@@ -162,6 +169,7 @@ impl<const D: usize> Generic<D> {
             point: vec![0.0; points * layout.point.len()],
             bonds: vec![0.0; bonds * layout.bond.len()],
         };
+        let damaged_through = vec![false; layout.damage.map_or(0, |_| bonds)];
         Self {
             law: Arc::clone(law),
             layout,
@@ -176,6 +184,7 @@ impl<const D: usize> Generic<D> {
             limit,
             kinematics: setup.kinematics,
             intact,
+            damaged_through,
             present: past.clone(),
             past,
             dissipated: vec![0.0; points],
@@ -245,6 +254,7 @@ impl<const D: usize> Generic<D> {
         }
         s.of.clear();
         s.past.clear();
+        s.keeps_damage = self.no_fail[i];
         let kept = self.layout.bond.len();
         for bond in self.range(i).filter(|&bond| counts(bond)) {
             let j = self.neighbour(bond);
@@ -397,6 +407,9 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             }
         }
         self.respond_all(u, interval.length);
+        if breakage == FailureUpdate::Update {
+            self.find_damaged_through();
+        }
         self.gather(&self.force_state, force);
         self.last.len() as u64
     }
@@ -436,22 +449,17 @@ impl<const D: usize> BondPass<D> for Generic<D> {
 
     fn damage_into(&self, damage: &mut [f64]) {
         for (i, damage) in damage.iter_mut().enumerate() {
-            let (mut all, mut lost) = (0.0, 0.0);
-            for bond in self.range(i) {
-                let v = self.volume[self.neighbour(bond)];
-                all += v;
-                lost += if self.intact[bond] { 0.0 } else { v };
-            }
-            *damage = if lost > 0.0 { lost / all } else { 0.0 };
+            *damage = self.damage_of_point(i);
         }
     }
 
     fn is_damaged(&self, i: usize) -> bool {
-        self.range(i).any(|bond| !self.intact[bond])
+        self.range(i).any(|bond| self.damage_of(bond) > 0.0)
     }
 
     fn broken(&self) -> u64 {
-        self.intact.iter().filter(|intact| !**intact).count() as u64
+        let broken = (0..self.intact.len()).filter(|&bond| !self.stands(bond));
+        broken.count() as u64
     }
 
     fn last_broken(&self) -> Vec<(u32, u32)> {
@@ -480,7 +488,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
 
     fn bonded(&self, i: usize, j: usize) -> bool {
         let place = self.families.of(i).binary_search(&(j as u32));
-        place.is_ok_and(|k| self.intact[self.range(i).start + k])
+        place.is_ok_and(|k| self.stands(self.range(i).start + k))
     }
 
     fn damage_state(&self) -> Vec<u64> {
@@ -519,6 +527,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             *number = f64::from_bits(*word);
         }
         self.present.clone_from(&self.past);
+        self.recall_damaged_through();
         true
     }
 
@@ -535,6 +544,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             + self.state.len() * std::mem::size_of::<Option<StatePart<D>>>()
             + self.families.offsets.len() * 8
             + bonds * 9
+            + self.damaged_through.len()
             + self.row.len() * 2
             + history * 8
     }

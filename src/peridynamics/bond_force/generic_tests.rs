@@ -180,16 +180,21 @@ fn consistent<const D: usize>(counts: [usize; D]) {
                 };
                 // what is stored, and what is dissipated on the way there
                 let state = pass.damage_state();
+                let along = |force: &[f64]| -> f64 {
+                    force.iter().zip(&direction).map(|(f, d)| f * d).sum()
+                };
                 let mut spent = |s: f64| {
                     pass.force_into(&at(s), &mut minus, now, FailureUpdate::Frozen);
                     let dissipated = pass.commit();
                     let sum = pass.stored_energy(&at(s)) + dissipated;
                     assert!(pass.restore_damage(&state), "{name}");
-                    sum
+                    (sum, along(&minus))
                 };
-                let slope = (spent(1e-5) - spent(-1e-5)) / 2e-5;
+                let (forward, backward) = (spent(1e-5), spent(-1e-5));
+                let slope = (forward.0 - backward.0) / 2e-5;
                 pass.force_into(&u, &mut plus, now, FailureUpdate::Frozen);
-                let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
+                // the slope of the force may be another one on either side: the trapezoidal rule on each
+                let work = 0.5 * along(&plus) + 0.25 * (forward.1 + backward.1);
                 assert!(
                     (slope - work).abs() < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
                     "{name}: force is no derivative of the energy, {slope} {work}"
@@ -310,5 +315,93 @@ fn rotations_turn_the_forces_and_histories_go_on_from_a_checkpoint() {
         assert_eq!(begun(Some(&state), &u).0, force, "{}", law.name());
         let kept = law.force_state().is_some_and(|f| !f.history().is_empty());
         assert_eq!(!state.is_empty(), kept, "{}", law.name());
+    }
+}
+
+#[test]
+fn damage_that_laws_keep_of_their_bonds_is_shown_counted_and_put_back() {
+    let case = case([9, 8], 0.2, false);
+    let (points, n) = (case.position.len(), case.position.len() * 2);
+    let held: Vec<bool> = (0..points).map(|i| i % 7 == 0).collect();
+    let laws = laws_with_states::<2>();
+    assert!(laws.iter().any(|law| law.damages()));
+    for law in laws.iter().filter(|law| law.damages()) {
+        let name = law.name();
+        let run = |no_fail: &[bool], size: f64, state: Option<&[u64]>| {
+            let failure = Failure {
+                critical: CriticalStretch::Uniform(f64::INFINITY),
+                no_fail,
+            };
+            let kinematics = Kinematics::Linear;
+            with_law(&case, law, kinematics, Some(failure), false, |mut pass| {
+                let u = noise(n, size * H, 8);
+                let mut force = vec![0.0; n];
+                let mut count = 0;
+                match state {
+                    Some(state) => assert!(pass.restore_damage(state), "{name}"),
+                    None => {
+                        // frozen trials show nothing
+                        pass.force_into(
+                            &noise(n, 9.0 * H, 3),
+                            &mut force,
+                            LATER,
+                            FailureUpdate::Frozen,
+                        );
+                        count = pass.force_into(&u, &mut force, LATER, FailureUpdate::Update);
+                        assert_eq!(pass.last_broken().len() as u64, count, "{name}");
+                        let lost = pass.lost_energy(&|i| [u[2 * i], u[2 * i + 1]]);
+                        assert_eq!(lost, 0.0, "{name}: damage has been accounted for");
+                        pass.commit();
+                        // what was counted is not counted again
+                        assert_eq!(
+                            pass.force_into(&u, &mut force, LATER, FailureUpdate::Update),
+                            0
+                        );
+                        pass.commit();
+                    }
+                }
+                let mut damage = vec![f64::NAN; points];
+                pass.damage_into(&mut damage);
+                let flags: Vec<bool> = (0..points).map(|i| pass.is_damaged(i)).collect();
+                assert!(
+                    flags.iter().zip(&damage).all(|(f, d)| *f == (*d > 0.0)),
+                    "{name}"
+                );
+                let bonds =
+                    (0..points).flat_map(|i| case.families.of(i).iter().map(move |&j| (i, j)));
+                let gone = bonds.filter(|&(i, j)| !pass.bonded(i, j as usize)).count() as u64;
+                assert_eq!(pass.broken(), gone, "{name}");
+                (damage, force, count, gone, pass.damage_state())
+            })
+        };
+        // a little, half-way, and through
+        let (damage, _, count, gone, _) = run(&[], 1e-4, None);
+        assert!(
+            damage.iter().all(|d| *d == 0.0) && count == 0 && gone == 0,
+            "{name}"
+        );
+        let (damage, _, _, _, state) = run(&[], 0.05, None);
+        let partly = damage.iter().filter(|d| **d > 0.0 && **d < 1.0).count();
+        assert!(2 * partly > points, "{name}: {partly}");
+        assert_eq!(run(&[], 0.05, Some(&state)).0, damage, "{name}");
+        let (damage, force, count, gone, state) = run(&[], 5.0, None);
+        assert!(
+            damage.iter().all(|d| *d == 1.0) && count == gone && gone > 0,
+            "{name}"
+        );
+        assert!(force.iter().all(|f| *f == 0.0), "{name}");
+        assert_eq!(run(&[], 5.0, Some(&state)).3, gone, "{name}");
+        // points that keep their damage hold on to their neighbours
+        let (damage, force, _, fewer, _) = run(&held, 5.0, None);
+        assert!(
+            held.iter()
+                .zip(&damage)
+                .all(|(held, d)| *held == (*d == 0.0)),
+            "{name}"
+        );
+        assert!(
+            fewer > 0 && fewer < gone && force.iter().any(|f| *f != 0.0),
+            "{name}"
+        );
     }
 }

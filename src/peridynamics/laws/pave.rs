@@ -164,6 +164,7 @@ impl<const D: usize> ForceState<D> for PositionAwareViscoelasticSolid<D> {
         HistoryLayout {
             point: &[],
             bond: &HISTORY[..=self.arms.len()],
+            damage: None,
         }
     }
 
@@ -258,6 +259,7 @@ mod tests {
             difference: &bonds,
             extension: &extension,
             direction: &direction,
+            keeps_damage: false,
         };
         let respond = |law: &dyn ForceState<3>, numbers: usize| {
             let past = vec![0.0; numbers];

@@ -1,7 +1,7 @@
 //! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::dynamic_system::{DynamicSystem, dynamic};
-use super::writer::{Breaks, Saved};
+use super::writer::Saved;
 use super::{RunOptions, StartFrom};
 use crate::coupling::{BrokenBonds, Model, Operator, Problem};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
@@ -196,8 +196,29 @@ pub(crate) fn restore(
 }
 
 /// Whether bonds may break.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Breaks {
+    /// They may, at a stretch.
+    Possibly,
+    /// They may, by a damage that grows before.
+    Gradually,
+    /// None does.
+    Never,
+    /// None does, but the law dissipates energy.
+    Dissipating,
+}
+
+impl Breaks {
+    /// Whether bonds may break.
+    pub fn may(self) -> bool {
+        matches!(self, Self::Possibly | Self::Gradually)
+    }
+}
+
+/// Whether bonds may break.
 pub fn breaks<const D: usize>(system: &dyn SemiDiscrete, rest: &RunSettings<D>) -> Breaks {
     match system.damage() {
+        Some(_) if rest.breaking.damages => Breaks::Gradually,
         Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
         _ if system.dissipation().is_some() => Breaks::Dissipating,
         _ => Breaks::Never,
