@@ -7,6 +7,7 @@
 //! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, what symmetry saves |
 //! | `seams` | cracks and waves in the plane beside every method, conditions of seams that do not follow the lattice |
 //! | `skin` | bars with free sides, with a skin of elements and without |
+//! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
 //! | `layers` | two lattices of different horizons with a layer of elements between |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
