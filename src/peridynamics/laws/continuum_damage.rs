@@ -182,87 +182,102 @@ impl<const D: usize> ContinuumDamage<D> {
     fn grow_by_direction(
         &self,
         family: &DeformedFamily<'_, D>,
-        (weakness, normal): (f64, &Vector<D>),
+        weak: (f64, &Vector<D>),
         past: &[f64],
         present: &mut [f64],
     ) -> f64 {
         let volume: f64 = family.volumes.iter().sum();
-        let bonds = 0..family.len();
-        // V₀ μ, with Σ μ V = 1
-        let mut rates: Vec<f64> = bonds
-            .clone()
-            .map(|k| {
-                let xi = &family.bonds[k];
-                1.0 + (weakness - 1.0) * xi.dot(normal).powi(2) / xi.norm_squared()
-            })
-            .collect();
-        let sum: f64 = bonds.clone().map(|k| rates[k] * family.volumes[k]).sum();
-        rates.iter_mut().for_each(|rate| *rate *= volume / sum);
-        let mean = |of: &dyn Fn(usize) -> f64| -> f64 {
-            bonds.clone().map(|k| of(k) * family.volumes[k]).sum()
+        let rates = rates(family, volume, weak);
+        let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
+            (0..family.len()).map(|k| of(k) * family.volumes[k]).sum()
         };
-        let drive = mean(&|k| rates[k] * present[2 * k + 1]);
-        let mut damage = mean(&|k| present[2 * k]) / volume;
+        let drive = sum(&|k| rates[k] * present[2 * k + 1]);
+        let damage = sum(&|k| present[2 * k]) / volume;
         let goal = self.surface(drive);
         if goal <= damage {
             return 0.0;
         }
-        let before = mean(&|k| rates[k] * past[2 * k + 1]);
-        let rise = drive - before;
-        // bonds that are not yet damaged through, those that will be first at the end
-        let mut growing: Vec<(f64, usize)> = bonds
-            .clone()
-            .filter(|&k| present[2 * k] < 1.0)
-            .map(|k| ((1.0 - present[2 * k]) / rates[k], k))
-            .collect();
-        growing.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-        // Σ rate V and Σ rate w V over them, at the beginning and at the end of the step
-        let sums = |growing: &[(f64, usize)]| {
-            growing.iter().fold([0.0; 3], |[a, b, c], &(_, k)| {
+        let begins = sum(&|k| rates[k] * past[2 * k + 1]);
+        let free = (0..family.len()).filter(|&k| present[2 * k] < 1.0);
+        let mut growing: Vec<Growing> = free
+            .map(|k| {
                 let rate = rates[k] * family.volumes[k];
-                [
-                    a + rate,
-                    b + rate * past[2 * k + 1],
-                    c + rate * present[2 * k + 1],
-                ]
+                Growing {
+                    through: (1.0 - present[2 * k]) / rates[k],
+                    rate: rate / volume,
+                    power: [rate * past[2 * k + 1], rate * present[2 * k + 1]],
+                }
             })
-        };
-        let (mut lambda, mut dissipated) = (0.0, 0.0);
-        while damage < goal {
-            let Some(&(through, _)) = growing.last() else {
-                break;
-            };
-            let [rate, w_before, w_after] = sums(&growing);
-            let rest = (goal - damage) * volume / rate;
-            let advance = rest.min(through - lambda).max(0.0);
-            let reached = damage + advance * rate / volume;
-            let at = self.threshold(0.5 * (damage + reached)) - before;
-            let share = if rise > 0.0 {
-                (at / rise).clamp(0.0, 1.0)
-            } else {
-                1.0
-            };
-            dissipated += advance * (w_before + share * (w_after - w_before));
-            (lambda, damage) = (lambda + advance, reached);
-            if rest <= advance {
-                break;
-            }
-            while growing.last().is_some_and(|last| last.0 <= lambda) {
-                growing.pop();
-            }
-        }
-        for k in bonds {
-            let through = (1.0 - present[2 * k]) / rates[k];
-            let grown = present[2 * k] + lambda * rates[k];
-            // at D = 1 every bond is damaged through, whatever is rounded
-            present[2 * k] = if goal == 1.0 || lambda >= through {
+            .collect();
+        growing.sort_unstable_by(|a, b| b.through.total_cmp(&a.through));
+        let (lambda, dissipated) = self.follow([damage, goal], [begins, drive], growing);
+        for (phi, rate) in present.iter_mut().step_by(2).zip(&rates) {
+            // at D = 1 every bond is damaged through, and each that was let go of, whatever is rounded
+            let is_through = goal == 1.0 || lambda >= (1.0 - *phi) / rate;
+            *phi = if is_through {
                 1.0
             } else {
-                grown.min(1.0)
+                (*phi + lambda * rate).min(1.0)
             };
         }
         dissipated
     }
+
+    /// Damage from where it is to where S = 0, bond after bond that is through (last first in `growing`), while `V₀ μ•w` grows evenly: λ, and what is dissipated.
+    fn follow(
+        &self,
+        [mut damage, goal]: [f64; 2],
+        [begins, ends]: [f64; 2],
+        mut growing: Vec<Growing>,
+    ) -> (f64, f64) {
+        let (mut lambda, mut dissipated) = (0.0, 0.0);
+        while let Some(through) = growing.last().map(|next| next.through) {
+            let rate: f64 = growing.iter().map(|bond| bond.rate).sum();
+            let power = |end: usize| growing.iter().map(|bond| bond.power[end]).sum::<f64>();
+            let rest = (goal - damage) / rate;
+            let advance = rest.min(through - lambda).max(0.0);
+            // where on the way this happens, in the middle of it: micropotentials are linear there
+            let at = self.threshold(damage + 0.5 * advance * rate) - begins;
+            let share = match ends > begins {
+                true => (at / (ends - begins)).clamp(0.0, 1.0),
+                false => 1.0,
+            };
+            dissipated += advance * (power(0) * (1.0 - share) + power(1) * share);
+            lambda += advance;
+            damage += advance * rate;
+            if rest <= advance {
+                break;
+            }
+            while growing.last().is_some_and(|next| next.through <= lambda) {
+                growing.pop();
+            }
+        }
+        (lambda, dissipated)
+    }
+}
+
+/// A bond with φ < 1.
+struct Growing {
+    /// λ at which φ is 1.
+    through: f64,
+    /// What D grows by with λ for it.
+    rate: f64,
+    /// What is dissipated with λ for it, with w of the beginning and of the end of the step.
+    power: [f64; 2],
+}
+
+/// `V₀ μ` of each bond, with `Σ μ V = 1`.
+fn rates<const D: usize>(
+    family: &DeformedFamily<'_, D>,
+    volume: f64,
+    (weakness, normal): (f64, &Vector<D>),
+) -> Vec<f64> {
+    let shape =
+        |xi: &Vector<D>| 1.0 + (weakness - 1.0) * xi.dot(normal).powi(2) / xi.norm_squared();
+    let shapes: Vec<f64> = family.bonds.iter().map(shape).collect();
+    let each = shapes.iter().zip(family.volumes);
+    let sum: f64 = each.map(|(shape, v)| shape * v).sum();
+    shapes.iter().map(|shape| shape * volume / sum).collect()
 }
 
 impl<const D: usize> ForceState<D> for ContinuumDamage<D> {

@@ -1,11 +1,12 @@
 //! A scene in time: from its beginning or a checkpoint to its end, an interrupt, or the edge of the nonlocal zone.
 
 use super::RunOptions;
+use super::breaks::{Breaks, breaks};
 use super::dynamic_system::{PlaneEnergy, plane_energy};
 use super::guard::Balance;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
-use super::setup::{Breaks, ModelSetup, RunSetup, begun, breaks, lay_out, opened};
+use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
 use super::step_observer::{Segment, StepObserver, Stop, Watched, moment};
 use super::writer::{Saved, Zone as FollowedZone};
 use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};

@@ -5,9 +5,10 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::RunOptions;
+use super::breaks::{Breaks, breaks};
 use super::dynamic_system::{plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
-use super::setup::{Breaks, ModelSetup, breaks, laid_out, opened, restore};
+use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{EdgeReached, Moment, Recorder, Saved, StepChoice};

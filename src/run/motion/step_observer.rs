@@ -5,10 +5,10 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::RunOptions;
+use super::breaks::Breaks;
 use super::dynamic_system::critical_stretch;
 use super::guard::{Balance, Guard};
 use super::seen::Seen;
-use super::setup::Breaks;
 use super::writer::{EdgeReached, Moment, Recorder, Row, StepChoice, Zone};
 use super::zone_monitor::{ZoneMonitor, fastest_crack};
 use crate::coupling::{Model, Operator};

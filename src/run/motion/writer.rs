@@ -6,8 +6,8 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::RunOptions;
+use super::breaks::Breaks;
 use super::rezoning::{nonlocal, share};
-use super::setup::Breaks;
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
