@@ -244,7 +244,7 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         found.push(Row::info(case, "strain when cracked through", ended));
         match case {
             "critical stretch" => {
-                found.push(Row::at_most(case, "strain between", ended - begun, 0.001))
+                found.push(Row::at_most(case, "strain between", ended - begun, 0.0012))
             }
             _ => found.push(Row::at_least(case, "strain between", ended - begun, 0.002)),
         }
