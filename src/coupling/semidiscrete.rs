@@ -167,9 +167,8 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
 
     /// Whether bonds can break.
     fn breaks(&self) -> bool {
-        self.body
-            .as_ref()
-            .is_some_and(|b| b.critical_stretch.is_some())
+        let body = self.body.as_ref();
+        body.is_some_and(|b| b.critical_stretch.is_some() || b.damages)
     }
 
     /// Whether the law remembers.

@@ -15,6 +15,10 @@ pub struct HistoryLayout {
     pub point: &'static [&'static str],
     /// Of each bond, seen from either end.
     pub bond: &'static [&'static str],
+    /// Which of the numbers of a bond is its damage φ, from 0 to 1; none for a law whose bonds are whole until they break by their stretch.
+    ///
+    /// By this results show damage, and a bond counts as broken once φ is 1 at both of its ends. Every law says it: what it left out would pass for undamaged.
+    pub damage: Option<usize>,
 }
 
 impl HistoryLayout {
@@ -22,6 +26,7 @@ impl HistoryLayout {
     pub const NONE: Self = Self {
         point: &[],
         bond: &[],
+        damage: None,
     };
 
     /// Whether nothing is kept.
@@ -55,6 +60,8 @@ pub struct DeformedFamily<'a, const D: usize> {
     pub is_whole: bool,
     /// Share of the family's volume whose bonds are broken, the `D = τ • φ` of [SAND2015-7998] eq. (6.28) with `τ = 1/V`.
     pub damage: f64,
+    /// Whether the point keeps the damage that it has: in a region `no-fail`, and where its row is not that of its bonds alone.
+    pub keeps_damage: bool,
 }
 
 impl<const D: usize> DeformedFamily<'_, D> {

@@ -44,6 +44,17 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     /// Whether bonds can break: [`Law::force_state`] then takes families that have lost some.
     fn has_breakable_bonds(&self) -> bool;
 
+    /// Whether that holds as long as nothing is damaged, so that a seam beside undamaged bonds is in equilibrium. A law that does not say so takes part in no coupling by force.
+    fn is_linear_until_damaged(&self) -> bool {
+        self.is_linear()
+    }
+
+    /// Whether its bonds lose their stiffness by a damage of their own, [`crate::peridynamics::HistoryLayout::damage`].
+    fn damages(&self) -> bool {
+        let states = self.force_state();
+        states.is_some_and(|states| states.history().damage.is_some())
+    }
+
     /// What the bonds of a continuous family store, and what breaking them costs, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy>;
 }

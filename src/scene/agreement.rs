@@ -60,7 +60,8 @@ pub(crate) fn balanced_seam<const D: usize>(
     let agrees = matches!(coupling, CouplingSpec::Splice(_))
         && material.law.local_law().is_some()
         && cell_material.iter().all(is_same);
-    if balances || agrees || material.law.is_linear() {
+    // elements are linear, and damage at their edge is found
+    if balances || agrees || material.law.is_linear_until_damaged() {
         return Ok(());
     }
     let name = spec.materials.get_key_value(material.name.as_str());

@@ -20,12 +20,21 @@ pub struct Breaking<const D: usize> {
     pub fracture: Option<Fracture>,
     /// How the critical stretch follows from a fracture energy.
     pub calibration: CalibrationSpec,
+    /// Whether the law of the peridynamic material damages its bonds.
+    pub damages: bool,
     /// Regions in which no bond breaks.
     pub no_fail: Vec<Region<D>>,
     /// What is done when damage reaches the edge of the nonlocal zone.
     pub at_edge: EdgeSpec,
     /// Short-range contact.
     pub contact: Option<Contact>,
+}
+
+impl<const D: usize> Breaking<D> {
+    /// Whether bonds may break, at a stretch or by their damage.
+    pub fn breaks(&self) -> bool {
+        self.fracture.is_some() || self.damages
+    }
 }
 
 /// Short-range contact.
@@ -42,7 +51,7 @@ fn refuse_needless<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
 ) -> Result<(), SceneError> {
-    if material.fracture.is_none() {
+    if !material.breaks() {
         let needless = |span, what: &str| {
             SceneError::new(
                 SceneErrorKind::Conflict,
@@ -82,7 +91,6 @@ fn bonds_of<const D: usize>(
     material: &Material<D>,
     is_static: bool,
 ) -> Result<BondsSpec, SceneError> {
-    let fracture = material.fracture;
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
     let is_objective = (material.law.force_state()).is_some_and(|f| f.is_objective());
     Ok(match typed {
@@ -105,7 +113,7 @@ fn bonds_of<const D: usize>(
             *bonds.get_ref()
         }
         // nothing breaks where nothing moves, and a law for small strains stays linear
-        None if !is_static && is_objective && (fracture.is_some() || spec.contact.is_some()) => {
+        None if !is_static && is_objective && (material.breaks() || spec.contact.is_some()) => {
             BondsSpec::Exact
         }
         None => BondsSpec::Linear,
@@ -161,6 +169,7 @@ pub(crate) fn breaking<const D: usize>(
         bonds,
         precision: precision.map_or(PrecisionSpec::Double, |p| *p.get_ref()),
         fracture,
+        damages: material.law.damages(),
         calibration: calibration.map_or(CalibrationSpec::Lattice, |c| *c.get_ref()),
         no_fail,
         at_edge: spec

@@ -67,6 +67,11 @@ pub enum Fracture {
 }
 
 impl<const D: usize> Material<D> {
+    /// Whether its bonds may break, at a stretch or by their damage.
+    pub fn breaks(&self) -> bool {
+        self.fracture.is_some() || self.law.damages()
+    }
+
     /// The local stiffness \[Pa\].
     pub fn stiffness(&self) -> Tensor4<D> {
         Tensor4::isotropic(self.lame.0, self.lame.1)

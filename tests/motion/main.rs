@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 mod contact;
+mod continuum_damage;
 mod driven;
 mod ductile;
 mod faults;

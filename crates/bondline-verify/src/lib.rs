@@ -7,6 +7,7 @@
 //! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, what symmetry saves |
 //! | `seams` | cracks and waves in the plane beside every method, conditions of seams that do not follow the lattice |
 //! | `skin` | bars with free sides, with a skin of elements and without |
+//! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
 //! | `layers` | two lattices of different horizons with a layer of elements between |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
@@ -32,6 +33,7 @@ pub mod accuracy_control;
 pub mod balance;
 pub mod bar;
 pub mod bobaru;
+pub mod continuum_damage;
 pub mod convergence;
 pub mod emmrich_weckner;
 pub mod enclosed;
@@ -110,6 +112,11 @@ pub const SUITES: &[Suite] = &[
         name: "pals",
         about: "SAND2015-7998 section 4.2: energies of a position-aware solid at surfaces, Young's modulus of a tension bar (figure 4.2)",
         run: position_aware::run,
+    },
+    Suite {
+        name: "damage",
+        about: "SAND2015-7998 section 6.2: continuum damage of a bar, and of the plate with a hole (6.2.5) beside bonds that break by their stretch",
+        run: continuum_damage::run,
     },
     Suite {
         name: "layers",

@@ -23,6 +23,8 @@ use crate::{
 pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
     pub critical_stretch: Option<Critical>,
+    /// Whether the law damages bonds.
+    pub damages: bool,
     /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
     pub contact: Option<Mutex<Contact<D>>>,
     /// The site of each point; `NONE` for a point that follows sites.
@@ -133,12 +135,15 @@ impl<const D: usize> PassInput<'_, D> {
             without_energy: seam.map_or(&[], NonlinearSeam::without_energy),
             force,
             kinematics: behaviour.kinematics,
-            failure: behaviour.critical_stretch.as_ref().map(|s| Failure {
-                critical: match s {
-                    Critical::Uniform(s) => CriticalStretch::Uniform(*s),
-                    Critical::ByHorizon(_) => CriticalStretch::PerBond(&by_bond),
-                    Critical::Tearing(p) => CriticalStretch::TearingParameter(*p),
-                },
+            failure: match &behaviour.critical_stretch {
+                None if law.damages() => Some(CriticalStretch::Uniform(f64::INFINITY)),
+                None => None,
+                Some(Critical::Uniform(s)) => Some(CriticalStretch::Uniform(*s)),
+                Some(Critical::ByHorizon(_)) => Some(CriticalStretch::PerBond(&by_bond)),
+                Some(Critical::Tearing(p)) => Some(CriticalStretch::TearingParameter(*p)),
+            }
+            .map(|critical| Failure {
+                critical,
                 no_fail: self.no_fail,
             }),
             precracked: broken.as_ref().map(|b| b as _),
@@ -232,7 +237,8 @@ impl<const D: usize> MovingBody<D> {
             (None, None) => &body.families,
         };
         let all_pass = seam.is_none() && passed.is_none();
-        let edge = if behaviour.critical_stretch.is_some() && seam.is_none() {
+        let may_break = behaviour.critical_stretch.is_some() || p.law.damages();
+        let edge = if may_break && seam.is_none() {
             (0..points as u32)
                 .filter(|&i| {
                     own_row[i as usize]
@@ -265,6 +271,7 @@ impl<const D: usize> MovingBody<D> {
         Ok(Some(Self {
             pass,
             critical_stretch: behaviour.critical_stretch.clone(),
+            damages: p.law.damages(),
             contact,
             site_of_point,
             shift,

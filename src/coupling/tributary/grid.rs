@@ -120,7 +120,7 @@ impl<'a, const D: usize> Grid<'a, D> {
     /// Sites and weights of a place: exact for affine fields, from its own side of cracks. Empty if there is no site around.
     ///
     /// The cube of lattice points around the place interpolates; where one of its corners is neither a point nor in an element, the nearest whole cube extrapolates. A point that is a corner of no such cube, as on curved surfaces, takes
-    /// its neighbours along the axes: its own cell is not left to others, or it would stand for nothing.
+    /// its neighbours along the axes, or a fit to the points around where it has none along one of them: its own cell is not left to others, or it would stand for nothing.
     pub fn place(&self, x: &Vector<D>) -> Vec<Follows<D>> {
         let h = self.cells.spacing;
         let local: Vector<D> = (x - self.cells.origin) / h;
@@ -149,10 +149,17 @@ impl<'a, const D: usize> Grid<'a, D> {
             for (_, shift) in &order {
                 let from = std::array::from_fn(|i| base[i] + shift[i]);
                 if let Some(found) = self.in_cube(x, &local, &from, is_strict) {
-                    let has_own = |site: u32| found.iter().any(|f| f.0 == site && f.1 != 0.0);
-                    return match own.filter(|&site| !has_own(site)) {
-                        None => found,
-                        Some(site) => self.along_axes(x, &index, site).unwrap_or(found),
+                    let has =
+                        |of: &[Follows<D>], site| of.iter().any(|f| f.0 == site && f.1 != 0.0);
+                    let Some(site) = own.filter(|&site| !has(&found, site)) else {
+                        return found;
+                    };
+                    let with_own = self.along_axes(x, &index, site);
+                    let with_own = with_own.unwrap_or_else(|| self.fitted(x));
+                    return if has(&with_own, site) {
+                        with_own
+                    } else {
+                        found
                     };
                 }
             }

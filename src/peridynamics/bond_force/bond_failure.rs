@@ -1,6 +1,6 @@
 //! What breaks bonds of the generic pass.
 
-use super::{BondSetup, CriticalStretch};
+use super::{BondSetup, CriticalStretch, Failure};
 use crate::peridynamics::{PdBody, tearing_parameter::TearingParameter};
 
 /// What breaks bonds.
@@ -15,7 +15,8 @@ pub(super) enum BondFailure {
 
 impl BondFailure {
     pub(super) fn new<const D: usize>(setup: &BondSetup<'_, D>, body: &PdBody<D>) -> Self {
-        let Some(failure) = setup.failure else {
+        // bonds may break by their damage alone
+        let Some(failure) = setup.failure.filter(Failure::has_limit) else {
             return Self::Never;
         };
         let points = setup.position.len();

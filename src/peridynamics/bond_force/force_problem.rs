@@ -95,10 +95,17 @@ pub enum CriticalStretch<'a, const D: usize> {
 /// When bonds fail.
 #[derive(Clone, Copy)]
 pub struct Failure<'a, const D: usize> {
-    /// Critical stretch \[1\].
+    /// Critical stretch \[1\]; infinite for bonds that only their law damages.
     pub critical: CriticalStretch<'a, D>,
     /// Points whose bonds never fail, one entry per point; empty for none.
     pub no_fail: &'a [bool],
+}
+
+impl<const D: usize> Failure<'_, D> {
+    /// Whether bonds break by their stretch: not at an infinite one, of bonds that their law damages.
+    pub(super) fn has_limit(&self) -> bool {
+        !matches!(self.critical, CriticalStretch::Uniform(f64::INFINITY))
+    }
 }
 
 /// Points, families and law of a bond pass. One horizon for all points.

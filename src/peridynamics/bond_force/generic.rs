@@ -55,6 +55,8 @@ pub(super) struct Generic<const D: usize> {
     pub(super) failure: BondFailure,
     kinematics: Kinematics,
     pub(super) intact: Vec<bool>,
+    /// Bonds that were told to be broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
+    pub(super) damaged_through: Vec<bool>,
     /// Volume of the far points of each family; empty where no bond can be broken.
     family_volume: Vec<f64>,
     /// Committed, and at the end of the last force.
@@ -70,6 +72,7 @@ pub(super) struct Generic<const D: usize> {
 
 /// One deformed family in memory that the next one takes over.
 pub(super) struct Scratch<const D: usize> {
+    keeps_damage: bool,
     bonds: Vec<Vector<D>>,
     volumes: Vec<f64>,
     pair: Vec<f64>,
@@ -110,6 +113,7 @@ impl<const D: usize> Scratch<D> {
                 direction: &self.direction,
                 is_whole: self.is_whole,
                 damage: self.damage,
+                keeps_damage: self.keeps_damage,
             },
             past: &self.past,
             present: Present {
@@ -125,6 +129,7 @@ impl<const D: usize> Scratch<D> {
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
         Self {
+            keeps_damage: false,
             bonds: Vec::new(),
             volumes: Vec::new(),
             pair: Vec::new(),
@@ -177,6 +182,7 @@ impl<const D: usize> Generic<D> {
             point: vec![0.0; points * layout.point.len()],
             bonds: vec![0.0; bonds * layout.bond.len()],
         };
+        let damaged_through = vec![false; layout.damage.map_or(0, |_| bonds)];
         Self {
             law: Arc::clone(law),
             layout,
@@ -203,6 +209,7 @@ impl<const D: usize> Generic<D> {
                 false => Vec::new(),
             },
             intact,
+            damaged_through,
             present: past.clone(),
             past,
             outcome: vec![Outcome::default(); points],
@@ -257,6 +264,7 @@ impl<const D: usize> Generic<D> {
         }
         s.of.clear();
         s.past.clear();
+        s.keeps_damage = self.no_fail[i];
         let kept = self.layout.bond.len();
         let mut intact_volume = 0.0;
         for bond in self.range(i).filter(|&bond| counts(bond)) {
@@ -419,6 +427,9 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             }
         }
         self.respond_all(u, interval.length);
+        if breakage == FailureUpdate::Update {
+            self.find_damaged_through();
+        }
         self.gather(&self.force_state, force);
         self.last.len() as u64
     }
@@ -465,22 +476,17 @@ impl<const D: usize> BondPass<D> for Generic<D> {
 
     fn damage_into(&self, damage: &mut [f64]) {
         for (i, damage) in damage.iter_mut().enumerate() {
-            let (mut all, mut lost) = (0.0, 0.0);
-            for bond in self.range(i) {
-                let v = self.volume[self.neighbour(bond)];
-                all += v;
-                lost += if self.intact[bond] { 0.0 } else { v };
-            }
-            *damage = if lost > 0.0 { lost / all } else { 0.0 };
+            *damage = self.damage_of_point(i);
         }
     }
 
     fn is_damaged(&self, i: usize) -> bool {
-        self.range(i).any(|bond| !self.intact[bond])
+        self.range(i).any(|bond| self.damage_of(bond) > 0.0)
     }
 
     fn broken(&self) -> u64 {
-        self.intact.iter().filter(|intact| !**intact).count() as u64
+        let broken = (0..self.intact.len()).filter(|&bond| !self.stands(bond));
+        broken.count() as u64
     }
 
     fn last_broken(&self) -> Vec<(u32, u32)> {
@@ -495,7 +501,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
 
     fn bonded(&self, i: usize, j: usize) -> bool {
         let place = self.families.of(i).binary_search(&(j as u32));
-        place.is_ok_and(|k| self.intact[self.range(i).start + k])
+        place.is_ok_and(|k| self.stands(self.range(i).start + k))
     }
 
     fn damage_state(&self) -> Vec<u64> {
@@ -520,6 +526,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             + self.state.len() * std::mem::size_of::<Option<StatePart<D>>>()
             + self.families.offsets.len() * 8
             + bonds * 9
+            + self.damaged_through.len()
             + self.row.len() * 2
             + history * 8
     }

@@ -130,6 +130,7 @@ impl<const D: usize> Generic<D> {
             *number = f64::from_bits(*word);
         }
         self.present.clone_from(&self.past);
+        self.recall_damaged_through();
         true
     }
 }

@@ -180,16 +180,21 @@ fn consistent<const D: usize>(counts: [usize; D]) {
                 };
                 // what is stored, and what is dissipated on the way there
                 let state = pass.damage_state();
+                let along = |force: &[f64]| -> f64 {
+                    force.iter().zip(&direction).map(|(f, d)| f * d).sum()
+                };
                 let mut spent = |s: f64| {
                     pass.force_into(&at(s), &mut minus, now, FailureUpdate::Frozen);
                     let dissipated = pass.commit();
                     let sum = pass.stored_energy(&at(s)) + dissipated;
                     assert!(pass.restore_damage(&state), "{name}");
-                    sum
+                    (sum, along(&minus))
                 };
-                let slope = (spent(1e-5) - spent(-1e-5)) / 2e-5;
+                let (forward, backward) = (spent(1e-5), spent(-1e-5));
+                let slope = (forward.0 - backward.0) / 2e-5;
                 pass.force_into(&u, &mut plus, now, FailureUpdate::Frozen);
-                let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
+                // the slope of the force may be another one on either side: the trapezoidal rule on each
+                let work = 0.5 * along(&plus) + 0.25 * (forward.1 + backward.1);
                 assert!(
                     (slope - work).abs() < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
                     "{name}: force is no derivative of the energy, {slope} {work}"
@@ -463,5 +468,113 @@ fn rotations_turn_the_forces_and_histories_go_on_from_a_checkpoint() {
         assert_eq!(begun(Some(&state), &u).0, force, "{}", law.name());
         let kept = law.force_state().is_some_and(|f| !f.history().is_empty());
         assert_eq!(!state.is_empty(), kept, "{}", law.name());
+    }
+}
+
+/// What a pass tells of its damage.
+struct Told {
+    damage: Vec<f64>,
+    force: Vec<f64>,
+    /// Bonds that the step broke, and all that do not stand.
+    count: u64,
+    gone: u64,
+    state: Vec<u64>,
+}
+
+/// The damage of a law after a step of a size, or after that of a checkpoint.
+fn damaged(
+    case: &Case<2>,
+    law: &Arc<dyn Law<2>>,
+    no_fail: &[bool],
+    size: f64,
+    state: Option<&[u64]>,
+) -> Told {
+    let (points, n) = (case.position.len(), case.position.len() * 2);
+    let failure = Failure {
+        critical: CriticalStretch::Uniform(f64::INFINITY),
+        no_fail,
+    };
+    let name = law.name();
+    with_law(
+        case,
+        law,
+        Kinematics::Linear,
+        Some(failure),
+        false,
+        |mut pass| {
+            let u = noise(n, size * H, 8);
+            let mut force = vec![0.0; n];
+            let mut count = 0;
+            match state {
+                Some(state) => assert!(pass.restore_damage(state), "{name}"),
+                None => {
+                    // frozen trials show nothing
+                    let trial = noise(n, 9.0 * H, 3);
+                    pass.force_into(&trial, &mut force, LATER, FailureUpdate::Frozen);
+                    count = pass.force_into(&u, &mut force, LATER, FailureUpdate::Update);
+                    assert_eq!(pass.last_broken().len() as u64, count, "{name}");
+                    let lost = pass.lost_energy(&|i| [u[2 * i], u[2 * i + 1]]);
+                    assert_eq!(lost, 0.0, "{name}: the law has dissipated it");
+                    pass.commit();
+                    // what was counted is not counted again
+                    let again = pass.force_into(&u, &mut force, LATER, FailureUpdate::Update);
+                    assert_eq!(again, 0, "{name}");
+                    pass.commit();
+                }
+            }
+            let mut damage = vec![f64::NAN; points];
+            pass.damage_into(&mut damage);
+            for (i, d) in damage.iter().enumerate() {
+                assert_eq!(pass.is_damaged(i), *d > 0.0, "{name}");
+            }
+            let bonds = |i: usize| case.families.of(i).iter().map(move |&j| (i, j as usize));
+            let bonds = (0..points).flat_map(bonds);
+            let gone = bonds.filter(|&(i, j)| !pass.bonded(i, j)).count() as u64;
+            assert_eq!(pass.broken(), gone, "{name}");
+            let state = pass.damage_state();
+            Told {
+                damage,
+                force,
+                count,
+                gone,
+                state,
+            }
+        },
+    )
+}
+
+#[test]
+fn damage_that_laws_keep_of_their_bonds_is_shown_counted_and_put_back() {
+    let case = case([9, 8], 0.2, false);
+    let points = case.position.len();
+    let held: Vec<bool> = (0..points).map(|i| i % 7 == 0).collect();
+    let laws = laws_with_states::<2>();
+    assert!(laws.iter().any(|law| law.damages()));
+    for law in laws.iter().filter(|law| law.damages()) {
+        let name = law.name();
+        // none, in part, through
+        let none = damaged(&case, law, &[], 1e-4, None);
+        assert!(none.damage.iter().all(|d| *d == 0.0), "{name}");
+        assert_eq!([none.count, none.gone], [0, 0], "{name}");
+        let part = damaged(&case, law, &[], 0.05, None);
+        let partly = part.damage.iter().filter(|d| **d > 0.0 && **d < 1.0);
+        assert!(2 * partly.count() > points, "{name}");
+        let again = damaged(&case, law, &[], 0.05, Some(&part.state));
+        assert_eq!(again.damage, part.damage, "{name}");
+        let through = damaged(&case, law, &[], 5.0, None);
+        assert!(through.damage.iter().all(|d| *d == 1.0), "{name}");
+        assert!(through.force.iter().all(|f| *f == 0.0), "{name}");
+        assert!(through.count == through.gone && through.gone > 0, "{name}");
+        let again = damaged(&case, law, &[], 5.0, Some(&through.state));
+        assert_eq!(again.gone, through.gone, "{name}");
+        // points that keep their damage hold on to their neighbours
+        let kept = damaged(&case, law, &held, 5.0, None);
+        let of_points = held.iter().zip(&kept.damage);
+        assert!(
+            of_points.clone().all(|(held, d)| *held == (*d == 0.0)),
+            "{name}"
+        );
+        assert!(kept.gone > 0 && kept.gone < through.gone, "{name}");
+        assert!(kept.force.iter().any(|f| *f != 0.0), "{name}");
     }
 }

@@ -7,6 +7,7 @@
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
+//! | `generic_damage.rs` | damage that laws keep of their bonds |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
 //! | `list.rs`, `list_simd.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `compressed_list.rs` | neighbours and weights of a list in few bytes |
@@ -27,6 +28,7 @@ mod breaks;
 mod compressed_list;
 mod force_problem;
 mod generic;
+mod generic_damage;
 mod generic_failure;
 mod generic_tangent;
 #[cfg(test)]
@@ -98,13 +100,13 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Energy stored at the points with rows \[J\]; of each bond, half belongs to each end.
     fn stored_energy(&self, u: &[f64]) -> f64;
 
-    /// Overwrites `damage` with `1 − Σ_intact V / Σ V` of every point; zero where there is no family.
+    /// Overwrites `damage` with `1 − Σ (1 − φ) V / Σ V` of every point, φ = 1 of broken bonds and else what a law says, 0 if nothing; zero where there is no family.
     fn damage_into(&self, damage: &mut [f64]);
 
-    /// Whether a bond of point `i` is broken.
+    /// Whether a bond of point `i` is broken, or damaged by its law.
     fn is_damaged(&self, i: usize) -> bool;
 
-    /// Directed bonds of the reference families that are broken.
+    /// Directed bonds of the reference families that are broken, or damaged through by their law at both ends.
     fn broken(&self) -> u64;
 
     /// Directed bonds that the last pass broke, as a point and its neighbour, in a fixed order.

@@ -119,6 +119,7 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         HistoryLayout {
             point: self.local.history(),
             bond: &[],
+            damage: None,
         }
     }
 

@@ -111,6 +111,7 @@ impl<const D: usize> ForceState<D> for Maxwell<D> {
         HistoryLayout {
             point: &[],
             bond: &["stretch", "stretch of the spring in the arm"],
+            damage: None,
         }
     }
 

@@ -5,6 +5,7 @@
 //! | `bond_based.rs` | bonds that act alone | [SAND2015-7998] eq. (3.1) |
 //! | `lps.rs` | linear peridynamic solid | eq. (5.16) |
 //! | `correspondence.rs` | elastic correspondence, to first order | section 7.2 |
+//! | `continuum_damage.rs` | bonds that lose their stiffness by damage | section 6.2 |
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
 //! | `pals.rs`, `pave.rs` | position-aware solid, linear (PALS) and viscoelastic (PAVE) | sections 4.2, 4.3 |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
@@ -15,6 +16,7 @@
 //! A law that implements [`NamedLaw`] and has its line in the list at the end of this file is a material of scenes, by its key.
 
 mod bond_based;
+mod continuum_damage;
 mod correspondence;
 mod hardening;
 mod johnson_cook;
@@ -33,6 +35,7 @@ use crate::material::Kinematics;
 use crate::peridynamics::{Influence, Law, force_state::PLASTIC_STRAIN};
 
 pub use bond_based::BondBased;
+pub use continuum_damage::ContinuumDamage;
 pub use correspondence::Correspondence;
 pub use hardening::Hardening;
 pub use johnson_cook::JohnsonCookCorrespondence;
@@ -259,6 +262,7 @@ macro_rules! named_laws {
 
 named_laws! {
     Hardening,
+    ContinuumDamage,
     Maxwell,
     PositionAwareSolid,
     PositionAwareViscoelasticSolid,

@@ -168,6 +168,7 @@ impl<const D: usize> ForceState<D> for PositionAwareViscoelasticSolid<D> {
         HistoryLayout {
             point: &[],
             bond: &HISTORY[..=self.arms.len()],
+            damage: None,
         }
     }
 
@@ -264,6 +265,7 @@ mod tests {
             direction: &direction,
             is_whole: true,
             damage: 0.0,
+            keeps_damage: false,
         };
         let respond = |law: &dyn ForceState<3>, numbers: usize| {
             let past = vec![0.0; numbers];

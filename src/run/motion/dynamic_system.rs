@@ -134,6 +134,9 @@ fn failure_text<const D: usize>(critical: Option<&Critical>, breaking: &Breaking
             format!("{s}, the fracture energy is {g:e}: {takes}")
         }
         (Some(s), _) => s,
+        (None, _) if breaking.damages => {
+            "their damage grows by the law of the material; a bond is broken once it is 1 at both ends".to_owned()
+        }
         (None, _) => "no bond breaks: no fracture-energy, no critical-stretch".to_owned(),
     }
 }

@@ -1,13 +1,14 @@
 //! A scene in time: from its beginning or a checkpoint to its end, an interrupt, or the edge of the nonlocal zone.
 
 use super::RunOptions;
+use super::breaks::{Breaks, breaks};
 use super::dynamic_system::{PlaneEnergy, plane_energy};
 use super::guard::Balance;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
-use super::setup::{ModelSetup, RunSetup, begun, breaks, lay_out, opened};
+use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
 use super::step_observer::{Segment, StepObserver, Stop, Watched, moment};
-use super::writer::{Breaks, Saved, Zone as FollowedZone};
+use super::writer::{Saved, Zone as FollowedZone};
 use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
 use crate::observe::cracks::CrackSummary;
@@ -358,9 +359,14 @@ pub(crate) fn cracks(
     breaks: Breaks,
     plane: Option<PlaneEnergy>,
 ) -> Option<CrackSummary> {
-    let spent = system
-        .dissipation()
-        .filter(|_| breaks == Breaks::Possibly)?;
+    let spent = system.dissipation().filter(|_| breaks.may())?;
+    if breaks == Breaks::Gradually {
+        // what the law dissipated is told of on its own: most of it beside the cracks
+        return Some(CrackSummary {
+            energy_per_area: None,
+            ..CrackSummary::new(spent.energy, spent.area)
+        });
+    }
     Some(CrackSummary {
         plane_energy: plane.map(|p| p.of_plane),
         fracture_energy: plane.and_then(|p| p.typed),

@@ -1,9 +1,10 @@
 //! What the steps with one layout of the zones begin with: at time zero, at a checkpoint, or where the zones have changed.
 
 use super::RunOptions;
+use super::breaks::breaks;
 use super::dynamic_system::{DynamicSystem, start};
 use super::rezoning::Leaving;
-use super::setup::{breaks, restore};
+use super::setup::restore;
 use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::{EdgeReached, Recorder, Saved, StepChoice, Zone};

@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `setup.rs` | what every run begins with |
+//! | `breaks.rs` | whether bonds may break |
 //! | `dynamic_system.rs` | what moves, its masses, its start |
 //! | `time_dependent_loads.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
@@ -16,6 +17,7 @@
 //! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
 
 pub(crate) mod bounding_boxes;
+pub mod breaks;
 pub mod dynamic_system;
 pub mod explicit;
 pub(crate) mod guard;

@@ -5,12 +5,13 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::RunOptions;
+use super::breaks::{Breaks, breaks};
 use super::dynamic_system::{plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
-use super::setup::{ModelSetup, breaks, laid_out, opened, restore};
+use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
-use super::writer::{Breaks, EdgeReached, Moment, Recorder, Saved, StepChoice};
+use super::writer::{EdgeReached, Moment, Recorder, Saved, StepChoice};
 use crate::coupling::{Model, Operator, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
@@ -296,7 +297,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
 
     /// Looks for damage at the edge of the nonlocal zone, as long as there is none.
     fn find_damage_at_edge(&mut self, seen: &LoadStep<'_>) {
-        if self.breaks == Breaks::Possibly && self.edge.is_none() {
+        if self.breaks.may() && self.edge.is_none() {
             self.edge = seen.system.damage_at_edge().map(|site| EdgeReached {
                 step: self.state.step,
                 time: self.state.time,

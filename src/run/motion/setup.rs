@@ -1,7 +1,7 @@
 //! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::dynamic_system::{DynamicSystem, dynamic};
-use super::writer::{Breaks, Saved};
+use super::writer::Saved;
 use super::{RunOptions, StartFrom};
 use crate::coupling::{BrokenBonds, Model, Operator, Problem};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
@@ -192,15 +192,6 @@ pub(crate) fn restore(
             message: "its bonds are not those of this model".to_owned(),
         }),
         _ => Ok(()),
-    }
-}
-
-/// Whether bonds may break.
-pub fn breaks<const D: usize>(system: &dyn SemiDiscrete, rest: &RunSettings<D>) -> Breaks {
-    match system.damage() {
-        Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
-        _ if system.dissipation().is_some() => Breaks::Dissipating,
-        _ => Breaks::Never,
     }
 }
 

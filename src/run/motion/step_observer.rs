@@ -5,10 +5,11 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::RunOptions;
+use super::breaks::Breaks;
 use super::dynamic_system::critical_stretch;
 use super::guard::{Balance, Guard};
 use super::seen::Seen;
-use super::writer::{Breaks, EdgeReached, Moment, Recorder, Row, StepChoice, Zone};
+use super::writer::{EdgeReached, Moment, Recorder, Row, StepChoice, Zone};
 use super::zone_monitor::{ZoneMonitor, fastest_crack};
 use crate::coupling::{Model, Operator};
 use crate::observe::ObserveError;
@@ -301,13 +302,16 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         ControlFlow::Break(())
     }
 
-    /// Looks for damage at the edge of the nonlocal zone where bonds have broken; says whether it has just come there.
+    /// Looks for damage at the edge of the nonlocal zone where bonds have broken, or may be damaged; says whether it has just come there.
     fn find_damage_at_edge(&mut self, moment: &Moment<'_>) -> bool {
         let state = moment.state;
-        if self.segment.breaks != Breaks::Possibly
-            || state.broken == self.known_broken
-            || self.edge.is_some()
-        {
+        let changes = match self.segment.breaks {
+            Breaks::Possibly => state.broken != self.known_broken,
+            // damage grows before a bond is damaged through
+            Breaks::Gradually => true,
+            Breaks::Never | Breaks::Dissipating => false,
+        };
+        if !changes || self.edge.is_some() {
             return false;
         }
         self.known_broken = state.broken;
@@ -419,7 +423,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         let speed = (state.step - self.first) as f64 / self.clock.elapsed().as_secs_f64();
         let energy = self.recorder.last.kinetic + self.recorder.last.stored;
         let broken = match breaks {
-            Breaks::Possibly => format!(", {} bonds broken", state.broken),
+            Breaks::Possibly | Breaks::Gradually => format!(", {} bonds broken", state.broken),
             Breaks::Never | Breaks::Dissipating => String::new(),
         };
         progress.tell(&format!(

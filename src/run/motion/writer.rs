@@ -6,6 +6,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::RunOptions;
+use super::breaks::Breaks;
 use super::rezoning::{nonlocal, share};
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
@@ -137,17 +138,6 @@ pub struct Written {
     pub times: Vec<f64>,
     /// Kinetic and stored energy at the start.
     pub energy_at_start: f64,
-}
-
-/// Whether bonds may break.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Breaks {
-    /// They may.
-    Possibly,
-    /// None does.
-    Never,
-    /// None does, but the law dissipates energy.
-    Dissipating,
 }
 
 /// A state to tell of.
@@ -328,7 +318,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
             stored,
             work: state.work,
             dissipated: match self.breaks {
-                Breaks::Possibly | Breaks::Dissipating => system.dissipated_energy().unwrap_or(0.0),
+                Breaks::Possibly | Breaks::Gradually | Breaks::Dissipating => {
+                    system.dissipated_energy().unwrap_or(0.0)
+                }
                 Breaks::Never => 0.0,
             },
             missing: self.energy_at_start + state.work - moment.kinetic - stored,
@@ -360,7 +352,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             row.push(energies.dissipated.into());
             row.push(energies.missing.into());
         }
-        if self.breaks == Breaks::Possibly {
+        if self.breaks.may() {
             row.push((state.broken as i64).into());
             row.push(system.dissipation().map_or(0.0, |d| d.area).into());
         }
@@ -380,7 +372,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let reactions = self.reactions(moment.supports);
         row.extend(reactions.into_iter().map(Entry::from));
         self.options.keep("history", &mut self.history, &row)?;
-        if state.broken > 0 && !self.tips.is_empty() {
+        let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
+        if may_be_damaged && !self.tips.is_empty() {
             self.tips(moment, positions)?;
         }
         self.seconds += begun.elapsed().as_secs_f64();
@@ -425,7 +418,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let begun = Instant::now();
         let mut more = vec![OverSites::Vector("velocity", &moment.state.v)];
         let damage = match self.breaks {
-            Breaks::Possibly => moment.system.damage(),
+            Breaks::Possibly | Breaks::Gradually => moment.system.damage(),
             Breaks::Never | Breaks::Dissipating => None,
         };
         if let Some(damage) = &damage {
@@ -561,7 +554,7 @@ fn history_header<const D: usize>(
     if breaks != Breaks::Never {
         header.extend(["dissipated_energy", "missing_energy"]);
     }
-    if breaks == Breaks::Possibly {
+    if breaks.may() {
         header.extend(["broken_bonds", "crack_area"]);
     }
     let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();

@@ -30,6 +30,7 @@ use crate::observe::summary::Decision;
 use crate::scene::bounds_checks;
 use crate::scene::draft::Draft;
 use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::materials::Material;
 use crate::scene::peridynamics;
 use crate::scene::solve::Solve;
 use crate::scene::source::Span;
@@ -106,6 +107,7 @@ pub(crate) fn placed<const D: usize>(scene: &Draft<'_, D>) -> Result<Option<Foun
     let marked = shapes::marked(scene)?;
     let shapes = marked.shapes();
     let material = material(scene, &shapes, &span)?;
+    refuse_damage(&scene.materials[material as usize], &span)?;
     let search = Search {
         scene,
         options,
@@ -288,6 +290,23 @@ fn alone(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     .label(span.clone(), "places the zone")
     .label(drawn.1, "draws it")
     .help("keep one of them; `--set zones=auto` replaces all of [zones]"))
+}
+
+/// Refuses a law that damages its bonds: where that begins is no stretch that a solution before the run shows.
+fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<(), SceneError> {
+    if !material.law.damages() {
+        return Ok(());
+    }
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!(
+            "`zones.auto` looks for bonds that reach a critical stretch, and the law of the material `{}`, {}, damages them by the energy of their family",
+            material.name,
+            material.law.name()
+        ),
+    )
+    .label(span.clone(), "cannot tell where damage begins")
+    .help("draw the zone, [zones.nonlocal], with room for the damage, or use coupling = \"nonlocal\""))
 }
 
 fn options(spec: &AutoSpec) -> Result<Options, SceneError> {

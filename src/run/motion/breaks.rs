@@ -1,0 +1,34 @@
+//! Whether bonds may break in a run.
+
+use crate::run::setup::RunSettings;
+use crate::system::SemiDiscrete;
+
+/// Whether bonds may break.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Breaks {
+    /// They may, at a stretch.
+    Possibly,
+    /// They may, by a damage that grows before.
+    Gradually,
+    /// None does.
+    Never,
+    /// None does, but the law dissipates energy.
+    Dissipating,
+}
+
+impl Breaks {
+    /// Whether bonds may break.
+    pub fn may(self) -> bool {
+        matches!(self, Self::Possibly | Self::Gradually)
+    }
+}
+
+/// Whether bonds may break.
+pub fn breaks<const D: usize>(system: &dyn SemiDiscrete, rest: &RunSettings<D>) -> Breaks {
+    match system.damage() {
+        Some(_) if rest.breaking.damages => Breaks::Gradually,
+        Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
+        _ if system.dissipation().is_some() => Breaks::Dissipating,
+        _ => Breaks::Never,
+    }
+}
