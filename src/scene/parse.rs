@@ -99,7 +99,12 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
             format!("{at} is {}", plain(found)),
         )
         .label(span, format!("not {}", plain(expected)))
-        .help(format!("write {} here", plain(expected)));
+        .help(match place.path.as_slice() {
+            [mesh, file] if mesh == "mesh" && file == "file" => {
+                "write mesh.file.path = \"part.msh\"".to_owned()
+            }
+            _ => format!("write {} here", plain(expected)),
+        });
     }
     if message.starts_with("wanted") {
         let path: Vec<&str> = place.path.iter().map(String::as_str).collect();
