@@ -86,6 +86,21 @@ fn check(error: &SceneError, kind: SceneErrorKind, underlined: &str, message: &s
 }
 
 #[test]
+fn a_mesh_file_without_its_key_is_told_where_the_path_belongs() {
+    let mesh =
+        "[mesh.rectangle]\nmin = [0, 0]\nmax = [2, 1]\nx = { cells = 20 }\ny = { cells = 10 }";
+    let found = error(mesh, "[mesh]\nfile = \"part.msh\"");
+    let help = "mesh.file.path";
+    check(
+        &found,
+        SceneErrorKind::WrongType,
+        "\"part.msh\"",
+        "`mesh.file` is text",
+        help,
+    );
+}
+
+#[test]
 fn the_right_scene_is_right() {
     parse(RIGHT, &[]).unwrap();
 }

@@ -186,3 +186,24 @@ fn criteria_that_a_law_does_not_have_are_refused() {
     let strange = law(5.0, 5.0, "").replace("large", "huge");
     refused(&scene("nonlocal", &strange, STEPS), "\"small\", \"large\"");
 }
+
+#[test]
+fn wherever_the_lattice_lies_in_a_round_bar_each_point_stands_for_some_mass() {
+    // on curved surfaces points stick out: they are corners of no whole cube of the lattice
+    let folder = tempfile::tempdir().unwrap();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let scene = root.join("examples/notched_bar.toml");
+    for origin in ["[0, 0, 0]", "[0.36, 0.81, 0.55]"] {
+        let output = crate::bondline(folder.path())
+            .arg("check")
+            .arg(&scene)
+            .args(["--set", "peridynamics.points.lattice.spacing=1.2"])
+            .args(["--set", "peridynamics.horizon=3"])
+            .arg("--set")
+            .arg(format!("peridynamics.points.lattice.origin={origin}"))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{origin}: {said}");
+    }
+}
