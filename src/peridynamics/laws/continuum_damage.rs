@@ -247,11 +247,13 @@ impl<const D: usize> ContinuumDamage<D> {
                 false => 1.0,
             };
             dissipated += advance * (power(0) * (1.0 - share) + power(1) * share);
-            lambda += advance;
             damage += advance * rate;
             if rest <= advance {
+                lambda += advance;
                 break;
             }
+            lambda = through;
+            growing.pop();
             while growing.last().is_some_and(|next| next.through <= lambda) {
                 growing.pop();
             }
