@@ -38,6 +38,14 @@ impl Place {
         self.path.join(".")
     }
 
+    /// What to write instead of something of another type.
+    fn belongs_here(&self, expected: &str) -> String {
+        match self.dotted().as_str() {
+            "mesh.file" => "write mesh.file.path = \"part.msh\"".to_owned(),
+            _ => format!("write {expected} here"),
+        }
+    }
+
     /// The path of the table around.
     fn parent(&self) -> String {
         self.path[..self.path.len().saturating_sub(1)].join(".")
@@ -99,12 +107,7 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
             format!("{at} is {}", plain(found)),
         )
         .label(span, format!("not {}", plain(expected)))
-        .help(match place.path.as_slice() {
-            [mesh, file] if mesh == "mesh" && file == "file" => {
-                "write mesh.file.path = \"part.msh\"".to_owned()
-            }
-            _ => format!("write {} here", plain(expected)),
-        });
+        .help(place.belongs_here(&plain(expected)));
     }
     if message.starts_with("wanted") {
         let path: Vec<&str> = place.path.iter().map(String::as_str).collect();

@@ -34,9 +34,12 @@ const RATE: f64 = 45.0;
 /// Damage from which a point counts as damaged, and as cracked. Bonds that break by their stretch leave at least 0.35 beside a crack.
 const LEVELS: [f64; 2] = [0.01, 0.35];
 
+/// The name of a table, and one of its rows by columns.
+type Named = (String, Vec<(String, f64)>);
+
 /// Rows of a run, by the name of their table.
 #[derive(Debug, Default)]
-struct Rows(Mutex<Vec<(String, Vec<(String, f64)>)>>);
+struct Rows(Mutex<Vec<Named>>);
 
 impl Observer for Rows {
     fn wants_files(&self) -> bool {
@@ -60,7 +63,7 @@ impl Observer for Rows {
 
 /// The rows of a scene, and the seconds that it took.
 struct Seen {
-    rows: Vec<(String, Vec<(String, f64)>)>,
+    rows: Vec<Named>,
     seconds: f64,
 }
 

@@ -17,7 +17,7 @@ use crate::{
 /// Source: [SAND2015-7998] section 7.2 (after \[Silling2007\]) and eq. (6.30), (6.32), with the first Piola–Kirchhoff stress of any local law. Its linearisation is [`Correspondence`] with the same constants.
 ///
 /// Broken bonds drop out of `F̄` and K, and the stress falls with the damage, `σ = (1 − D) σ₀` (section 6.3), or what bonds are left would carry more. A family whose intact bonds no longer span the space
-/// ([`SPANNED`]) has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
+/// (`SPANNED`) has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
 #[derive(Clone, Debug)]
 pub struct LocalCorrespondence<const D: usize> {
     name: &'static str,
