@@ -201,8 +201,8 @@ pub trait SemiDiscrete: Send + Sync {
         None
     }
 
-    /// Number of points whose intact bonds are too few for their law: they carry no stress of their own.
-    fn points_without_response(&self) -> usize {
+    /// Number of points that have lost so many bonds that their law does not respond: they carry no stress of their own.
+    fn points_without_response(&self, _u: &[f64]) -> usize {
         0
     }
 

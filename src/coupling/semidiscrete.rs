@@ -451,8 +451,8 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.spent.area += spent.area;
     }
 
-    fn points_without_response(&self) -> usize {
-        self.count_without_response()
+    fn points_without_response(&self, u: &[f64]) -> usize {
+        self.count_without_response(u)
     }
 
     fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {

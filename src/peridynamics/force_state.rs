@@ -139,7 +139,7 @@ pub trait ForceState<const D: usize>: Send + Sync {
         })
     }
 
-    /// Whether the intact bonds of a family are enough for a response; if not, its point carries no stress of its own. Runs tell how many do.
+    /// Whether a family that has lost bonds still has a response; if not, its point carries no stress of its own. Runs tell how many do.
     fn responds(&self, _family: &DeformedFamily<'_, D>) -> bool {
         true
     }

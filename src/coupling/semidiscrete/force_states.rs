@@ -44,9 +44,16 @@ impl<const D: usize> CoupledSystem<'_, D> {
     }
 
     /// See [`crate::system::SemiDiscrete::points_without_response`].
-    pub(super) fn count_without_response(&self) -> usize {
-        let states = self.body.as_ref().and_then(|b| b.pass.force_states());
-        states.map_or(0, |s| s.points_without_response())
+    pub(super) fn count_without_response(&self, u: &[f64]) -> usize {
+        let Some(body) = &self.body else {
+            return 0;
+        };
+        let Some(states) = body.pass.force_states() else {
+            return 0;
+        };
+        let mut points = vec![0.0; body.displacement.len()];
+        body.spread(u, &mut points);
+        states.points_without_response(&points)
     }
 
     /// See [`crate::system::SemiDiscrete::remembered`].

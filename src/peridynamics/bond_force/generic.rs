@@ -566,14 +566,14 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
         self.range(point).len()
     }
 
-    fn points_without_response(&self) -> usize {
+    fn points_without_response(&self, u: &[f64]) -> usize {
         let Some(law) = self.law.force_state() else {
             return 0;
         };
         let mut s = Scratch::default();
         let lacks = |i: &usize| {
             let intact = |bond: usize| self.intact[bond];
-            self.respond(*i, &|_| Vector::zeros(), intact, 0.0, &self.past, &mut s);
+            self.respond(*i, &|j| at(u, j), intact, 0.0, &self.past, &mut s);
             !law.responds(&s.split(self.state[*i].as_ref(), false).family)
         };
         let damaged = (0..self.position.len()).filter(|&i| self.row[i] && self.is_damaged(i));

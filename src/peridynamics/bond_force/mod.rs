@@ -143,8 +143,8 @@ pub trait ForceStates<const D: usize> {
     /// Number of bonds of a point's family.
     fn family_size(&self, point: usize) -> usize;
 
-    /// Number of points with rows whose intact bonds are too few for a response, [`crate::peridynamics::ForceState::responds`].
-    fn points_without_response(&self) -> usize;
+    /// Number of points with rows that have lost bonds and do not respond at the displacements `u`, [`crate::peridynamics::ForceState::responds`].
+    fn points_without_response(&self, u: &[f64]) -> usize;
 
     /// What points remember, by name: one number per point.
     fn remembered(&self) -> Vec<(&'static str, Vec<f64>)>;

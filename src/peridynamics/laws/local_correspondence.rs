@@ -9,7 +9,7 @@ use crate::{
         Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Past, Present,
     },
-    tensor::{Tensor, Vector, inverse, least_eigenvalue},
+    tensor::{Tensor, Vector, determinant, inverse, least_eigenvalue},
 };
 
 /// Correspondence with a [`LocalLaw`]: `F̄ − I = Ḡ K⁻¹`, `T⟨ξ⟩ = ω P(F̄) K⁻¹ ξ + q ω (η − (F̄ − I) ξ)`, the stabilising term elastic.
@@ -17,7 +17,7 @@ use crate::{
 /// Source: [SAND2015-7998] section 7.2 (after \[Silling2007\]) and eq. (6.30), (6.32), with the first Piola–Kirchhoff stress of any local law. Its linearisation is [`Correspondence`] with the same constants.
 ///
 /// Broken bonds drop out of `F̄` and K, and the stress falls with the damage, `σ = (1 − D) σ₀` (section 6.3), or what bonds are left would carry more. A family whose intact bonds no longer span the space
-/// (`SPANNED`) has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
+/// (`SPANNED`), or that have turned inside out, has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
 #[derive(Clone, Debug)]
 pub struct LocalCorrespondence<const D: usize> {
     name: &'static str,
@@ -82,7 +82,7 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
 }
 
 /// Least share of the second moment K that intact bonds have to keep, along the direction along which they keep the least.
-pub const SPANNED: f64 = 0.05;
+pub const SPANNED: f64 = 0.2;
 
 /// `K⁻¹` of the intact bonds; none if they do not span the space.
 fn inverse_shape<const D: usize>(family: &DeformedFamily<'_, D>) -> Option<Tensor<D>> {
@@ -140,6 +140,11 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
             return energy;
         };
         let local = (self.local).respond(&gradient, step, past.point, present.point);
+        if family.damage > 0.0 && !local.stored.is_finite() {
+            // what is left of the family is turned inside out
+            present.point.copy_from_slice(past.point);
+            return energy;
+        }
         if let Some(principal) = present.principal_stress {
             *principal = local.principal_stresses(&gradient, self.local.is_objective());
         }
@@ -173,7 +178,8 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
     }
 
     fn responds(&self, family: &DeformedFamily<'_, D>) -> bool {
-        inverse_shape(family).is_some()
+        let gradient = displacement_gradient(family);
+        gradient.is_some_and(|(g, _)| determinant(&(Tensor::identity() + g)) > 0.0)
     }
 
     fn is_objective(&self) -> bool {

@@ -278,7 +278,7 @@ impl SegmentRecord {
         self.proof.parts.extend(self.growth.take());
         let mut told = warnings(model, self.joining, &self.proof);
         told.extend(locking(model, &rest.local_laws));
-        told.extend(without_response(motion.system()));
+        told.extend(without_response(motion.system(), &motion.state().u));
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
         told.extend(rotation.as_ref().map(Rotation::warning));
         let files = observer.recorder.files();

@@ -117,7 +117,7 @@ fn load_steps<const D: usize>(
     let summary = observer.summary(system.as_ref(), info.iterations, first, seconds)?;
     let mut told = warnings(model, laid_out.joining, &laid_out.proof);
     told.extend(locking(model, &rest.local_laws));
-    told.extend(without_response(system.as_ref()));
+    told.extend(summary.warnings.iter().cloned());
     told.extend(summary.rotation.as_ref().map(Rotation::warning));
     Ok(RunSummary {
         scene: laid_out.title,
@@ -398,6 +398,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             nonlocal_share: [0.0; 3],
         };
         Ok(RunSummary {
+            warnings: without_response(system, &state.u).into_iter().collect(),
             dimension: D,
             applied,
             iterations,
