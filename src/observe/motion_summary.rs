@@ -24,7 +24,7 @@ pub enum Ended {
     ElementsRotated,
 }
 
-/// Energy that a motion gained without work: what a coupling of unsymmetric stiffness feeds to it.
+/// Energy that a motion gained without work: what a coupling of unsymmetric stiffness feeds to it, or a step that has become too large for its law.
 ///
 /// Parts are those of the largest energy so far, or of the work where that is larger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -39,14 +39,24 @@ pub struct EnergyGain {
     pub limit: f64,
     /// Step and time at which it first went beyond 1 %.
     pub first_told: Option<(u64, f64)>,
+    /// Whether the undeformed body could not gain any: a law that changes with the strain then does.
+    pub by_law: bool,
 }
 
 impl EnergyGain {
     /// What a summary warns of, from 1 % on.
     pub fn warning(&self) -> Option<String> {
         let (step, time) = self.first_told?;
+        let cause = match self.by_law {
+            true => {
+                "the material has stiffened with its strain, and the step is too large for it; results from there on are not to be trusted: take a smaller solve.explicit.step-fraction"
+            }
+            false => {
+                "the stiffness is not symmetric, and the seam feeds its modes; results from there on are not to be trusted: make the run shorter, or use coupling.truncated"
+            }
+        };
         Some(format!(
-            "the motion gained {:.1} % of its largest energy without work by step {}, t = {} (1 % at step {step}, t = {}): the stiffness is not symmetric, and the seam feeds its modes; results from there on are not to be trusted: make the run shorter, or use coupling.truncated",
+            "the motion gained {:.1} % of its largest energy without work by step {}, t = {} (1 % at step {step}, t = {}): {cause}",
             100.0 * self.largest,
             self.step,
             number(self.time),

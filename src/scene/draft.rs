@@ -71,7 +71,12 @@ impl<'a, const D: usize> Draft<'a, D> {
         };
         let (materials, cell_material) =
             materials::materials(&spec.materials, influence, kinematics, &mesh)?;
-        let solve = solve::solve(spec.solve.as_ref())?;
+        let is_objective = |m: &Material<D>| {
+            let local = m.law.local_law();
+            local.is_some_and(|law| law.is_objective())
+        };
+        let has_large_strains = materials.iter().any(is_objective);
+        let solve = solve::solve(spec.solve.as_ref(), has_large_strains)?;
         let clock = solve.clock();
         let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
         let initial = initial::initial(&spec.initial, &mesh, clock)?;

@@ -140,10 +140,15 @@ pub(crate) fn still(place: &str, expression: &Expression) -> Result<(), SceneErr
 }
 
 /// What a scene computes.
-pub(crate) fn solve(spec: Option<&Spanned<SolveSpec>>) -> Result<Solve, SceneError> {
+///
+/// `has_large_strains` tells of materials for strains of any size: they stiffen as they are compressed, and the stable step is that of the undeformed body.
+pub(crate) fn solve(
+    spec: Option<&Spanned<SolveSpec>>,
+    has_large_strains: bool,
+) -> Result<Solve, SceneError> {
     Ok(match spec.map(Spanned::get_ref) {
         None | Some(SolveSpec::Static(_)) => Solve::Static,
-        Some(SolveSpec::Explicit(e)) => Solve::Explicit(explicit(e)?),
+        Some(SolveSpec::Explicit(e)) => Solve::Explicit(explicit(e, has_large_strains)?),
         Some(SolveSpec::QuasiStatic(q)) => Solve::QuasiStatic(quasi_static(q)?),
     })
 }
@@ -203,7 +208,7 @@ fn interval(
 }
 
 /// A scene in time: its steps, and how often it is written and watched.
-fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
+fn explicit(spec: &ExplicitSpec, has_large_strains: bool) -> Result<Explicit, SceneError> {
     let place = |key: &str| format!("solve.explicit.{key}");
     let duration = bounds_checks::positive(&place("duration"), &spec.duration)?;
     let step = match spec.step.value {
@@ -228,6 +233,7 @@ fn explicit(spec: &ExplicitSpec) -> Result<Explicit, SceneError> {
             "must be positive and at most 1",
             "0.95 suits most scenes; beyond 1 no step is stable",
         )?,
+        None if has_large_strains => 0.5,
         None => 0.95,
     };
     let output_interval = output_interval(spec, duration)?;

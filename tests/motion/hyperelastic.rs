@@ -1,7 +1,7 @@
 //! Hyperelastic solids of points and of finite elements at large strains and rotations, through scenes.
 
-use crate::column;
 use crate::laws::{STEPS, history, refused, scene, summary};
+use crate::{column, run, write};
 
 const YOUNG: f64 = 1000.0;
 const POISSON: f64 = 0.3;
@@ -173,5 +173,30 @@ fn a_hyperelastic_solid_is_refused_where_its_seam_would_not_balance() {
         folder.path(),
         &scene("balanced", &law, STEPS),
         "does not balance",
+    );
+}
+
+#[test]
+fn a_bar_that_stiffens_beyond_its_step_is_stopped_and_the_default_step_is_small_enough() {
+    // pressed to 0.6 of its length its stiffness, over the undeformed length, is up to 2.8 times what it was
+    let rest =
+        "[initial.u.velocity]\nx = \"-0.4*x\"\n[solve.explicit]\nduration = 1\noutputs = 2\n";
+    let law = "neo-hooke]\npoisson-ratio = 0.3";
+    let typed = scene("local", law, rest).replace("\"0.1*t\"", "\"-4*t\"");
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "bar.toml", &typed);
+    let said = run(folder.path(), &["bar.toml"]);
+    assert!(said.contains("0.5 of the stable step"), "{said}");
+    let too_large = format!("{typed}step-fraction = 0.95\n");
+    write(folder.path(), "bar.toml", &too_large);
+    let output = crate::bondline(folder.path())
+        .args(["run", "bar.toml"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        said.contains("smaller solve.explicit.step-fraction"),
+        "{said}"
     );
 }

@@ -186,7 +186,15 @@ fn run_segment<'r, const D: usize>(
         is_linear: begin.moving.is_linear,
         breaks: breaks(begin.moving.system.as_ref(), rest),
     };
-    let balance = proved.map_or(Balance::Watched, |_| Balance::Proved);
+    // what is proved of the undeformed body need not hold of one whose law changes with its strain
+    let follows_law = rest.has_nonlinear_elements(model)
+        || (model.peridynamics.as_ref())
+            .is_some_and(|p| !p.law.is_linear() && p.law.accelerator().is_none());
+    let balance = match proved {
+        Some(_) if follows_law => Balance::WatchedForLaw,
+        Some(_) => Balance::Proved,
+        None => Balance::Watched,
+    };
     let watched = Watched {
         balance,
         seen: begin.seen,

@@ -1,6 +1,6 @@
 //! What is watched while a run goes on: energy that nobody put in, and elements that rotate.
 //!
-//! A model whose stiffness is symmetric and positive keeps its energy, and is not asked. Every other may feed its modes at the seam, whatever was computed before the first step:
+//! A model whose stiffness is symmetric and positive, whatever its strain, keeps its energy, and is not asked. Every other may feed its modes at the seam, whatever was computed before the first step:
 //!
 //! ```text
 //! gain = (kinetic + stored + dissipated − work − start) / (largest of |kinetic + stored| and |work| so far)
@@ -30,6 +30,8 @@ pub(crate) const TOLD: f64 = 0.01;
 pub(crate) enum Balance {
     /// It closes by construction.
     Proved,
+    /// It would if the law did not change with the strain.
+    WatchedForLaw,
     /// Nothing shows that it closes.
     Watched,
 }
@@ -67,7 +69,7 @@ impl<'m, const D: usize> Guard<'m, D> {
 
     /// Whether energies are wanted after a step, be there a row of the history or not.
     pub fn wants_energies(&self, step: u64) -> bool {
-        self.balance == Balance::Watched && step.is_multiple_of(self.every)
+        self.balance != Balance::Proved && step.is_multiple_of(self.every)
     }
 
     /// Looks at the energies of a state; returns why the run has to end.
@@ -120,6 +122,7 @@ impl<'m, const D: usize> Guard<'m, D> {
             time,
             limit: self.largest_gain,
             first_told: self.seen.told.map(|_| (told_step, told_time)),
+            by_law: self.balance == Balance::WatchedForLaw,
         })
     }
 
