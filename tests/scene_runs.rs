@@ -175,3 +175,23 @@ fn partial_stress_throughout_a_body_needs_no_elements() {
         assert_eq!(rows, 57);
     }
 }
+
+#[cfg(not(feature = "umat"))]
+#[test]
+fn a_user_material_needs_its_feature() {
+    let material = "materials={ steel = { umat = { library = \"none.so\", youngs-modulus = 200e9, poisson-ratio = 0.3 } } }";
+    let folder = tempfile::tempdir().unwrap();
+    let mut source = Source::new("scene.toml", Template::Bar.text());
+    source.push_override(material).unwrap();
+    let Err(error) = AnyScene::from_source(&source, folder.path(), "scene") else {
+        panic!("a routine cannot be called");
+    };
+    let said = error.to_string();
+    let parts = [
+        "umat` names a routine",
+        "built without the feature `umat`",
+        "--features umat",
+    ];
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+    assert_eq!(error.underlined(), ["\"none.so\""]);
+}

@@ -8,6 +8,7 @@
 //! | `hyperelastic.rs` | St Venant–Kirchhoff and Neo-Hooke, for strains of any size |
 //! | `logarithmic_j2.rs` | the same for strains of any size |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
+//! | `umat.rs`, `umat/` | a user's routine with the calling convention of Abaqus' UMAT (feature `umat`) |
 //!
 //! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] at the end of a step and what it remembers, and gives the first Piola–Kirchhoff stress `P` \[Pa\] (for small strains there is but one stress),
 //! the energies stored and dissipated \[J/m^D\], and the tangent of the undeformed body `C = ∂P/∂G` \[Pa\]. It serves the points of a correspondence material and the quadrature points of finite elements.
@@ -20,6 +21,8 @@ mod hyperelastic;
 mod j2;
 mod logarithmic_j2;
 mod reduction;
+#[cfg(feature = "umat")]
+mod umat;
 
 pub use elastic::{Elastic, LinearElastic};
 pub use hardening::{Hardening, JohnsonCook};
@@ -27,6 +30,8 @@ pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
 pub use j2::J2;
 pub use logarithmic_j2::LogarithmicJ2;
 pub use reduction::Reduced;
+#[cfg(feature = "umat")]
+pub use umat::{Routine, RoutineError, Umat, UmatEnergies, UmatSettings};
 
 use crate::tensor::{Tensor, Tensor4};
 
@@ -179,6 +184,11 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
         past: &[f64],
         present: &mut [f64],
     ) -> LocalResponse<D>;
+
+    /// What failed last within the law, with its remedy; none of a law that computes what it is given. What fails has a response that is not a number.
+    fn failure(&self) -> Option<String> {
+        None
+    }
 }
 
 #[cfg(test)]

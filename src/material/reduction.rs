@@ -117,6 +117,10 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         self.law.history()
     }
 
+    fn failure(&self) -> Option<String> {
+        self.law.failure()
+    }
+
     fn respond(
         &self,
         gradient: &Tensor<D>,

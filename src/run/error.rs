@@ -1,7 +1,10 @@
 //! Why a scene that is right could not be run.
 
 use crate::coupling::semidiscrete::behaviour::SystemError;
-use crate::coupling::{CarryError, ModelError};
+use std::sync::Arc;
+
+use crate::coupling::{CarryError, Model, ModelError};
+use crate::material::LocalLaw;
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointError;
 use crate::peridynamics::FractureError;
@@ -110,6 +113,19 @@ pub enum RunError {
         /// What to do instead.
         remedy: &'static str,
     },
+    /// A local law failed, and with it the motion.
+    #[error("{}{failure}. {source}", place.as_ref().map_or(String::new(), |x| {
+        let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
+        format!("at ({}): ", x.join(", "))
+    }))]
+    Law {
+        /// What the law says.
+        failure: String,
+        /// The site that the motion or the load step names.
+        place: Option<Vec<f64>>,
+        /// How the failure ended the run.
+        source: Box<RunError>,
+    },
     /// The scene needs more memory than there is.
     #[error(
         "the scene needs about {needed} of memory, {there} are there: {largest} ({sizes}); {remedy}"
@@ -134,4 +150,33 @@ pub enum RunError {
         /// What to do.
         remedy: &'static str,
     },
+}
+
+/// The error of a motion, or of a load step, with what a local law says that failed in it.
+pub(crate) fn explained<const D: usize>(
+    error: RunError,
+    model: &Model<D>,
+    laws: &[Option<Arc<dyn LocalLaw<D>>>],
+) -> RunError {
+    let Some(failure) = laws.iter().flatten().find_map(|law| law.failure()) else {
+        return error;
+    };
+    let site = match &error {
+        RunError::Explicit(
+            ExplicitError::NotFinite { site, .. } | ExplicitError::Runaway { site, .. },
+        )
+        | RunError::QuasiStatic(
+            QuasiStaticError::NotFinite { site, .. }
+            | QuasiStaticError::NoEquilibrium { site, .. }
+            | QuasiStaticError::RanAway { site, .. },
+        ) => Some(*site),
+        RunError::QuasiStatic(QuasiStaticError::Linear { .. }) => None,
+        _ => return error,
+    };
+    let site = site.and_then(|site| model.sites.get(site));
+    RunError::Law {
+        failure,
+        place: site.map(|site| site.position.as_slice().to_vec()),
+        source: Box::new(error),
+    }
 }

@@ -13,8 +13,9 @@ use super::materials::{self, Material};
 use super::meshing;
 use super::peridynamics::{self, Peridynamics};
 use super::solve::Solve;
-use super::spec::{CouplingSpec, InfluenceSpec, SceneSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded};
 use super::unused::Parts;
+use super::user_material;
 use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
@@ -70,7 +71,12 @@ impl<'a, const D: usize> Draft<'a, D> {
             None => default_influence()?,
         };
         let (materials, cell_material) =
-            materials::materials(&spec.materials, influence, kinematics, &mesh)?;
+            materials::materials(&spec.materials, influence, kinematics, &mesh, directory)?;
+        for (name, material) in &spec.materials {
+            if let MaterialSpec::Umat(m) = material {
+                user_material::add_library(name, m, directory, &mut fingerprint)?;
+            }
+        }
         let is_objective = |m: &Material<D>| {
             let local = m.law.local_law();
             local.is_some_and(|law| law.is_objective())

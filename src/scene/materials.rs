@@ -1,6 +1,7 @@
 //! Materials of a validated scene.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use super::bounds_checks;
@@ -8,6 +9,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics;
 use super::region::cells_of_set;
 use super::spec::{Given, MaterialSpec, MicromodulusSpec};
+use super::user_material;
 use super::value::Text;
 use crate::material::{Elastic, Kinematics};
 use crate::mesh::Mesh;
@@ -78,12 +80,13 @@ impl<const D: usize> Material<D> {
     }
 }
 
-/// All materials, and the material of each cell.
+/// All materials, and the material of each cell; libraries of routines lie relative to `directory`.
 pub(crate) fn materials<const D: usize>(
     spec: &BTreeMap<Text, MaterialSpec>,
     influence: Influence,
     kinematics: Kinematics,
     mesh: &Mesh<D>,
+    directory: &Path,
 ) -> Result<(Vec<Material<D>>, Vec<u16>), SceneError> {
     let Some(first) = spec.keys().next() else {
         return Err(SceneError::new(SceneErrorKind::Missing, "`materials` names no material")
@@ -96,7 +99,7 @@ pub(crate) fn materials<const D: usize>(
     for (number, (name, material)) in spec.iter().enumerate() {
         let number = number as u16;
         let (lame, density) = constants::<D>(name, material, kinematics)?;
-        let (law, cells) = law_and_cells(name, material, influence, kinematics, lame)?;
+        let (law, cells) = law_and_cells(name, material, influence, kinematics, lame, directory)?;
         found.push(Material {
             name: name.value.clone(),
             law,
@@ -154,7 +157,14 @@ fn law_and_cells<'a, const D: usize>(
     influence: Influence,
     kinematics: Kinematics,
     (lambda, mu): (f64, f64),
+    directory: &Path,
 ) -> Result<(Arc<dyn Law<D>>, Option<&'a Text>), SceneError> {
+    let constants = Constants {
+        lambda,
+        shear: mu,
+        influence,
+        kinematics,
+    };
     Ok(match spec {
         MaterialSpec::BondBased(m) => {
             let micromodulus = match &m.micromodulus {
@@ -184,6 +194,10 @@ fn law_and_cells<'a, const D: usize>(
                 m.cells.as_ref(),
             )
         }
+        MaterialSpec::Umat(m) => (
+            user_material::umat(name, m, constants, directory)?,
+            m.cells.as_ref(),
+        ),
         MaterialSpec::Named(m) => {
             let known = m.law.kinematics();
             if !known.contains(&kinematics) {
@@ -200,12 +214,6 @@ fn law_and_cells<'a, const D: usize>(
                 .help(format!("it holds for {}", others.join(", "))));
             }
             let values = named_values(name, m)?;
-            let constants = Constants {
-                lambda,
-                shear: mu,
-                influence,
-                kinematics,
-            };
             (m.law.build(constants, &values), m.cells.as_ref())
         }
     })
@@ -313,6 +321,12 @@ fn constants<const D: usize>(
         MaterialSpec::Lps(m) => ("lps", &m.youngs_modulus, Some(&m.poisson_ratio), &m.density),
         MaterialSpec::Correspondence(m) => (
             "correspondence",
+            &m.youngs_modulus,
+            Some(&m.poisson_ratio),
+            &m.density,
+        ),
+        MaterialSpec::Umat(m) => (
+            "umat",
             &m.youngs_modulus,
             Some(&m.poisson_ratio),
             &m.density,

@@ -10,6 +10,7 @@
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `peridynamics.rs`, `default_points.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
 //! | `agreement.rs` | whether parts that are right alone agree |
 //! | `unused.rs` | parts of a scene that touch nothing |
@@ -43,6 +44,7 @@ pub mod spec;
 pub(crate) mod tagged_table;
 pub(crate) mod template;
 pub(crate) mod unused;
+pub(crate) mod user_material;
 pub(crate) mod validated;
 pub(crate) mod value;
 pub(crate) mod zones;

@@ -164,7 +164,7 @@ impl Source {
         Ok(plain_table(self.merged()?.get_ref()))
     }
 
-    /// The scene as one TOML text with all overrides applied; a mesh file is looked for from `folder`, wherever the text will lie.
+    /// The scene as one TOML text with all overrides applied; a mesh file and libraries of routines are looked for from `folder`, wherever the text will lie.
     ///
     /// # Errors
     /// [`SceneErrorKind::Syntax`], [`SceneErrorKind::Choice`] where the scene is none.
@@ -176,6 +176,13 @@ impl Source {
             .and_then(|f| f.get_mut("path"));
         if let Some(toml::Value::String(path)) = path {
             *path = folder.join(&*path).display().to_string();
+        }
+        let materials = table.get_mut("materials").and_then(|m| m.as_table_mut());
+        for (_, material) in materials.into_iter().flatten() {
+            let library = material.get_mut("umat").and_then(|m| m.get_mut("library"));
+            if let Some(toml::Value::String(library)) = library {
+                *library = folder.join(&*library).display().to_string();
+            }
         }
         Ok(table.to_string())
     }

@@ -18,7 +18,7 @@ use crate::observe::summary::{
     peak_memory_bytes,
 };
 use crate::progress::Progress;
-use crate::run::error::RunError;
+use crate::run::error::{RunError, explained};
 use crate::run::loads;
 use crate::run::setup::RunSettings;
 use crate::run::warnings::{locking, warnings, without_response};
@@ -204,10 +204,14 @@ fn run_segment<'r, const D: usize>(
     let mut observer = StepObserver::new(&segment, watched, begin.recorder)?;
     let params = ExplicitParams::with_step(begin.pace.step);
     let system = begin.moving.system.as_mut();
-    let mut motion = Explicit::new(system, &begin.drive, params, begin.state)?;
+    let law_failed = |error: RunError| explained(error, model, &rest.local_laws);
+    let mut motion = Explicit::new(system, &begin.drive, params, begin.state)
+        .map_err(|error| law_failed(error.into()))?;
     observer.begin(&motion, begin.resumed, begin.due)?;
     watch.lap(&mut record.timings, "start");
-    let (steps, seconds) = observer.take_steps(&mut motion, &mut record.timings)?;
+    let (steps, seconds) = observer
+        .take_steps(&mut motion, &mut record.timings)
+        .map_err(|error| law_failed(error.into()))?;
     record.growth = begin.growth;
     let (steps_before, seconds_before) = begin.taken;
     record.taken = (steps_before + steps, seconds_before + seconds);

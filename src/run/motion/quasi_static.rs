@@ -21,7 +21,7 @@ use crate::observe::summary::{
 };
 use crate::progress::Progress;
 use crate::run::equilibrium;
-use crate::run::error::RunError;
+use crate::run::error::{RunError, explained};
 use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
@@ -250,8 +250,11 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         progress.advance(self.state.step);
         let clock = Instant::now();
         self.options.begin_steps();
+        let (model, laws) = (self.model, &self.rest.local_laws);
         let mut observe = |seen: &LoadStep<'_>| self.observe(seen);
-        let info = quasi_static::run(system, drive, params, near, &times, loaded, &mut observe)?;
+
+        let info = quasi_static::run(system, drive, params, near, &times, loaded, &mut observe)
+            .map_err(|error| explained(error.into(), model, laws))?;
         if let Some(error) = self.failed.take() {
             return Err(error.into());
         }

@@ -12,6 +12,7 @@ use serde::de::{
 };
 
 use super::named_law::{self, NamedSpec};
+use super::user_material::UmatSpec;
 use crate::peridynamics::laws::Named;
 use crate::scene::expression::Expression;
 use crate::scene::value::{Coordinates, Count, Number, Text};
@@ -25,13 +26,15 @@ pub enum MaterialSpec {
     Lps(StateBasedSpec),
     /// Elastic correspondence: the local law applied to a deformation gradient averaged over the family.
     Correspondence(CorrespondenceSpec),
+    /// A routine of a user's library.
+    Umat(UmatSpec),
     /// A law of [`Named`].
     Named(NamedSpec),
 }
 
 /// Keys of materials.
 static KEYS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
-    let typed = ["bond-based", "lps", "correspondence"];
+    let typed = ["bond-based", "lps", "correspondence", "umat"];
     typed.iter().chain(Named::KEYS).copied().collect()
 });
 
@@ -51,6 +54,7 @@ impl<'de> Deserialize<'de> for MaterialSpec {
                     Key::BondBased => MaterialSpec::BondBased(content.newtype_variant()?),
                     Key::Lps => MaterialSpec::Lps(content.newtype_variant()?),
                     Key::Correspondence => MaterialSpec::Correspondence(content.newtype_variant()?),
+                    Key::Umat => MaterialSpec::Umat(content.newtype_variant()?),
                     Key::Named(law) => {
                         MaterialSpec::Named(content.newtype_variant_seed(named_law::Seed(law))?)
                     }
@@ -66,6 +70,7 @@ enum Key {
     BondBased,
     Lps,
     Correspondence,
+    Umat,
     Named(Named),
 }
 
@@ -81,6 +86,7 @@ impl<'de> DeserializeSeed<'de> for MaterialKey {
             "bond-based" => Key::BondBased,
             "lps" => Key::Lps,
             "correspondence" => Key::Correspondence,
+            "umat" => Key::Umat,
             other => match Named::ALL.iter().find(|law| law.key() == other) {
                 Some(law) => Key::Named(*law),
                 None => return Err(de::Error::unknown_variant(other, &KEYS)),
@@ -120,6 +126,11 @@ impl JsonSchema for MaterialSpec {
                 "Elastic correspondence: the local law applied to a deformation gradient averaged over the family.",
                 generator.subschema_for::<CorrespondenceSpec>(),
             ),
+            of(
+                "umat",
+                "Correspondence with the stress of a user's routine, called as Abaqus calls UMAT; the program has to be built with the feature umat.",
+                generator.subschema_for::<UmatSpec>(),
+            ),
         ];
         for law in Named::ALL {
             let content = named_law::schema(*law, generator);
@@ -144,6 +155,7 @@ impl MaterialSpec {
                 &m.critical_stretch,
                 m.tearing_parameter.as_ref(),
             ),
+            Self::Umat(m) => ("umat", &None, &m.critical_stretch, None),
             Self::Correspondence(_) => return None,
         };
         Some(FractureSpec {

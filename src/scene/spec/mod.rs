@@ -10,6 +10,7 @@ mod mesh;
 mod motion;
 pub(super) mod named_law;
 mod region;
+mod user_material;
 
 pub use condition::{
     BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VelocitySpec, VoidSpec,
@@ -38,6 +39,7 @@ pub use region::{
     AutoSpec, BallSpec, BodySpec, BoxSpec, EdgeSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec,
     SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
+pub use user_material::{EnergiesSpec, StrainsSpec, UmatSpec};
 
 use std::collections::BTreeMap;
 

@@ -1,0 +1,393 @@
+//! A user's routine with the calling convention of Abaqus' UMAT as a local law of solids.
+
+// calls of routines that other compilers made: the other modules of the folder have no unsafe code
+#[allow(unsafe_code)]
+mod library;
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+pub use library::{Routine, RoutineError};
+
+use super::{LocalLaw, LocalResponse};
+use crate::tensor::{Tensor, Tensor4, determinant, inverse, strain};
+use library::Call;
+
+/// What a routine's energies are taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UmatEnergies {
+    /// Stored is the elastic energy of the stress, `½ σ : C⁻¹ : σ`; what else was worked is dissipated.
+    Stress,
+    /// Stored is `SSE`; dissipated is what `SPD` and `SCD` grow by.
+    Routine,
+}
+
+/// How a routine is called.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UmatSettings {
+    /// `CMNAME`: the name of the material.
+    pub name: String,
+    /// `PROPS`.
+    pub constants: Vec<f64>,
+    /// `NSTATV`; all are zero at the start.
+    pub states: usize,
+    /// Lamé's λ and μ of the solid at rest \[Pa\].
+    pub lame: (f64, f64),
+    /// For strains and rotations of any size, by the rate form of [`Umat`].
+    pub is_large: bool,
+    /// Whether routines keep no common state, so that many may be called at a time.
+    pub is_thread_safe: bool,
+    /// `TEMP`.
+    pub temperature: f64,
+    /// `CELENT` \[m\]; not a number where it is not known.
+    pub length: f64,
+    /// What energies are taken from.
+    pub energies: UmatEnergies,
+    /// See [`LocalLaw::flows_at_constant_volume`].
+    pub flows_at_constant_volume: bool,
+}
+
+/// The law of a user's routine, called with `NDI = 3`, `NSHR = 3`, `NTENS = 6`.
+///
+/// For small strains `DSTRAN` is the growth of `ε = ½ (G + Gᵀ)`, `DROT = I`, `DFGRD = I + G`.
+///
+/// For strains of any size it is the rate form of \[HughesWinget1980\]: with `L = ΔF F⁻¹` of the middle of the step, `DSTRAN = sym L`, `ω = skew L`, `DROT = (I − ½ ω)⁻¹ (I + ½ ω)`. `STRESS` and `STRAN`
+/// are turned by `DROT` before the call, as Abaqus does, which makes it of second order in the length of a step where the principal directions stay, and of first order where they turn; tensors among `STATEV` are the routine's own (`ROTSIG`); `P = J σ F⁻ᵀ`. A rotation stresses nothing, whatever its size below half a turn within a step.
+///
+/// `DDSDDE` is not used: solvers difference forces. `COORDS` is not a number, `NOEL`, `NPT`, `LAYER`, `KSPT` are 1: a law does not know its place. `KINC` counts the increments of a point. Without time (`step` of zero) and at the deformation
+/// that is remembered the routine is not called.
+#[derive(Debug)]
+pub struct Umat {
+    routine: Routine,
+    settings: UmatSettings,
+    elastic: Tensor4<3>,
+    history: &'static [&'static str],
+    failure: Mutex<Option<String>>,
+    /// Whether the routine has called `XIT`.
+    is_over: AtomicBool,
+}
+
+/// Components in the order of Abaqus.
+const COMPONENTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
+/// Where each part of the history begins, and names of its numbers before `STATEV`.
+const STRESS: usize = 9;
+const STRAIN: usize = 15;
+const ENERGIES: usize = 21;
+const STORED: usize = 24;
+const TIME: usize = 25;
+const INCREMENTS: usize = 26;
+const STATES: usize = 27;
+const NAMES: [&str; STATES] = [
+    "umat gradient xx",
+    "umat gradient yx",
+    "umat gradient zx",
+    "umat gradient xy",
+    "umat gradient yy",
+    "umat gradient zy",
+    "umat gradient xz",
+    "umat gradient yz",
+    "umat gradient zz",
+    "umat stress xx",
+    "umat stress yy",
+    "umat stress zz",
+    "umat stress xy",
+    "umat stress xz",
+    "umat stress yz",
+    "umat strain xx",
+    "umat strain yy",
+    "umat strain zz",
+    "umat strain xy",
+    "umat strain xz",
+    "umat strain yz",
+    "umat sse",
+    "umat spd",
+    "umat scd",
+    "umat stored energy",
+    "umat time",
+    "umat increments",
+];
+
+/// Names of a history with so many `STATEV`; those of each number are made once.
+fn names(states: usize) -> &'static [&'static str] {
+    static MADE: Mutex<BTreeMap<usize, &'static [&'static str]>> = Mutex::new(BTreeMap::new());
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(states).or_insert_with(|| {
+        let own = (1..=states).map(|k| &*format!("umat state {k}").leak());
+        let all: Vec<&'static str> = NAMES.into_iter().chain(own).collect();
+        all.leak()
+    })
+}
+
+/// A symmetric tensor of six components, those off the diagonal times `shear`.
+fn tensor(components: &[f64], shear: f64) -> Tensor<3> {
+    let mut t = Tensor::zeros();
+    for ((i, j), x) in COMPONENTS.into_iter().zip(components) {
+        let x = if i == j { *x } else { x * shear };
+        t[(i, j)] = x;
+        t[(j, i)] = x;
+    }
+    t
+}
+
+/// The six components of a symmetric tensor, those off the diagonal times `shear`.
+fn components(t: &Tensor<3>, shear: f64) -> [f64; 6] {
+    COMPONENTS.map(|(i, j)| if i == j { t[(i, j)] } else { t[(i, j)] * shear })
+}
+
+fn columns(t: &Tensor<3>) -> [f64; 9] {
+    std::array::from_fn(|k| t[(k % 3, k / 3)])
+}
+
+/// How a step deforms the material.
+struct Increment {
+    /// `sym L` of the step.
+    change: Tensor<3>,
+    rotation: Tensor<3>,
+    /// `J` before and after.
+    volume_ratio: [f64; 2],
+}
+
+impl Umat {
+    /// The law of a routine.
+    pub fn new(routine: Routine, settings: UmatSettings) -> Self {
+        Self {
+            elastic: Tensor4::isotropic(settings.lame.0, settings.lame.1),
+            history: names(settings.states),
+            routine,
+            settings,
+            failure: Mutex::new(None),
+            is_over: AtomicBool::new(false),
+        }
+    }
+
+    /// How a step deforms the material; none where it is turned inside out.
+    fn increment(&self, before: &Tensor<3>, after: &Tensor<3>) -> Option<Increment> {
+        let identity = Tensor::identity();
+        if !self.settings.is_large {
+            return Some(Increment {
+                change: strain(&(after - before)),
+                rotation: identity,
+                volume_ratio: [1.0; 2],
+            });
+        }
+        let volume_ratio = [before, after].map(|g| determinant(&(identity + g)));
+        let (middle, _) = inverse(&(identity + (before + after) * 0.5))?;
+        let flow = (after - before) * middle;
+        let half_spin = (flow - flow.transpose()) * 0.25;
+        let (back, _) = inverse(&(identity - half_spin))?;
+        volume_ratio.iter().all(|j| *j > 0.0).then(|| Increment {
+            change: strain(&flow),
+            rotation: back * (identity + half_spin),
+            volume_ratio,
+        })
+    }
+
+    /// `½ σ : C⁻¹ : σ`.
+    fn elastic_energy(&self, stress: &Tensor<3>) -> f64 {
+        let (lambda, shear) = self.settings.lame;
+        let mean = lambda / (3.0 * lambda + 2.0 * shear) * stress.trace();
+        let elastic = (stress - Tensor::identity() * mean) / (2.0 * shear);
+        0.5 * stress.dot(&elastic)
+    }
+
+    /// The response of a history.
+    fn answer(&self, gradient: &Tensor<3>, history: &[f64], dissipated: f64) -> LocalResponse<3> {
+        let stress = tensor(&history[STRESS..STRAIN], 1.0);
+        let stored = history[STORED];
+        if !self.settings.is_large {
+            return LocalResponse {
+                stress,
+                across: 0.0,
+                volume_ratio: 1.0,
+                stored,
+                dissipated,
+            };
+        }
+        let deformation = Tensor::identity() + gradient;
+        let Some((reverse, volume_ratio)) = inverse(&deformation) else {
+            return NOT_A_NUMBER;
+        };
+        LocalResponse {
+            stress: stress * reverse.transpose() * volume_ratio,
+            across: 0.0,
+            volume_ratio,
+            stored,
+            dissipated,
+        }
+    }
+
+    /// Notes what failed, and responds with what is not a number.
+    fn failed(&self, call: &Call<'_>, what: &str, remedy: &str) -> LocalResponse<3> {
+        let strain: Vec<String> = (call.strain.iter().zip(&call.change))
+            .map(|(e, d)| format!("{:.4e}", e + d))
+            .collect();
+        let message = format!(
+            "the routine `{}` of the material `{}` ({}) {what} in increment {} of a point, to t = {:.6e}, at the strain ({}); {remedy}",
+            self.routine.symbol(),
+            self.settings.name,
+            self.routine.path().display(),
+            call.increment,
+            call.time + call.step,
+            strain.join(", ")
+        );
+        let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        *failure = Some(message);
+        NOT_A_NUMBER
+    }
+
+    /// What is wrong with what a call gave, and the remedy.
+    fn wrong(&self, call: &Call<'_>) -> Option<(String, &'static str)> {
+        let is_finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
+        if self.routine.has_given_up() {
+            self.is_over.store(true, Ordering::Relaxed);
+            let remedy = "its own output says why";
+            return Some(("called XIT".to_owned(), remedy));
+        }
+        let named = [
+            ("STRESS", &call.stress[..]),
+            ("STATEV", &*call.state),
+            ("SSE, SPD, SCD", &call.energies[..]),
+        ];
+        let bad = named.into_iter().find(|(_, numbers)| !is_finite(numbers));
+        if let Some((what, numbers)) = bad {
+            let k = numbers.iter().position(|x| !x.is_finite()).unwrap_or(0);
+            let what = format!("gave {what} whose number {} is {}", k + 1, numbers[k]);
+            let remedy = "check the routine and its constants; COORDS, and CELENT without `element-length`, are not numbers";
+            return Some((what, remedy));
+        }
+        (call.wanted_step < 1.0).then(|| {
+            let what = format!("asked for a smaller step, PNEWDT = {}", call.wanted_step);
+            (what, "take more load steps, or a smaller time step")
+        })
+    }
+}
+
+/// The response where there is none.
+const NOT_A_NUMBER: LocalResponse<3> = LocalResponse {
+    stress: Tensor::from_array_storage(nalgebra::ArrayStorage([[f64::NAN; 3]; 3])),
+    across: f64::NAN,
+    volume_ratio: f64::NAN,
+    stored: f64::NAN,
+    dissipated: f64::NAN,
+};
+
+/// Deformations that differ by no more than this of their size are one.
+const SAME: f64 = 4.0 * f64::EPSILON;
+
+impl LocalLaw<3> for Umat {
+    fn tangent(&self) -> &Tensor4<3> {
+        &self.elastic
+    }
+
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    fn is_objective(&self) -> bool {
+        self.settings.is_large
+    }
+
+    fn flows_at_constant_volume(&self) -> bool {
+        self.settings.flows_at_constant_volume
+    }
+
+    fn history(&self) -> &'static [&'static str] {
+        self.history
+    }
+
+    fn failure(&self) -> Option<String> {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.clone()
+    }
+
+    fn respond(
+        &self,
+        gradient: &Tensor<3>,
+        step: f64,
+        past: &[f64],
+        present: &mut [f64],
+    ) -> LocalResponse<3> {
+        present.copy_from_slice(past);
+        let before = Tensor::<3>::from_column_slice(&past[..STRESS]);
+        if step == 0.0 && (gradient - before).amax() <= SAME * gradient.amax() {
+            return self.answer(&before, past, 0.0);
+        }
+        let Some(increment) = self.increment(&before, gradient) else {
+            return NOT_A_NUMBER;
+        };
+        // what is not a number already says nothing of the routine
+        let is_lost = !gradient.iter().all(|x| x.is_finite());
+        if is_lost || self.is_over.load(Ordering::Relaxed) {
+            return NOT_A_NUMBER;
+        }
+        let Increment {
+            change,
+            rotation,
+            volume_ratio,
+        } = increment;
+        let turned = |t: Tensor<3>| rotation * t * rotation.transpose();
+        let stress = turned(tensor(&past[STRESS..STRAIN], 1.0));
+        let total = turned(tensor(&past[STRAIN..ENERGIES], 0.5));
+        let settings = &self.settings;
+        let identity = Tensor::identity();
+        let mut call = Call {
+            stress: components(&stress, 1.0),
+            state: &mut present[STATES..],
+            energies: std::array::from_fn(|k| past[ENERGIES + k]),
+            strain: components(&total, 2.0),
+            change: components(&change, 2.0),
+            time: past[TIME],
+            step,
+            temperature: settings.temperature,
+            name: &settings.name,
+            constants: &settings.constants,
+            rotation: columns(&rotation),
+            length: settings.length,
+            deformation: [
+                columns(&(identity + before)),
+                columns(&(identity + gradient)),
+            ],
+            is_large: settings.is_large,
+            increment: past[INCREMENTS] as i32 + 1,
+            wanted_step: 1.0,
+        };
+        self.routine.call(&mut call, !settings.is_thread_safe);
+        let wrong = self.wrong(&call);
+        // what was to be read only is as it was, whatever the routine wrote there
+        call.strain = components(&total, 2.0);
+        call.change = components(&change, 2.0);
+        (call.time, call.step) = (past[TIME], step);
+        if let Some((what, remedy)) = wrong {
+            return self.failed(&call, &what, remedy);
+        }
+        let (found, energies) = (call.stress, call.energies);
+        let now = tensor(&found, 1.0);
+        let [was, is] = volume_ratio;
+        let spent = |e: &[f64]| e[1] + e[2];
+        let (stored, dissipated) = match settings.energies {
+            UmatEnergies::Routine => {
+                let spent_before = was * spent(&past[ENERGIES..STORED]);
+                (is * energies[0], is * spent(&energies) - spent_before)
+            }
+            UmatEnergies::Stress => {
+                let stored = is * self.elastic_energy(&now);
+                let work = 0.5 * (stress * was + now * is).dot(&change);
+                (stored, work - (stored - past[STORED]))
+            }
+        };
+        present[..STRESS].copy_from_slice(&columns(gradient));
+        present[STRESS..STRAIN].copy_from_slice(&found);
+        present[STRAIN..ENERGIES].copy_from_slice(&components(&(total + change), 2.0));
+        present[ENERGIES..STORED].copy_from_slice(&energies);
+        present[STORED] = stored;
+        present[TIME] = past[TIME] + step;
+        present[INCREMENTS] = past[INCREMENTS] + 1.0;
+        self.answer(gradient, present, dissipated)
+    }
+}

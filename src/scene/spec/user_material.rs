@@ -1,0 +1,79 @@
+//! Materials whose stress a user's routine gives.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::scene::value::{Count, Number, Text};
+
+/// A routine of a compiled library with the calling convention of Abaqus' UMAT.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct UmatSpec {
+    /// The library, relative to the scene; its code runs within the program.
+    pub library: Text,
+    /// The routine's name in the library; `umat_`, `umat` or `UMAT` if left out.
+    #[serde(default)]
+    pub symbol: Option<Text>,
+    /// Young's modulus E at rest.
+    pub youngs_modulus: Number,
+    /// Poisson's ratio at rest.
+    pub poisson_ratio: Number,
+    /// Density.
+    #[serde(default)]
+    pub density: Option<Number>,
+    /// PROPS, the numbers that the routine takes.
+    #[serde(default)]
+    pub constants: Vec<Number>,
+    /// NSTATV, how many numbers the routine remembers of a point; 0 if left out.
+    #[serde(default)]
+    pub state: Option<Count>,
+    /// How large strains and rotations may become.
+    #[serde(default)]
+    pub strains: StrainsSpec,
+    /// What the energies are taken from.
+    #[serde(default)]
+    pub energies: EnergiesSpec,
+    /// Whether the routine keeps no common state, so that several calls may run at a time; no if left out.
+    #[serde(default)]
+    pub thread_safe: bool,
+    /// Whether cells with several quadrature points take the mean of their dilatation, as Abaqus' fully integrated ones do; yes if left out.
+    #[serde(default)]
+    pub mean_dilatation: Option<bool>,
+    /// TEMP; 0 if left out.
+    #[serde(default)]
+    pub temperature: Option<Number>,
+    /// CELENT; not a number if left out.
+    #[serde(default)]
+    pub element_length: Option<Number>,
+    /// Strength of the stabilising bond force relative to an LPS; 1 if left out, 0 switches it off.
+    #[serde(default)]
+    pub stabilisation: Option<Number>,
+    /// Stretch at which a bond breaks.
+    #[serde(default)]
+    pub critical_stretch: Option<Number>,
+    /// The set of cells that this material fills.
+    #[serde(default)]
+    pub cells: Option<Text>,
+}
+
+/// How large strains and rotations may become.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StrainsSpec {
+    /// Small ones.
+    #[default]
+    Small,
+    /// Large ones: the rate form, with stresses turned by DROT.
+    Large,
+}
+
+/// What energies are taken from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum EnergiesSpec {
+    /// The stress: stored is its elastic energy, the rest of the work is dissipated.
+    #[default]
+    Stress,
+    /// The routine: SSE, SPD and SCD.
+    Routine,
+}
