@@ -196,6 +196,30 @@ impl Umat {
         0.5 * stress.dot(&elastic)
     }
 
+    /// What is stored at the end of a step and what was dissipated within it, per undeformed volume; `energies` are those that the routine gave, `stress` is that before, turned, and after.
+    fn energies(
+        &self,
+        past: &[f64],
+        energies: &[f64; 3],
+        stress: &[Tensor<3>; 2],
+        change: &Tensor<3>,
+        volume_ratio: [f64; 2],
+    ) -> (f64, f64) {
+        let [was, is] = volume_ratio;
+        let spent = |e: &[f64]| e[1] + e[2];
+        match self.settings.energies {
+            UmatEnergies::Routine => {
+                let before = was * spent(&past[ENERGIES..STORED]);
+                (is * energies[0], is * spent(energies) - before)
+            }
+            UmatEnergies::Stress => {
+                let stored = is * self.elastic_energy(&stress[1]);
+                let work = 0.5 * (stress[0] * was + stress[1] * is).dot(change);
+                (stored, work - (stored - past[STORED]))
+            }
+        }
+    }
+
     /// The response of a history.
     fn answer(&self, gradient: &Tensor<3>, history: &[f64], dissipated: f64) -> LocalResponse<3> {
         let stress = tensor(&history[STRESS..STRAIN], 1.0);
@@ -367,20 +391,8 @@ impl LocalLaw<3> for Umat {
             return self.failed(&call, &what, remedy);
         }
         let (found, energies) = (call.stress, call.energies);
-        let now = tensor(&found, 1.0);
-        let [was, is] = volume_ratio;
-        let spent = |e: &[f64]| e[1] + e[2];
-        let (stored, dissipated) = match settings.energies {
-            UmatEnergies::Routine => {
-                let spent_before = was * spent(&past[ENERGIES..STORED]);
-                (is * energies[0], is * spent(&energies) - spent_before)
-            }
-            UmatEnergies::Stress => {
-                let stored = is * self.elastic_energy(&now);
-                let work = 0.5 * (stress * was + now * is).dot(&change);
-                (stored, work - (stored - past[STORED]))
-            }
-        };
+        let ends = [stress, tensor(&found, 1.0)];
+        let (stored, dissipated) = self.energies(past, &energies, &ends, &change, volume_ratio);
         present[..STRESS].copy_from_slice(&columns(gradient));
         present[STRESS..STRAIN].copy_from_slice(&found);
         present[STRAIN..ENERGIES].copy_from_slice(&components(&(total + change), 2.0));

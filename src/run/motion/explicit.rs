@@ -147,6 +147,20 @@ fn run_segment<'r, const D: usize>(
     options: &RunOptions<'r>,
     progress: &dyn Progress,
 ) -> Result<RunSegment<'r, D>, RunError> {
+    let model = laid_out.model;
+    take_segment(laid_out, from, rest, spec, options, progress)
+        .map_err(|error| explained(error, model, &rest.local_laws))
+}
+
+/// The steps of [`run_segment`].
+fn take_segment<'r, const D: usize>(
+    laid_out: ModelSetup<'_, D>,
+    from: From<'r, D>,
+    rest: &'r RunSettings<D>,
+    spec: &Spec,
+    options: &RunOptions<'r>,
+    progress: &dyn Progress,
+) -> Result<RunSegment<'r, D>, RunError> {
     let (model, operator, proved) = (laid_out.model, laid_out.operator, laid_out.proved);
     let mut watch = laid_out.watch;
     let mut record = SegmentRecord {
@@ -204,14 +218,10 @@ fn run_segment<'r, const D: usize>(
     let mut observer = StepObserver::new(&segment, watched, begin.recorder)?;
     let params = ExplicitParams::with_step(begin.pace.step);
     let system = begin.moving.system.as_mut();
-    let law_failed = |error: RunError| explained(error, model, &rest.local_laws);
-    let mut motion = Explicit::new(system, &begin.drive, params, begin.state)
-        .map_err(|error| law_failed(error.into()))?;
+    let mut motion = Explicit::new(system, &begin.drive, params, begin.state)?;
     observer.begin(&motion, begin.resumed, begin.due)?;
     watch.lap(&mut record.timings, "start");
-    let (steps, seconds) = observer
-        .take_steps(&mut motion, &mut record.timings)
-        .map_err(|error| law_failed(error.into()))?;
+    let (steps, seconds) = observer.take_steps(&mut motion, &mut record.timings)?;
     record.growth = begin.growth;
     let (steps_before, seconds_before) = begin.taken;
     record.taken = (steps_before + steps, seconds_before + seconds);
