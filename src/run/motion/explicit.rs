@@ -152,6 +152,18 @@ fn run_segment<'r, const D: usize>(
         .map_err(|error| explained(error, model, &rest.local_laws))
 }
 
+/// Whether the balance of energy is watched: what is proved of the undeformed body need not hold of one whose law changes with its strain.
+fn balance_of<const D: usize>(model: &Model<D>, rest: &RunSettings<D>, is_proved: bool) -> Balance {
+    let points = model.peridynamics.as_ref();
+    let follows_law = rest.has_nonlinear_elements(model)
+        || points.is_some_and(|p| !p.law.is_linear() && p.law.accelerator().is_none());
+    match is_proved {
+        true if follows_law => Balance::WatchedForLaw,
+        true => Balance::Proved,
+        false => Balance::Watched,
+    }
+}
+
 /// The steps of [`run_segment`].
 fn take_segment<'r, const D: usize>(
     laid_out: ModelSetup<'_, D>,
@@ -200,17 +212,8 @@ fn take_segment<'r, const D: usize>(
         is_linear: begin.moving.is_linear,
         breaks: breaks(begin.moving.system.as_ref(), rest),
     };
-    // what is proved of the undeformed body need not hold of one whose law changes with its strain
-    let follows_law = rest.has_nonlinear_elements(model)
-        || (model.peridynamics.as_ref())
-            .is_some_and(|p| !p.law.is_linear() && p.law.accelerator().is_none());
-    let balance = match proved {
-        Some(_) if follows_law => Balance::WatchedForLaw,
-        Some(_) => Balance::Proved,
-        None => Balance::Watched,
-    };
     let watched = Watched {
-        balance,
+        balance: balance_of(model, rest, proved.is_some()),
         seen: begin.seen,
         edge: begin.edge,
         zone: begin.zone,
