@@ -183,6 +183,13 @@ fn criteria_that_a_law_does_not_have_are_refused() {
     );
     let zero = law(5.0, 5.0, "tearing-parameter = 0");
     refused(&scene("nonlocal", &zero, STEPS), "must be positive");
+    // no solution before the run shows where the material flows
+    let auto = scene("splice", &law(5.0, 5.0, "tearing-parameter = 1"), STEPS);
+    let auto = auto.replace(
+        "[zones.nonlocal]\nbox = { min = 3, max = 7 }",
+        "[zones]\nauto = {}",
+    );
+    refused(&auto, "breaks them by a tearing parameter");
     let strange = law(5.0, 5.0, "").replace("large", "huge");
     refused(&scene("nonlocal", &strange, STEPS), "\"small\", \"large\"");
 }

@@ -30,7 +30,7 @@ use crate::observe::summary::Decision;
 use crate::scene::bounds_checks;
 use crate::scene::draft::Draft;
 use crate::scene::error::{SceneError, SceneErrorKind};
-use crate::scene::materials::Material;
+use crate::scene::materials::{Fracture, Material};
 use crate::scene::peridynamics;
 use crate::scene::solve::Solve;
 use crate::scene::source::Span;
@@ -292,15 +292,17 @@ fn alone(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     .help("keep one of them; `--set zones=auto` replaces all of [zones]"))
 }
 
-/// Refuses a law that damages its bonds: where that begins is no stretch that a solution before the run shows.
+/// Refuses bonds that are damaged, or break, by something else than their stretch: where that begins no solution before the run shows.
 fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<(), SceneError> {
-    if !material.law.damages() {
-        return Ok(());
-    }
+    let does = match material.fracture {
+        _ if material.law.damages() => "damages them by the energy of their family",
+        Some(Fracture::Tearing(_)) => "breaks them by a tearing parameter",
+        _ => return Ok(()),
+    };
     Err(SceneError::new(
         SceneErrorKind::Conflict,
         format!(
-            "`zones.auto` looks for bonds that reach a critical stretch, and the law of the material `{}`, {}, damages them by the energy of their family",
+            "`zones.auto` looks for bonds that reach a critical stretch, and the law of the material `{}`, {}, {does}",
             material.name,
             material.law.name()
         ),
