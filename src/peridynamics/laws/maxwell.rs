@@ -90,13 +90,43 @@ impl<const D: usize> Law<D> for Maxwell<D> {
     }
 }
 
+/// A Maxwell arm over a step: its spring's extension `q̇ = ė − q/τ` for an extension e that is linear in time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arm {
+    /// `e^−x`, with x the length of the step over τ.
+    decay: f64,
+    /// The mean of `e^−xθ`, θ from 0 to 1: what of the growth of e is left in q at the end.
+    driven: f64,
+    /// The mean of what is left at θ.
+    rise: f64,
+}
+
+impl Arm {
+    /// The arm of the relaxation time `time` over a step of the length `step` \[s\].
+    pub(super) fn over(step: f64, time: f64) -> Self {
+        let x = step / time;
+        Self {
+            decay: (-x).exp(),
+            driven: mean_decay(x),
+            rise: mean_rise(x),
+        }
+    }
+
+    /// q at the end of a step in which e grows by `growth`, from q `before`; and what is dissipated by a unit stiffness: the work `growth · (mean of q)` less what the spring stores.
+    pub(super) fn follow(self, before: f64, growth: f64) -> (f64, f64) {
+        let q = self.decay * before + self.driven * growth;
+        let mean = self.driven * before + self.rise * growth;
+        (q, growth * mean - 0.5 * (q * q - before * before))
+    }
+}
+
 /// `(1 − e^−x)/x`, `1` at zero.
-pub(super) fn mean_decay(x: f64) -> f64 {
+fn mean_decay(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x }
 }
 
 /// `∫₀¹ (1 − e^−xθ)/x dθ = (1 − (1 − e^−x)/x)/x`, `1/2` at zero.
-pub(super) fn mean_rise(x: f64) -> f64 {
+fn mean_rise(x: f64) -> f64 {
     // below this the difference loses what the series leaves out
     const SERIES: f64 = 1e-3;
     if x < SERIES {
@@ -123,8 +153,7 @@ impl<const D: usize> ForceState<D> for Maxwell<D> {
         present: Present<'_>,
         force: &mut [Vector<D>],
     ) -> EnergyDensity {
-        let x = step / self.time;
-        let (decay, driven, rise) = ((-x).exp(), mean_decay(x), mean_rise(x));
+        let arm = Arm::over(step, self.time);
         let mut energy = EnergyDensity::default();
         let bonds = past
             .bonds
@@ -133,19 +162,14 @@ impl<const D: usize> ForceState<D> for Maxwell<D> {
         for (k, (past, present)) in bonds.enumerate() {
             let r = family.bonds[k].norm();
             let s = family.extension[k] / r;
-            let (before, q_before) = (past[0], past[1]);
-            let growth = s - before;
-            let q = decay * q_before + driven * growth;
+            let (q, spent) = arm.follow(past[1], s - past[0]);
             present.copy_from_slice(&[s, q]);
             // p r³ = c/2 per bond and volume
             let half = family.pair[k] * r * r * r;
             force[k] = family.direction[k] * (half * ((1.0 - self.share) * s + self.share * q));
             let weight = half * r * family.volumes[k];
             energy.stored += 0.5 * weight * ((1.0 - self.share) * s * s + self.share * q * q);
-            // work of the arm, growth · (mean of q over the step), less what its spring stores
-            let mean = driven * q_before + rise * growth;
-            let stored = 0.5 * (q * q - q_before * q_before);
-            energy.dissipated += weight * self.share * (growth * mean - stored);
+            energy.dissipated += weight * self.share * spent;
         }
         energy
     }

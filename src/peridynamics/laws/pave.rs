@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::maxwell::{mean_decay, mean_rise};
+use super::maxwell::Arm;
 use super::{Constants, NamedLaw, Parameter, PositionAwareSolid, Ratio};
 use crate::{
     material::Kinematics,
@@ -188,6 +188,10 @@ impl<const D: usize> ForceState<D> for PositionAwareViscoelasticSolid<D> {
             dissipated: 0.0,
         };
         let mut product = 0.0;
+        let mut arms = [(0.0, Arm::over(0.0, 1.0)); ARMS];
+        for (arm, (share, time)) in arms.iter_mut().zip(&self.arms) {
+            *arm = (*share, Arm::over(step, *time));
+        }
         let bonds = past.bonds.chunks_exact(kept);
         let bonds = bonds.zip(present.bonds.chunks_exact_mut(kept));
         for (k, (past, present)) in bonds.enumerate() {
@@ -199,15 +203,10 @@ impl<const D: usize> ForceState<D> for PositionAwareViscoelasticSolid<D> {
             let volume = family.volumes[k];
             energy.stored += 0.5 * (modulus * (self.lasting * epsilon)) * epsilon * volume;
             present[0] = epsilon;
-            for (i, (share, time)) in self.arms.iter().enumerate() {
-                let x = step / time;
-                let before = past[1 + i];
-                let q = (-x).exp() * before + mean_decay(x) * growth;
+            for (i, (share, arm)) in arms[..self.arms.len()].iter().enumerate() {
+                let (q, spent) = arm.follow(past[1 + i], growth);
                 present[1 + i] = q;
                 energy.stored += 0.5 * modulus * share * q * q * volume;
-                // work of the arm, growth · (mean of q over the step), less what its spring stores
-                let mean = mean_decay(x) * before + mean_rise(x) * growth;
-                let spent = growth * mean - 0.5 * (q * q - before * before);
                 energy.dissipated += modulus * share * spent * volume;
             }
             product += modulus * self.carried(present) * r * volume;
