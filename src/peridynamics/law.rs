@@ -31,15 +31,19 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     fn force_state(&self) -> Option<&dyn ForceState<D>>;
 
     /// A fast pass for [`Law::force_state`], if there is one.
-    fn accelerator(&self) -> Option<Accelerator>;
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
 
     /// The local law that finite elements of this material have; none if they are linear, with the collapsed tensor of the bonds.
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         None
     }
 
-    /// Whether the force with linear kinematics is that of [`Law::linearised`], whatever the displacement and the time.
-    fn is_linear(&self) -> bool;
+    /// Whether the force with linear kinematics is that of [`Law::linearised`], whatever the displacement and the time. A law that does not say so is computed as nonlinear.
+    fn is_linear(&self) -> bool {
+        false
+    }
 
     /// Whether bonds can break: [`Law::force_state`] then takes families that have lost some.
     fn has_breakable_bonds(&self) -> bool;

@@ -6,7 +6,7 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
+        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Micromodulus, Past, Present,
     },
     tensor::Vector,
@@ -129,14 +129,6 @@ impl<const D: usize> Law<D> for ContinuumDamage<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
-    }
-
-    fn accelerator(&self) -> Option<Accelerator> {
-        None
-    }
-
-    fn is_linear(&self) -> bool {
-        false
     }
 
     fn is_linear_until_damaged(&self) -> bool {

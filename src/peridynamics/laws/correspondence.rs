@@ -2,8 +2,8 @@
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, Conditions, Family, ForceState, Influence, Law, LinearForceState,
-        PdError, ShellTarget, StatePart, invert_shape_tensor,
+        BondEnergy, Conditions, Family, ForceState, Influence, Law, LinearForceState, PdError,
+        ShellTarget, StatePart, invert_shape_tensor,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -44,10 +44,6 @@ impl<const D: usize> Law<D> for Correspondence<D> {
     }
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
-        None
-    }
-
-    fn accelerator(&self) -> Option<Accelerator> {
         None
     }
 

@@ -6,7 +6,7 @@ use super::{Correspondence, Parameter};
 use crate::{
     material::LocalLaw,
     peridynamics::{
-        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
+        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Past, Present,
     },
     tensor::{Tensor, Vector, determinant, inverse, least_eigenvalue},
@@ -62,14 +62,6 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
 
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         Some(Arc::clone(&self.local))
-    }
-
-    fn accelerator(&self) -> Option<Accelerator> {
-        None
-    }
-
-    fn is_linear(&self) -> bool {
-        false
     }
 
     fn has_breakable_bonds(&self) -> bool {

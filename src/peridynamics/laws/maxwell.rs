@@ -6,7 +6,7 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
+        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Micromodulus, Past, Present,
     },
     tensor::Vector,
@@ -71,14 +71,6 @@ impl<const D: usize> Law<D> for Maxwell<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
-    }
-
-    fn accelerator(&self) -> Option<Accelerator> {
-        None
-    }
-
-    fn is_linear(&self) -> bool {
-        false
     }
 
     fn has_breakable_bonds(&self) -> bool {

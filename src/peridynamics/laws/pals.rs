@@ -6,9 +6,9 @@ use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        Accelerator, BondEnergy, CalibrationFields, Conditions, DeformedFamily, EnergyDensity,
-        Family, ForceState, HistoryLayout, Influence, Law, LinearForceState, Past, PdError,
-        Present, ShellTarget, StatePart, position_aware_influence,
+        BondEnergy, CalibrationFields, Conditions, DeformedFamily, EnergyDensity, Family,
+        ForceState, HistoryLayout, Influence, Law, LinearForceState, Past, PdError, Present,
+        ShellTarget, StatePart, position_aware_influence,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -100,10 +100,6 @@ impl<const D: usize> Law<D> for PositionAwareSolid<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
-    }
-
-    fn accelerator(&self) -> Option<Accelerator> {
-        None
     }
 
     fn is_linear(&self) -> bool {

@@ -7,7 +7,7 @@ use super::{Constants, NamedLaw, Parameter, PositionAwareSolid, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
+        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Past, Present,
     },
     tensor::Vector,
@@ -144,14 +144,6 @@ impl<const D: usize> Law<D> for PositionAwareViscoelasticSolid<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
-    }
-
-    fn accelerator(&self) -> Option<Accelerator> {
-        None
-    }
-
-    fn is_linear(&self) -> bool {
-        false
     }
 
     fn has_breakable_bonds(&self) -> bool {
