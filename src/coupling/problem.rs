@@ -203,6 +203,15 @@ pub enum ModelError {
     /// Weights of the lattice's shells cannot be made isotropic.
     #[error(transparent)]
     Shells(#[from] crate::peridynamics::ShellError),
+    /// No constants of the law do on this lattice what the material is to do.
+    #[error("the material `{law}`: {source}")]
+    Calibration {
+        /// The law's name.
+        law: &'static str,
+        /// Why.
+        #[source]
+        source: crate::peridynamics::softening::CalibrationError,
+    },
     /// Faces cut the lattice in such a way that no energies of pieces make affine fields exact.
     #[error(
         "the faces of the nonlocal zone cut the lattice where truncated bonds cannot be fitted to them: no {what} leave less than {residual:.1e} of the largest traction; let the faces follow the lattice (element edges a whole number of spacings long), use a horizon of three spacings or more or elements of two spacings or more at the seam, or couple by splice"

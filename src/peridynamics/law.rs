@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use crate::material::LocalLaw;
-use crate::peridynamics::{BondEnergy, ForceState, LinearForceState};
+use crate::peridynamics::{
+    BondEnergy, ForceState, LinearForceState,
+    softening::{CalibrationError, RegularFamily},
+};
 
 /// A fast pass over all bonds that computes what a law's [`ForceState`] says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +20,21 @@ pub enum Accelerator {
         /// Shear modulus \[Pa\].
         shear: f64,
     },
+}
+
+/// Constants that follow from the lattice at hand and its horizon.
+pub trait Calibrate<const D: usize> {
+    /// The law for a lattice, whatever lattice it was calibrated for before.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if no constants do what the material is to do.
+    fn to_lattice(
+        &self,
+        family: &RegularFamily<'_, D>,
+    ) -> Result<Arc<dyn Law<D>>, CalibrationError>;
+
+    /// What they are, in words; none before a calibration.
+    fn found(&self) -> Option<String>;
 }
 
 /// A peridynamic law.
@@ -57,6 +75,11 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     fn damages(&self) -> bool {
         let states = self.force_state();
         states.is_some_and(|states| states.history().damage.is_some())
+    }
+
+    /// How its constants follow from the lattice at hand, if they do.
+    fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
+        None
     }
 
     /// What the bonds of a continuous family store, and what breaking them costs, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].

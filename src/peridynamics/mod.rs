@@ -15,6 +15,7 @@
 //! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.3) |
 //! | `laws/` | the laws, one file each | eq. (3.1), (5.16), section 7.2 |
 //! | `critical_stretch.rs` | critical stretch from the fracture energy | \[Silling2005\] |
+//! | `softening.rs` | softening of bonds from strength and fracture energy | \[BazantOh1983\] |
 //! | `tearing_parameter.rs` | failure of ductile materials | eq. (6.33) |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
@@ -43,6 +44,7 @@ pub mod partial_volume;
 pub mod position_aware_influence;
 pub mod shape_tensor;
 pub mod shell_weights;
+pub mod softening;
 mod tearing_parameter;
 
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
@@ -51,7 +53,7 @@ pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_en
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, Present};
 pub use influence::{Influence, Micromodulus};
-pub use law::{Accelerator, Law};
+pub use law::{Accelerator, Calibrate, Law};
 pub use laws::{
     BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell, PositionAwareSolid,
 };

@@ -6,6 +6,7 @@
 //! | `lps.rs` | linear peridynamic solid | eq. (5.16) |
 //! | `correspondence.rs` | elastic correspondence, to first order | section 7.2 |
 //! | `continuum_damage.rs` | bonds that lose their stiffness by damage | section 6.2 |
+//! | `softening_bond.rs` | bonds that soften: strength and fracture energy | |
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
 //! | `pals.rs`, `pave.rs` | position-aware solid, linear (PALS) and viscoelastic (PAVE) | sections 4.2, 4.3 |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
@@ -27,6 +28,7 @@ mod neo_hooke;
 mod pals;
 mod pave;
 mod plastic;
+mod softening_bond;
 mod st_venant_kirchhoff;
 
 use std::sync::Arc;
@@ -46,6 +48,7 @@ pub use neo_hooke::NeoHookeSolid;
 pub use pals::PositionAwareSolid;
 pub use pave::PositionAwareViscoelasticSolid;
 pub use plastic::PlasticCorrespondence;
+pub use softening_bond::SofteningBond;
 pub use st_venant_kirchhoff::StVenantKirchhoffSolid;
 
 /// A number, or a word, that a law takes beside the elastic constants.
@@ -175,7 +178,27 @@ pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
         let values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
         law.build(constants, &values)
     });
-    typed.into_iter().chain(named).collect()
+    typed.into_iter().chain(named).map(on_a_lattice).collect()
+}
+
+/// A law whose constants follow from a lattice, for a family of six bonds or less.
+#[cfg(test)]
+fn on_a_lattice<const D: usize>(law: Arc<dyn Law<D>>) -> Arc<dyn Law<D>> {
+    use crate::{peridynamics::softening::RegularFamily, tensor::Vector};
+    let Some(calibrate) = law.calibrate() else {
+        return law;
+    };
+    let vector = |n: usize| {
+        let (axis, sign) = (n / 2, if n.is_multiple_of(2) { 0.1 } else { -0.1 });
+        Vector::from_fn(|a, _| if a == axis { sign } else { 0.0 })
+    };
+    let bonds: Vec<_> = (0..2 * D).map(|n| (vector(n), 1e4)).collect();
+    let family = RegularFamily {
+        bonds: &bonds,
+        plane_energy: 0.1,
+        horizon: 0.1,
+    };
+    calibrate.to_lattice(&family).unwrap()
 }
 
 /// Declares [`Named`], the laws that scenes know by key.
@@ -262,6 +285,7 @@ macro_rules! named_laws {
 
 named_laws! {
     Hardening,
+    SofteningBond,
     ContinuumDamage,
     Maxwell,
     PositionAwareSolid,

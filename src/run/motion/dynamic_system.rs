@@ -54,7 +54,8 @@ pub(crate) fn dynamic<'a, const D: usize>(
         PrecisionSpec::Double => Storage::Double,
         PrecisionSpec::Single => Storage::Single,
     };
-    let breaks = failure_text(critical_stretch.as_ref(), breaking);
+    let calibration = (model.peridynamics.as_ref()).and_then(|p| p.law.calibrate()?.found());
+    let breaks = calibration.unwrap_or_else(|| failure_text(critical_stretch.as_ref(), breaking));
     let density = |material: u16| rest.density[material as usize];
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
     let is_linear = critical_stretch.is_none()
