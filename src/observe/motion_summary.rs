@@ -76,6 +76,8 @@ pub struct Rotation {
     pub when: Option<(u64, f64)>,
     /// What linear elements add to lengths at this angle, `1/cos θ − 1`.
     pub length_error: f64,
+    /// That over the stretch at which the bonds beside them break or soften, where it is a tenth or more.
+    pub of_failure: Option<f64>,
     /// Energy of the misfit between elements and a zone of exact bonds, as a part of the largest energy of the run; none where bonds are linear as well, or nothing moves.
     pub energy_error: Option<f64>,
 }
@@ -85,6 +87,12 @@ impl Rotation {
     pub fn warning(&self) -> String {
         let when = self.when.map_or_else(String::new, |(step, time)| {
             format!(" at step {step}, t = {}", number(time))
+        });
+        let failure = self.of_failure.map_or_else(String::new, |part| {
+            format!(
+                ", {} of the stretch at which bonds beside them fail",
+                number(part)
+            )
         });
         let energy = match self.energy_error {
             Some(part) if part < 1.0 => format!(
@@ -96,7 +104,7 @@ impl Rotation {
             None => String::new(),
         };
         format!(
-            "a finite element at ({}) has rotated by {:.1} degrees{when}: elements are linear, and rotated by so much they are {} % too large{energy}; where that matters let coupling = \"nonlocal\" carry what rotates",
+            "a finite element at ({}) has rotated by {:.1} degrees{when}: elements are linear, and rotated by so much they are {} % too large{failure}{energy}; where that matters let coupling = \"nonlocal\" carry what rotates",
             components(&self.place),
             self.degrees,
             number(100.0 * self.length_error)

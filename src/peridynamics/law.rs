@@ -35,6 +35,9 @@ pub trait Calibrate<const D: usize> {
 
     /// What they are, in words; none before a calibration.
     fn found(&self) -> Option<String>;
+
+    /// The stretch at which bonds cease to be elastic; none before a calibration.
+    fn elastic_limit(&self) -> Option<f64>;
 }
 
 /// A peridynamic law.

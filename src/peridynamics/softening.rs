@@ -34,7 +34,7 @@ impl std::fmt::Display for Calibration {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "they soften from the stretch {:.3e} on and are through at {:.3e}: the tensile strength {:e} and the fracture energy {:e} of the lattice; horizons up to {:.3} would do",
+            "they soften from the stretch {:.3e} on and are through at {:.3e}: the lattice has the tensile strength {} and the fracture energy {}, and horizons up to {:.4e} would do",
             self.envelope.onset,
             self.envelope.end,
             self.typed.strength,

@@ -19,6 +19,9 @@ use crate::tensor::{Tensor, padded};
 /// Rotation in degrees from which on it is told.
 pub(crate) const TOLD: f64 = 2.0;
 
+/// Misfit, over the stretch at which bonds fail, from which on a smaller rotation is told as well.
+const TOLD_OF_FAILURE: f64 = 0.1;
+
 /// The finite elements of a model, to measure their rotation.
 pub(crate) struct Rotations<'m, const D: usize> {
     model: &'m Model<D>,
@@ -26,6 +29,8 @@ pub(crate) struct Rotations<'m, const D: usize> {
     volume: Vec<f64>,
     /// Energy of a misfit of 1 for each unit of the elements' volume; zero where none arises.
     stiffness: f64,
+    /// The stretch at which bonds break or soften; none where no misfit arises or none fails.
+    failing: Option<f64>,
 }
 
 /// The largest rotation of a state.
@@ -37,8 +42,13 @@ pub(crate) struct Largest {
 }
 
 impl<'m, const D: usize> Rotations<'m, D> {
-    /// Of all elements of a model that are for small strains, none in one dimension; `is_linear` tells that bonds are linear too.
-    pub fn new(model: &'m Model<D>, rest: &RunSettings<D>, is_linear: bool) -> Self {
+    /// Of all elements of a model that are for small strains, none in one dimension; `is_linear` tells that bonds are linear too, `failing` the stretch at which they break or soften.
+    pub fn new(
+        model: &'m Model<D>,
+        rest: &RunSettings<D>,
+        is_linear: bool,
+        failing: Option<f64>,
+    ) -> Self {
         let all = 0..model.mesh.cell_count();
         let cells: Vec<u32> = match D {
             1 => Vec::new(),
@@ -66,6 +76,7 @@ impl<'m, const D: usize> Rotations<'m, D> {
             cells,
             volume,
             stiffness,
+            failing: failing.filter(|_| stiffness > 0.0),
         }
     }
 
@@ -97,7 +108,7 @@ impl<'m, const D: usize> Rotations<'m, D> {
         })
     }
 
-    /// What a summary tells, from [`TOLD`] on; `scale` is the largest energy of the run, `when` a step with its time.
+    /// What a summary tells, from [`TOLD`] or [`TOLD_OF_FAILURE`] on; `scale` is the largest energy of the run, `when` a step with its time.
     pub fn told(
         &self,
         degrees: f64,
@@ -106,11 +117,15 @@ impl<'m, const D: usize> Rotations<'m, D> {
         scale: f64,
         when: Option<(u64, f64)>,
     ) -> Option<Rotation> {
-        (degrees >= TOLD).then(|| Rotation {
+        let length_error = 1.0 / degrees.to_radians().cos().abs().max(0.01) - 1.0;
+        let of_failure = self.failing.map(|stretch| length_error / stretch);
+        let is_near_failure = of_failure.is_some_and(|part| part >= TOLD_OF_FAILURE);
+        (degrees >= TOLD || is_near_failure).then(|| Rotation {
             degrees,
             place: place[..D].to_vec(),
             when,
-            length_error: 1.0 / degrees.to_radians().cos().abs().max(0.01) - 1.0,
+            length_error,
+            of_failure: of_failure.filter(|_| is_near_failure),
             energy_error: (self.stiffness > 0.0 && scale > 0.0).then(|| energy / scale),
         })
     }

@@ -261,7 +261,7 @@ impl<const D: usize> StaticBody<'_, D> {
     ) -> RunSummary {
         let solution = &equilibrium.solution;
         let info = &solution.info;
-        let rotations = Rotations::new(self.model, self.rest, is_linear);
+        let rotations = Rotations::new(self.model, self.rest, is_linear, None);
         let rotation = rotations
             .largest(&solution.displacement)
             .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));

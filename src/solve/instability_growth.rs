@@ -20,8 +20,7 @@ use crate::{
 pub const REMEDY: &str = "give the material and the divergence an influence function P_n/|xi| with n >= 1 (bond-based: micromodulus triangular), keep the horizon constant in the transition zone, or use coupling.truncated";
 
 /// What to do about a splice or a blending whose motion grows.
-pub const REMEDY_SEAM: &str =
-    "make the run shorter, or use coupling.truncated, whose stiffness is symmetric";
+pub const REMEDY_SEAM: &str = "make the run shorter, or use coupling.truncated if the material allows, whose stiffness is symmetric";
 
 /// Unknowns up to which eigenvalues are computed one and all: a second of time.
 pub const DENSE: usize = 600;

@@ -1,7 +1,7 @@
 //! Continuum damage of bonds through scenes: energies of a bar, stress of load steps, tips, checkpoints, seams, and what is refused.
 
 use crate::laws::{history, refused, summary};
-use crate::{column, run, same, write};
+use crate::{column, write};
 
 /// A bar that is pulled at one end.
 const BAR: &str = r#"
@@ -137,19 +137,7 @@ fn a_bar_that_is_torn_shows_damage_counts_its_bonds_and_goes_on_from_a_checkpoin
             "x = 0\n[conditions.right",
             "x = \"-1.5*t\"\n[conditions.right",
         );
-    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    for folder in [whole.path(), parts.path()] {
-        write(folder, "bar.toml", &pulled);
-        run(folder, &["bar.toml"]);
-    }
-    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
-    let mut files = files.map(|e| e.unwrap().path());
-    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
-    let previous = previous.expect("two checkpoints");
-    std::fs::rename(&previous, previous.with_extension("")).unwrap();
-    let said = run(parts.path(), &["bar.toml", "--resume"]);
-    assert!(said.contains("resumed after step"), "{said}");
-    same(&whole.path().join("out"), &parts.path().join("out"));
+    let whole = crate::resumes_with_the_same_bytes(&pulled);
     let path = whole.path().join("out/bar_history.csv");
     let broken = column(&path, "broken_bonds");
     assert!(*broken.last().unwrap() > 0.0);
@@ -264,7 +252,7 @@ fn what_continuum_damage_cannot_do_is_refused_by_name() {
     let with = |key: &str| typed.replace("density = 1\n", &format!("density = 1\n{key}\n"));
     refused(
         &with("critical-stretch = 0.01"),
-        "`critical-stretch` is not known",
+        "whose bonds break by their own damage",
     );
     refused(
         &with("fracture-energy = 1"),
@@ -288,7 +276,7 @@ fn what_continuum_damage_cannot_do_is_refused_by_name() {
     };
     refused(
         &zoned("zones = \"auto\""),
-        "damages them by the energy of their family",
+        "takes their stiffness by a damage",
     );
     refused(
         &zoned("zones = { nonlocal = { box = { min = 3, max = 7 } }, follow = { padding = 1 } }"),

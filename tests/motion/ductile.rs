@@ -1,7 +1,7 @@
 //! Ductile bodies in large strains, and how they tear, through scenes.
 
 use crate::laws::{STEPS, history, refused, scene, summary};
-use crate::{column, run, same, write};
+use crate::{column, run, write};
 
 const YOUNG: f64 = 1000.0;
 
@@ -97,19 +97,7 @@ fn accounts_for_its_energy(history: &std::path::Path, tolerance: f64) {
 #[test]
 fn a_bar_that_tears_goes_on_from_its_checkpoint() {
     let typed = torn("tearing-parameter = 0.12");
-    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    for folder in [whole.path(), parts.path()] {
-        write(folder, "bar.toml", &typed);
-        run(folder, &["bar.toml"]);
-    }
-    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
-    let mut files = files.map(|e| e.unwrap().path());
-    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
-    let previous = previous.expect("two checkpoints");
-    std::fs::rename(&previous, previous.with_extension("")).unwrap();
-    let said = run(parts.path(), &["bar.toml", "--resume"]);
-    assert!(said.contains("resumed after step"), "{said}");
-    same(&whole.path().join("out"), &parts.path().join("out"));
+    crate::resumes_with_the_same_bytes(&typed);
 }
 
 /// A plate of Neo-Hooke that is pulled in two by its ends.

@@ -1,6 +1,6 @@
 //! Laws that are known by their force states alone: nonlinear bonds, bonds that remember.
 
-use crate::{column, run, same, table, write};
+use crate::{column, run, table, write};
 
 /// A bar that is pulled at one end, all of its bonds peridynamic where `{coupling}` has points.
 const BAR: &str = r#"
@@ -190,21 +190,7 @@ fn a_motion_goes_on_from_its_checkpoint_with_what_bonds_remember() {
     let law = "viscoelastic-bond]\nrelaxing-share = 0.5\nrelaxation-time = 0.05";
     let rest = "[initial.u.velocity]\nx = \"sin(pi*x/10)\"\n[solve.explicit]\nduration = 1\noutputs = 4\ncheckpoint-every = 50\n";
     let typed = scene("truncated", law, rest).replace("x = \"0.1*t\"", "x = 0");
-    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    for folder in [whole.path(), parts.path()] {
-        write(folder, "bar.toml", &typed);
-    }
-    run(whole.path(), &["bar.toml"]);
-    // from the last checkpoint but one of a run that came to its end
-    run(parts.path(), &["bar.toml"]);
-    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
-    let mut files = files.map(|e| e.unwrap().path());
-    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
-    let previous = previous.expect("two checkpoints");
-    std::fs::rename(&previous, previous.with_extension("")).unwrap();
-    let said = run(parts.path(), &["bar.toml", "--resume"]);
-    assert!(said.contains("resumed after step"), "{said}");
-    same(&whole.path().join("out"), &parts.path().join("out"));
+    let whole = crate::resumes_with_the_same_bytes(&typed);
     // damped: energy falls, and is accounted for
     let path = whole.path().join("out/bar_history.csv");
     let (kinetic, stored) = (

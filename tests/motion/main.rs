@@ -20,6 +20,7 @@ mod neighbours;
 mod plasticity;
 mod position_aware;
 mod restarts;
+mod softening;
 mod sub_steps;
 
 /// A bar that breaks: peridynamics in the middle, struck at its left end.
@@ -125,6 +126,24 @@ fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
     let path = folder.join(name);
     std::fs::write(&path, text).unwrap();
     path
+}
+
+/// Runs a scene, `bar.toml`, at once and from its last checkpoint but one, with the same bytes; the folder of the first run.
+fn resumes_with_the_same_bytes(typed: &str) -> tempfile::TempDir {
+    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for folder in [whole.path(), parts.path()] {
+        write(folder, "bar.toml", typed);
+        run(folder, &["bar.toml"]);
+    }
+    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
+    let mut files = files.map(|e| e.unwrap().path());
+    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
+    let previous = previous.expect("two checkpoints");
+    std::fs::rename(&previous, previous.with_extension("")).unwrap();
+    let said = run(parts.path(), &["bar.toml", "--resume"]);
+    assert!(said.contains("resumed after step"), "{said}");
+    same(&whole.path().join("out"), &parts.path().join("out"));
+    whole
 }
 
 /// Numbers between 0 and 1 (splitmix64), the same in every run.

@@ -1,7 +1,7 @@
 //! J2 plasticity of points and of finite elements, through scenes.
 
 use crate::laws::{STEPS, history, refused, scene};
-use crate::{column, run, same, write};
+use crate::column;
 
 const YIELD: f64 = 5.0;
 const HARDENING: f64 = 250.0;
@@ -175,19 +175,7 @@ fn a_bar_of_elements_goes_on_from_its_checkpoint_with_what_flowed() {
     let typed = scene("local", &law, rest)
         .replace("x = \"0.1*t\"", "x = 0")
         .replacen("density = 1\nyoungs", "youngs", 1);
-    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    for folder in [whole.path(), parts.path()] {
-        write(folder, "bar.toml", &typed);
-        run(folder, &["bar.toml"]);
-    }
-    let files = std::fs::read_dir(parts.path().join("out")).unwrap();
-    let mut files = files.map(|e| e.unwrap().path());
-    let previous = files.find(|p| p.to_string_lossy().ends_with(".previous"));
-    let previous = previous.expect("two checkpoints");
-    std::fs::rename(&previous, previous.with_extension("")).unwrap();
-    let said = run(parts.path(), &["bar.toml", "--resume"]);
-    assert!(said.contains("resumed after step"), "{said}");
-    same(&whole.path().join("out"), &parts.path().join("out"));
+    let whole = crate::resumes_with_the_same_bytes(&typed);
     let path = whole.path().join("out/bar_history.csv");
     let [kinetic, stored, lost] =
         ["kinetic_energy", "stored_energy", "dissipated_energy"].map(|name| column(&path, name));

@@ -2,21 +2,11 @@
 //!
 //! The report's plate is a solid of some 38 000 points with ν = 1/4. Here it is in plane stress, where bonds that act alone have ν = 1/3; the plate is thin against its hole.
 
-use std::path::Path;
-use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
-
 use crate::Effort;
+use crate::observed::{Seen, run_scene};
 use bondline::{
-    observe::{
-        Observer,
-        csv::Entry,
-        report::{Columns, Row, Table},
-        vtu::Snapshot,
-    },
-    progress::{Progress, Silent},
-    run::{AnyScene, RunOptions},
-    scene::Source,
+    observe::report::{Columns, Row, Table},
+    progress::Progress,
 };
 
 /// Largest error of the stress of the bar, over its largest stress.
@@ -33,72 +23,6 @@ const RATE: f64 = 45.0;
 
 /// Damage from which a point counts as damaged, and as cracked. Bonds that break by their stretch leave at least 0.35 beside a crack.
 const LEVELS: [f64; 2] = [0.01, 0.35];
-
-/// The name of a table, and one of its rows by columns.
-type Named = (String, Vec<(String, f64)>);
-
-/// Rows of a run, by the name of their table.
-#[derive(Debug, Default)]
-struct Rows(Mutex<Vec<Named>>);
-
-impl Observer for Rows {
-    fn wants_files(&self) -> bool {
-        false
-    }
-
-    fn row(&self, table: &str, columns: &[String], row: &[Entry]) {
-        let number = |entry: &Entry| match entry {
-            Entry::Real(x) => Some(*x),
-            Entry::Integer(n) => Some(*n as f64),
-            _ => None,
-        };
-        let named = columns.iter().zip(row);
-        let named = named.filter_map(|(name, entry)| Some((name.clone(), number(entry)?)));
-        let mut rows = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        rows.push((table.to_owned(), named.collect()));
-    }
-
-    fn snapshot(&self, _snapshot: Snapshot) {}
-}
-
-/// The rows of a scene, and the seconds that it took.
-struct Seen {
-    rows: Vec<Named>,
-    seconds: f64,
-}
-
-impl Seen {
-    /// Columns of a table.
-    fn columns<const N: usize>(&self, table: &str, names: [&str; N]) -> Vec<[f64; N]> {
-        let rows = self.rows.iter().filter(|(of, _)| of == table);
-        let value = |row: &[(String, f64)], name: &str| {
-            let found = row.iter().find(|(of, _)| of == name);
-            found.map_or(f64::NAN, |(_, x)| *x)
-        };
-        rows.map(|(_, row)| names.map(|name| value(row, name)))
-            .collect()
-    }
-}
-
-fn run_scene(text: &str) -> Result<Seen, String> {
-    let rows = Rows::default();
-    let start = Instant::now();
-    let source = Source::new("scene.toml", text.to_owned());
-    let scene =
-        AnyScene::from_source(&source, Path::new(""), "scene").map_err(|e| e.to_string())?;
-    let options = RunOptions {
-        observer: Some(&rows),
-        ..RunOptions::default()
-    };
-    scene
-        .run_with(&options, &Silent)
-        .map_err(|e| e.to_string())?;
-    let rows = rows.0.into_inner();
-    Ok(Seen {
-        rows: rows.unwrap_or_else(PoisonError::into_inner),
-        seconds: start.elapsed().as_secs_f64(),
-    })
-}
 
 /// Young's modulus of the bar, its strain at the onset over ε₀, and η.
 const BAR: (f64, f64, f64) = (1000.0, 0.816_496_580_927_726, 10.0);

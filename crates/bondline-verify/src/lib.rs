@@ -7,6 +7,7 @@
 //! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, what symmetry saves |
 //! | `seams` | cracks and waves in the plane beside every method, conditions of seams that do not follow the lattice |
 //! | `skin` | bars with free sides, with a skin of elements and without |
+//! | `softening` | softening bonds: a notched strip pulled to separation, a notched beam in three-point bending |
 //! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
 //! | `layers` | two lattices of different horizons with a layer of elements between |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
@@ -27,7 +28,7 @@
 //! | `extremes` | units, places, laws, shapes and steps at their limits |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is their scene |
 //!
-//! `typed.rs` has what the suites type of laws, couplings and shapes; `enclosed.rs`, `strip.rs` are scenes that several suites share. `report_page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
+//! `typed.rs` has what the suites type of laws, couplings and shapes; `observed.rs` runs scenes by their text; `enclosed.rs`, `strip.rs` are scenes that several suites share. `report_page.rs` writes what they found as a page in Markdown. A suite is one file and one line of [`SUITES`]; the command line, the tests and the examples run them from there.
 
 pub mod accuracy_control;
 pub mod balance;
@@ -43,12 +44,14 @@ pub mod fields;
 pub mod horizons;
 pub mod layers;
 pub mod meshes;
+mod observed;
 pub mod partial_volumes;
 pub mod patch;
 pub mod position_aware;
 pub mod reflection;
 pub mod report_page;
 pub mod scale;
+pub mod softening;
 pub mod spectrum;
 pub mod strip;
 pub mod surface_layer;
@@ -112,6 +115,11 @@ pub const SUITES: &[Suite] = &[
         name: "pals",
         about: "SAND2015-7998 section 4.2: energies of a position-aware solid at surfaces, Young's modulus of a tension bar (figure 4.2)",
         run: position_aware::run,
+    },
+    Suite {
+        name: "softening",
+        about: "softening bonds: energy and peak load of a notched strip pulled to separation, a notched beam in three-point bending",
+        run: softening::run,
     },
     Suite {
         name: "damage",

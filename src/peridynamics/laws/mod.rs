@@ -256,6 +256,11 @@ macro_rules! named_laws {
                 self.usual().bond_energy(1.0).is_some()
             }
 
+            /// Whether its bonds lose their stiffness by a damage of their own.
+            pub fn damages(self) -> bool {
+                self.usual().damages()
+            }
+
             /// Whether its points remember a plastic strain.
             pub fn flows(self) -> bool {
                 let law = self.usual();

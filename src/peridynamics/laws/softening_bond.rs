@@ -119,6 +119,10 @@ impl<const D: usize> Calibrate<D> for SofteningBond<D> {
     fn found(&self) -> Option<String> {
         self.calibration.map(|found| found.to_string())
     }
+
+    fn elastic_limit(&self) -> Option<f64> {
+        self.calibration.map(|found| found.envelope.onset)
+    }
 }
 
 /// What a bond remembers.

@@ -292,6 +292,24 @@ pub(crate) fn critical_stretch<const D: usize>(
     }))
 }
 
+/// The smallest stretch at which bonds break or soften, if that is known.
+pub(crate) fn failing_stretch<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+) -> Result<Option<f64>, RunError> {
+    let law = model.peridynamics.as_ref().map(|p| &p.law);
+    if let Some(limit) = law.and_then(|law| law.calibrate()?.elastic_limit()) {
+        return Ok(Some(limit));
+    }
+    Ok(
+        critical_stretch(model, rest)?.and_then(|critical| match critical {
+            Critical::Uniform(s) => Some(s),
+            Critical::ByHorizon(list) => list.iter().map(|(_, s)| *s).reduce(f64::min),
+            Critical::Tearing(_) => None,
+        }),
+    )
+}
+
 /// What a plane of the lattice costs to open at the stretch at which bonds break, per area, and the energy that was typed; none where nothing breaks, or where lattices differ.
 pub(crate) fn plane_energy<const D: usize>(
     model: &Model<D>,

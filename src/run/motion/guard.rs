@@ -10,10 +10,8 @@
 
 use super::seen::{Rotated, Seen};
 use super::writer::{Moment, Row};
-use crate::coupling::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::rotation::Rotations;
-use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit as Spec;
 
 /// Steps between two looks, at least.
@@ -49,11 +47,9 @@ pub(crate) struct Guard<'m, const D: usize> {
 impl<'m, const D: usize> Guard<'m, D> {
     /// For a run of so many steps.
     pub fn new(
-        model: &'m Model<D>,
+        rotations: Rotations<'m, D>,
         balance: Balance,
-        rest: &RunSettings<D>,
         spec: &Spec,
-        is_linear: bool,
         steps: u64,
         seen: Seen,
     ) -> Self {
@@ -62,7 +58,7 @@ impl<'m, const D: usize> Guard<'m, D> {
             largest_gain: spec.largest_energy_gain,
             largest_rotation: spec.largest_rotation.unwrap_or(f64::INFINITY),
             every: STEPS.max(steps / LOOKS),
-            rotations: Rotations::new(model, rest, is_linear),
+            rotations,
             seen,
         }
     }

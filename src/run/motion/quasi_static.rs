@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::RunOptions;
 use super::breaks::{Breaks, breaks};
-use super::dynamic_system::{plane_energy, start};
+use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
 use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::step_observer::FieldOutput;
@@ -99,7 +99,12 @@ fn load_steps<const D: usize>(
         drive: &drive,
         fields: FieldOutput::new(model, operator),
         recorder,
-        rotations: Rotations::new(model, rest, laid_out.moving.is_linear),
+        rotations: Rotations::new(
+            model,
+            rest,
+            laid_out.moving.is_linear,
+            failing_stretch(model, rest)?,
+        ),
         state,
         edge,
         ended: Ended::Finished,
@@ -400,8 +405,11 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             switches: Vec::new(),
             nonlocal_share: [0.0; 3],
         };
+        let warnings = without_response(system, &state.u).into_iter();
         Ok(RunSummary {
-            warnings: without_response(system, &state.u).into_iter().collect(),
+            warnings: warnings
+                .chain(created_energy(model, &motion, &state.u))
+                .collect(),
             dimension: D,
             applied,
             iterations,
@@ -411,6 +419,35 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             ..RunSummary::default()
         })
     }
+}
+
+/// Part of the work from which on energy that load steps created is warned of. Work is summed by the trapezoidal rule, which errs by the square of a step.
+const CREATED: f64 = 0.02;
+
+/// Warns of energy that nothing supplied: stored and dissipated energy beyond the work of loads and supports.
+fn created_energy<const D: usize>(
+    model: &Model<D>,
+    motion: &MotionSummary,
+    u: &[f64],
+) -> Option<String> {
+    /// Part of the energy of a strain as large as the displacement over the size of the body that is round-off.
+    const ROUND_OFF: f64 = 1e-12;
+    let dissipated =
+        motion.cracks.map_or(0.0, |c| c.dissipated_energy) + motion.inelastic_energy.unwrap_or(0.0);
+    let created = dissipated - motion.missing_energy;
+    let work = motion.external_work.abs().max(motion.stored_energy);
+    let volume: f64 = (0..model.mesh.cell_count())
+        .map(|c| model.mesh.cell_volume(c).abs())
+        .sum();
+    let furthest = u.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+    let strain = furthest / volume.powf(1.0 / D as f64);
+    let none = ROUND_OFF * model.tensor_of_cell(0).get(0, 0, 0, 0) * strain * strain * volume;
+    (created > (CREATED * work).max(none)).then(|| {
+        format!(
+            "stored and dissipated energy exceed the work of loads and supports by {} % of it: take smaller load steps; if that does not help, let coupling = \"nonlocal\" carry what rotates or cracks",
+            number(100.0 * created / work)
+        )
+    })
 }
 
 /// What is added to the stiffness, as a part of its diagonal, so that pieces that nothing holds have factors too: far above round-off, and too little to

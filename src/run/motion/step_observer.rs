@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::RunOptions;
 use super::breaks::Breaks;
-use super::dynamic_system::critical_stretch;
+use super::dynamic_system::{critical_stretch, failing_stretch};
 use super::guard::{Balance, Guard};
 use super::seen::Seen;
 use super::writer::{EdgeReached, Moment, Recorder, Row, StepChoice, Zone};
@@ -16,6 +16,7 @@ use crate::observe::ObserveError;
 use crate::observe::summary::{Ended, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
+use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
 use crate::scene::solve::Explicit as Spec;
@@ -144,16 +145,9 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             edge,
             zone,
         } = watched;
-        let is_linear = segment.is_linear;
-        let guard = Guard::new(
-            model,
-            balance,
-            rest,
-            segment.spec,
-            is_linear,
-            pace.steps,
-            seen,
-        );
+        let failing = failing_stretch(model, rest)?;
+        let rotations = Rotations::new(model, rest, segment.is_linear, failing);
+        let guard = Guard::new(rotations, balance, segment.spec, pace.steps, seen);
         let monitor = match &rest.follow {
             Some(follow) => {
                 critical_stretch(model, rest)?

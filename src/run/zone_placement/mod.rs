@@ -295,7 +295,7 @@ fn alone(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
 /// Refuses bonds that are damaged, or break, by something else than their stretch: where that begins no solution before the run shows.
 fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<(), SceneError> {
     let does = match material.fracture {
-        _ if material.law.damages() => "damages them by the energy of their family",
+        _ if material.law.damages() => "takes their stiffness by a damage before they break",
         Some(Fracture::Tearing(_)) => "breaks them by a tearing parameter",
         _ => return Ok(()),
     };

@@ -172,6 +172,10 @@ impl<'de> DeserializeSeed<'de> for Key {
         match (own, common) {
             (Some(k), _) => Ok(Field::Own(k)),
             (None, Some(k)) => Ok(Field::Common(k)),
+            _ if key == "critical-stretch" && self.0.damages() => Err(de::Error::custom(format!(
+                "`critical-stretch` is no key of `{}`, whose bonds break by their own damage",
+                self.0.key()
+            ))),
             _ => Err(de::Error::unknown_field(&key, fields(self.0))),
         }
     }

@@ -1,0 +1,152 @@
+//! Softening bonds through scenes: a notched strip that is pulled to separation, checkpoints, a beam that rotates, and what is refused.
+
+use crate::laws::{refused, summary};
+use crate::{column, run, write};
+
+/// A strip with a notch from either side, pulled to separation; units mm, N, MPa.
+const STRIP: &str = r#"
+kinematics = "plane-stress"
+coupling = "nonlocal"
+[mesh.rectangle]
+min = [-15, -15]
+max = [15, 15]
+x = { cells = 20 }
+y = { cells = 20 }
+[materials.m.softening-bond]
+youngs-modulus = 30e3
+tensile-strength = 3
+fracture-energy = 0.01
+softening = "{softening}"
+[peridynamics]
+horizon = 4.5
+points.lattice = { spacing = 1.5, origin = [-14.25, -14.25] }
+[cracks.upper]
+polyline = [[0, 6], [0, 16]]
+[cracks.lower]
+polyline = [[0, -16], [0, -6]]
+[no-fail]
+left.box = { min = [-16, -16], max = [-5, 16] }
+right.box = { min = [5, -16], max = [16, 16] }
+[conditions.left.displacement]
+inside.box = { min = [-16, -16], max = [-7.5, 16] }
+x = "-{opening}*t^2/2"
+y = 0
+[conditions.right.displacement]
+inside.box = { min = [7.5, -16], max = [16, 16] }
+x = "{opening}*t^2/2"
+y = 0
+[solve.quasi-static]
+duration = 1
+steps = 30
+[output]
+vtu = false
+"#;
+
+#[test]
+fn a_notched_strip_is_separated_by_its_strength_and_energy() {
+    for (softening, opening) in [("bilinear", "0.015"), ("exponential", "0.04")] {
+        let folder = tempfile::tempdir().unwrap();
+        let typed = STRIP.replace("{softening}", softening);
+        write(
+            folder.path(),
+            "s.toml",
+            &typed.replace("{opening}", opening),
+        );
+        let said = run(folder.path(), &["s.toml"]);
+        assert!(
+            said.contains("the lattice has the tensile strength 3"),
+            "{said}"
+        );
+        assert!(!said.contains("exceed the work"), "{said}");
+        let history = folder.path().join("out/s_history.csv");
+        let of = |name: &str| column(&history, name);
+        let (load, work, spent) = (
+            of("right_reaction_x"),
+            of("external_work"),
+            of("dissipated_energy"),
+        );
+        let (ligament, last) = (12.0, load.len() - 1);
+        // nothing holds the halves together any more
+        assert!(load[last].abs() < 1e-6 * 3.0 * ligament, "{}", load[last]);
+        let energy = spent[last] / ligament;
+        assert!((energy / 0.01 - 1.0).abs() < 0.05, "{softening}: {energy}");
+        assert!((work[last] / spent[last] - 1.0).abs() < 0.01, "{softening}");
+        let peak = load.iter().fold(0.0, |most: f64, x| most.max(*x)) / ligament;
+        assert!((peak / 3.0 - 1.0).abs() < 0.05, "{softening}: {peak}");
+    }
+}
+
+#[test]
+fn a_strip_goes_on_from_its_checkpoint() {
+    let typed = STRIP
+        .replace("{softening}", "exponential")
+        .replace("{opening}", "0.01");
+    let typed = typed
+        .replace("steps = 30", "steps = 8\ncheckpoint-every = 3")
+        .replace(
+            "spacing = 1.5, origin = [-14.25, -14.25]",
+            "spacing = 2, origin = [-14, -14]",
+        )
+        .replace("horizon = 4.5", "horizon = 4");
+    let whole = crate::resumes_with_the_same_bytes(&typed);
+    let spent = column(
+        &whole.path().join("out/bar_history.csv"),
+        "dissipated_energy",
+    );
+    assert!(*spent.last().unwrap() > 0.0);
+}
+
+#[test]
+fn elements_that_rotate_by_a_part_of_the_softening_stretch_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let turned = |angle: f64| {
+        let typed = format!(
+            "kinematics = \"plane-stress\"\ncoupling = \"splice\"\n[mesh.rectangle]\nmin = [0, 0]\nmax = [20, 10]\nx = {{ cells = 20 }}\ny = {{ cells = 10 }}\n[materials.m.softening-bond]\nyoungs-modulus = 30e3\ntensile-strength = 3\nfracture-energy = 0.01\n[zones]\nnonlocal.box = {{ min = [7, -1], max = [13, 11] }}\n[peridynamics]\nhorizon = 2\npoints.lattice = {{ spacing = 1 }}\n[conditions.left.displacement]\non = \"left\"\nx = \"(cos({angle}*t)-1)*x - sin({angle}*t)*y\"\ny = \"sin({angle}*t)*x + (cos({angle}*t)-1)*y\"\n[solve.quasi-static]\nduration = 1\nsteps = 1\n[output]\nvtu = false\n"
+        );
+        summary(folder.path(), &typed)["rotation"].clone()
+    };
+    // θ²/2 over a stretch of some 8e-5: 0.6 at 0.01 rad, which is far below two degrees
+    let told = turned(0.01);
+    let part = told["of_failure"].as_f64().unwrap();
+    assert!(part > 0.4 && part < 0.9, "{told}");
+    assert!(turned(0.002).is_null());
+}
+
+#[test]
+fn what_softening_bonds_cannot_do_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let typed = STRIP
+        .replace("{softening}", "bilinear")
+        .replace("{opening}", "0.01");
+    let refused = |from: &str, to: &str, part: &str| {
+        assert!(typed.contains(from), "{from}");
+        refused(folder.path(), &typed.replace(from, to), part);
+    };
+    // of a continuous family 4π/9 E G/σ², here 23 mm for a tenth of the energy
+    refused(
+        "fracture-energy = 0.01",
+        "fracture-energy = 0.0009",
+        "is too large for the tensile strength 3",
+    );
+    refused("tensile-strength = 3\n", "", "lacks `tensile-strength`");
+    refused(
+        "\"bilinear\"",
+        "\"linear\"",
+        "use one of \"bilinear\", \"exponential\"",
+    );
+    refused(
+        "fracture-energy = 0.01",
+        "fracture-energy = 0.01\ncritical-stretch = 1e-3",
+        "whose bonds break by their own damage",
+    );
+    refused(
+        "horizon = 4.5",
+        "horizon = \"4.5 + 0.01*x\"",
+        "calibrated for one horizon",
+    );
+    refused(
+        "fracture-energy = 0.01",
+        "fracture-energy = -1",
+        "must lie between",
+    );
+}
