@@ -1,7 +1,7 @@
 //! J2 plasticity of points and of finite elements, through scenes.
 
-use crate::laws::{STEPS, history, refused, scene};
 use crate::column;
+use crate::laws::{STEPS, history, refused, scene};
 
 const YIELD: f64 = 5.0;
 const HARDENING: f64 = 250.0;
