@@ -21,7 +21,7 @@ use crate::{
     system::{BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
 };
 use behaviour::NONE;
-pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, SystemError};
+pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, StretchOfMaterials, SystemError};
 
 pub(crate) mod behaviour;
 mod body;

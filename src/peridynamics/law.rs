@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::material::LocalLaw;
-use crate::peridynamics::{BondEnergy, ForceState, LinearForceState};
+use crate::peridynamics::{BondEnergy, ForceState, LinearForceState, Several};
 
 /// A fast pass over all bonds that computes what a law's [`ForceState`] says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +53,11 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     fn damages(&self) -> bool {
         let states = self.force_state();
         states.is_some_and(|states| states.history().damage.is_some())
+    }
+
+    /// The laws of its materials, if it stands for several.
+    fn several(&self) -> Option<&Several<D>> {
+        None
     }
 
     /// What the bonds of a continuous family store, and what breaking them costs, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::coupling::{self, Model, PointSource, Problem, Surfaces, Zone};
+use crate::coupling::{self, Model, PointSource, Problem, Surfaces};
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
-use crate::peridynamics::{BondWeights, PartialVolume};
+use crate::peridynamics::{BondWeights, Law, PartialVolume, StiffnessMean};
 use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
 use crate::scene::failure::Breaking;
@@ -101,15 +101,16 @@ impl<const D: usize> RunSettings<D> {
 
 /// The problem of a scene, and what remains of the scene.
 pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) {
-    let material = scene
-        .zones
-        .iter()
-        .zip(&scene.cell_material)
-        .find(|(zone, _)| **zone != Zone::Local)
-        .map_or(0, |(_, m)| *m);
-    let stuff = &scene.materials[material as usize];
-    let law = Arc::clone(&stuff.law);
-    let ratio = Ratio::new(stuff.lame, scene.kinematics);
+    let material = scene.point_materials[0];
+    let law = Arc::clone(&scene.point_law);
+    // of several the one that is farthest below bonds that act alone
+    let ratios = scene.point_materials.iter().map(|&m| {
+        let stuff = &scene.materials[usize::from(m)];
+        Ratio::new(stuff.lame, scene.kinematics)
+    });
+    let least = ratios.min_by(|a, b| a.typed.total_cmp(&b.typed));
+    let first = &scene.materials[usize::from(material)];
+    let ratio = least.unwrap_or_else(|| Ratio::new(first.lame, scene.kinematics));
     let method = scene.coupling.build(law.linearised().divergence());
     let chosen = scene.coupling_why.map(|why| Decision {
         choice: format!("coupling {}", scene.coupling.joining().name),
@@ -172,6 +173,47 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             choices: scene.choices,
         },
     )
+}
+
+/// Says which materials points have, and what their bonds are between two, if they have several.
+pub fn materials_choice<const D: usize>(
+    model: &Model<D>,
+    breaking: &Breaking<D>,
+) -> Option<Decision> {
+    let (several, fracture) = (model.several()?, breaking.several.as_ref()?);
+    let mut used = several.used().to_vec();
+    used.sort_unstable();
+    let names: Vec<&str> = used
+        .iter()
+        .map(|&m| fracture.of[usize::from(m)].0.as_str())
+        .collect();
+    let stiffness = match several.linearised().is_pairwise() {
+        true => {
+            let arithmetic = fracture.interfaces.iter();
+            let arithmetic: Vec<&str> = arithmetic
+                .filter(|i| i.mean == StiffnessMean::Arithmetic)
+                .map(|i| i.name.as_str())
+                .collect();
+            match arithmetic[..] {
+                [] => "the harmonic mean of their stiffnesses".to_owned(),
+                _ => format!(
+                    "the harmonic mean of their stiffnesses, of `{}` the arithmetic one",
+                    arithmetic.join("`, `")
+                ),
+            }
+        }
+        false => "half of their stiffness from either end".to_owned(),
+    };
+    let border = match model.points_on_border() {
+        0 => String::new(),
+        n => format!(
+            "; {n} points lie on a border and have the material whose name comes first: move peridynamics.points.lattice.origin by half a spacing to part them"
+        ),
+    };
+    Some(Decision {
+        choice: format!("points of the materials {}", names.join(", ")),
+        why: format!("bonds between two have {stiffness}{border}"),
+    })
 }
 
 /// Says which partial volumes are in use, if not full ones.

@@ -20,7 +20,7 @@ use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
     adaptive_zone, agreement, coupling_selection, cracks_and_voids, failure, initial,
-    lattice_regions, output, solve, zones,
+    lattice_regions, material_interfaces, output, solve, zones,
 };
 use crate::coupling::Zone;
 use crate::material::Kinematics;
@@ -158,7 +158,11 @@ impl<'a, const D: usize> Draft<'a, D> {
         let peridynamics = peridynamics
             .map(|p| lattice_regions::bodies(spec, joining, p, mesh, &mut zones))
             .transpose()?;
-        agreement::one_peridynamic_material(spec, &self.materials, &self.cell_material, &zones)?;
+        let used = material_interfaces::materials_of_points(&self.cell_material, &zones);
+        let interfaces = material_interfaces::interfaces(spec, &self.materials)?;
+        let (coupling, points) = (&joined.coupling, peridynamics.as_ref());
+        material_interfaces::check(spec, coupling, points, &self.materials, &used, &interfaces)?;
+        let law = material_interfaces::law_of_points(spec, &self.materials, &used, &interfaces)?;
         if let Some(p) = &peridynamics {
             agreement::horizon(spec, p, mesh, &zones)?;
         }
@@ -166,22 +170,19 @@ impl<'a, const D: usize> Draft<'a, D> {
         if matches!(self.solve, Solve::Explicit(_)) {
             densities(spec, &self.materials)?;
         }
-        let peridynamic = self
-            .cell_material
-            .iter()
-            .zip(&zones)
-            .find(|(_, zone)| **zone != Zone::Local)
-            .map_or(0, |(m, _)| *m);
-        agreement::balanced_seam(
-            spec,
-            &joined.coupling,
-            &self.materials,
-            &self.cell_material,
-            peridynamic,
-        )?;
+        let peridynamic = used[0];
+        for &material in &used {
+            agreement::balanced_seam(
+                spec,
+                &joined.coupling,
+                &self.materials,
+                &self.cell_material,
+                material,
+            )?;
+        }
         agreement::elastic_elements(spec, &self.materials, &self.cell_material, &zones)?;
         agreement::memory(spec, &self.materials, &self.cell_material, &zones)?;
-        let breaking = failure::breaking(spec, &self.materials[peridynamic as usize], mesh)?;
+        let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
         agreement::energy_density(spec, &self.materials[peridynamic as usize], breaking.bonds)?;
         let follow = adaptive_zone::follow(
             spec,
@@ -200,6 +201,8 @@ impl<'a, const D: usize> Draft<'a, D> {
             zones,
             materials: self.materials.clone(),
             cell_material: self.cell_material.clone(),
+            point_materials: used,
+            point_law: law,
             peridynamics,
             coupling: joined.coupling,
             coupling_why: joined.why,

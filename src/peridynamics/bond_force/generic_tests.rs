@@ -26,6 +26,7 @@ fn with_law<const D: usize, T>(
         volume: case.volume.clone(),
         horizon: vec![3.0 * H; points],
         transfer: Transfer::new(),
+        material: Vec::new(),
     };
     let families = case.families.clone();
     let linear = law.linearised();

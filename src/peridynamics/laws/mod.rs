@@ -10,6 +10,7 @@
 //! | `pals.rs`, `pave.rs` | position-aware solid, linear (PALS) and viscoelastic (PAVE) | sections 4.2, 4.3 |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
+//! | `several.rs` | several materials of one law in one body | |
 //! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
 //! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | its stress hyperelastic, for large deformations | |
 //!
@@ -27,6 +28,7 @@ mod neo_hooke;
 mod pals;
 mod pave;
 mod plastic;
+mod several;
 mod st_venant_kirchhoff;
 
 use std::sync::Arc;
@@ -46,6 +48,7 @@ pub use neo_hooke::NeoHookeSolid;
 pub use pals::PositionAwareSolid;
 pub use pave::PositionAwareViscoelasticSolid;
 pub use plastic::PlasticCorrespondence;
+pub use several::{NoMixture, Several, StiffnessMean};
 pub use st_venant_kirchhoff::StVenantKirchhoffSolid;
 
 /// A number, or a word, that a law takes beside the elastic constants.
