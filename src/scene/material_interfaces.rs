@@ -270,11 +270,26 @@ pub(crate) fn check<const D: usize>(
     let name = coupling.joining().name;
     match coupling {
         CouplingSpec::Nonlocal(_) | CouplingSpec::Local(_) | CouplingSpec::Splice(_) => {}
+        CouplingSpec::Truncated(_) if D == 3 => {
+            return refused(
+                "the coupling is `truncated`".to_owned(),
+                "another, and the strings along the edges of a zone in space have the stiffness of one",
+                "use coupling = \"splice\" or \"nonlocal\", or keep the nonlocal zone within one material",
+            );
+        }
+        CouplingSpec::Truncated(_) if !a.law.linearised().is_pairwise() => {
+            return refused(
+                format!("the coupling is `truncated`, and the law {}", a.law.name()),
+                "another, and the dilatations of that seam have the constants of one",
+                "use bond-based materials, coupling = \"splice\" or \"nonlocal\", or keep the nonlocal zone within one material",
+            );
+        }
+        CouplingSpec::Truncated(_) => {}
         _ => {
             return refused(
                 format!("the coupling is `{name}`"),
                 "another, whose bonds the rows of that seam do not know",
-                "use coupling = \"splice\" or \"nonlocal\", or keep the nonlocal and transition zones within one material",
+                "use coupling = \"truncated\", \"splice\" or \"nonlocal\", or keep the nonlocal and transition zones within one material",
             );
         }
     }
