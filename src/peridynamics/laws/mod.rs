@@ -178,7 +178,55 @@ pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
         let values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
         law.build(constants, &values)
     });
-    typed.into_iter().chain(named).collect()
+    typed.into_iter().chain(named).chain(mixtures()).collect()
+}
+
+/// Bodies of two materials, numbers 0 and 1, for the same tests.
+#[cfg(test)]
+fn mixtures<const D: usize>() -> impl Iterator<Item = Arc<dyn Law<D>>> {
+    use crate::peridynamics::Micromodulus;
+    let bonds = |shear| -> Arc<dyn Law<D>> {
+        Arc::new(BondBased::new(Micromodulus::InverseDistance, shear))
+    };
+    let solid = |lambda, shear| -> Arc<dyn Law<D>> {
+        Arc::new(LinearPeridynamicSolid::new(
+            Influence::Gaussian,
+            lambda,
+            shear,
+        ))
+    };
+    let flowing = |shear, yields| {
+        let constants = Constants {
+            lambda: 1.7,
+            shear,
+            influence: Influence::Gaussian,
+            kinematics: match D {
+                1 => Kinematics::Bar,
+                2 => Kinematics::PlaneStrain,
+                _ => Kinematics::Solid,
+            },
+        };
+        let law = Named::PlasticCorrespondence;
+        let mut values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
+        values[0] *= yields;
+        law.build::<D>(constants, &values)
+    };
+    let of = |first, second, mean: StiffnessMean| {
+        let mixed = Several::new(vec![first, second], &[0, 1], |_, _| mean);
+        mixed.ok().map(|law| Arc::new(law) as Arc<dyn Law<D>>)
+    };
+    let found = [
+        of(bonds(1.3), bonds(4.1), StiffnessMean::Harmonic),
+        of(bonds(1.3), bonds(4.1), StiffnessMean::Arithmetic),
+        of(solid(1.7, 1.3), solid(0.4, 2.9), StiffnessMean::Harmonic),
+        of(
+            flowing(1.3, 1.0),
+            flowing(0.7, 2.0),
+            StiffnessMean::Harmonic,
+        ),
+    ];
+    assert!(found.iter().all(Option::is_some));
+    found.into_iter().flatten()
 }
 
 /// Declares [`Named`], the laws that scenes know by key.

@@ -317,3 +317,113 @@ impl<const D: usize> ForceState<D> for Several<D> {
         states.map_or(1.0, |states| states.energy_ratio(s))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peridynamics::{BondBased, FamilyMaterials, LinearPeridynamicSolid, Micromodulus};
+
+    fn bonds(strength: f64) -> Arc<dyn Law<2>> {
+        Arc::new(BondBased::new(Micromodulus::InverseDistance, strength))
+    }
+
+    fn solid(lambda: f64, shear: f64) -> Arc<dyn Law<2>> {
+        let law = LinearPeridynamicSolid::new(Influence::Gaussian, lambda, shear);
+        Arc::new(law)
+    }
+
+    fn family() -> (Vec<Vector<2>>, Vec<f64>) {
+        let bonds = [
+            [1.0, 0.0],
+            [0.0, 1.0],
+            [-1.0, 0.5],
+            [1.5, -1.0],
+            [-0.5, -1.5],
+        ];
+        (
+            bonds.map(Vector::from).to_vec(),
+            vec![1.0, 0.9, 1.1, 1.0, 0.7],
+        )
+    }
+
+    /// `p` and ω of a family of the material `own` whose far points have the materials `far`.
+    fn coefficients(law: &dyn Law<2>, own: u16, far: &[u16]) -> (Vec<f64>, Vec<f64>) {
+        let (bonds, volumes) = family();
+        let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);
+        let family = Family {
+            bonds: &bonds,
+            volumes: &volumes,
+            factors: &vec![1.0; bonds.len()],
+            horizon: 2.0,
+            materials: Some(FamilyMaterials { own, far }),
+        };
+        (law.linearised()
+            .coefficients(&family, &mut pair, &mut omega))
+        .unwrap();
+        (pair, omega)
+    }
+
+    #[test]
+    fn bonds_between_two_materials_have_the_mean_from_both_ends() {
+        // stiffnesses 2 and 6: 3 in series, 4 in the mean
+        for (mean, stiffness) in [
+            (StiffnessMean::Harmonic, 3.0),
+            (StiffnessMean::Arithmetic, 4.0),
+        ] {
+            let law = Several::new(vec![bonds(2.0), bonds(6.0)], &[0, 1], |_, _| mean).unwrap();
+            let one = coefficients(bonds(1.0).as_ref(), 0, &[0; 5]).0;
+            let from_first = coefficients(&law, 0, &[0, 1, 1, 0, 1]).0;
+            let from_second = coefficients(&law, 1, &[0, 1, 1, 0, 1]).0;
+            for (k, far) in [0, 1, 1, 0, 1].into_iter().enumerate() {
+                let expected = [
+                    if far == 0 { 2.0 } else { stiffness },
+                    if far == 1 { 6.0 } else { stiffness },
+                ];
+                let found = [from_first[k] / one[k], from_second[k] / one[k]];
+                for (found, expected) in found.iter().zip(expected) {
+                    assert!(
+                        (found - expected).abs() < 1e-14 * expected,
+                        "{mean:?} {found}"
+                    );
+                }
+            }
+            assert!((law.scale(0, 1) - 0.5 * stiffness).abs() < 1e-14);
+            assert!((law.scale(1, 0) - 0.5 * stiffness).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn points_of_a_solid_have_the_coefficients_of_their_own_material() {
+        let laws = [solid(1.7, 1.3), solid(0.4, 2.9)];
+        let law = Several::new(laws.to_vec(), &[1, 0], |_, _| StiffnessMean::Harmonic).unwrap();
+        for own in [0, 1] {
+            let found = coefficients(&law, own, &[0, 1, 0, 1, 1]);
+            assert_eq!(
+                found,
+                coefficients(laws[usize::from(own)].as_ref(), 0, &[0; 5])
+            );
+            assert_eq!(law.relative(own, 1 - own), 1.0);
+        }
+        // constants that differ have no common fast pass, and equal ones have
+        assert_eq!(law.accelerator(), None);
+        let alike = vec![solid(1.7, 1.3), solid(1.7, 1.3)];
+        let alike = Several::new(alike, &[0, 1], |_, _| StiffnessMean::Harmonic).unwrap();
+        assert_eq!(alike.accelerator(), laws[0].accelerator());
+    }
+
+    #[test]
+    fn laws_and_kernels_that_differ_do_not_mix() {
+        let constant: Arc<dyn Law<2>> = Arc::new(BondBased::new(Micromodulus::Constant, 1.0));
+        for (other, why) in [
+            (solid(1.0, 1.0), "laws differ"),
+            (constant, "on the distance"),
+        ] {
+            let mixed = Several::new(vec![bonds(1.0), bonds(2.0), other], &[0, 1, 2], |_, _| {
+                StiffnessMean::Harmonic
+            });
+            let no = mixed.unwrap_err();
+            assert_eq!((no.first, no.second), (0, 2));
+            assert!(no.why.contains(why), "{no}");
+        }
+    }
+}
