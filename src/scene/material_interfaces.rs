@@ -230,6 +230,49 @@ fn span_of(spec: &SceneSpec, name: &str) -> Span {
     found.map_or(0..0, |(key, _)| key.span.clone())
 }
 
+/// The first two materials of points that have several, to refuse something of both.
+struct Pair<'a, const D: usize> {
+    spec: &'a SceneSpec,
+    materials: [&'a Material<D>; 2],
+}
+
+impl<const D: usize> Pair<'_, D> {
+    fn refused(&self, what: &str, why: &str, help: &str) -> SceneError {
+        let [a, b] = self.materials.map(|m| m.name.as_str());
+        SceneError::new(
+            SceneErrorKind::Later,
+            format!("points have the materials `{a}` and `{b}`, and {what}"),
+        )
+        .label(span_of(self.spec, a), "one")
+        .label(span_of(self.spec, b), why)
+        .help(help)
+    }
+
+    /// Refuses couplings whose rows know of one material.
+    fn check_coupling(&self, coupling: &CouplingSpec) -> Result<(), SceneError> {
+        let law = &self.materials[0].law;
+        match coupling {
+            CouplingSpec::Nonlocal(_) | CouplingSpec::Local(_) | CouplingSpec::Splice(_) => Ok(()),
+            CouplingSpec::Truncated(_) if D == 3 => Err(self.refused(
+                "the coupling is `truncated`",
+                "another, and the strings along the edges of a zone in space have the stiffness of one",
+                "use coupling = \"splice\" or \"nonlocal\", or keep the nonlocal zone within one material",
+            )),
+            CouplingSpec::Truncated(_) if !law.linearised().is_pairwise() => Err(self.refused(
+                &format!("the coupling is `truncated`, and the law {}", law.name()),
+                "another, and the dilatations of that seam have the constants of one",
+                "use bond-based materials, coupling = \"splice\" or \"nonlocal\", or keep the nonlocal zone within one material",
+            )),
+            CouplingSpec::Truncated(_) => Ok(()),
+            _ => Err(self.refused(
+                &format!("the coupling is `{}`", coupling.joining().name),
+                "another, whose bonds the rows of that seam do not know",
+                "use coupling = \"truncated\", \"splice\" or \"nonlocal\", or keep the nonlocal and transition zones within one material",
+            )),
+        }
+    }
+}
+
 /// Refuses what points of several materials do not take.
 ///
 /// # Errors
@@ -242,97 +285,55 @@ pub(crate) fn check<const D: usize>(
     used: &[u16],
     interfaces: &[MaterialInterface],
 ) -> Result<(), SceneError> {
-    let [first, second, ..] = used else {
+    let &[first, second, ..] = used else {
         return Ok(());
     };
-    let (a, b) = (
-        &materials[usize::from(*first)],
-        &materials[usize::from(*second)],
-    );
-    let refused = |what: String, why: &str, help: &str| {
-        Err(SceneError::new(
-            SceneErrorKind::Later,
-            format!(
-                "points have the materials `{}` and `{}`, and {what}",
-                a.name, b.name
-            ),
-        )
-        .label(span_of(spec, &a.name), "one")
-        .label(span_of(spec, &b.name), why)
-        .help(help))
+    let of = |m: u16| &materials[usize::from(m)];
+    let pair = Pair {
+        spec,
+        materials: [of(first), of(second)],
     };
-    let mut pairs = used.iter().flat_map(|a| used.iter().map(move |b| (*a, *b)));
-    let breaks = |m: u16| materials[usize::from(m)].fracture.is_some();
-    let is_broken = used.iter().any(|m| breaks(*m))
-        || pairs.any(|(a, b)| {
-            MaterialInterface::of(interfaces, a, b).is_some_and(|i| i.fracture.is_some())
-        });
-    let name = coupling.joining().name;
-    match coupling {
-        CouplingSpec::Nonlocal(_) | CouplingSpec::Local(_) | CouplingSpec::Splice(_) => {}
-        CouplingSpec::Truncated(_) if D == 3 => {
-            return refused(
-                "the coupling is `truncated`".to_owned(),
-                "another, and the strings along the edges of a zone in space have the stiffness of one",
-                "use coupling = \"splice\" or \"nonlocal\", or keep the nonlocal zone within one material",
-            );
-        }
-        CouplingSpec::Truncated(_) if !a.law.linearised().is_pairwise() => {
-            return refused(
-                format!("the coupling is `truncated`, and the law {}", a.law.name()),
-                "another, and the dilatations of that seam have the constants of one",
-                "use bond-based materials, coupling = \"splice\" or \"nonlocal\", or keep the nonlocal zone within one material",
-            );
-        }
-        CouplingSpec::Truncated(_) => {}
-        _ => {
-            return refused(
-                format!("the coupling is `{name}`"),
-                "another, whose bonds the rows of that seam do not know",
-                "use coupling = \"truncated\", \"splice\" or \"nonlocal\", or keep the nonlocal and transition zones within one material",
-            );
-        }
-    }
+    pair.check_coupling(coupling)?;
     if spec.accuracy.is_some() {
-        return refused(
-            "`accuracy` is set".to_owned(),
+        return Err(pair.refused(
+            "`accuracy` is set",
             "another, and what is known of errors is of one",
             "choose mesh, horizon and zones yourself, or keep the zones within one material",
-        );
+        ));
     }
     if spec.zones.follow.is_some() {
-        return refused(
-            "`zones.follow` is set".to_owned(),
+        return Err(pair.refused(
+            "`zones.follow` is set",
             "another, and a zone that follows damage stays within one",
             "draw a zone that is wide enough, or remove it",
-        );
+        ));
     }
-    if used.iter().any(|&m| {
-        matches!(
-            materials[usize::from(m)].fracture,
-            Some(Fracture::Tearing(_))
-        )
-    }) {
-        return refused(
-            "one breaks by a tearing parameter".to_owned(),
+    let tears = |m: &&u16| matches!(of(**m).fracture, Some(Fracture::Tearing(_)));
+    if used.iter().find(tears).is_some() {
+        return Err(pair.refused(
+            "one breaks by a tearing parameter",
             "another, and the parameter is a mean over bonds of one",
             "give critical-stretch to both",
-        );
+        ));
     }
     let Some(p) = p else { return Ok(()) };
     if matches!(p.points, Points::Lattices { .. }) {
-        return refused(
-            "`zones.bodies` is set".to_owned(),
+        return Err(pair.refused(
+            "`zones.bodies` is set",
             "another, and each body has a lattice of one",
             "use one lattice, or keep the zones within one material",
-        );
+        ));
     }
-    if is_broken && p.horizon.as_constant().is_none() {
-        return refused(
-            "the horizon varies".to_owned(),
+    let own = |i: &&MaterialInterface| i.between.iter().all(|m| used.contains(m));
+    let mut between = interfaces.iter().filter(own);
+    let breaks =
+        used.iter().any(|&m| of(m).fracture.is_some()) || between.any(|i| i.fracture.is_some());
+    if breaks && p.horizon.as_constant().is_none() {
+        return Err(pair.refused(
+            "the horizon varies",
             "another, and critical stretches follow from one horizon",
             "give peridynamics.horizon a number, or remove what breaks bonds",
-        );
+        ));
     }
     Ok(())
 }

@@ -73,6 +73,7 @@ pub(super) struct Generic<const D: usize> {
 }
 
 /// One deformed family in memory that the next one takes over.
+#[derive(Default)]
 pub(super) struct Scratch<const D: usize> {
     keeps_damage: bool,
     material: u16,
@@ -126,30 +127,6 @@ impl<const D: usize> Scratch<D> {
                 principal_stress: stress.then_some(&mut self.principal_stress),
             },
             force: &mut self.force,
-        }
-    }
-}
-
-impl<const D: usize> Default for Scratch<D> {
-    fn default() -> Self {
-        Self {
-            keeps_damage: false,
-            material: 0,
-            bonds: Vec::new(),
-            volumes: Vec::new(),
-            pair: Vec::new(),
-            omega: Vec::new(),
-            difference: Vec::new(),
-            extension: Vec::new(),
-            direction: Vec::new(),
-            of: Vec::new(),
-            past: Vec::new(),
-            present: Vec::new(),
-            point: Vec::new(),
-            principal_stress: [f64::NAN; 3],
-            force: Vec::new(),
-            is_whole: true,
-            damage: 0.0,
         }
     }
 }
