@@ -8,7 +8,7 @@ use crate::{
         point_cloud::PointCloud,
     },
     fem::Locator,
-    peridynamics::{Law, Several},
+    peridynamics::{Law, Mixture},
     tensor::Vector,
 };
 
@@ -26,7 +26,7 @@ pub(super) struct PointMaterials {
 
 impl<const D: usize> Model<D> {
     /// The laws of the points, if they have several materials.
-    pub fn several(&self) -> Option<&Several<D>> {
+    pub fn several(&self) -> Option<&dyn Mixture<D>> {
         self.peridynamics.as_ref()?.law.several()
     }
 

@@ -51,7 +51,7 @@ pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_en
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, Present};
 pub use influence::{Influence, Micromodulus};
-pub use law::{Accelerator, Law};
+pub use law::{Accelerator, Law, Mixture};
 pub use laws::{
     BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell, NoMixture,
     PositionAwareSolid, Several, StiffnessMean,

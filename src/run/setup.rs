@@ -6,7 +6,7 @@ use crate::coupling::{self, Model, PointSource, Problem, Surfaces};
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
-use crate::peridynamics::{BondWeights, Law, PartialVolume, StiffnessMean};
+use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
 use crate::scene::failure::Breaking;
@@ -175,44 +175,12 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
     )
 }
 
-/// Says which materials points have, and what their bonds are between two, if they have several.
-pub fn materials_choice<const D: usize>(
-    model: &Model<D>,
-    breaking: &Breaking<D>,
-) -> Option<Decision> {
-    let (several, fracture) = (model.several()?, breaking.several.as_ref()?);
-    let mut used = several.used().to_vec();
-    used.sort_unstable();
-    let names: Vec<&str> = used
-        .iter()
-        .map(|&m| fracture.of[usize::from(m)].0.as_str())
-        .collect();
-    let stiffness = match several.linearised().is_pairwise() {
-        true => {
-            let arithmetic = fracture.interfaces.iter();
-            let arithmetic: Vec<&str> = arithmetic
-                .filter(|i| i.mean == StiffnessMean::Arithmetic)
-                .map(|i| i.name.as_str())
-                .collect();
-            match arithmetic[..] {
-                [] => "the harmonic mean of their stiffnesses".to_owned(),
-                _ => format!(
-                    "the harmonic mean of their stiffnesses, of `{}` the arithmetic one",
-                    arithmetic.join("`, `")
-                ),
-            }
-        }
-        false => "half of their stiffness from either end".to_owned(),
-    };
-    let border = match model.points_on_border() {
-        0 => String::new(),
-        n => format!(
-            "; {n} points lie on a border and have the material whose name comes first: move peridynamics.points.lattice.origin by half a spacing to part them"
-        ),
-    };
-    Some(Decision {
-        choice: format!("points of the materials {}", names.join(", ")),
-        why: format!("bonds between two have {stiffness}{border}"),
+/// Says how many points lie on a border of two materials, if any do.
+pub fn border_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
+    let points = model.points_on_border();
+    (points > 0).then(|| Decision {
+        choice: format!("{points} points on a border of two materials"),
+        why: "they have the one whose name comes first; peridynamics.points.lattice.origin half a spacing on parts them".to_owned(),
     })
 }
 

@@ -155,6 +155,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         material_interfaces::check(spec, coupling, p, materials, &used, &interfaces)?;
         let law = material_interfaces::law_of_points(spec, materials, &used, &interfaces)?;
         Ok(PointMaterials {
+            told: material_interfaces::choice(materials, &used, &interfaces),
             used,
             law,
             interfaces,
@@ -204,6 +205,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             used,
             law,
             interfaces,
+            told,
         } = self.point_materials(&joined.coupling, peridynamics.as_ref(), &zones)?;
         if let Some(p) = &peridynamics {
             agreement::horizon(spec, p, mesh, &zones)?;
@@ -239,7 +241,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             coupling: joined.coupling,
             coupling_why: joined.why,
             placement: None,
-            choices: choices.into_iter().collect(),
+            choices: choices.into_iter().chain(told).collect(),
             conditions: self.conditions.clone(),
             voids,
             barriers,
@@ -263,6 +265,8 @@ struct PointMaterials<const D: usize> {
     used: Vec<u16>,
     law: Arc<dyn Law<D>>,
     interfaces: Vec<MaterialInterface>,
+    /// Which they are, if there are several.
+    told: Option<Decision>,
 }
 
 /// Says where points lie that the scene does not place.

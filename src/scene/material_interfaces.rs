@@ -1,5 +1,6 @@
 //! Several materials of the points of a scene: whether they have bonds with each other, and what these are.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::bounds_checks;
@@ -10,6 +11,7 @@ use super::source::Span;
 use super::spec::{CouplingSpec, MaterialInterfaceSpec, SceneSpec, StiffnessSpec};
 use super::value::Text;
 use crate::coupling::Zone;
+use crate::observe::summary::Decision;
 use crate::peridynamics::{Law, Several, StiffnessMean};
 use crate::scene::points::Points;
 
@@ -228,6 +230,69 @@ pub(crate) fn law_of_points<const D: usize>(
 fn span_of(spec: &SceneSpec, name: &str) -> Span {
     let found = spec.materials.get_key_value(name);
     found.map_or(0..0, |(key, _)| key.span.clone())
+}
+
+/// Says which materials points have, and what their bonds are between two, if they have several.
+pub(crate) fn choice<const D: usize>(
+    materials: &[Material<D>],
+    used: &[u16],
+    interfaces: &[MaterialInterface],
+) -> Option<Decision> {
+    let mut used = used.to_vec();
+    used.sort_unstable();
+    if used.len() < 2 {
+        return None;
+    }
+    let of = |m: &u16| &materials[usize::from(*m)];
+    let names: Vec<&str> = used.iter().map(|m| of(m).name.as_str()).collect();
+    let is_own = |i: &&MaterialInterface| i.between.iter().all(|m| used.contains(m));
+    let list = |counts: &dyn Fn(&MaterialInterface) -> bool| -> Vec<String> {
+        let counted = interfaces.iter().filter(is_own).filter(|i| counts(i));
+        counted.map(|i| format!("`{}`", i.name)).collect()
+    };
+    let arithmetic = list(&|i| i.mean == StiffnessMean::Arithmetic);
+    let mut why = match (of(&used[0]).law.linearised().is_pairwise(), &arithmetic[..]) {
+        (false, _) => "bonds between two have half of their stiffness from either end".to_owned(),
+        (true, []) => "bonds between two have the harmonic mean of their stiffnesses".to_owned(),
+        (true, list) => format!(
+            "bonds between two have the harmonic mean of their stiffnesses, of {} the arithmetic one",
+            list.join(", ")
+        ),
+    };
+    let typed = list(&|i| i.fracture.is_some());
+    if !typed.is_empty() || used.iter().any(|m| of(m).fracture.is_some()) {
+        why += ", and break at the smaller critical stretch of the two";
+        if !typed.is_empty() {
+            why += &format!(", or as {} says", typed.join(", "));
+        }
+    }
+    Some(Decision {
+        choice: format!("points of the materials {}", names.join(", ")),
+        why,
+    })
+}
+
+/// Warnings of interfaces between materials that have no points together.
+pub(crate) fn unused<const D: usize>(
+    interfaces: &BTreeMap<Text, MaterialInterfaceSpec>,
+    materials: &[Material<D>],
+    used: &[u16],
+) -> Vec<String> {
+    let has_points = |name: &Text| {
+        used.iter()
+            .any(|&m| materials[usize::from(m)].name == name.value)
+    };
+    let idle = interfaces
+        .iter()
+        .filter(|(_, i)| !i.between.iter().all(has_points));
+    idle.map(|(name, i)| {
+        let [a, b] = &i.between;
+        format!(
+            "the interface `{name}` is not used: no points of `{}` and `{}` have bonds with each other",
+            a.value, b.value
+        )
+    })
+    .collect()
 }
 
 /// The first two materials of points that have several, to refuse something of both.

@@ -7,7 +7,7 @@ use super::seam::{Course, Foot, Piece, Seam};
 use crate::{
     assembly::{Row, Transfer},
     coupling::{Model, SiteKind, multi_lattice::ContinuedLattice},
-    peridynamics::{PdBody, Several},
+    peridynamics::{Mixture, PdBody},
     tensor::{Tensor, Vector},
 };
 
@@ -235,7 +235,7 @@ struct Ends<'a, const D: usize> {
     site: &'a [u32],
     body: &'a PdBody<D>,
     passing: &'a ContinuedLattice<D>,
-    several: Option<&'a Several<D>>,
+    several: Option<&'a dyn Mixture<D>>,
 }
 
 impl<const D: usize> Ends<'_, D> {
@@ -307,7 +307,7 @@ impl<const D: usize> Ends<'_, D> {
     fn of_materials(&self, i: u32, j: u32) -> f64 {
         let material = &self.body.cloud.material;
         let scale =
-            |several: &Several<D>| several.scale(material[i as usize], material[j as usize]);
+            |several: &dyn Mixture<D>| several.scale(material[i as usize], material[j as usize]);
         self.several.map_or(1.0, scale)
     }
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::{
     peridynamics::{
         Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Past, PdError, Present, ShellTarget,
-        StatePart,
+        HistoryLayout, Influence, Law, LinearForceState, Mixture, Past, PdError, Present,
+        ShellTarget, StatePart,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -134,29 +134,6 @@ impl<const D: usize> Several<D> {
         })
     }
 
-    /// The numbers of the materials that points have.
-    pub fn used(&self) -> &[u16] {
-        &self.used
-    }
-
-    /// The law of a material.
-    pub fn law(&self, material: u16) -> &dyn Law<D> {
-        self.laws[usize::from(material)].as_ref()
-    }
-
-    /// `p` of a bond from a point of the material `own` to one of `far` over that within `own`; 1 for laws that do not act bond by bond.
-    pub fn relative(&self, own: u16, far: u16) -> f64 {
-        match self.is_pairwise() {
-            true => self.relative[usize::from(own) * self.laws.len() + usize::from(far)],
-            false => 1.0,
-        }
-    }
-
-    /// Stiffness of a bond between two materials over that within the first in use; of laws that do not act bond by bond what the end in `own` gives.
-    pub fn scale(&self, own: u16, far: u16) -> f64 {
-        self.stiffness[usize::from(own)] * self.relative(own, far)
-    }
-
     fn first(&self) -> &dyn Law<D> {
         self.law(self.used[0])
     }
@@ -167,6 +144,27 @@ impl<const D: usize> Several<D> {
 
     fn states(&self, material: u16) -> Option<&dyn ForceState<D>> {
         self.laws.get(usize::from(material))?.force_state()
+    }
+}
+
+impl<const D: usize> Mixture<D> for Several<D> {
+    fn used(&self) -> &[u16] {
+        &self.used
+    }
+
+    fn law(&self, material: u16) -> &dyn Law<D> {
+        self.laws[usize::from(material)].as_ref()
+    }
+
+    fn relative(&self, own: u16, far: u16) -> f64 {
+        match self.is_pairwise() {
+            true => self.relative[usize::from(own) * self.laws.len() + usize::from(far)],
+            false => 1.0,
+        }
+    }
+
+    fn scale(&self, own: u16, far: u16) -> f64 {
+        self.stiffness[usize::from(own)] * self.relative(own, far)
     }
 }
 
@@ -205,7 +203,7 @@ impl<const D: usize> Law<D> for Several<D> {
         self.in_use().all(|law| law.is_linear_until_damaged())
     }
 
-    fn several(&self) -> Option<&Several<D>> {
+    fn several(&self) -> Option<&dyn Mixture<D>> {
         Some(self)
     }
 

@@ -2,8 +2,8 @@
 
 use crate::coupling::Model;
 use crate::coupling::semidiscrete::behaviour::{Critical, StretchOfMaterials, SystemError};
+use crate::peridynamics::Mixture;
 use crate::peridynamics::critical_stretch as failure_stretch;
-use crate::peridynamics::{Law, Several};
 use crate::run::error::RunError;
 use crate::scene::failure::{Breaking, FractureOfMaterials};
 use crate::scene::material_interfaces::MaterialInterface;
@@ -13,7 +13,7 @@ use crate::scene::spec::CalibrationSpec;
 /// What breaks the bonds of a body of several materials.
 struct Stretches<'a, const D: usize> {
     model: &'a Model<D>,
-    law: &'a Several<D>,
+    law: &'a dyn Mixture<D>,
     fracture: &'a FractureOfMaterials,
     calibration: CalibrationSpec,
 }
@@ -84,11 +84,12 @@ impl<const D: usize> Stretches<'_, D> {
 /// [`RunError::Fracture`], or [`RunError::System`] for a law whose bond energy is not known.
 pub(super) fn of<const D: usize>(
     model: &Model<D>,
-    law: &Several<D>,
+    law: &dyn Mixture<D>,
     breaking: &Breaking<D>,
 ) -> Result<Critical, RunError> {
     let Some(fracture) = &breaking.several else {
-        return Err(SystemError::Law { law: law.name() }.into());
+        let law = law.law(law.used()[0]).name();
+        return Err(SystemError::Law { law }.into());
     };
     let stretches = Stretches {
         model,
