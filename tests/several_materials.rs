@@ -286,3 +286,16 @@ fn what_materials_do_not_share_is_refused_by_name() {
     let said = refusal(&plain.replace("min = 0.5, max = 1 }", "min = 2, max = 3 }"));
     assert!(said.contains("holds no cell"), "{said}");
 }
+
+#[test]
+fn results_name_the_material_of_points_that_have_several() {
+    for (right, is_named) in [(Some(4.0), true), (None, false)] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = bar(BONDS, "nonlocal", 40, right, 0.7).replace("vtu = false", "vtu = true");
+        assert!(bondline(&text, folder.path()).status.success());
+        let vtu = std::fs::read(folder.path().join("scene.vtu")).unwrap();
+        let field = b"Name=\"material\"";
+        let is_found = vtu.windows(field.len()).any(|bytes| bytes == field);
+        assert_eq!(is_found, is_named);
+    }
+}

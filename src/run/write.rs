@@ -325,7 +325,7 @@ struct SnapshotRows<'a, const D: usize> {
     displacement: Vec<Vector<D>>,
     zones: Vec<u8>,
     /// The material of each cell; empty if all are of one.
-    materials: Vec<u8>,
+    materials: Vec<i32>,
     strains: Vec<Tensor<D>>,
     stresses: Vec<Tensor<D>>,
     shown_cells: Vec<u32>,
@@ -380,7 +380,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                 .push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
             self.zones.push(label(model.zones[c]));
             if model.several().is_some() {
-                self.materials.push(model.material_of_cell(c) as u8);
+                self.materials.push(i32::from(model.material_of_cell(c)));
             }
             let gradient = solved.element_gradient(c);
             self.strains.push(strain(&gradient));
@@ -434,7 +434,8 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             let material = model
                 .point_of(site)
                 .map(|(body, p)| body.cloud.material.get(p));
-            self.materials.extend(material.flatten().map(|&m| m as u8));
+            self.materials
+                .extend(material.flatten().map(|&m| i32::from(m)));
             self.strains.push(e);
             self.stresses.push(stress);
         }
@@ -497,7 +498,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             Field::tensor("stress", &self.stresses),
         ];
         if !self.materials.is_empty() {
-            fields.push(Field::labels("material", self.materials.clone()));
+            fields.push(Field::integers("material", self.materials.clone()));
         }
         let remembered = self
             .solved
