@@ -1,5 +1,6 @@
 //! Energy that scenes spend on fracture, against the energy typed; `bondline verify meshes` has more laws and steps.
 
+use bondline_verify::interfaces::opening;
 use bondline_verify::meshes::fracture::{balance, plane, plate};
 
 const LAWS: [&str; 2] = ["bond-based]", "lps]\npoisson-ratio = 0.2"];
@@ -22,5 +23,13 @@ fn the_energy_of_a_plate_that_breaks_is_accounted_for() {
     for coupling in ["nonlocal", "truncated"] {
         let (gap, broken) = balance(&plate(coupling, law, 0.1), &[], &[]).expect("it runs");
         assert!(broken > 0 && gap.abs() < 1e-3, "{coupling} {law}: {gap}");
+    }
+}
+
+#[test]
+fn an_interface_pulled_apart_spends_its_own_energy() {
+    for law in LAWS {
+        let ratio = opening(law, [1.0, 4.0]).expect("it runs");
+        assert!((ratio - 1.0).abs() < 0.02, "{law}: {ratio}");
     }
 }

@@ -7,9 +7,9 @@ use crate::{
     coupling::{ModelError, Peridynamics, PointSource, point_cloud::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, visibility::SegmentCutter},
     peridynamics::{
-        BondWeights, Families, Family, PartialVolume, StatePart, TIE_TOLERANCE, collapsed_tensor,
-        isotropic_shell_factors, offset_table::OffsetTable, partial_volume::lattice_shells,
-        plane_energy,
+        BondWeights, Families, Family, LinearForceState, PartialVolume, StatePart, TIE_TOLERANCE,
+        collapsed_tensor, isotropic_shell_factors, offset_table::OffsetTable,
+        partial_volume::lattice_shells, plane_energy,
     },
     shape::Barriers,
     tensor::{Tensor, Tensor4, Vector},
@@ -197,18 +197,18 @@ impl<const D: usize> LatticeFactors<D> {
     /// The whole family of a lattice point with the coefficients that the law gives it; none without a lattice.
     pub fn whole_family(
         &self,
-        p: &Peridynamics<D>,
+        law: &dyn LinearForceState<D>,
         horizon: f64,
     ) -> Result<Option<WholeFamily<D>>, ModelError> {
         self.is_lattice()
-            .then(|| self.regular_family(p, horizon))
+            .then(|| self.regular_family(law, horizon))
             .transpose()
     }
 
     /// The whole family of a point of a regular lattice of the same spacing and horizon: the lattice's own if the points are one.
     pub fn regular_family(
         &self,
-        p: &Peridynamics<D>,
+        law: &dyn LinearForceState<D>,
         horizon: f64,
     ) -> Result<WholeFamily<D>, ModelError> {
         let axes = self.axes.unwrap_or_else(Tensor::identity);
@@ -233,11 +233,10 @@ impl<const D: usize> LatticeFactors<D> {
             volumes: &volumes,
             factors: &factors,
             horizon,
+            materials: None,
         };
         let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);
-        let state = p
-            .law
-            .linearised()
+        let state = law
             .coefficients(&family, &mut pair, &mut omega)
             .map_err(|source| ModelError::Family {
                 what: "a point of the full lattice",

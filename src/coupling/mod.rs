@@ -38,6 +38,7 @@ mod multi_lattice;
 pub mod partial_stress;
 pub mod point_cloud;
 mod point_generation;
+mod point_materials;
 pub mod problem;
 mod recovery;
 mod rows;

@@ -72,6 +72,7 @@ pub struct Model<const D: usize> {
     /// All quadrature points in and around elements whose stress is a partial stress.
     surroundings: Option<Cloud<D>>,
     point_zone: Vec<Zone>,
+    pub(super) points_on_border: usize,
     node_cells: (Vec<u32>, Vec<u32>),
     pub(super) interface: Interface,
     passing: Option<ContinuedLattice<D>>,
@@ -146,6 +147,7 @@ impl<const D: usize> Model<D> {
             body: None,
             surroundings: None,
             point_zone: Vec::new(),
+            points_on_border: 0,
             node_cells,
             interface: coupling.interface(),
             passing: None,
@@ -298,7 +300,7 @@ impl<const D: usize> Model<D> {
         if body.cloud.horizon.iter().any(|of| of != horizon) {
             return Err(failed(CalibrationError::Varies));
         }
-        let whole = factors.regular_family(p, *horizon)?;
+        let whole = factors.regular_family(p.law.linearised(), *horizon)?;
         let vectors = whole.vectors();
         let bonds = vectors.iter().map(|(xi, v)| (*xi, whole.of(xi).0 * v));
         let bonds: Vec<_> = bonds.collect();
@@ -352,6 +354,9 @@ impl<const D: usize> Model<D> {
         progress.stage("seam", None);
         let transfer = self.express_places(p, &cloud, wide, &point_site, node_site, coupling)?;
         progress.stage("bonds", None);
+        self.check_seam_on_border(p.law.as_ref())?;
+        let materials = self.materials_of(p.law.as_ref(), &cloud);
+        self.points_on_border = materials.on_border;
         let shells = |horizon: f64, xi: &Vector<D>| {
             let mut known = factors.iter().filter_map(|l| l.factor(horizon, xi));
             known.next().unwrap_or(1.0)
@@ -380,6 +385,7 @@ impl<const D: usize> Model<D> {
             volume: cloud.volume,
             horizon: cloud.horizon,
             transfer,
+            material: materials.of_point,
         };
         let body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
             .map_err(|e| ModelError::family("the point", e))?;
@@ -434,6 +440,7 @@ impl<const D: usize> Model<D> {
                 volume: wide.volume,
                 horizon: wide.horizon,
                 transfer,
+                material: Vec::new(),
             });
         }
         Ok(transfer)
@@ -447,7 +454,13 @@ impl<const D: usize> Model<D> {
         horizon: f64,
         peridynamic_material: u16,
     ) -> Result<(), ModelError> {
-        if let Some(whole) = factors.whole_family(p, horizon)? {
+        if let Some(several) = p.law.several().filter(|_| factors.is_lattice()) {
+            for &material in several.used() {
+                let law = several.law(material).linearised();
+                self.tensors[usize::from(material)] = factors.regular_family(law, horizon)?.tensor;
+            }
+        }
+        if let Some(whole) = factors.whole_family(p.law.linearised(), horizon)? {
             self.tensors[peridynamic_material as usize] = whole.tensor;
             self.plain_lattice = Some(whole);
         }
@@ -503,37 +516,6 @@ impl<const D: usize> Model<D> {
     /// Whether the points are those of a lattice, whatever its axes.
     pub fn is_lattice(&self) -> bool {
         self.is_lattice
-    }
-
-    /// How far the families of points are from the constants of their material: relative differences of `C_1111`, mean and largest size, over the families that
-    /// weigh at least 0.95 of the heaviest one; none without points.
-    pub fn tensor_deviation(&self) -> Option<[f64; 2]> {
-        /// Families looked at: enough for a mean.
-        const SAMPLE: usize = 1000;
-        let body = self.body.as_ref()?;
-        let typed = self
-            .peridynamics
-            .as_ref()?
-            .law
-            .linearised()
-            .tensor()
-            .get(0, 0, 0, 0);
-        let weight = |i: usize| -> f64 {
-            let family = body.families.of(i).iter();
-            family.map(|&j| body.cloud.volume[j as usize]).sum()
-        };
-        let points = body.cloud.position.len();
-        let sample: Vec<(usize, f64)> = (0..points)
-            .step_by(points.div_ceil(SAMPLE).max(1))
-            .map(|i| (i, weight(i)))
-            .collect();
-        let heaviest = sample.iter().map(|s| s.1).fold(0.0, f64::max);
-        let full = sample.iter().filter(|s| s.1 >= 0.95 * heaviest);
-        let off: Vec<f64> = full
-            .map(|s| body.collapsed_tensor(s.0).get(0, 0, 0, 0) / typed - 1.0)
-            .collect();
-        let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
-        Some([mean, off.iter().fold(0.0, |m, e| m.max(e.abs()))])
     }
 
     /// Volumes of the peridynamic zone and of the points in it.

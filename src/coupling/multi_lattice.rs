@@ -8,7 +8,7 @@ use crate::{
         point_cloud::PointCloud,
     },
     mesh::boundary::BoundaryFacet,
-    peridynamics::{Families, PartialVolume, TIE_TOLERANCE},
+    peridynamics::{Families, Law, LinearForceState, PartialVolume, TIE_TOLERANCE},
     tensor::{Tensor4, Vector},
 };
 
@@ -170,12 +170,14 @@ impl<const D: usize> Model<D> {
             .then(|| (cloud.clone(), keep.renumbered.clone()));
         if let Some((wide, _)) = &wide {
             let near = self.near_stress_elements(wide);
-            self.check_materials(wide, |i| near(&wide.position[i], wide.horizon[i]))?;
+            self.check_materials(p.law.as_ref(), wide, |i| {
+                near(&wide.position[i], wide.horizon[i])
+            })?;
         }
         cloud.retain(&keep.renumbered);
         // bonds that are cut where elements begin see nothing of what lies beyond
         if self.interface != Interface::Faces {
-            self.check_materials(&cloud, |_| true)?;
+            self.check_materials(p.law.as_ref(), &cloud, |_| true)?;
         }
         Ok(CompletedLattice {
             factors,
@@ -221,21 +223,23 @@ impl<const D: usize> Model<D> {
     /// know nothing of them, forces would not balance by far.
     fn check_materials(
         &self,
+        law: &dyn Law<D>,
         cloud: &PointCloud<D>,
         counts: impl Fn(usize) -> bool,
     ) -> Result<(), ModelError> {
         let (offsets, cells) = self.node_cells();
+        let is_own = |c: u32| self.is_peridynamic(law, self.material_of_cell(c as usize));
         let own = |node: u32| {
             cells[offsets[node as usize] as usize..offsets[node as usize + 1] as usize]
                 .iter()
-                .any(|&c| self.material_of_cell(c as usize) == self.peridynamic_material())
+                .any(|&c| is_own(c))
         };
         for (i, (x, element)) in cloud.position.iter().zip(&cloud.element).enumerate() {
             let Some((cell, weights)) = element else {
                 continue;
             };
             // a place on the border of the two materials has its weights on nodes of both
-            let beyond = self.material_of_cell(*cell as usize) != self.peridynamic_material()
+            let beyond = !is_own(*cell)
                 && self
                     .mesh
                     .cell(*cell as usize)
@@ -307,8 +311,16 @@ impl<const D: usize> Model<D> {
         let Some(p) = &self.peridynamics else {
             return Ok(Vec::new());
         };
+        self.plane_energies_of(p.law.linearised())
+    }
+
+    /// As [`Model::plane_energies`], of a body all of whose points have that law.
+    pub fn plane_energies_of(
+        &self,
+        law: &dyn LinearForceState<D>,
+    ) -> Result<Vec<(f64, f64)>, ModelError> {
         let of = |(factors, horizon): &(LatticeFactors<D>, f64)| {
-            let family = factors.regular_family(p, *horizon)?;
+            let family = factors.regular_family(law, *horizon)?;
             Ok((*horizon, family.plane_energy()))
         };
         self.factors.iter().map(of).collect()
@@ -348,7 +360,7 @@ pub(super) fn whole_families<const D: usize>(
     let whole = lattices
         .iter()
         .zip(horizons)
-        .map(|(lattice, &horizon)| lattice.whole_family(p, horizon))
+        .map(|(lattice, &horizon)| lattice.whole_family(p.law.linearised(), horizon))
         .collect::<Result<Option<Vec<_>>, _>>()?;
     // the faces that cut bonds follow the axes
     let is_regular = is_regular && lattices.iter().all(LatticeFactors::is_axis_parallel);

@@ -21,7 +21,7 @@ use crate::{
     system::{BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
 };
 use behaviour::NONE;
-pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, SystemError};
+pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, StretchOfMaterials, SystemError};
 
 pub(crate) mod behaviour;
 mod body;
@@ -88,7 +88,14 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
             let cloud = &body.cloud;
             let critical = behaviour.critical_stretch.as_ref();
-            let critical = critical.map(|c| |p: u32| c.at(cloud.horizon[p as usize]));
+            let critical = critical.map(|c| {
+                |[i, j]: [u32; 2]| match c {
+                    Critical::ByMaterials(stretch) => {
+                        stretch.at(cloud.material[i as usize], cloud.material[j as usize])
+                    }
+                    _ => c.at(cloud.horizon[i as usize]),
+                }
+            });
             seam.behave(behaviour.kinematics, critical, |p| {
                 (behaviour.no_fail)(&cloud.position[p as usize])
             });

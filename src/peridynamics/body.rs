@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use crate::{
     assembly::{Row, Transfer},
     peridynamics::{
-        Bound, Families, Family, LinearForceState, PdError, PointError, Reversed, StatePart,
-        collapsed_tensor, moment_fitted_weights,
+        Bound, Families, Family, FamilyMaterials, LinearForceState, PdError, PointError, Reversed,
+        StatePart, collapsed_tensor, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -41,6 +41,8 @@ pub struct Cloud<const D: usize> {
     pub horizon: Vec<f64>,
     /// Displacement of each point through sites.
     pub transfer: Transfer,
+    /// The number of each point's material; empty if all have one.
+    pub material: Vec<u16>,
 }
 
 /// Points with families and the coefficients of one law.
@@ -62,6 +64,7 @@ struct Scratch<const D: usize> {
     bonds: Vec<Vector<D>>,
     volumes: Vec<f64>,
     factors: Vec<f64>,
+    materials: Vec<u16>,
 }
 
 /// Factors of the bonds of a point's family.
@@ -154,7 +157,11 @@ impl<const D: usize> PdBody<D> {
                         .map(|j| cloud.position[j] - cloud.position[i]),
                 );
                 of.volumes.clear();
-                of.volumes.extend(family.map(|j| cloud.volume[j]));
+                of.volumes.extend(family.clone().map(|j| cloud.volume[j]));
+                of.materials.clear();
+                if !cloud.material.is_empty() {
+                    of.materials.extend(family.map(|j| cloud.material[j]));
+                }
                 of.fill_factors(i, factors, law, horizon).map_err(at)?;
                 law.coefficients(
                     &Family {
@@ -162,6 +169,10 @@ impl<const D: usize> PdBody<D> {
                         volumes: &of.volumes,
                         factors: &of.factors,
                         horizon,
+                        materials: (cloud.material.get(i)).map(|&own| FamilyMaterials {
+                            own,
+                            far: &of.materials,
+                        }),
                     },
                     pair,
                     omega,
@@ -226,6 +237,7 @@ impl<const D: usize> PdBody<D> {
             volumes: &volumes,
             factors: &[],
             horizon: self.cloud.horizon[i],
+            materials: None,
         };
         collapsed_tensor(&family, self.kernel(i).0, self.state(i))
     }

@@ -62,6 +62,8 @@ pub struct DeformedFamily<'a, const D: usize> {
     pub damage: f64,
     /// Whether the point keeps the damage that it has: in a region `no-fail`, and where its row is not that of its bonds alone.
     pub keeps_damage: bool,
+    /// The material of the point, 0 in a body of one.
+    pub material: u16,
 }
 
 impl<const D: usize> DeformedFamily<'_, D> {

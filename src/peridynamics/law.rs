@@ -85,6 +85,26 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
         None
     }
 
+    /// The laws of its materials, if it stands for several.
+    fn several(&self) -> Option<&dyn Mixture<D>> {
+        None
+    }
+
     /// What the bonds of a continuous family store, and what breaking them costs, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy>;
+}
+
+/// Several materials behind one law, by their numbers.
+pub trait Mixture<const D: usize>: Send + Sync {
+    /// The numbers of the materials that points have.
+    fn used(&self) -> &[u16];
+
+    /// The law of a material.
+    fn law(&self, material: u16) -> &dyn Law<D>;
+
+    /// `p` of a bond from a point of the material `own` to one of `far` over that within `own`; 1 for laws that do not act bond by bond.
+    fn relative(&self, own: u16, far: u16) -> f64;
+
+    /// Stiffness of a bond between two materials over that within the first in use; of laws that do not act bond by bond what the end in `own` gives.
+    fn scale(&self, own: u16, far: u16) -> f64;
 }

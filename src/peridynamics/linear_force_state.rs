@@ -30,6 +30,17 @@ pub struct Family<'a, const D: usize> {
     pub factors: &'a [f64],
     /// Horizon δ of the family's centre.
     pub horizon: f64,
+    /// The materials of its points; none in a body of one material.
+    pub materials: Option<FamilyMaterials<'a>>,
+}
+
+/// The materials of a family's points, by the numbers that [`crate::peridynamics::Several`] has for them.
+#[derive(Clone, Copy, Debug)]
+pub struct FamilyMaterials<'a> {
+    /// Of its centre.
+    pub own: u16,
+    /// Of the far points, one entry per bond.
+    pub far: &'a [u16],
 }
 
 /// The state part of a law at one point.

@@ -53,11 +53,14 @@ pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_en
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, Present};
 pub use influence::{Influence, Micromodulus};
-pub use law::{Accelerator, Calibrate, Law};
+pub use law::{Accelerator, Calibrate, Law, Mixture};
 pub use laws::{
-    BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell, PositionAwareSolid,
+    BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell, NoMixture,
+    PositionAwareSolid, Several, StiffnessMean,
 };
-pub use linear_force_state::{Family, LinearForceState, StatePart, collapsed_tensor};
+pub use linear_force_state::{
+    Family, FamilyMaterials, LinearForceState, StatePart, collapsed_tensor,
+};
 pub use moment_fitted_weights::{Bound, Conditions, FitError};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use position_aware_influence::{CalibrationFields, NotPositionAware};

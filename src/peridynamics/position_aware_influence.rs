@@ -190,6 +190,7 @@ mod tests {
             volumes: &volumes,
             factors: &base,
             horizon: 3.0,
+            materials: None,
         };
         fit(&family, &base, fields)
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::coupling::{self, Model, PointSource, Problem, Surfaces, Zone};
+use crate::coupling::{self, Model, PointSource, Problem, Surfaces};
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
@@ -101,15 +101,16 @@ impl<const D: usize> RunSettings<D> {
 
 /// The problem of a scene, and what remains of the scene.
 pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) {
-    let material = scene
-        .zones
-        .iter()
-        .zip(&scene.cell_material)
-        .find(|(zone, _)| **zone != Zone::Local)
-        .map_or(0, |(_, m)| *m);
-    let stuff = &scene.materials[material as usize];
-    let law = Arc::clone(&stuff.law);
-    let ratio = Ratio::new(stuff.lame, scene.kinematics);
+    let material = scene.point_materials[0];
+    let law = Arc::clone(&scene.point_law);
+    // of several the one that is farthest below bonds that act alone
+    let ratios = scene.point_materials.iter().map(|&m| {
+        let stuff = &scene.materials[usize::from(m)];
+        Ratio::new(stuff.lame, scene.kinematics)
+    });
+    let least = ratios.min_by(|a, b| a.typed.total_cmp(&b.typed));
+    let first = &scene.materials[usize::from(material)];
+    let ratio = least.unwrap_or_else(|| Ratio::new(first.lame, scene.kinematics));
     let method = scene.coupling.build(law.linearised().divergence());
     let chosen = scene.coupling_why.map(|why| Decision {
         choice: format!("coupling {}", scene.coupling.joining().name),
@@ -172,6 +173,15 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             choices: scene.choices,
         },
     )
+}
+
+/// Says how many points lie on a border of two materials, if any do.
+pub fn border_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
+    let points = model.points_on_border();
+    (points > 0).then(|| Decision {
+        choice: format!("{points} points on a border of two materials"),
+        why: "they have the one whose name comes first; peridynamics.points.lattice.origin half a spacing on parts them".to_owned(),
+    })
 }
 
 /// Says which partial volumes are in use, if not full ones.

@@ -5,7 +5,7 @@ use super::equilibrium::{Equilibrium, StaticInput, equilibrium};
 use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
-use super::setup::{RunSettings, problem, volumes_choice};
+use super::setup::{RunSettings, border_choice, problem, volumes_choice};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
@@ -248,6 +248,7 @@ impl<const D: usize> StaticBody<'_, D> {
             ),
         });
         choices.extend(volumes_choice(self.model));
+        choices.extend(border_choice(self.model));
         choices
     }
 

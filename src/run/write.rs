@@ -324,6 +324,8 @@ struct SnapshotRows<'a, const D: usize> {
     node_of_point: Vec<Option<usize>>,
     displacement: Vec<Vector<D>>,
     zones: Vec<u8>,
+    /// The material of each cell; empty if all are of one.
+    materials: Vec<i32>,
     strains: Vec<Tensor<D>>,
     stresses: Vec<Tensor<D>>,
     shown_cells: Vec<u32>,
@@ -338,6 +340,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             node_of_point: Vec::new(),
             displacement: Vec::new(),
             zones: Vec::new(),
+            materials: Vec::new(),
             strains: Vec::new(),
             stresses: Vec::new(),
             shown_cells: Vec::new(),
@@ -376,6 +379,9 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             self.snapshot
                 .push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
             self.zones.push(label(model.zones[c]));
+            if model.several().is_some() {
+                self.materials.push(i32::from(model.material_of_cell(c)));
+            }
             let gradient = solved.element_gradient(c);
             self.strains.push(strain(&gradient));
             self.stresses.push(match of_cells.get(&(c as u32)) {
@@ -425,6 +431,11 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             self.site_of_point.push(Some(site));
             self.node_of_point.push(None);
             self.zones.push(label(solved.zone_of_site[site]));
+            let material = model
+                .point_of(site)
+                .map(|(body, p)| body.cloud.material.get(p));
+            self.materials
+                .extend(material.flatten().map(|&m| i32::from(m)));
             self.strains.push(e);
             self.stresses.push(stress);
         }
@@ -486,6 +497,9 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             Field::tensor("strain", &self.strains),
             Field::tensor("stress", &self.stresses),
         ];
+        if !self.materials.is_empty() {
+            fields.push(Field::integers("material", self.materials.clone()));
+        }
         let remembered = self
             .solved
             .system

@@ -3,45 +3,11 @@
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
-use super::source::Span;
 use super::spec::{BondsSpec, CouplingSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::scene::points::Points;
-
-/// The core gives all points one law.
-pub(crate) fn one_peridynamic_material<const D: usize>(
-    spec: &SceneSpec,
-    found: &[Material<D>],
-    cell_material: &[u16],
-    zones: &[Zone],
-) -> Result<(), SceneError> {
-    let mut used = cell_material
-        .iter()
-        .zip(zones)
-        .filter(|(_, zone)| **zone != Zone::Local)
-        .map(|(m, _)| *m);
-    let Some(first) = used.next() else {
-        return Ok(());
-    };
-    let Some(other) = used.find(|m| *m != first) else {
-        return Ok(());
-    };
-    let (a, b) = (&found[first as usize].name, &found[other as usize].name);
-    let span = |name: &str| -> Span {
-        spec.materials
-            .get_key_value(name)
-            .map_or(0..0, |(k, _)| k.span.clone())
-    };
-    Err(SceneError::new(
-        SceneErrorKind::Later,
-        format!("the materials `{a}` and `{b}` both reach into the peridynamic zones"),
-    )
-    .label(span(a), "one")
-    .label(span(b), "another")
-    .help("keep the nonlocal and transition zones within one material; bonds between materials come later"))
-}
 
 /// Refuses a law that is not linear where rows at the seam would not balance it: those of splice, blending, balanced and partial stress hold a uniform strain whatever stress the two sides have.
 pub(crate) fn balanced_seam<const D: usize>(

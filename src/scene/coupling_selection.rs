@@ -5,6 +5,7 @@
 //! Poisson's ratio, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
 
 use super::error::{SceneError, SceneErrorKind};
+use super::material_interfaces;
 use super::materials::Material;
 use super::peridynamics;
 use super::selected_coupling::SelectedCoupling;
@@ -36,7 +37,7 @@ enum Obstacle {
 /// Those of the zones and of the lattice, which the choice looks at.
 pub(crate) fn joined<const D: usize>(
     spec: &SceneSpec,
-    found: &[Material<D>],
+    (found, cell_material): (&[Material<D>], &[u16]),
     mesh: &Mesh<D>,
     placed: Option<&Placed>,
     instead: Option<&CouplingSpec>,
@@ -86,23 +87,25 @@ pub(crate) fn joined<const D: usize>(
     }
     let splice = CouplingSpec::Splice(NoOptionsSpec {});
     let is_placed = spec.zones.auto.is_some();
-    Ok(match obstacle(spec, p, found, mesh, &truncated, placed)? {
-        None => truncated,
-        Some(Obstacle::Possible(reason)) if !is_placed => SelectedCoupling {
-            otherwise: Some(splice),
-            why: Some(format!(
-                "the scene names none; symmetric and in exact equilibrium, though {reason}"
-            )),
-            ..truncated
+    Ok(
+        match obstacle(spec, p, (found, cell_material), mesh, &truncated, placed)? {
+            None => truncated,
+            Some(Obstacle::Possible(reason)) if !is_placed => SelectedCoupling {
+                otherwise: Some(splice),
+                why: Some(format!(
+                    "the scene names none; symmetric and in exact equilibrium, though {reason}"
+                )),
+                ..truncated
+            },
+            Some(Obstacle::Certain(reason) | Obstacle::Possible(reason)) => of(
+                splice,
+                span,
+                Some(format!(
+                    "the scene names none, and `truncated` is not for {reason}"
+                )),
+            ),
         },
-        Some(Obstacle::Certain(reason) | Obstacle::Possible(reason)) => of(
-            splice,
-            span,
-            Some(format!(
-                "the scene names none, and `truncated` is not for {reason}"
-            )),
-        ),
-    })
+    )
 }
 
 /// Refuses a scene that draws a nonlocal zone and has no peridynamics to fill it with.
@@ -126,7 +129,7 @@ fn without_peridynamics(spec: &SceneSpec) -> Result<(), SceneError> {
 fn obstacle<const D: usize>(
     spec: &SceneSpec,
     p: &PeridynamicsSpec,
-    found: &[Material<D>],
+    (found, cell_material): (&[Material<D>], &[u16]),
     mesh: &Mesh<D>,
     truncated: &SelectedCoupling,
     placed: Option<&Placed>,
@@ -156,6 +159,10 @@ fn obstacle<const D: usize>(
         return certain("a horizon that varies");
     }
     let zones = zones::zones(spec, truncated, mesh, placed)?;
+    let used = material_interfaces::materials_of_points(cell_material, &zones);
+    if used.len() > 1 && (D == 3 || !found[usize::from(used[0])].law.linearised().is_pairwise()) {
+        return certain("points of several materials in space, or of a law with dilatations");
+    }
     let lattice = peridynamics::peridynamics(p, truncated.joining.lattice, mesh, &zones)?;
     let Points::Lattice { spacing, origin } = lattice.points else {
         return certain("points that are no lattice");

@@ -4,11 +4,13 @@
 //! zone makes the scene.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::bounds_checks;
 use super::conditions::{self, Condition};
 use super::error::{SceneError, SceneErrorKind};
 use super::initial::Initial;
+use super::material_interfaces::MaterialInterface;
 use super::materials::{self, Material};
 use super::meshing;
 use super::peridynamics::{self, Peridynamics};
@@ -20,7 +22,7 @@ use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
     adaptive_zone, agreement, coupling_selection, cracks_and_voids, failure, initial,
-    lattice_regions, output, solve, zones,
+    lattice_regions, material_interfaces, output, solve, zones,
 };
 use crate::coupling::Zone;
 use crate::material::Kinematics;
@@ -28,7 +30,7 @@ use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
-use crate::peridynamics::Influence;
+use crate::peridynamics::{Influence, Law};
 use crate::scene::points::Points;
 use crate::scene::selected_coupling::SelectedCoupling;
 
@@ -140,6 +142,41 @@ impl<'a, const D: usize> Draft<'a, D> {
         Ok(())
     }
 
+    /// The materials of the points, and their law.
+    fn point_materials(
+        &self,
+        coupling: &CouplingSpec,
+        p: Option<&Peridynamics<D>>,
+        zones: &[Zone],
+    ) -> Result<PointMaterials<D>, SceneError> {
+        let (spec, materials) = (self.spec, &self.materials);
+        let used = material_interfaces::materials_of_points(&self.cell_material, zones);
+        let interfaces = material_interfaces::interfaces(spec, materials)?;
+        material_interfaces::check(spec, coupling, p, materials, &used, &interfaces)?;
+        let law = material_interfaces::law_of_points(spec, materials, &used, &interfaces)?;
+        Ok(PointMaterials {
+            told: material_interfaces::choice(materials, &used, &interfaces),
+            used,
+            law,
+            interfaces,
+        })
+    }
+
+    /// Refuses laws that do not agree with the coupling, the elements, or the want of time.
+    fn check_laws(
+        &self,
+        coupling: &CouplingSpec,
+        used: &[u16],
+        zones: &[Zone],
+    ) -> Result<(), SceneError> {
+        let (spec, materials, cells) = (self.spec, &self.materials, &self.cell_material);
+        for &material in used {
+            agreement::balanced_seam(spec, coupling, materials, cells, material)?;
+        }
+        agreement::elastic_elements(spec, materials, cells, zones)?;
+        agreement::memory(spec, materials, cells, zones)
+    }
+
     /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
     fn with_coupling(
         &self,
@@ -147,7 +184,13 @@ impl<'a, const D: usize> Draft<'a, D> {
         instead: Option<&CouplingSpec>,
     ) -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
         let (spec, mesh) = (self.spec, &self.mesh);
-        let mut joined = coupling_selection::joined(spec, &self.materials, mesh, placed, instead)?;
+        let mut joined = coupling_selection::joined(
+            spec,
+            (&self.materials, &self.cell_material),
+            mesh,
+            placed,
+            instead,
+        )?;
         let joining = joined.joining;
         self.refuse_missing_peridynamics(&joined)?;
         let mut zones = zones::zones(spec, &joined, mesh, placed)?;
@@ -158,7 +201,12 @@ impl<'a, const D: usize> Draft<'a, D> {
         let peridynamics = peridynamics
             .map(|p| lattice_regions::bodies(spec, joining, p, mesh, &mut zones))
             .transpose()?;
-        agreement::one_peridynamic_material(spec, &self.materials, &self.cell_material, &zones)?;
+        let PointMaterials {
+            used,
+            law,
+            interfaces,
+            told,
+        } = self.point_materials(&joined.coupling, peridynamics.as_ref(), &zones)?;
         if let Some(p) = &peridynamics {
             agreement::horizon(spec, p, mesh, &zones)?;
         }
@@ -166,29 +214,16 @@ impl<'a, const D: usize> Draft<'a, D> {
         if matches!(self.solve, Solve::Explicit(_)) {
             densities(spec, &self.materials)?;
         }
-        let peridynamic = self
-            .cell_material
-            .iter()
-            .zip(&zones)
-            .find(|(_, zone)| **zone != Zone::Local)
-            .map_or(0, |(m, _)| *m);
-        agreement::balanced_seam(
-            spec,
-            &joined.coupling,
-            &self.materials,
-            &self.cell_material,
-            peridynamic,
-        )?;
-        agreement::elastic_elements(spec, &self.materials, &self.cell_material, &zones)?;
-        agreement::memory(spec, &self.materials, &self.cell_material, &zones)?;
-        let breaking = failure::breaking(spec, &self.materials[peridynamic as usize], mesh)?;
+        let peridynamic = used[0];
+        self.check_laws(&joined.coupling, &used, &zones)?;
+        let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
         agreement::energy_density(spec, &self.materials[peridynamic as usize], breaking.bonds)?;
         let follow = adaptive_zone::follow(
             spec,
             &mut joined,
             &self.solve,
             &breaking,
-            (peridynamics.as_ref()).map(|p| (p, self.materials[peridynamic as usize].law.as_ref())),
+            (peridynamics.as_ref()).map(|p| (p, law.as_ref())),
             mesh,
             |c| self.cell_material[c] == peridynamic,
         )?;
@@ -200,11 +235,13 @@ impl<'a, const D: usize> Draft<'a, D> {
             zones,
             materials: self.materials.clone(),
             cell_material: self.cell_material.clone(),
+            point_materials: used,
+            point_law: law,
             peridynamics,
             coupling: joined.coupling,
             coupling_why: joined.why,
             placement: None,
-            choices: choices.into_iter().collect(),
+            choices: choices.into_iter().chain(told).collect(),
             conditions: self.conditions.clone(),
             voids,
             barriers,
@@ -220,6 +257,16 @@ impl<'a, const D: usize> Draft<'a, D> {
         };
         Ok((scene, joined.otherwise))
     }
+}
+
+/// What points are made of.
+struct PointMaterials<const D: usize> {
+    /// Their materials.
+    used: Vec<u16>,
+    law: Arc<dyn Law<D>>,
+    interfaces: Vec<MaterialInterface>,
+    /// Which they are, if there are several.
+    told: Option<Decision>,
 }
 
 /// Says where points lie that the scene does not place.

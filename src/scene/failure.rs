@@ -2,6 +2,7 @@
 
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
+use super::material_interfaces::MaterialInterface;
 use super::materials::{Fracture, Material};
 use super::region::{Region, region};
 use super::spec::{
@@ -18,6 +19,8 @@ pub struct Breaking<const D: usize> {
     pub precision: PrecisionSpec,
     /// When bonds of the peridynamic material break; never if there is none.
     pub fracture: Option<Fracture>,
+    /// When bonds of each material break, and between materials, where points have several.
+    pub several: Option<FractureOfMaterials>,
     /// How the critical stretch follows from a fracture energy.
     pub calibration: CalibrationSpec,
     /// Whether the law of the peridynamic material damages its bonds.
@@ -37,6 +40,17 @@ impl<const D: usize> Breaking<D> {
     }
 }
 
+/// When bonds break in a body of several materials.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FractureOfMaterials {
+    /// Name of each material of the scene, and when its bonds break; never if there is none.
+    pub of: Vec<(String, Option<Fracture>)>,
+    /// The numbers of those that points have.
+    pub used: Vec<u16>,
+    /// Interfaces that the scene types.
+    pub interfaces: Vec<MaterialInterface>,
+}
+
 /// Short-range contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
@@ -50,8 +64,9 @@ pub struct Contact {
 fn refuse_needless<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
+    breaks: bool,
 ) -> Result<(), SceneError> {
-    if !material.breaks() {
+    if !breaks {
         let needless = |span, what: &str| {
             SceneError::new(
                 SceneErrorKind::Conflict,
@@ -89,6 +104,7 @@ fn refuse_needless<const D: usize>(
 fn bonds_of<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
+    breaks: bool,
     is_static: bool,
 ) -> Result<BondsSpec, SceneError> {
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
@@ -113,26 +129,55 @@ fn bonds_of<const D: usize>(
             *bonds.get_ref()
         }
         // nothing breaks where nothing moves, and a law for small strains stays linear
-        None if !is_static && is_objective && (material.breaks() || spec.contact.is_some()) => {
+        None if !is_static && is_objective && (breaks || spec.contact.is_some()) => {
             BondsSpec::Exact
         }
         None => BondsSpec::Linear,
     })
 }
 
-/// How bonds of the peridynamic material `material` deform and break.
+/// The material by which questions about breaking bonds are answered, and what breaks bonds of it or of an interface: of several the first that breaks.
+fn material_that_breaks<'a, const D: usize>(
+    materials: &'a [Material<D>],
+    used: &[u16],
+    interfaces: &[MaterialInterface],
+) -> (&'a Material<D>, Option<Fracture>) {
+    let mut own = used.iter().map(|&m| &materials[usize::from(m)]);
+    let first = &materials[usize::from(used[0])];
+    let material = own.find(|m| m.breaks()).unwrap_or(first);
+    let mut between = interfaces
+        .iter()
+        .filter(|i| i.between.iter().all(|m| used.contains(m)));
+    let fracture = material
+        .fracture
+        .or_else(|| between.find_map(|i| i.fracture));
+    (material, fracture)
+}
+
+/// How bonds of the points deform and break, whose materials are those that are `used`.
 pub(crate) fn breaking<const D: usize>(
     spec: &SceneSpec,
-    material: &Material<D>,
+    materials: &[Material<D>],
+    used: &[u16],
+    interfaces: Vec<MaterialInterface>,
     mesh: &Mesh<D>,
 ) -> Result<Breaking<D>, SceneError> {
-    let fracture = material.fracture;
-    refuse_needless(spec, material)?;
+    let (material, fracture) = material_that_breaks(materials, used, &interfaces);
+    let breaks = material.breaks() || fracture.is_some();
+    refuse_needless(spec, material, breaks)?;
     let calibration = spec
         .peridynamics
         .as_ref()
         .and_then(|p| p.calibration.as_ref());
-    if let (Some(typed), None | Some(Fracture::Stretch(_))) = (calibration, fracture) {
+    let has_energy = |fracture: Option<Fracture>| matches!(fracture, Some(Fracture::Energy(_)));
+    let has_energy = has_energy(fracture)
+        || used.len() > 1
+            && (used
+                .iter()
+                .any(|&m| has_energy(materials[usize::from(m)].fracture))
+                || interfaces.iter().any(|i| has_energy(i.fracture)));
+    let is_of_stretch = !matches!(fracture, Some(Fracture::Tearing(_)));
+    if let (Some(typed), false, true) = (calibration, has_energy, is_of_stretch) {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
             format!(
@@ -145,7 +190,7 @@ pub(crate) fn breaking<const D: usize>(
     }
     let solve = spec.solve.as_ref().map(|s| s.get_ref());
     let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
-    let bonds = bonds_of(spec, material, is_static)?;
+    let bonds = bonds_of(spec, material, breaks, is_static)?;
     let mut no_fail = Vec::with_capacity(spec.no_fail.len());
     for (name, shape) in &spec.no_fail {
         no_fail.push(region(&format!("no-fail.{name}"), shape, mesh)?);
@@ -169,6 +214,14 @@ pub(crate) fn breaking<const D: usize>(
         bonds,
         precision: precision.map_or(PrecisionSpec::Double, |p| *p.get_ref()),
         fracture,
+        several: (used.len() > 1).then(|| FractureOfMaterials {
+            of: materials
+                .iter()
+                .map(|m| (m.name.clone(), m.fracture))
+                .collect(),
+            used: used.to_vec(),
+            interfaces,
+        }),
         damages: material.law.damages(),
         calibration: calibration.map_or(CalibrationSpec::Lattice, |c| *c.get_ref()),
         no_fail,

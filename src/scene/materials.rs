@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics;
-use super::region::cells_of_set;
-use super::spec::{Given, MaterialSpec, MicromodulusSpec};
+use super::region::region;
+use super::spec::{CellsSpec, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
 use super::user_material;
 use super::value::Text;
 use crate::material::{Elastic, Kinematics};
@@ -108,15 +108,19 @@ pub(crate) fn materials<const D: usize>(
             fracture: fracture(name, material)?,
         });
         match (cells, rest) {
-            (Some(set), _) => {
-                for c in cells_of_set(&format!("materials.{name}.cells"), set, mesh)? {
-                    if let Some(other) = owner[c as usize].replace(number) {
+            (Some(cells), _) => {
+                for c in cells_of(name, cells, mesh)? {
+                    if let Some(other) = owner[c].replace(number) {
                         let other = &found[other as usize].name;
+                        let span = match &cells.0 {
+                            ShapeSpec::Set(set) => set.span.clone(),
+                            _ => name.span.clone(),
+                        };
                         return Err(SceneError::new(
                             SceneErrorKind::Conflict,
                             format!("cell {c} belongs to the materials `{other}` and `{name}`"),
                         )
-                        .label(set.span.clone(), "this set overlaps another")
+                        .label(span, "this set overlaps another")
                         .help("make the sets of cells disjoint"));
                     }
                 }
@@ -151,6 +155,25 @@ pub(crate) fn materials<const D: usize>(
     Ok((found, material))
 }
 
+/// The cells of a material that names some.
+fn cells_of<const D: usize>(
+    name: &Text,
+    cells: &CellsSpec,
+    mesh: &Mesh<D>,
+) -> Result<Vec<usize>, SceneError> {
+    let selected = region(&format!("materials.{name}.cells"), &cells.0, mesh)?.select(mesh);
+    let found: Vec<usize> = (0..selected.len()).filter(|&c| selected[c]).collect();
+    match found.is_empty() {
+        false => Ok(found),
+        true => Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`materials.{name}.cells` holds no cell of the mesh"),
+        )
+        .label(name.span.clone(), "fills nothing")
+        .help("a shape holds the cells whose centroid lies inside; enlarge it, or remove the material")),
+    }
+}
+
 fn law_and_cells<'a, const D: usize>(
     name: &Text,
     spec: &'a MaterialSpec,
@@ -158,7 +181,7 @@ fn law_and_cells<'a, const D: usize>(
     kinematics: Kinematics,
     (lambda, mu): (f64, f64),
     directory: &Path,
-) -> Result<(Arc<dyn Law<D>>, Option<&'a Text>), SceneError> {
+) -> Result<(Arc<dyn Law<D>>, Option<&'a CellsSpec>), SceneError> {
     let constants = Constants {
         lambda,
         shear: mu,

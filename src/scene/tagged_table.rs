@@ -19,6 +19,7 @@ const TOP: &[&str] = &[
     "kinematics",
     "mesh",
     "materials",
+    "interfaces",
     "peridynamics",
     "zones",
     "coupling",
@@ -95,6 +96,7 @@ pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
         | ["conditions" | "initial", _, _, "inside"]
         | ["zones", "bodies", _, "inside"]
         | ["voids", _, "inside"]
+        | ["materials", _, _, "cells"]
         | ["output", "tips", _, "inside"]
         | ["cracks" | "no-fail", _] => Some(SHAPES),
         _ => None,
@@ -150,16 +152,20 @@ fn chooses_otherwise(path: &[String], old: &DeTable<'_>, new: &DeTable<'_>) -> b
 
 fn text_to_table(value: &mut Spanned<DeValue<'_>>, path: &[String]) {
     let path: Vec<&str> = path.iter().map(String::as_str).collect();
-    if !as_text(&path) {
+    let is_set = matches!(path[..], ["materials", _, _, "cells"]);
+    if !(as_text(&path) || is_set) {
         return;
     }
     let span = value.span();
     if let DeValue::String(name) = value.get_mut() {
+        let name = std::mem::take(name);
+        let (key, inner) = match is_set {
+            // the name of a set of cells
+            true => ("set".into(), DeValue::String(name)),
+            false => (name, DeValue::Table(DeTable::new())),
+        };
         let mut table = DeTable::new();
-        table.insert(
-            Spanned::new(span.clone(), std::mem::take(name)),
-            Spanned::new(span, DeValue::Table(DeTable::new())),
-        );
+        table.insert(Spanned::new(span.clone(), key), Spanned::new(span, inner));
         *value.get_mut() = DeValue::Table(table);
     }
 }

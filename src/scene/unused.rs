@@ -3,6 +3,7 @@
 //! A shape beside the body is no mistake of the format, and nothing else tells of it: the run goes on as if it had not been typed. So each is warned of
 //! by its name. Points are taken where the lattice or the cells of the zone have them, and the search ends with the first that is touched.
 
+use super::material_interfaces;
 use super::peridynamics::Peridynamics;
 use super::region::Region;
 use super::spec::{SceneSpec, ZonesNeeded};
@@ -46,6 +47,12 @@ impl<const D: usize> Parts<'_, D> {
                 joining.name
             ));
         }
+        let (materials, used) = (&self.scene.materials, &self.scene.point_materials);
+        list.extend(material_interfaces::unused(
+            &self.spec.interfaces,
+            materials,
+            used,
+        ));
         let Some(p) = &self.scene.peridynamics else {
             return list;
         };

@@ -1,6 +1,7 @@
 //! A validated scene: every name resolved, every number checked.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::adaptive_zone::Follow;
 use super::conditions::Condition;
@@ -16,6 +17,7 @@ use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
+use crate::peridynamics::Law;
 use crate::shape::{Barrier, Shape};
 use crate::solve::ordering::Ordering;
 use crate::tensor::{Vector, padded};
@@ -35,6 +37,10 @@ pub struct Scene<const D: usize> {
     pub materials: Vec<Material<D>>,
     /// The material of each cell.
     pub cell_material: Vec<u16>,
+    /// The materials that points have, that of the first cell of the zones first; never empty.
+    pub point_materials: Vec<u16>,
+    /// The law of the points, of all their materials.
+    pub point_law: Arc<dyn Law<D>>,
     /// The peridynamic choices; none if the scene is local throughout.
     pub peridynamics: Option<Peridynamics<D>>,
     /// How the models are joined.

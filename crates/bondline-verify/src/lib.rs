@@ -10,6 +10,7 @@
 //! | `softening` | softening bonds: a notched strip pulled to separation, a notched beam in three-point bending |
 //! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
 //! | `layers` | two lattices of different horizons with a layer of elements between |
+//! | `interfaces` | two materials: energy of an interface, a crack that meets one |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
 //! | `bar` | the coupled bar of [SAND2015-7998] section 7.3 |
@@ -42,6 +43,7 @@ pub mod estimates;
 pub mod extremes;
 pub mod fields;
 pub mod horizons;
+pub mod interfaces;
 pub mod layers;
 pub mod meshes;
 mod observed;
@@ -130,6 +132,11 @@ pub const SUITES: &[Suite] = &[
         name: "layers",
         about: "two lattices, horizons 4:1, with a layer of elements between: reciprocity, affine fields, reflection",
         run: layers::run,
+    },
+    Suite {
+        name: "interfaces",
+        about: "two materials: what opening their interface takes, and whether a crack that meets it turns or goes through",
+        run: interfaces::run,
     },
     Suite {
         name: "weights",

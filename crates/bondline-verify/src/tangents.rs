@@ -93,6 +93,7 @@ impl<const D: usize> RandomCloud<D> {
             volume: self.volume.clone(),
             horizon: self.horizon.clone(),
             transfer: Transfer::from_rows((0..self.position.len() as u32).map(|s| vec![(s, 1.0)])),
+            material: Vec::new(),
         };
         PdBody::new(
             cloud,

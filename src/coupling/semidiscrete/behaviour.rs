@@ -37,16 +37,45 @@ pub enum Critical {
     Uniform(f64),
     /// One for each horizon of the model, \[m\] and \[1\]: the same fracture energy takes a larger stretch where the horizon is smaller.
     ByHorizon(Vec<(f64, f64)>),
+    /// One for each pair of materials.
+    ByMaterials(StretchOfMaterials),
     /// No stretch, but this tearing parameter.
     Tearing(f64),
 }
 
+/// The stretch that breaks bonds of each pair of materials.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StretchOfMaterials {
+    /// Row by row, the same from both ends; infinite where no bond breaks.
+    stretch: Vec<f64>,
+    materials: usize,
+}
+
+impl StretchOfMaterials {
+    /// Of so many materials, each pair by `of`.
+    pub fn new(materials: usize, of: impl Fn(u16, u16) -> f64) -> Self {
+        let pairs = (0..materials as u16).flat_map(|a| (0..materials as u16).map(move |b| (a, b)));
+        let stretch = pairs.map(|(a, b)| of(a.min(b), a.max(b))).collect();
+        Self { stretch, materials }
+    }
+
+    /// The smallest.
+    pub fn smallest(&self) -> f64 {
+        self.stretch.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Of bonds between two of them.
+    pub fn at(&self, a: u16, b: u16) -> f64 {
+        self.stretch[usize::from(a) * self.materials + usize::from(b)]
+    }
+}
+
 impl Critical {
-    /// The stretch that breaks bonds of a horizon; infinite for one that is not listed, and where none does.
+    /// The stretch that breaks bonds of a horizon; infinite for one that is not listed, where none does, and where materials say so.
     pub fn at(&self, horizon: f64) -> f64 {
         match self {
             Self::Uniform(s) => *s,
-            Self::Tearing(_) => f64::INFINITY,
+            Self::Tearing(_) | Self::ByMaterials(_) => f64::INFINITY,
             Self::ByHorizon(list) => {
                 let found = list.iter().find(|(of, _)| *of == horizon);
                 found.map_or(f64::INFINITY, |(_, s)| *s)

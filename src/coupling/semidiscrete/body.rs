@@ -123,6 +123,13 @@ impl<const D: usize> PassInput<'_, D> {
             let critical = behaviour.critical_stretch.as_ref();
             critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon[i]))
         };
+        let material = &body.cloud.material;
+        let by_materials = |i: usize, k: usize, _: &Vector<D>| match &behaviour.critical_stretch {
+            Some(Critical::ByMaterials(stretch)) => {
+                stretch.at(material[i], material[families.of(i)[k] as usize])
+            }
+            _ => f64::INFINITY,
+        };
         let broken = behaviour
             .broken
             .filter(|b| !b.is_empty())
@@ -140,6 +147,7 @@ impl<const D: usize> PassInput<'_, D> {
                 None => None,
                 Some(Critical::Uniform(s)) => Some(CriticalStretch::Uniform(*s)),
                 Some(Critical::ByHorizon(_)) => Some(CriticalStretch::PerBond(&by_bond)),
+                Some(Critical::ByMaterials(_)) => Some(CriticalStretch::PerBond(&by_materials)),
                 Some(Critical::Tearing(p)) => Some(CriticalStretch::TearingParameter(*p)),
             }
             .map(|critical| Failure {
@@ -353,11 +361,17 @@ fn omega_of<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
 
 /// `c` of `f = c s`, the largest of the bonds of the point with the most of them.
 fn bond_constant<const D: usize>(body: &PdBody<D>) -> f64 {
-    let fullest = (0..body.families.len()).max_by_key(|&i| body.families.of(i).len());
-    fullest.map_or(0.0, |i| {
+    let of_point = |i: usize| {
         let family = body.families.of(i).iter().zip(body.kernel(i).0);
         family
             .map(|(&j, p)| 2.0 * p * body.bond(i, j as usize).norm().powi(3))
             .fold(0.0, f64::max)
-    })
+    };
+    let points = 0..body.families.len();
+    if !body.cloud.material.is_empty() {
+        // the stiffest material keeps all apart
+        return points.map(of_point).fold(0.0, f64::max);
+    }
+    let fullest = points.max_by_key(|&i| body.families.of(i).len());
+    fullest.map_or(0.0, of_point)
 }

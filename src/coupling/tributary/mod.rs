@@ -66,6 +66,14 @@ impl Tributary {
                 }
             });
         }
+        let holds: Vec<bool> = model.roles.iter().map(|&r| r == CellRole::Points).collect();
+        let mut zone = 0.0;
+        if holds.contains(&true) && model.body().is_some() {
+            let parts = Parts::of_cells(model, &holds, Detail::Centre);
+            parts.add_sizes(&mut volume);
+            zone = parts.total();
+            by_material.extend(parts_of_materials(model, &holds));
+        }
         by_material.sort_by_key(|m| (m.0, m.1));
         by_material.dedup_by(|next, kept| {
             let same = (next.0, next.1) == (kept.0, kept.1);
@@ -74,13 +82,6 @@ impl Tributary {
             }
             same
         });
-        let holds: Vec<bool> = model.roles.iter().map(|&r| r == CellRole::Points).collect();
-        let mut zone = 0.0;
-        if holds.contains(&true) && model.body().is_some() {
-            let parts = Parts::of_cells(model, &holds, Detail::Centre);
-            parts.add_sizes(&mut volume);
-            zone = parts.total();
-        }
         Self {
             volume,
             mixed: by_material,
@@ -97,6 +98,21 @@ impl Tributary {
         }
         masses
     }
+}
+
+/// What the sites of a zone of several materials have of each but the first: site, material and volume.
+fn parts_of_materials<const D: usize>(model: &Model<D>, holds: &[bool]) -> Vec<(u32, u16, f64)> {
+    let mut found = Vec::new();
+    let used = model.several().map_or(&[][..], |several| several.used());
+    for &material in used.iter().filter(|m| **m != model.peridynamic_material()) {
+        let is_its = |c: usize| holds[c] && model.material_of_cell(c) == material;
+        let its: Vec<bool> = (0..holds.len()).map(is_its).collect();
+        let mut volume = vec![0.0; model.sites.len()];
+        Parts::of_cells(model, &its, Detail::Centre).add_sizes(&mut volume);
+        let own = volume.iter().enumerate().filter(|(_, v)| **v != 0.0);
+        found.extend(own.map(|(site, &v)| (site as u32, material, v)));
+    }
+    found
 }
 
 impl<const D: usize> Model<D> {

@@ -7,7 +7,7 @@ use super::seam::{Course, Foot, Piece, Seam};
 use crate::{
     assembly::{Row, Transfer},
     coupling::{Model, SiteKind, multi_lattice::ContinuedLattice},
-    peridynamics::PdBody,
+    peridynamics::{Mixture, PdBody},
     tensor::{Tensor, Vector},
 };
 
@@ -92,6 +92,7 @@ impl<'a, const D: usize> Segments<'a, D> {
             site: &site,
             body,
             passing,
+            several: model.several(),
         };
         let found: Vec<Cut> = (0..cloud.position.len())
             .into_par_iter()
@@ -173,7 +174,15 @@ impl<'a, const D: usize> Segments<'a, D> {
             site: &self.site,
             body: self.body,
             passing: self.passing,
+            several: self.model.several(),
         }
+    }
+
+    /// Stiffness of the bond between two points over that within the first material; 1 in a body of one.
+    ///
+    /// A seam is laid out, and fitted, as if the body were of the first material; its springs then have those of their own bonds.
+    fn of_materials(&self, i: u32, j: u32) -> f64 {
+        self.ends().of_materials(i, j)
     }
 
     /// What the whole bond from `i` to `j` hands to the dilatations of the two.
@@ -226,6 +235,7 @@ struct Ends<'a, const D: usize> {
     site: &'a [u32],
     body: &'a PdBody<D>,
     passing: &'a ContinuedLattice<D>,
+    several: Option<&'a dyn Mixture<D>>,
 }
 
 impl<const D: usize> Ends<'_, D> {
@@ -287,9 +297,18 @@ impl<const D: usize> Ends<'_, D> {
         }
         let (pair, omega) = self.body.kernel(i as usize);
         match self.body.families.of(i as usize).binary_search(&j) {
+            Ok(k) if self.several.is_some() => (pair[k] / self.of_materials(i, j), 0.0),
             Ok(k) => (pair[k], omega.get(k).copied().unwrap_or(0.0)),
             Err(_) => (0.0, 0.0),
         }
+    }
+
+    /// As [`Segments::of_materials`].
+    fn of_materials(&self, i: u32, j: u32) -> f64 {
+        let material = &self.body.cloud.material;
+        let scale =
+            |several: &dyn Mixture<D>| several.scale(material[i as usize], material[j as usize]);
+        self.several.map_or(1.0, scale)
     }
 
     /// As [`Segments::stiffness`].
@@ -402,9 +421,9 @@ impl<const D: usize> Springs<D> {
             springs
                 .direction
                 .push(body.bond(s.i as usize, s.j as usize));
-            springs
-                .stiffness
-                .push(s.stiffness * s.piece.share * s.scale / length);
+            springs.stiffness.push(
+                s.stiffness * s.piece.share * s.scale / length * segments.of_materials(s.i, s.j),
+            );
             springs.difference.push(segments.difference(s));
             springs.origin.push(Origin {
                 bond: [s.i, s.j],
@@ -452,7 +471,7 @@ impl<const D: usize> Springs<D> {
         self.direction
             .push(segments.body.bond(i as usize, j as usize));
         self.stiffness
-            .push(segments.stiffness(i, j) * segments.scale(i, j));
+            .push(segments.stiffness(i, j) * segments.scale(i, j) * segments.of_materials(i, j));
         self.difference.push([
             (segments.site[i as usize], -1.0),
             (segments.site[j as usize], 1.0),

@@ -71,15 +71,15 @@ struct Breaking {
 }
 
 impl<const D: usize> NonlinearSeam<D> {
-    /// How bonds follow the motion, and by the number of a point at which stretch its bonds break, if any do, and whether they never do.
+    /// How bonds follow the motion, and by the numbers of its points at which stretch a bond breaks, if any does, and of a point whether its bonds never do.
     pub(in crate::coupling) fn behave(
         &mut self,
         kinematics: Kinematics,
-        critical: Option<impl Fn(u32) -> f64>,
+        critical: Option<impl Fn([u32; 2]) -> f64>,
         never: impl Fn(u32) -> bool,
     ) {
         self.kinematics = kinematics;
-        let critical = critical.map(|of| self.bonds.iter().map(|b| of(b[0])).collect::<Vec<_>>());
+        let critical = critical.map(|of| self.bonds.iter().map(|b| of(*b)).collect::<Vec<_>>());
         self.breaks = critical.map(|critical| Breaking {
             limit: critical.iter().map(|&s| kinematics.limit(s)).collect(),
             never: self

@@ -46,6 +46,8 @@ pub(super) struct Generic<const D: usize> {
     pub(super) volume: Vec<f64>,
     pub(super) row: Vec<bool>,
     pub(super) no_fail: Vec<bool>,
+    /// The material of each point; empty if all have one.
+    material: Vec<u16>,
     pub(super) families: Families,
     /// Of each bond, that of its other end, counted over all families; `NONE` if the far point has no family.
     pub(super) reverse: Vec<u32>,
@@ -71,8 +73,10 @@ pub(super) struct Generic<const D: usize> {
 }
 
 /// One deformed family in memory that the next one takes over.
+#[derive(Default)]
 pub(super) struct Scratch<const D: usize> {
     keeps_damage: bool,
+    material: u16,
     bonds: Vec<Vector<D>>,
     volumes: Vec<f64>,
     pair: Vec<f64>,
@@ -114,6 +118,7 @@ impl<const D: usize> Scratch<D> {
                 is_whole: self.is_whole,
                 damage: self.damage,
                 keeps_damage: self.keeps_damage,
+                material: self.material,
             },
             past: &self.past,
             present: Present {
@@ -122,29 +127,6 @@ impl<const D: usize> Scratch<D> {
                 principal_stress: stress.then_some(&mut self.principal_stress),
             },
             force: &mut self.force,
-        }
-    }
-}
-
-impl<const D: usize> Default for Scratch<D> {
-    fn default() -> Self {
-        Self {
-            keeps_damage: false,
-            bonds: Vec::new(),
-            volumes: Vec::new(),
-            pair: Vec::new(),
-            omega: Vec::new(),
-            difference: Vec::new(),
-            extension: Vec::new(),
-            direction: Vec::new(),
-            of: Vec::new(),
-            past: Vec::new(),
-            present: Vec::new(),
-            point: Vec::new(),
-            principal_stress: [f64::NAN; 3],
-            force: Vec::new(),
-            is_whole: true,
-            damage: 0.0,
         }
     }
 }
@@ -190,6 +172,7 @@ impl<const D: usize> Generic<D> {
             volume: setup.volume.to_vec(),
             row: (0..points).map(|i| setup.row(i)).collect(),
             no_fail: (0..points).map(|i| setup.no_fail(i)).collect(),
+            material: body.cloud.material.clone(),
             state: (0..points).map(|i| body.state(i).cloned()).collect(),
             reverse,
             pair,
@@ -265,6 +248,7 @@ impl<const D: usize> Generic<D> {
         s.of.clear();
         s.past.clear();
         s.keeps_damage = self.no_fail[i];
+        s.material = self.material.get(i).copied().unwrap_or(0);
         let kept = self.layout.bond.len();
         let mut intact_volume = 0.0;
         for bond in self.range(i).filter(|&bond| counts(bond)) {
@@ -527,7 +511,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             + self.families.offsets.len() * 8
             + bonds * 9
             + self.damaged_through.len()
-            + self.row.len() * 2
+            + (self.row.len() + self.material.len()) * 2
             + history * 8
     }
 }

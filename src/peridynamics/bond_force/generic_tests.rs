@@ -26,6 +26,11 @@ fn with_law<const D: usize, T>(
         volume: case.volume.clone(),
         horizon: vec![3.0 * H; points],
         transfer: Transfer::new(),
+        // every third point is of the second material
+        material: match law.several() {
+            Some(_) => (0..points).map(|i| u16::from(i % 3 == 0)).collect(),
+            None => Vec::new(),
+        },
     };
     let families = case.families.clone();
     let linear = law.linearised();

@@ -58,6 +58,7 @@ impl Point {
             volumes: &volumes,
             factors: &vec![1.0; bonds.len()],
             horizon: HORIZON,
+            materials: None,
         };
         law.linearised()
             .coefficients(&family, &mut pair, &mut [])
@@ -106,6 +107,7 @@ impl Point {
             keeps_damage,
             is_whole: true,
             damage: 0.0,
+            material: 0,
         };
         let mut present = vec![f64::NAN; self.history.len()];
         let mut force = vec![Vector::zeros(); self.bonds.len()];

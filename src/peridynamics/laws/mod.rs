@@ -11,6 +11,7 @@
 //! | `pals.rs`, `pave.rs` | position-aware solid, linear (PALS) and viscoelastic (PAVE) | sections 4.2, 4.3 |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
+//! | `several.rs` | several materials of one law in one body | |
 //! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
 //! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | its stress hyperelastic, for large deformations | |
 //!
@@ -28,6 +29,7 @@ mod neo_hooke;
 mod pals;
 mod pave;
 mod plastic;
+mod several;
 mod softening_bond;
 mod st_venant_kirchhoff;
 
@@ -48,6 +50,7 @@ pub use neo_hooke::NeoHookeSolid;
 pub use pals::PositionAwareSolid;
 pub use pave::PositionAwareViscoelasticSolid;
 pub use plastic::PlasticCorrespondence;
+pub use several::{NoMixture, Several, StiffnessMean};
 pub use softening_bond::SofteningBond;
 pub use st_venant_kirchhoff::StVenantKirchhoffSolid;
 
@@ -178,7 +181,11 @@ pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
         let values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
         law.build(constants, &values)
     });
-    typed.into_iter().chain(named).map(on_a_lattice).collect()
+    typed
+        .into_iter()
+        .chain(named.map(on_a_lattice))
+        .chain(mixtures())
+        .collect()
 }
 
 /// A law whose constants follow from a lattice, for a family of six bonds or less.
@@ -199,6 +206,54 @@ fn on_a_lattice<const D: usize>(law: Arc<dyn Law<D>>) -> Arc<dyn Law<D>> {
         horizon: 0.1,
     };
     calibrate.to_lattice(&family).unwrap()
+}
+
+/// Bodies of two materials, numbers 0 and 1, for the same tests.
+#[cfg(test)]
+fn mixtures<const D: usize>() -> impl Iterator<Item = Arc<dyn Law<D>>> {
+    use crate::peridynamics::Micromodulus;
+    let bonds = |shear| -> Arc<dyn Law<D>> {
+        Arc::new(BondBased::new(Micromodulus::InverseDistance, shear))
+    };
+    let solid = |lambda, shear| -> Arc<dyn Law<D>> {
+        Arc::new(LinearPeridynamicSolid::new(
+            Influence::Gaussian,
+            lambda,
+            shear,
+        ))
+    };
+    let flowing = |shear, yields| {
+        let constants = Constants {
+            lambda: 1.7,
+            shear,
+            influence: Influence::Gaussian,
+            kinematics: match D {
+                1 => Kinematics::Bar,
+                2 => Kinematics::PlaneStrain,
+                _ => Kinematics::Solid,
+            },
+        };
+        let law = Named::PlasticCorrespondence;
+        let mut values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
+        values[0] *= yields;
+        law.build::<D>(constants, &values)
+    };
+    let of = |first, second, mean: StiffnessMean| {
+        let mixed = Several::new(vec![first, second], &[0, 1], |_, _| mean);
+        mixed.ok().map(|law| Arc::new(law) as Arc<dyn Law<D>>)
+    };
+    let found = [
+        of(bonds(1.3), bonds(4.1), StiffnessMean::Harmonic),
+        of(bonds(1.3), bonds(4.1), StiffnessMean::Arithmetic),
+        of(solid(1.7, 1.3), solid(0.4, 2.9), StiffnessMean::Harmonic),
+        of(
+            flowing(1.3, 1.0),
+            flowing(0.7, 2.0),
+            StiffnessMean::Harmonic,
+        ),
+    ];
+    assert!(found.iter().all(Option::is_some));
+    found.into_iter().flatten()
 }
 
 /// Declares [`Named`], the laws that scenes know by key.

@@ -257,6 +257,7 @@ mod tests {
             is_whole: true,
             damage: 0.0,
             keeps_damage: false,
+            material: 0,
         };
         let respond = |law: &dyn ForceState<3>, numbers: usize| {
             let past = vec![0.0; numbers];

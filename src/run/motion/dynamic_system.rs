@@ -12,6 +12,7 @@ use crate::progress::Progress;
 use crate::run::definiteness;
 use crate::run::equilibrium;
 use crate::run::error::RunError;
+use crate::run::motion::material_stretches::{self, stretches_of_materials};
 use crate::run::setup::RunSettings;
 use crate::scene::failure::Breaking;
 use crate::scene::initial::{Initial, InitialKind};
@@ -124,8 +125,12 @@ fn failure_text<const D: usize>(critical: Option<&Critical>, breaking: &Breaking
             let each: Vec<String> = each.collect();
             format!("bonds break at the stretch {}", each.join(", "))
         }
+        Critical::ByMaterials(stretch) => stretches_of_materials(stretch, breaking),
         Critical::Tearing(p) => format!("bonds break at the tearing parameter {p}"),
     });
+    if let (Some(s), Some(_)) = (&stretches, &breaking.several) {
+        return s.clone();
+    }
     match (stretches, breaking.fracture) {
         (Some(s), Some(Fracture::Energy(g))) => {
             let takes = match breaking.calibration {
@@ -265,6 +270,9 @@ pub(crate) fn critical_stretch<const D: usize>(
     else {
         return Ok(None);
     };
+    if let Some(several) = p.law.several() {
+        return material_stretches::of(model, several, &rest.breaking).map(Some);
+    }
     let energy = match fracture {
         Fracture::Stretch(s) => return Ok(Some(Critical::Uniform(s))),
         Fracture::Tearing(p) => return Ok(Some(Critical::Tearing(p))),
@@ -320,7 +328,8 @@ pub(crate) fn plane_energy<const D: usize>(
     };
     let knows_energy =
         (model.peridynamics.as_ref()).is_some_and(|p| p.law.bond_energy(1.0).is_some());
-    if matches!(critical, Critical::Tearing(_)) || !knows_energy {
+    let has_one = !matches!(critical, Critical::Tearing(_) | Critical::ByMaterials(_));
+    if !has_one || !knows_energy {
         return Ok(None);
     }
     let planes = model.plane_energies()?;

@@ -22,6 +22,7 @@ pub mod dynamic_system;
 pub mod explicit;
 pub(crate) mod guard;
 pub(crate) mod initial_state;
+mod material_stretches;
 pub mod quasi_static;
 pub(crate) mod rezoning;
 pub(crate) mod seen;

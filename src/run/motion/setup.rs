@@ -96,6 +96,7 @@ pub(crate) fn lay_out<const D: usize, T>(
     } = begun;
     let (model, coupling) = Model::new(problem, progress)?;
     choices.extend(setup::volumes_choice(&model));
+    choices.extend(setup::border_choice(&model));
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;

@@ -404,6 +404,7 @@ fn class<const D: usize>(
     let is_seam = points > 0 && points < columns.len();
     let is_cracked = is_broken || boundary.is_near_crack(x, reach);
     let class = match (is_seam, facet, is_cracked) {
+        _ if boundary.is_near_border(x, reach) => RowClass::Border,
         (true, None, false) => RowClass::Seam,
         (true, ..) => RowClass::SeamAtSurface,
         (false, _, true) => RowClass::Crack,
@@ -444,7 +445,9 @@ fn predicted<const D: usize>(
     let place = model.sites[site as usize].position;
     let (main, list) = match (class, facet) {
         // what a crack does to the stress is what it is there for
-        (RowClass::Crack, _) | (RowClass::SeamAtSurface, None) => return Predicted::NotAsked,
+        (RowClass::Crack | RowClass::Border, _) | (RowClass::SeamAtSurface, None) => {
+            return Predicted::NotAsked;
+        }
         (RowClass::Seam | RowClass::Points, _) | (_, None) => (None, gradients(tensor)),
         (_, Some(f)) => {
             let n = around.boundary.normals[f];

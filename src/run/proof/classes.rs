@@ -44,6 +44,8 @@ pub(super) enum RowClass {
     LoadedSurface,
     /// A family of the row lacks points behind a crack or in a void.
     Crack,
+    /// Bonds of the row join points of two materials.
+    Border,
     /// Elements and points meet in the row, and a family of it lacks points.
     SeamAtSurface,
 }
@@ -122,6 +124,7 @@ impl RowClass {
             Self::Support => "at supports",
             Self::LoadedSurface => "at loaded surfaces",
             Self::Crack => "at cracks and voids",
+            Self::Border => "at borders of materials",
             Self::SeamAtSurface => "where the seam meets surfaces",
         }
     }
@@ -184,7 +187,7 @@ fn described(
             "zones.skin = \"free-surfaces\" puts elements there",
             [limits::WARN_SURFACE, f64::INFINITY],
         ),
-        RowClass::Crack => return None,
+        RowClass::Crack | RowClass::Border => return None,
     })
 }
 

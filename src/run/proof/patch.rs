@@ -138,6 +138,7 @@ fn keeps_field<const D: usize>(around: &Around<'_, D>, site: u32, main: Option<u
         })
     };
     boundary.is_near_crack(x, around.reach)
+        || boundary.is_near_border(x, around.reach)
         || (boundary.near_of(x, around.reach, |f| !lies_in(f)).next()).is_some()
 }
 
@@ -193,7 +194,6 @@ fn largest<const D: usize>(
     u: &[f64],
 ) -> StressError<D> {
     let model = around.model;
-    let own = model.peridynamic_material();
     let mut found = StressError {
         relative: 0.0,
         at: model.sites[list[0] as usize].position,
@@ -214,7 +214,19 @@ fn largest<const D: usize>(
             }
         }
     };
-    let of_points = (0..model.mesh.cell_count()).find(|&c| model.material_of_cell(c) == own);
+    let cell_of = |material: u16| {
+        let mut cells = 0..model.mesh.cell_count();
+        cells.find(|&c| model.material_of_cell(c) == material)
+    };
+    let materials = model.body().map_or(&[][..], |body| &body.cloud.material);
+    // the first cell of each material in use
+    let count = materials.iter().max().map_or(0, |m| usize::from(*m) + 1);
+    let cells_of: Vec<Option<usize>> = (0..count as u16).map(cell_of).collect();
+    let of_points = cell_of(model.peridynamic_material());
+    let cell_of_point = |p: usize| match materials.get(p) {
+        Some(&m) => cells_of[usize::from(m)],
+        None => of_points,
+    };
     let mut cells: Vec<usize> = Vec::new();
     for (&s, keeps) in list.iter().zip(keeps) {
         let site = &model.sites[s as usize];
@@ -222,8 +234,9 @@ fn largest<const D: usize>(
         if *keeps && matches!(site.kind, SiteKind::Point(_)) {
             continue;
         }
-        match (site.kind, model.point_of(s as usize), of_points) {
-            (SiteKind::Point(_), Some((body, p)), Some(c)) => {
+        match (site.kind, model.point_of(s as usize)) {
+            (SiteKind::Point(_), Some((body, p))) => {
+                let Some(c) = cell_of_point(p) else { continue };
                 let exact = model.tensor_of_cell(c).contract(gradient);
                 compare(body.partial_stress(p, u), exact, site.position);
             }

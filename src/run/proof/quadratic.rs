@@ -105,7 +105,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     }
     let whole: Vec<bool> = (0..places)
         .into_par_iter()
-        .map(|i| is_whole(body, i))
+        .map(|i| is_whole(body, i) && is_of_material(body, i, model.peridynamic_material()))
         .collect();
     let seam = seam_sites(subject, body, &whole);
     let Some(&(first, _)) = seam.first() else {
@@ -204,6 +204,13 @@ fn is_whole<const D: usize>(body: &PdBody<D>, i: usize) -> bool {
         size += xi.norm() * body.cloud.volume[j as usize];
     }
     size > 0.0 && sum.norm() <= WHOLE * size
+}
+
+/// Whether all points of a family have one material, where points may have several.
+fn is_of_material<const D: usize>(body: &PdBody<D>, i: usize, own: u16) -> bool {
+    let material = &body.cloud.material;
+    let mut family = body.families.of(i).iter();
+    material.is_empty() || material[i] == own && family.all(|&j| material[j as usize] == own)
 }
 
 /// Points (with their sites) that see places in elements and whose families lack nothing, nor do those of their neighbours where these enter; some of them where rows are not there yet.

@@ -30,6 +30,8 @@ pub(super) struct Boundary<'a, const D: usize> {
     bins: FxHashMap<[i64; D], Vec<u32>>,
     reach: f64,
     barriers: Barriers<D>,
+    /// The boxes around facets between materials of the points.
+    borders: Vec<(Vector<D>, Vector<D>)>,
 }
 
 impl<'a, const D: usize> Boundary<'a, D> {
@@ -75,6 +77,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
             bins,
             reach,
             barriers: Barriers::new(barriers.map_or(Vec::new(), |p| p.barriers.clone())),
+            borders: borders(model, reach, (low, high)),
         }
     }
 
@@ -108,6 +111,15 @@ impl<'a, const D: usize> Boundary<'a, D> {
         })
     }
 
+    /// Whether bonds of another material come nearer to `x` than `limit`: points stand for their material up to half a spacing beyond its border.
+    pub fn is_near_border(&self, x: &Vector<D>, limit: f64) -> bool {
+        let limit = limit + self.model.spacing();
+        self.borders.iter().any(|(low, high)| {
+            let outside = (low - x).sup(&(x - high)).sup(&Vector::zeros());
+            outside.norm_squared() < limit * limit
+        })
+    }
+
     /// Whether a crack or a void is nearer to `x` than `limit`.
     pub fn is_near_crack(&self, x: &Vector<D>, limit: f64) -> bool {
         self.barriers.near(x, limit)
@@ -116,6 +128,27 @@ impl<'a, const D: usize> Boundary<'a, D> {
 
 fn bin<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {
     std::array::from_fn(|i| (x[i] / size).floor() as i64)
+}
+
+/// The boxes around facets between materials, of points that have several, near a box.
+fn borders<const D: usize>(
+    model: &Model<D>,
+    reach: f64,
+    (low, high): (Vector<D>, Vector<D>),
+) -> Vec<(Vector<D>, Vector<D>)> {
+    let used = model.several().map_or(&[][..], |several| several.used());
+    let reach = reach + model.spacing();
+    let mesh = &model.mesh;
+    let of_material = |&material: &u16| {
+        let own = (0..mesh.cell_count()).map(|c| model.material_of_cell(c) == material);
+        let own: Vec<bool> = own.collect();
+        let facets = mesh.interface_facets(&own, &true, &false).into_iter();
+        facets.map(|f| mesh.bounds_of(&f.first.nodes))
+    };
+    let mut boxes: Vec<_> = used.iter().flat_map(of_material).collect();
+    boxes
+        .retain(|(from, to)| (0..D).all(|k| from[k] <= high[k] + reach && to[k] >= low[k] - reach));
+    boxes
 }
 
 /// What the conditions make of each facet.

@@ -370,8 +370,8 @@ fn material<const D: usize>(
                 scene.materials[first as usize].name, scene.materials[other as usize].name
             ),
         )
-        .label(span.clone(), "points have one material")
-        .help("draw the zone within one of them, [zones.nonlocal]; bonds between materials come later")),
+        .label(span.clone(), "places points of one material")
+        .help("draw the zone, [zones.nonlocal]; points of a zone that is drawn may have several materials")),
     }
 }
 

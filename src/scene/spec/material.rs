@@ -12,10 +12,11 @@ use serde::de::{
 };
 
 use super::named_law::{self, NamedSpec};
+use super::region::CellsSpec;
 use super::user_material::UmatSpec;
 use crate::peridynamics::laws::Named;
 use crate::scene::expression::Expression;
-use crate::scene::value::{Coordinates, Count, Number, Text};
+use crate::scene::value::{Coordinates, Count, Number};
 
 /// A material: its peridynamic law, beside which the local law is linear elasticity with the same constants.
 #[derive(Clone, Debug)]
@@ -195,9 +196,9 @@ pub struct BondBasedSpec {
     /// Stretch at which a bond breaks, instead of `fracture-energy`.
     #[serde(default)]
     pub critical_stretch: Option<Number>,
-    /// The set of cells that this material fills.
+    /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
     #[serde(default)]
-    pub cells: Option<Text>,
+    pub cells: Option<CellsSpec>,
 }
 
 /// The constants of a state-based material.
@@ -217,9 +218,9 @@ pub struct StateBasedSpec {
     /// Stretch at which a bond breaks, instead of `fracture-energy`.
     #[serde(default)]
     pub critical_stretch: Option<Number>,
-    /// The set of cells that this material fills.
+    /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
     #[serde(default)]
-    pub cells: Option<Text>,
+    pub cells: Option<CellsSpec>,
 }
 
 /// The constants of a correspondence material.
@@ -236,9 +237,9 @@ pub struct CorrespondenceSpec {
     /// Strength of the stabilising bond force, relative to that of an LPS; 1 if left out, 0 switches it off.
     #[serde(default)]
     pub stabilisation: Option<Number>,
-    /// The set of cells that this material fills.
+    /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
     #[serde(default)]
-    pub cells: Option<Text>,
+    pub cells: Option<CellsSpec>,
 }
 
 /// Stiffness of a bond over its length, up to a factor that Young's modulus and the horizon fix.

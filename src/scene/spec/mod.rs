@@ -6,6 +6,7 @@ mod condition;
 mod control;
 mod coupling;
 mod material;
+mod material_interface;
 mod mesh;
 mod motion;
 pub(super) mod named_law;
@@ -25,6 +26,7 @@ pub use material::{
     PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec, VolumesSpec,
     WeightsSpec,
 };
+pub use material_interface::{MaterialInterfaceSpec, StiffnessSpec};
 pub use mesh::{
     AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
@@ -36,8 +38,8 @@ pub use motion::{
 };
 pub use named_law::Given;
 pub use region::{
-    AutoSpec, BallSpec, BodySpec, BoxSpec, EdgeSpec, FollowSpec, NearSpec, SegmentSpec, ShapeSpec,
-    SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
+    AutoSpec, BallSpec, BodySpec, BoxSpec, CellsSpec, EdgeSpec, FollowSpec, NearSpec, SegmentSpec,
+    ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
 pub use user_material::{EnergiesSpec, StrainsSpec, UmatSpec};
 
@@ -70,6 +72,9 @@ pub struct SceneSpec {
     pub mesh: MeshSpec,
     /// The materials by name. At most one of several may be without `cells`: it fills what the others leave.
     pub materials: BTreeMap<Text, MaterialSpec>,
+    /// Bonds between two materials of the points, by name; those of two that none names have the harmonic mean of their stiffnesses and the smaller critical stretch.
+    #[serde(default)]
+    pub interfaces: BTreeMap<Text, MaterialInterfaceSpec>,
     /// Horizon, points and weights of the peridynamic region; needed unless the coupling is `local`.
     #[serde(default)]
     pub peridynamics: Option<PeridynamicsSpec>,

@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserialize, DeserializeSeed, Deserializer, MapAccess, Visitor};
 
+use super::region::CellsSpec;
 use crate::peridynamics::laws::{Named, Ratio};
 use crate::scene::value::{Number, Text};
 
@@ -26,8 +27,8 @@ pub struct NamedSpec {
     pub critical_stretch: Option<Number>,
     /// Tearing parameter at which a bond breaks.
     pub tearing_parameter: Option<Number>,
-    /// The set of cells that this material fills.
-    pub cells: Option<Text>,
+    /// The cells that this material fills.
+    pub cells: Option<CellsSpec>,
     /// What the law takes of its own, in the order of [`Named::parameters`]; none where one is left out that has a default.
     pub parameters: Vec<Option<Given>>,
 }
@@ -58,7 +59,10 @@ const COMMON: [(&str, &str); 7] = [
         "tearing-parameter",
         "Tearing parameter at which a bond breaks: the equivalent plastic strain at failure of a bar in tension.",
     ),
-    ("cells", "The set of cells that this material fills."),
+    (
+        "cells",
+        "The cells that this material fills: the name of a set, or a shape that holds their centroids.",
+    ),
 ];
 
 /// Keys of each law, as errors list them.
@@ -110,7 +114,7 @@ impl<'de> Visitor<'de> for Seed {
         let parameters = law.parameters();
         let mut common: [Option<Number>; 6] = Default::default();
         let mut own: Vec<Option<Given>> = vec![None; parameters.len()];
-        let mut cells: Option<Text> = None;
+        let mut cells: Option<CellsSpec> = None;
         while let Some(key) = map.next_key_seed(Key(law))? {
             match key {
                 Field::Common(6) => cells = Some(map.next_value()?),
@@ -183,9 +187,9 @@ impl<'de> DeserializeSeed<'de> for Key {
 
 /// The schema of a law's material.
 pub(super) fn schema(law: Named, generator: &mut SchemaGenerator) -> Schema {
-    let (number, text) = (
+    let (number, cells) = (
         generator.subschema_for::<Number>(),
-        generator.subschema_for::<Text>(),
+        generator.subschema_for::<CellsSpec>(),
     );
     let mut properties = serde_json::Map::new();
     let mut required = vec!["youngs-modulus"];
@@ -198,7 +202,7 @@ pub(super) fn schema(law: Named, generator: &mut SchemaGenerator) -> Schema {
         properties.insert(key.to_owned(), entry);
     };
     for (key, about) in COMMON.iter().filter(|c| takes(law, c.0)) {
-        add(key, about, if *key == "cells" { &text } else { &number });
+        add(key, about, if *key == "cells" { &cells } else { &number });
     }
     for parameter in law.parameters() {
         if parameter.words.is_empty() {

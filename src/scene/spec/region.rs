@@ -118,6 +118,27 @@ pub enum ShapeSpec {
     Without(Box<WithoutSpec>),
 }
 
+/// The cells of a material: a shape, or the name of a set.
+///
+/// A name is read as `{ set = "name" }`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(transparent)]
+pub struct CellsSpec(pub ShapeSpec);
+
+impl JsonSchema for CellsSpec {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "CellsSpec".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let shape = generator.subschema_for::<ShapeSpec>();
+        schemars::json_schema!({
+            "description": "The cells of a material: the name of a set, or a shape that holds their centroids.",
+            "anyOf": [{ "type": "string" }, shape]
+        })
+    }
+}
+
 /// The region where both models overlap.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::region::CellsSpec;
 use crate::scene::value::{Count, Number, Text};
 
 /// A routine of a compiled library with the calling convention of Abaqus' UMAT.
@@ -51,9 +52,9 @@ pub struct UmatSpec {
     /// Stretch at which a bond breaks.
     #[serde(default)]
     pub critical_stretch: Option<Number>,
-    /// The set of cells that this material fills.
+    /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
     #[serde(default)]
-    pub cells: Option<Text>,
+    pub cells: Option<CellsSpec>,
 }
 
 /// How large strains and rotations may become.

@@ -95,6 +95,18 @@ pub fn history(
         .collect()
 }
 
+/// Runs a scene to its end and returns what its output files hold, by their names; none for one that was not written.
+///
+/// # Errors
+/// The message of a refusal.
+pub fn files(text: &str, names: &[&str]) -> Result<Vec<Option<String>>, String> {
+    let folder = Folder::with(&[])?;
+    let scene = load(text, &[], &folder)?;
+    scene.run(&Silent).map_err(|e| e.to_string())?;
+    let read = |name: &&str| std::fs::read_to_string(folder.path().join("out").join(name)).ok();
+    Ok(names.iter().map(read).collect())
+}
+
 /// What `check` says of a scene, without its error prediction.
 ///
 /// # Errors
