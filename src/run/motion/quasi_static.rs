@@ -404,6 +404,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             warnings: without_response(system, &state.u).into_iter().collect(),
             dimension: D,
             applied,
+            reactions: self.recorder.reactions(),
             iterations,
             motion: Some(motion),
             files: self.recorder.files(),
