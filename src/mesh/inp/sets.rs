@@ -23,11 +23,9 @@ impl<'a> Reader<'a> {
         let name = card.required(&card.keyword, &self.source)?;
         let body = self.body_named(card)?;
         let mut members = Vec::new();
-        if of == Of::Nodes {
-            if let Some(cells) = card.get("ELSET") {
-                let cells = self.named(card.at, cells, body, Of::Elements)?;
-                members = self.nodes_of(card.at, &cells)?;
-            }
+        if let Some(cells) = card.get("ELSET").filter(|_| of == Of::Nodes) {
+            let cells = self.named(card.at, cells, body, Of::Elements)?;
+            members = self.nodes_of(card.at, &cells)?;
         }
         let generate = card.get("GENERATE").is_some();
         while let Some((at, line)) = self.data()? {
@@ -113,10 +111,11 @@ impl<'a> Reader<'a> {
         }
         let ends = word.match_indices('.').map(|(i, _)| i);
         for end in ends.collect::<Vec<_>>() {
-            if let Some(i) = self.find_instance(&word[..end]) {
-                if let Some(members) = of_body(self, i as u32, &word[end + 1..])? {
-                    return Ok(members);
-                }
+            let Some(i) = self.find_instance(&word[..end]) else {
+                continue;
+            };
+            if let Some(members) = of_body(self, i as u32, &word[end + 1..])? {
+                return Ok(members);
             }
         }
         Err(self.syntax(at, word, "a number, or the name of a set above"))
@@ -205,7 +204,7 @@ impl<'a> Reader<'a> {
         let members = self.named(at, whose, body, Of::Nodes)?;
         let known = self.sets(Of::Nodes).entry(name);
         // a surface of the set of its own name adds nothing to it
-        if !(same && !known.is_empty()) {
+        if !same || known.is_empty() {
             known.extend(members);
         }
         Ok(())
