@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::Reader;
 use super::body::{Body, Members};
-use super::{REWRITE, Reader};
+use super::text::REWRITE;
 use crate::mesh::raw::{RawElement, RawMesh, RawNode};
 use crate::mesh::{CellShape, MeshError};
 

@@ -27,13 +27,11 @@ use std::path::Path;
 use body::{Body, Element, Members, Motion, Node, THIS};
 use kinds::kind;
 pub(super) use text::load;
-use text::{Card, bytes_of_line};
+use text::{Card, REWRITE, bytes_of_line};
 
 use super::MeshError;
 use super::raw::{Encoding, Piece, RawMesh, Source};
 
-/// What a wrong line calls for.
-const REWRITE: &str = "correct the deck, or write it again";
 /// The largest number of a node or an element.
 const MOST: u64 = 999_999_999;
 

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::REWRITE;
 use crate::mesh::MeshError;
 use crate::mesh::raw::{Encoding, Piece, Source};
 use crate::regular_file;
 
+/// What a wrong line calls for.
+pub(super) const REWRITE: &str = "correct the deck, or write it again";
 /// The most files that a deck may include, one counted as often as it is named.
 const MOST_INCLUDED: usize = 1000;
 /// Keywords whose data lines may lie in a file of their own.

@@ -1,6 +1,5 @@
 //! What holds the body: the force of each condition that prescribes how sites move, and by how much it has moved them.
 
-use super::writer::Moment;
 use crate::observe::summary::Reaction;
 use crate::scene::conditions::{Condition, Prescribed};
 
@@ -71,9 +70,9 @@ impl<const D: usize> Supports<D> {
 
     /// Forces of all conditions by components, then the means of the displacements that each prescribes.
     ///
+    /// `forces` are those of supports and loads together by dof, `loads` those of loads alone on each prescribed dof, `u` displacements by dof.
     /// A condition all of whose dofs are held by others has force and displacement zero.
-    pub fn row(&mut self, moment: &Moment<'_>) -> Vec<f64> {
-        let (forces, loads) = moment.supports;
+    pub fn row(&mut self, (forces, loads): (&[f64], &[f64]), u: &[f64]) -> Vec<f64> {
         let mut reactions = vec![0.0; self.conditions.len() * D];
         let mut sums = vec![(0.0, 0.0); reactions.len()];
         for (&(dof, holder), load) in self.holders.iter().zip(loads) {
@@ -83,7 +82,7 @@ impl<const D: usize> Supports<D> {
             if let Ok(place) = place {
                 let k = place * D + dof as usize % D;
                 reactions[k] += forces[dof as usize] - load;
-                sums[k].0 += moment.state.u[dof as usize];
+                sums[k].0 += u[dof as usize];
                 sums[k].1 += 1.0;
             }
         }

@@ -363,7 +363,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 }));
             }
         }
-        let supports = self.supports.row(moment);
+        let supports = self.supports.row(moment.supports, &state.u);
         row.extend(supports.into_iter().map(Entry::from));
         self.options.keep("history", &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
