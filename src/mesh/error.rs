@@ -40,7 +40,7 @@ pub enum MeshError {
         source: std::io::Error,
     },
     /// The file name ends in nothing that a reader knows.
-    #[error("{}: no reader for this file extension; use .msh (Gmsh 4.1 or 2.2), .vtk or .vtu", path.display())]
+    #[error("{}: no reader for this file extension; use .msh (Gmsh 4.1 or 2.2), .inp (Abaqus, CalculiX), .vtk or .vtu", path.display())]
     UnknownExtension {
         /// The file.
         path: PathBuf,
@@ -92,8 +92,8 @@ pub enum MeshError {
         place: Place,
         /// Its number in the file.
         element: u64,
-        /// The file's number for its type.
-        kind: i64,
+        /// The file's number or word for its type.
+        kind: String,
         /// The name of that type.
         name: &'static str,
         /// What to do.
@@ -120,6 +120,18 @@ pub enum MeshError {
         place: Place,
         /// The tag.
         node: u64,
+        /// Where the first one stands.
+        first: Place,
+    },
+    /// Two elements have the same number.
+    #[error("{}: {place}: element {element} was already defined at {first}; give each element its own number", path.display())]
+    DuplicateElementNumber {
+        /// The file.
+        path: PathBuf,
+        /// Where the second one stands.
+        place: Place,
+        /// The number.
+        element: u64,
         /// Where the first one stands.
         first: Place,
     },

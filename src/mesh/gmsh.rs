@@ -21,6 +21,7 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(RawMesh, Source
             path: path.into(),
             bytes,
             encoding: Encoding::Text,
+            pieces: &[],
         },
         at: 0,
         section: "$MeshFormat".into(),
@@ -552,7 +553,7 @@ impl<'a> Reader<'a> {
             path: self.source.path.clone(),
             place: self.source.place(at),
             element,
-            kind,
+            kind: kind.to_string(),
             name,
             remedy,
         }

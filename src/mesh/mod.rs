@@ -7,6 +7,7 @@
 //! | `raw.rs` | what a file holds before it is a mesh |
 //! | `parts.rs` | a mesh in memory, as another program hands it over |
 //! | `gmsh.rs`, `gmsh_kinds.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
+//! | `inp/` | decks of Abaqus and CalculiX: nodes, elements, sets, surfaces, instances |
 //! | `vtk.rs`, `vtk_grid.rs` | VTK files: cells, and groups of them by integers |
 //! | `vtu.rs`, `vtk_legacy.rs` | their two formats, `.vtu` and `.vtk` |
 //! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
@@ -24,6 +25,7 @@ mod error;
 pub mod generate;
 pub mod gmsh;
 mod gmsh_kinds;
+mod inp;
 mod parts;
 pub mod quality;
 pub(crate) mod raw;
@@ -123,6 +125,8 @@ pub struct Mesh<const D: usize> {
     pub facet_sets: BTreeMap<String, Vec<Facet>>,
     /// Named sets of single nodes.
     pub node_sets: BTreeMap<String, Vec<u32>>,
+    /// What the reader of its file left out, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl<const D: usize> Default for Mesh<D> {
@@ -135,6 +139,7 @@ impl<const D: usize> Default for Mesh<D> {
             cell_sets: BTreeMap::new(),
             facet_sets: BTreeMap::new(),
             node_sets: BTreeMap::new(),
+            notes: Vec::new(),
         }
     }
 }

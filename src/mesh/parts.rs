@@ -44,6 +44,7 @@ impl MeshParts {
             path: PathBuf::from(&self.name),
             bytes: &[],
             encoding: Encoding::Memory,
+            pieces: &[],
         };
         let mesh = self.raw(&source)?.assemble(&source)?;
         quality::check(&mesh)?;

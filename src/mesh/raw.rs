@@ -15,6 +15,18 @@ pub(super) struct Source<'a> {
     pub path: PathBuf,
     pub bytes: &'a [u8],
     pub encoding: Encoding,
+    /// Where the text of other files begins that the file includes; empty where all is of one file.
+    pub pieces: &'a [Piece],
+}
+
+/// A stretch of text that comes from one file.
+pub(super) struct Piece {
+    /// Byte where it begins in the whole text.
+    pub start: usize,
+    /// The file.
+    pub path: PathBuf,
+    /// Number of its first line in that file, from 1.
+    pub line: usize,
 }
 
 /// How positions in a file are told to its reader.
@@ -44,10 +56,23 @@ impl<'a> Source<'a> {
         (text, at + (length + 1).min(rest.len()))
     }
 
+    /// The piece that holds byte `at`.
+    fn piece(&self, at: usize) -> Option<&Piece> {
+        let after = self.pieces.partition_point(|piece| piece.start <= at);
+        self.pieces[..after].last()
+    }
+
+    /// The file that holds byte `at`.
+    pub fn file(&self, at: usize) -> PathBuf {
+        self.piece(at)
+            .map_or(&self.path, |piece| &piece.path)
+            .clone()
+    }
+
     /// The file ends at byte `at`, where `wanted` should stand.
     pub fn truncated(&self, at: usize, section: &str, wanted: &str) -> MeshError {
         MeshError::Truncated {
-            path: self.path.clone(),
+            path: self.file(at),
             place: self.place(at),
             section: section.to_owned(),
             wanted: wanted.into(),
@@ -58,7 +83,7 @@ impl<'a> Source<'a> {
     pub fn syntax(&self, at: usize, found: &str, wanted: &str, remedy: &'static str) -> MeshError {
         let found: String = found.chars().take(60).collect();
         MeshError::Syntax {
-            path: self.path.clone(),
+            path: self.file(at),
             place: self.place(at),
             found: if found.is_empty() {
                 "nothing legible".into()
@@ -74,8 +99,10 @@ impl<'a> Source<'a> {
     pub fn place(&self, at: usize) -> Place {
         match self.encoding {
             Encoding::Text => {
-                let before = &self.bytes[..at.min(self.bytes.len())];
-                Place::Line(1 + before.iter().filter(|&&b| b == b'\n').count())
+                let at = at.min(self.bytes.len());
+                let (start, line) = self.piece(at).map_or((0, 1), |p| (p.start, p.line));
+                let before = &self.bytes[start..at];
+                Place::Line(line + before.iter().filter(|&&b| b == b'\n').count())
             }
             Encoding::Binary => Place::Byte(at),
             Encoding::Memory => Place::Entry(at),
@@ -110,6 +137,8 @@ pub(super) struct RawMesh {
     pub element_nodes: Vec<u64>,
     /// Lists of set names; the first one is empty.
     pub groups: Vec<Vec<String>>,
+    /// What the reader left out, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Default for RawMesh {
@@ -119,6 +148,7 @@ impl Default for RawMesh {
             elements: Vec::new(),
             element_nodes: Vec::new(),
             groups: vec![Vec::new()],
+            notes: Vec::new(),
         }
     }
 }
@@ -181,6 +211,7 @@ impl RawMesh {
                 .iter()
                 .map(|n| Vector::from_fn(|k, _| n.x[k]))
                 .collect(),
+            notes: self.notes.clone(),
             ..Mesh::default()
         };
         // a 2.2 file repeats an element for each of its groups
@@ -231,7 +262,7 @@ impl RawMesh {
         for tag in tags {
             let Some(&n) = numbers.get(tag) else {
                 return Err(MeshError::MissingNode {
-                    path: source.path.clone(),
+                    path: source.file(element.at),
                     place: source.place(element.at),
                     element: element.tag,
                     node: *tag,
@@ -269,7 +300,7 @@ impl RawMesh {
                 if !groups.insert(element.group) {
                     let first = self.cell_tag(D, *cell as usize);
                     return Err(MeshError::DuplicateElement {
-                        path: source.path.clone(),
+                        path: source.file(element.at),
                         place: source.place(element.at),
                         element: element.tag,
                         first,
@@ -287,7 +318,7 @@ impl RawMesh {
         for (i, node) in self.nodes.iter().enumerate() {
             if let Some(first) = numbers.insert(node.tag, i as u32) {
                 return Err(MeshError::DuplicateTag {
-                    path: source.path.clone(),
+                    path: source.file(node.at),
                     place: source.place(node.at),
                     node: node.tag,
                     first: source.place(self.nodes[first as usize].at),
@@ -295,7 +326,7 @@ impl RawMesh {
             }
             if let Some(k) = node.x.iter().position(|v| !v.is_finite()) {
                 return Err(MeshError::NonFinite {
-                    path: source.path.clone(),
+                    path: source.file(node.at),
                     place: source.place(node.at),
                     node: node.tag,
                     axis: axis_name(k),
@@ -334,7 +365,7 @@ impl RawMesh {
             for k in D..3 {
                 if node.x[k].abs() > tolerance {
                     return Err(MeshError::OutOfPlane {
-                        path: source.path.clone(),
+                        path: source.file(node.at),
                         place: source.place(node.at),
                         node: node.tag,
                         axis: axis_name(k),

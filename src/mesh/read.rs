@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::raw::{RawMesh, Source};
-use super::{Mesh, MeshError, gmsh, vtk};
+use super::raw::{Piece, RawMesh, Source};
+use super::{Mesh, MeshError, gmsh, inp, vtk};
 use crate::regular_file;
 
-/// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.vtk` or `.vtu`.
+/// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.inp`, `.vtk` or `.vtu`.
 ///
 /// Cells are the elements of dimension `D`. Named groups of them become cell sets, groups of dimension `D − 1` facet sets,
 /// and groups of still lower dimension node sets. The cell set `all` is added unless the file has one of that name. Nodes
@@ -16,8 +16,8 @@ use crate::regular_file;
 /// See [`MeshError`]; each names the file, the place in it, the value and the remedy. The shapes of cells are not
 /// looked at here: see [`quality::check`](super::quality::check).
 pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>, MeshError> {
-    let bytes = load(path)?;
-    let (raw, source) = parse(path, &bytes)?;
+    let text = load(path)?;
+    let (raw, source) = parse(path, &text)?;
     raw.assemble(&source)
 }
 
@@ -26,22 +26,40 @@ pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>, MeshError> {
 /// # Errors
 /// As [`read`].
 pub fn detect_dimension(path: &Path) -> Result<usize, MeshError> {
-    let bytes = load(path)?;
-    let (raw, source) = parse(path, &bytes)?;
+    let text = load(path)?;
+    let (raw, source) = parse(path, &text)?;
     raw.dimension(&source)
 }
 
-fn load(path: &Path) -> Result<Vec<u8>, MeshError> {
-    regular_file::read(path).map_err(|source| MeshError::Open {
-        path: path.into(),
-        source,
-    })
+/// The content of a file and of those that it includes.
+struct Loaded {
+    bytes: Vec<u8>,
+    pieces: Vec<Piece>,
 }
 
-fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(RawMesh, Source<'a>), MeshError> {
+fn extension(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    match extension.to_ascii_lowercase().as_str() {
+    extension.to_ascii_lowercase()
+}
+
+fn load(path: &Path) -> Result<Loaded, MeshError> {
+    if extension(path) == "inp" {
+        let (bytes, pieces) = inp::load(path)?;
+        return Ok(Loaded { bytes, pieces });
+    }
+    let bytes = regular_file::read(path).map_err(|source| MeshError::Open {
+        path: path.into(),
+        source,
+    })?;
+    let pieces = Vec::new();
+    Ok(Loaded { bytes, pieces })
+}
+
+fn parse<'a>(path: &Path, text: &'a Loaded) -> Result<(RawMesh, Source<'a>), MeshError> {
+    let bytes = &text.bytes;
+    match extension(path).as_str() {
         "msh" => gmsh::parse(path, bytes),
+        "inp" => inp::parse(path, bytes, &text.pieces),
         "vtk" => vtk::parse(path, bytes, vtk::Flavour::Legacy),
         "vtu" => vtk::parse(path, bytes, vtk::Flavour::Xml),
         _ => Err(MeshError::UnknownExtension { path: path.into() }),

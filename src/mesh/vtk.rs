@@ -83,7 +83,7 @@ fn add_piece(
                 path: source.path.clone(),
                 place: source.place(grid.at),
                 element,
-                kind: i64::from(kind),
+                kind: kind.to_string(),
                 name: "by VTK's numbering",
                 remedy: "supported are Vertex, Line, Triangle, Quad, Tetra and Hexahedron of first order: convert the mesh",
             });

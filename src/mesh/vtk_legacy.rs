@@ -20,6 +20,7 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Grid, Source<'a
             path: path.into(),
             bytes,
             encoding: Encoding::Text,
+            pieces: &[],
         },
         at: 0,
         section: "the head of the file".into(),

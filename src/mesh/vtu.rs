@@ -65,6 +65,7 @@ pub(super) fn parse<'a>(
             path: path.into(),
             bytes,
             encoding: Encoding::Text,
+            pieces: &[],
         },
         storage: Storage {
             is_big_endian: false,

@@ -202,7 +202,7 @@ pub struct RunSummary {
     pub out_of_balance_relative: f64,
     /// Forces of the loads.
     pub applied: Vec<Applied>,
-    /// Forces of the displacement conditions.
+    /// Forces of the displacement conditions; of a run in time or in load steps those of the last row of its history.
     pub reactions: Vec<Reaction>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
     pub energy: Option<f64>,

@@ -15,7 +15,8 @@ use crate::system::{SemiDiscrete, Symmetry};
 /// All doubts about a model.
 pub fn doubts<const D: usize>(model: &Model<D>, joining: CouplingTraits) -> Vec<String> {
     let all = [one_sided(model), crack_beside_seam(model, joining)];
-    all.into_iter().flatten().collect()
+    let notes = model.mesh.notes.iter().cloned();
+    notes.chain(all.into_iter().flatten()).collect()
 }
 
 /// The warnings of a proof, then all doubts.

@@ -256,3 +256,71 @@ growing-modes = "warn"
         }
     }
 }
+
+/// A bar of EA = 4 and ρc = 2: the force of a support is EA ε in each load step, and ρ c v before a wave comes back.
+#[test]
+fn supports_tell_force_and_displacement_of_every_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let bar = MODE
+        .replace(
+            "[initial.mode.displacement]\nx = \"0.01 * sin(pi * x / 2)\"",
+            "",
+        )
+        .replace("[solve.explicit]\nduration = 5\noutputs = 2\n", "");
+    let run_of = |name: &str, rest: &str| {
+        write(
+            folder.path(),
+            &format!("{name}.toml"),
+            &format!("{bar}{rest}"),
+        );
+        let said = run(folder.path(), &[&format!("{name}.toml"), "--json"]);
+        let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+        let path = folder.path().join(format!("out/{name}_history.csv"));
+        let of = |what: &str| column(&path, what);
+        let columns = [
+            of("time"),
+            of("right_reaction_x"),
+            of("right_displacement_x"),
+            of("left_reaction_x"),
+            of("left_displacement_x"),
+        ];
+        (summary, columns)
+    };
+    let (summary, [time, force, moved, back, held]) = run_of(
+        "pulled",
+        "[conditions.right.displacement]\non = \"right\"\nx = \"0.01 * t^2\"\n[solve.quasi-static]\nsteps = 5\n",
+    );
+    assert_eq!(time.len(), 6);
+    for k in 0..6 {
+        let strain = 0.01 * time[k] * time[k];
+        assert!((moved[k] - strain).abs() < 1e-16, "{moved:?}");
+        assert!((force[k] - 4.0 * strain).abs() < 1e-9 && (back[k] + force[k]).abs() < 1e-9);
+        assert_eq!(held[k], 0.0);
+    }
+    let last: Vec<_> = summary["reactions"].as_array().unwrap().iter().collect();
+    assert_eq!(last[0]["condition"], "left");
+    assert_eq!(last[1]["condition"], "right");
+    assert_eq!(last[1]["force"][0].as_f64().unwrap(), force[5]);
+    let (summary, [time, force, moved, back, _]) = run_of(
+        "driven",
+        "[conditions.right.velocity]\non = \"right\"\nx = \"0.01 * t^2\"\n[solve.explicit]\nduration = 0.45\n",
+    );
+    assert!(time.len() > 30);
+    for k in 0..time.len() {
+        let t = time[k];
+        assert!(
+            (moved[k] - 0.01 * t * t * t / 3.0).abs() < 1e-6,
+            "{t}: {}",
+            moved[k]
+        );
+        // the scheme spreads a wave by O(h²)
+        assert!((force[k] - 0.02 * t * t).abs() < 1e-5, "{t}: {}", force[k]);
+        assert!(back[k].abs() < 1e-5, "{t}: {}", back[k]);
+    }
+    let reaction = &summary["reactions"][1];
+    assert_eq!(reaction["condition"], "right");
+    assert_eq!(
+        reaction["force"][0].as_f64().unwrap(),
+        *force.last().unwrap()
+    );
+}

@@ -11,11 +11,13 @@
 //! | `mesh.rs` | a mesh in memory |
 //! | `value.rs` | Python's values as those of a scene |
 //! | `errors.rs` | errors of the library as exceptions |
+//! | `program.rs` | the command line |
 
 mod attend;
 mod errors;
 mod frame;
 mod mesh;
+mod program;
 mod scene;
 mod value;
 
@@ -26,5 +28,6 @@ fn _bondline(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<mesh::Mesh>()?;
+    module.add_function(wrap_pyfunction!(program::command, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_vertices, module)?)
 }

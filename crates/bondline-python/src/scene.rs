@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bondline::run::{AnyScene, RunOptions};
+use bondline::run::{AnyScene, RunOptions, StartFrom};
 use bondline::scene::{Source, read};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -134,6 +134,7 @@ impl Scene {
         py: Python<'py>,
         output: Option<PathBuf>,
         threads: Option<usize>,
+        resume: bool,
         progress: Option<&Bound<'py, PyAny>>,
         take: &Bound<'py, PyAny>,
     ) -> PyResult<(String, Bound<'py, PyDict>)> {
@@ -152,6 +153,10 @@ impl Scene {
             move |watched, outlet| {
                 let outlet = outlet.with_files(files);
                 let options = RunOptions {
+                    start: match resume {
+                        true => StartFrom::Checkpoint,
+                        false => StartFrom::Beginning,
+                    },
                     interrupt: Some(&watched.stop),
                     heeds: Some(&watched.heeded),
                     observer: Some(&outlet),

@@ -307,6 +307,7 @@ impl SegmentRecord {
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
         told.extend(rotation.as_ref().map(Rotation::warning));
         let files = observer.recorder.files();
+        let reactions = observer.recorder.reactions();
         let motion = motion_summary(observer, motion, ended, energy_gain, self.taken)?;
         Ok(RunSummary {
             scene: self.title,
@@ -320,6 +321,7 @@ impl SegmentRecord {
             warnings: told,
             proof: self.proof,
             applied,
+            reactions,
             rotation,
             motion: Some(motion),
             files,

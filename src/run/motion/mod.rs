@@ -14,6 +14,7 @@
 //! | `guard.rs`, `seen.rs` | what is watched meanwhile: energy, rotation of elements |
 //! | `zone_monitor.rs`, `bounding_boxes.rs` | where a zone that follows the crack is wanted |
 //! | `rezoning.rs` | what a change of the zone carries over, and what it costs |
+//! | `supports.rs` | what holds the body: forces and displacements of conditions |
 //! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
 
 pub(crate) mod bounding_boxes;
@@ -28,6 +29,7 @@ pub(crate) mod rezoning;
 pub(crate) mod seen;
 pub mod setup;
 pub(crate) mod step_observer;
+mod supports;
 pub mod time_dependent_loads;
 pub mod time_step;
 pub mod writer;

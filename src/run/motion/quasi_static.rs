@@ -412,6 +412,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
                 .collect(),
             dimension: D,
             applied,
+            reactions: self.recorder.reactions(),
             iterations,
             motion: Some(motion),
             files: self.recorder.files(),

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::RunOptions;
 use super::breaks::Breaks;
 use super::rezoning::{nonlocal, share};
+use super::supports::Supports;
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
@@ -15,6 +16,7 @@ use crate::observe::csv::Entry;
 use crate::observe::history::History;
 use crate::observe::rezoning_event::Switch;
 use crate::observe::series::Series;
+use crate::observe::summary::Reaction;
 use crate::run::motion::seen::Seen;
 use crate::run::solution::Solved;
 use crate::run::write::{ENERGY_DENSITY, OverSites, Shown, energy_densities, snapshot};
@@ -201,9 +203,7 @@ pub struct Recorder<'a, const D: usize> {
     output: &'a Output<D>,
     /// Sites and weights of each probe.
     probes: Vec<Vec<(u32, f64)>>,
-    /// Prescribed dofs with the condition that holds each, and which conditions hold any.
-    holders: Vec<(u32, u32)>,
-    holding: Vec<u32>,
+    supports: Supports<D>,
     breaks: Breaks,
     history: History,
     tips: Vec<History>,
@@ -242,7 +242,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
             true => History::resumed(&path(name), header, bytes(file)),
             false => Ok(History::unwritten(header)),
         };
-        let header = history_header(output, conditions, breaks, is_linear);
+        let supports = Supports::new(conditions);
+        let header = history_header(output, &supports, breaks, is_linear);
         let history = table("history", header, 0)?;
         let tips = output
             .tips
@@ -268,8 +269,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(Self {
             output,
             probes,
-            holders: Vec::new(),
-            holding: holding(conditions).map(|(number, _)| number).collect(),
+            supports,
             breaks,
             history,
             tips,
@@ -290,18 +290,12 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// Learns which condition holds each prescribed dof.
     pub fn hold(&mut self, holders: impl Iterator<Item = (u32, u32)>) {
-        self.holders = holders.collect();
+        self.supports.hold(holders);
     }
 
-    /// Forces of the conditions that hold, by their components.
-    fn reactions(&self, (forces, loads): (&[f64], &[f64])) -> Vec<f64> {
-        let mut reactions = vec![0.0; self.holding.len() * D];
-        for (&(dof, holder), load) in self.holders.iter().zip(loads) {
-            if let Ok(place) = self.holding.binary_search(&holder) {
-                reactions[place * D + dof as usize % D] += forces[dof as usize] - load;
-            }
-        }
-        reactions
+    /// The forces of the conditions that hold, at the last row.
+    pub fn reactions(&self) -> Vec<Reaction> {
+        self.supports.reactions()
     }
 
     /// Begins the account of energy.
@@ -369,8 +363,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 }));
             }
         }
-        let reactions = self.reactions(moment.supports);
-        row.extend(reactions.into_iter().map(Entry::from));
+        let supports = self.supports.row(moment.supports, &state.u);
+        row.extend(supports.into_iter().map(Entry::from));
         self.options.keep("history", &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
         if may_be_damaged && !self.tips.is_empty() {
@@ -527,17 +521,9 @@ fn probes<const D: usize>(output: &Output<D>, sampler: &Sampler<'_, D>) -> Vec<V
         .collect()
 }
 
-/// The conditions that hold something, with their numbers.
-fn holding<const D: usize>(
-    conditions: &[Condition<D>],
-) -> impl Iterator<Item = (u32, &Condition<D>)> {
-    let all = conditions.iter().enumerate();
-    all.filter(|(_, c)| c.holds()).map(|(n, c)| (n as u32, c))
-}
-
 fn history_header<const D: usize>(
     output: &Output<D>,
-    conditions: &[Condition<D>],
+    supports: &Supports<D>,
     breaks: Breaks,
     is_linear: bool,
 ) -> Vec<String> {
@@ -564,10 +550,7 @@ fn history_header<const D: usize>(
             header.extend(AXES[..D].iter().map(|a| format!("{name}_{field}{a}")));
         }
     }
-    for (_, condition) in holding(conditions) {
-        let name = &condition.name;
-        header.extend(AXES[..D].iter().map(|a| format!("{name}_reaction_{a}")));
-    }
+    header.extend(supports.header());
     header
 }
 

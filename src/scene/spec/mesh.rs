@@ -22,7 +22,7 @@ pub enum MeshSpec {
     Rectangle(RectangleMeshSpec),
     /// A box of hexahedra or tetrahedra (3D).
     Box(BoxMeshSpec),
-    /// A Gmsh (`.msh`, 2.2 or 4.1) or VTK (`.vtk`, `.vtu`) file; physical groups become named sets.
+    /// A Gmsh (`.msh`, 2.2 or 4.1), Abaqus or CalculiX (`.inp`) or VTK (`.vtk`, `.vtu`) file; physical groups and sets become named sets.
     File(FileMeshSpec),
 }
 

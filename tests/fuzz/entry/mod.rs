@@ -77,7 +77,7 @@ fn run_text(text: &str, meshes: &Path) -> Outcome {
     }
 }
 
-/// The bytes of a mesh file: Gmsh, VTK or VTU, told by its beginning. A mesh that is read carries scenes on it.
+/// The bytes of a mesh file: Gmsh, VTK, VTU or a deck, told by its beginning. A mesh that is read carries scenes on it.
 ///
 /// # Panics
 /// As [`scene_text`].
@@ -85,6 +85,7 @@ pub fn mesh_file(data: &[u8]) -> Outcome {
     let extension = match data.first() {
         Some(b'#') => "vtk",
         Some(b'<') => "vtu",
+        Some(b'*') => "inp",
         _ => "msh",
     };
     let folder = folder();

@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 /// The name of the program.
 const NAME: &str = "bondline-verify";
@@ -11,8 +11,8 @@ const NAME: &str = "bondline-verify";
 ///
 /// # Errors
 /// Where it does not lie beside this program, or does not start.
-pub fn start(arguments: &[OsString]) -> miette::Result<ExitCode> {
-    let this = std::env::current_exe()
+pub fn start(program: std::io::Result<PathBuf>, arguments: &[OsString]) -> miette::Result<u8> {
+    let this = program
         .map_err(|e| miette::miette!("cannot find this program, beside which {NAME} lies: {e}"))?;
     let program = beside(&this);
     if !program.is_file() {
@@ -37,15 +37,15 @@ fn beside(this: &Path) -> PathBuf {
 
 /// The process itself becomes the other program: a signal meets that alone.
 #[cfg(unix)]
-fn run(command: &mut Command) -> std::io::Result<ExitCode> {
+fn run(command: &mut Command) -> std::io::Result<u8> {
     use std::os::unix::process::CommandExt as _;
     Err(command.exec())
 }
 
 /// Waits for the other program; Ctrl-C reaches both.
 #[cfg(not(unix))]
-fn run(command: &mut Command) -> std::io::Result<ExitCode> {
+fn run(command: &mut Command) -> std::io::Result<u8> {
     let status = command.status()?;
     let code = status.code().and_then(|code| u8::try_from(code).ok());
-    Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
+    Ok(code.unwrap_or(1))
 }

@@ -7,7 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Mesh", "Scene", "__version__", "frame_of_vertices"]
+__all__ = ["Mesh", "Scene", "__version__", "command", "frame_of_vertices"]
 
 __version__: str
 
@@ -43,6 +43,7 @@ class Scene:
         self,
         output: str | os.PathLike[str] | None,
         threads: int | None,
+        resume: bool,
         progress: _Progress | None,
         take: Callable[..., None],
     ) -> tuple[str, dict[str, dict[str, NDArray[Any]]]]: ...
@@ -58,4 +59,7 @@ class Mesh:
         point_sets: Sequence[tuple[str, NDArray[np.uint64]]],
     ) -> Mesh: ...
 
+def command(
+    program: str | os.PathLike[str], arguments: Sequence[str]
+) -> int: ...
 def frame_of_vertices(count: int) -> tuple[_Frame, int]: ...

@@ -85,6 +85,7 @@ class Scene:
         progress: bool = True,
         output: str | os.PathLike[str] | None = None,
         threads: int | None = None,
+        resume: bool = False,
         on_frame: Callable[[Frame], object] | None = None,
         keep_frames: bool = True,
     ) -> Result:
@@ -93,6 +94,7 @@ class Scene:
         progress: shows on standard error how the run stands.
         output: a folder for the files that the command line writes; no file is written without one.
         threads: threads to compute with, instead of one per core.
+        resume: goes on from the last checkpoint in ``output``, or from the beginning if there is none; of scenes in time or load steps. Frames and tables are those from there on.
         on_frame: called with each solution as it is there.
         keep_frames: keeps all of them for :meth:`Result.frames`; without it, the last one.
 
@@ -101,6 +103,10 @@ class Scene:
         """
         if threads is not None and threads < 1:
             raise ValueError(f"threads is {threads}; give at least 1, or leave it out for one per core")
+        if resume and (output is None or not self.in_time):
+            raise ValueError(
+                "resume goes on from a checkpoint: give the folder that holds it as output, and a scene in time or load steps"
+            )
         frames: list[Frame] = []
 
         def take(*parts: Any) -> None:
@@ -113,7 +119,7 @@ class Scene:
 
         folder = None if output is None else Path(output)
         with Line(progress) as line:
-            summary, tables = self._native.run(folder, threads, line if progress else None, take)
+            summary, tables = self._native.run(folder, threads, resume, line if progress else None, take)
         if not frames:
             raise BondlineError("the run showed no solution; please report this with the scene")
         last = frames[-1]

@@ -1,0 +1,154 @@
+//! Types of elements in decks, and the numbers of their faces.
+//!
+//! Sources: Abaqus Analysis User's Guide, "Element library"; CalculiX CrunchiX user's manual, chapters "Element types" and "*SURFACE".
+
+use crate::mesh::CellShape;
+
+/// A type of elements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Kind {
+    pub shape: CellShape,
+    /// Whether its faces are counted as those of a shell: both sides first, then edges.
+    pub shell: bool,
+}
+
+/// A face of an element by its label in a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Face {
+    /// `S1` to `S6`.
+    Side(usize),
+    /// `SPOS` or `SNEG`: a surface element itself.
+    Whole,
+    /// `E1` to `E4`: an edge of a surface element.
+    Edge(usize),
+    /// `END1` or `END2` of a line.
+    End(usize),
+}
+
+impl Face {
+    /// The face of this label.
+    pub fn parse(label: &str) -> Option<Self> {
+        let label = label.to_ascii_uppercase();
+        let number = |prefix: &str, most: usize| {
+            let n: usize = label.strip_prefix(prefix)?.parse().ok()?;
+            (1..=most).contains(&n).then_some(n)
+        };
+        if label == "SPOS" || label == "SNEG" {
+            return Some(Self::Whole);
+        }
+        number("S", 6)
+            .map(Self::Side)
+            .or_else(|| number("E", 4).map(Self::Edge))
+            .or_else(|| number("END", 2).map(Self::End))
+    }
+
+    /// Local node numbers of the face of an element.
+    pub fn nodes(self, kind: Kind) -> Option<&'static [usize]> {
+        const HEX: [&[usize]; 6] = [
+            &[0, 1, 2, 3],
+            &[4, 7, 6, 5],
+            &[0, 4, 5, 1],
+            &[1, 5, 6, 2],
+            &[2, 6, 7, 3],
+            &[3, 7, 4, 0],
+        ];
+        const TET: [&[usize]; 4] = [&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]];
+        const ENDS: [&[usize]; 2] = [&[0], &[1]];
+        const ALL: &[usize] = &[0, 1, 2, 3];
+        let plane = matches!(kind.shape, CellShape::Tri3 | CellShape::Quad4);
+        match (kind.shape, self) {
+            (CellShape::Hex8, Self::Side(n)) => HEX.get(n - 1).copied(),
+            (CellShape::Tet4, Self::Side(n)) => TET.get(n - 1).copied(),
+            (CellShape::Line2, Self::End(n)) => ENDS.get(n - 1).copied(),
+            (_, Self::Edge(n)) if plane => kind.shape.facets().get(n - 1).copied(),
+            (_, Self::Whole) if plane => ALL.get(..kind.shape.node_count()),
+            (_, Self::Side(1 | 2)) if plane && kind.shell => ALL.get(..kind.shape.node_count()),
+            (_, Self::Side(n)) if plane && kind.shell => kind.shape.facets().get(n - 3).copied(),
+            (_, Self::Side(n)) if plane => kind.shape.facets().get(n - 1).copied(),
+            _ => None,
+        }
+    }
+}
+
+/// Families of types by their stem, their shape and whether they are counted as shells; variants follow by the letters below.
+const STEMS: [(&str, CellShape, bool); 24] = [
+    ("T2D2", CellShape::Line2, false),
+    ("T3D2", CellShape::Line2, false),
+    ("B21", CellShape::Line2, false),
+    ("B23", CellShape::Line2, false),
+    ("B31", CellShape::Line2, false),
+    ("B33", CellShape::Line2, false),
+    ("CPS3", CellShape::Tri3, false),
+    ("CPE3", CellShape::Tri3, false),
+    ("CPEG3", CellShape::Tri3, false),
+    ("CPS4", CellShape::Quad4, false),
+    ("CPE4", CellShape::Quad4, false),
+    ("CPEG4", CellShape::Quad4, false),
+    ("CAX3", CellShape::Tri3, false),
+    ("CAX4", CellShape::Quad4, false),
+    ("S3", CellShape::Tri3, true),
+    ("STRI3", CellShape::Tri3, true),
+    ("M3D3", CellShape::Tri3, true),
+    ("R3D3", CellShape::Tri3, true),
+    ("S4", CellShape::Quad4, true),
+    ("M3D4", CellShape::Quad4, true),
+    ("R3D4", CellShape::Quad4, true),
+    ("SFM3D4", CellShape::Quad4, true),
+    ("C3D4", CellShape::Tet4, false),
+    ("C3D8", CellShape::Hex8, false),
+];
+
+/// Letters after a stem: reduced integration, incompatible modes, hybrid, with temperature or pore pressure, and what shells add.
+const VARIANTS: [&str; 18] = [
+    "", "R", "I", "H", "T", "P", "S", "RH", "IH", "RT", "HT", "RP", "PH", "RHT", "RPH", "RS",
+    "RSW", "R5",
+];
+
+/// Stems of elements of second order, with their names.
+const SECOND_ORDER: [(&str, &str); 20] = [
+    ("C3D10", "second-order tetrahedron"),
+    ("C3D20", "second-order hexahedron"),
+    ("C3D27", "second-order hexahedron"),
+    ("C3D15", "second-order prism"),
+    ("CPS6", "second-order triangle"),
+    ("CPE6", "second-order triangle"),
+    ("CPS8", "second-order quadrilateral"),
+    ("CPE8", "second-order quadrilateral"),
+    ("CAX6", "second-order axisymmetric triangle"),
+    ("CAX8", "second-order axisymmetric quadrilateral"),
+    ("S6", "second-order shell"),
+    ("S8", "second-order shell"),
+    ("S9", "second-order shell"),
+    ("STRI65", "second-order shell"),
+    ("M3D6", "second-order membrane"),
+    ("M3D8", "second-order membrane"),
+    ("T2D3", "second-order line"),
+    ("T3D3", "second-order line"),
+    ("B22", "second-order beam"),
+    ("B32", "second-order beam"),
+];
+
+/// Our shape for a type in capitals, or its name and a remedy.
+pub(super) fn kind(word: &str) -> Result<Kind, (&'static str, &'static str)> {
+    const ORDER: &str = "only first-order elements are read: mesh again with them, or convert the mesh (in Gmsh: SetOrder 1)";
+    const SHAPE: &str = "supported are lines, triangles, quadrilaterals, tetrahedra and hexahedra of first order: mesh without it";
+    let stem = |stem: &str| {
+        let rest = word.strip_prefix(stem)?;
+        VARIANTS.contains(&rest).then_some(())
+    };
+    for (name, shape, shell) in STEMS {
+        if stem(name).is_some() {
+            return Ok(Kind { shape, shell });
+        }
+    }
+    for (name, told) in SECOND_ORDER {
+        if word.starts_with(name) {
+            return Err((told, ORDER));
+        }
+    }
+    Err(match word {
+        _ if word.starts_with("C3D6") => ("prism", SHAPE),
+        _ if word.starts_with("C3D5") => ("pyramid", SHAPE),
+        _ => ("no continuum element that is known here", SHAPE),
+    })
+}

@@ -1,0 +1,212 @@
+//! The keywords of sets and surfaces.
+
+use super::body::{Members, Sets, Sides};
+use super::kinds::Face;
+use super::text::Card;
+use super::{Reader, fields, one};
+use crate::mesh::MeshError;
+
+/// Of what a set is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Of {
+    Nodes,
+    Elements,
+}
+
+impl<'a> Reader<'a> {
+    /// `*NSET` and `*ELSET`: numbers, ranges, and names of sets that stand above.
+    pub(super) fn set(&mut self, card: &Card<'a>) -> Result<(), MeshError> {
+        let of = match card.keyword.as_str() {
+            "NSET" => Of::Nodes,
+            _ => Of::Elements,
+        };
+        let name = card.required(&card.keyword, &self.source)?;
+        let body = self.body_named(card)?;
+        let mut members = Vec::new();
+        if let Some(cells) = card.get("ELSET").filter(|_| of == Of::Nodes) {
+            let cells = self.named(card.at, cells, body, Of::Elements)?;
+            members = self.nodes_of(card.at, &cells)?;
+        }
+        let generate = card.get("GENERATE").is_some();
+        while let Some((at, line)) = self.data()? {
+            if generate {
+                members.push(self.range(at, line, body)?);
+                continue;
+            }
+            for word in fields(line) {
+                members.extend(self.named(at, word, body, of)?);
+            }
+        }
+        self.sets(of).entry(name).extend(members);
+        Ok(())
+    }
+
+    fn sets(&mut self, of: Of) -> &mut Sets<Members> {
+        let body = self.body();
+        match of {
+            Of::Nodes => &mut body.node_sets,
+            Of::Elements => &mut body.element_sets,
+        }
+    }
+
+    /// To which body numbers belong: to the one that is being read, or to that of the parameter INSTANCE.
+    fn body_named(&self, card: &Card) -> Result<u32, MeshError> {
+        let Some(name) = card.get("INSTANCE") else {
+            return Ok(self.own());
+        };
+        match self.find_instance(name) {
+            Some(i) => Ok(i as u32),
+            None => Err(self.syntax(card.at, name, "the name of an instance above")),
+        }
+    }
+
+    /// `first, last[, step]`.
+    fn range(&self, at: usize, line: &str, body: u32) -> Result<Members, MeshError> {
+        let mut numbers = Vec::new();
+        self.numbers(at, line, &mut numbers)?;
+        let (first, last, step) = match numbers[..] {
+            [first, last] => (first, last, 1),
+            [first, last, step] => (first, last, step),
+            _ => return Err(self.syntax(at, line, "first, last and step of a range")),
+        };
+        if last < first {
+            return Err(self.syntax(at, line, "a range that ends after its beginning"));
+        }
+        Ok(Members {
+            body,
+            first,
+            last,
+            step,
+            range: true,
+            at,
+        })
+    }
+
+    /// What a word in a set stands for: a number, a set, or either of an instance.
+    fn named(
+        &mut self,
+        at: usize,
+        word: &str,
+        body: u32,
+        of: Of,
+    ) -> Result<Vec<Members>, MeshError> {
+        let of_body = |this: &mut Self, body: u32, word: &str| {
+            if word.starts_with(|c: char| c.is_ascii_digit()) && word.parse::<u64>().is_ok() {
+                let number = this.number(at, word, "a number of a set")?;
+                return Ok(Some(vec![one(body, number, at)]));
+            }
+            let sets = if body == this.own() {
+                this.sets(of)
+            } else {
+                let body = &mut this.bodies[body as usize];
+                match of {
+                    Of::Nodes => &mut body.node_sets,
+                    Of::Elements => &mut body.element_sets,
+                }
+            };
+            Ok(sets.get(word).map(<[Members]>::to_vec))
+        };
+        if let Some(members) = of_body(self, body, word)? {
+            return Ok(members);
+        }
+        let ends = word.match_indices('.').map(|(i, _)| i);
+        for end in ends.collect::<Vec<_>>() {
+            let Some(i) = self.find_instance(&word[..end]) else {
+                continue;
+            };
+            if let Some(members) = of_body(self, i as u32, &word[end + 1..])? {
+                return Ok(members);
+            }
+        }
+        Err(self.syntax(at, word, "a number, or the name of a set above"))
+    }
+
+    /// The nodes of elements, which have to stand above.
+    fn nodes_of(&mut self, at: usize, cells: &[Members]) -> Result<Vec<Members>, MeshError> {
+        let own = self.own();
+        let mut all = Vec::new();
+        for members in cells {
+            let body = if members.body == own {
+                &*self.body()
+            } else {
+                &self.bodies[members.body as usize]
+            };
+            let (places, missing) = members.find(&body.element_places);
+            if missing > 0 && !members.range {
+                let found = format!("element {} of the set", members.first);
+                return Err(self.syntax(at, &found, "an element that stands above"));
+            }
+            for place in places {
+                let nodes = body.nodes_of(&body.elements[place as usize]);
+                all.extend(nodes.iter().map(|&n| one(members.body, n, members.at)));
+            }
+        }
+        Ok(all)
+    }
+
+    /// `*SURFACE` of elements or nodes.
+    pub(super) fn surface(&mut self, card: &Card<'a>) -> Result<(), MeshError> {
+        let kind = card.get("TYPE").unwrap_or("ELEMENT").to_ascii_uppercase();
+        if !["ELEMENT", "NODE"].contains(&kind.as_str()) {
+            self.ignore(format!("SURFACE, TYPE={kind}"), card.at);
+            return Ok(());
+        }
+        for word in ["COMBINE", "CROP"] {
+            if card.get(word).is_some() {
+                return Err(self.unsupported(
+                    card.at,
+                    &format!("*SURFACE with {word}"),
+                    "write the surface by its elements and their faces",
+                ));
+            }
+        }
+        let name = card.required("NAME", &self.source)?;
+        let body = self.body_named(card)?;
+        while let Some((at, line)) = self.data()? {
+            let mut words = fields(line);
+            let whose = words.next().unwrap_or("");
+            if kind == "NODE" {
+                self.surface_of_nodes(at, name, whose, body)?;
+                continue;
+            }
+            let Some(label) = words.next() else {
+                return Err(self.unsupported(
+                    at,
+                    &format!("a surface of all free faces of {whose}"),
+                    "name the faces, S1 to S6, behind the element or its set",
+                ));
+            };
+            let Some(face) = Face::parse(label) else {
+                return Err(self.syntax(
+                    at,
+                    label,
+                    "a face (S1 to S6, SPOS, SNEG, E1 to E4, END1 or END2)",
+                ));
+            };
+            let members = self.named(at, whose, body, Of::Elements)?;
+            let sides = members.into_iter().map(|members| Sides {
+                members: Members { at, ..members },
+                face,
+            });
+            self.body().surfaces.entry(name).extend(sides);
+        }
+        Ok(())
+    }
+
+    fn surface_of_nodes(
+        &mut self,
+        at: usize,
+        name: &str,
+        whose: &str,
+        body: u32,
+    ) -> Result<(), MeshError> {
+        let same = super::body::key(name) == super::body::key(whose);
+        let members = self.named(at, whose, body, Of::Nodes)?;
+        let known = self.sets(Of::Nodes).entry(name);
+        // a surface of the set of its own name adds nothing to it
+        if !same || known.is_empty() {
+            known.extend(members);
+        }
+        Ok(())
+    }
+}
