@@ -46,6 +46,7 @@ fn point<const D: usize>(spacing: f64, m: i32) -> Point<D> {
         volumes: &volumes,
         factors: &vec![1.0; bonds.len()],
         horizon,
+        materials: None,
     };
     let linear = BondBased::<D>::new(Micromodulus::InverseDistance, SHEAR);
     let state = linear.coefficients(&family, &mut pair, &mut []).unwrap();
@@ -91,6 +92,7 @@ impl<const D: usize> Point<D> {
             is_whole: true,
             damage: 0.0,
             keeps_damage: false,
+            material: 0,
         };
         let mut force = vec![Vector::zeros(); self.bonds.len()];
         let mut after = past.to_vec();

@@ -312,6 +312,7 @@ pub(crate) fn failing_stretch<const D: usize>(
     Ok(
         critical_stretch(model, rest)?.and_then(|critical| match critical {
             Critical::Uniform(s) => Some(s),
+            Critical::ByMaterials(of) => Some(of.smallest()).filter(|s| s.is_finite()),
             Critical::ByHorizon(list) => list.iter().map(|(_, s)| *s).reduce(f64::min),
             Critical::Tearing(_) => None,
         }),
