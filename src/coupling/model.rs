@@ -19,10 +19,7 @@ use crate::{
     },
     fem,
     mesh::{CellShape, Mesh},
-    peridynamics::{
-        BondWeights, Cloud, Ends, Factors, Families, PdBody,
-        softening::{CalibrationError, RegularFamily},
-    },
+    peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody},
     progress::Progress,
     shape::Barriers,
     system::Symmetry,
@@ -280,41 +277,6 @@ impl<const D: usize> Model<D> {
         self.peridynamics = Some(p);
         result?;
         self.calibrate_law()
-    }
-
-    /// Gives a law the constants that follow from the lattice.
-    fn calibrate_law(&mut self) -> Result<(), ModelError> {
-        let (Some(p), Some(body)) = (&self.peridynamics, &self.body) else {
-            return Ok(());
-        };
-        let Some(law) = p.law.calibrate() else {
-            return Ok(());
-        };
-        let failed = |source| ModelError::Calibration {
-            law: p.law.name(),
-            source,
-        };
-        let [(factors, horizon)] = &self.factors[..] else {
-            return Err(failed(CalibrationError::Varies));
-        };
-        if body.cloud.horizon.iter().any(|of| of != horizon) {
-            return Err(failed(CalibrationError::Varies));
-        }
-        let whole = factors.regular_family(p.law.linearised(), *horizon)?;
-        let vectors = whole.vectors();
-        let bonds = vectors.iter().map(|(xi, v)| (*xi, whole.of(xi).0 * v));
-        let bonds: Vec<_> = bonds.collect();
-        let law = law
-            .to_lattice(&RegularFamily {
-                bonds: &bonds,
-                plane_energy: whole.plane_energy(),
-                horizon: *horizon,
-            })
-            .map_err(failed)?;
-        if let Some(p) = &mut self.peridynamics {
-            p.law = law;
-        }
-        Ok(())
     }
 
     fn place_points_of(

@@ -8,7 +8,10 @@ use crate::{
         point_cloud::PointCloud,
     },
     mesh::boundary::BoundaryFacet,
-    peridynamics::{Families, Law, LinearForceState, PartialVolume, TIE_TOLERANCE},
+    peridynamics::{
+        Families, Law, LinearForceState, PartialVolume, TIE_TOLERANCE,
+        softening::{CalibrationError, RegularFamily},
+    },
     tensor::{Tensor4, Vector},
 };
 
@@ -324,6 +327,41 @@ impl<const D: usize> Model<D> {
             Ok((*horizon, family.plane_energy()))
         };
         self.factors.iter().map(of).collect()
+    }
+
+    /// Gives a law the constants that follow from the lattice.
+    pub(super) fn calibrate_law(&mut self) -> Result<(), ModelError> {
+        let (Some(p), Some(body)) = (&self.peridynamics, self.body()) else {
+            return Ok(());
+        };
+        let Some(law) = p.law.calibrate() else {
+            return Ok(());
+        };
+        let failed = |source| ModelError::Calibration {
+            law: p.law.name(),
+            source,
+        };
+        let [(factors, horizon)] = &self.factors[..] else {
+            return Err(failed(CalibrationError::Varies));
+        };
+        if body.cloud.horizon.iter().any(|of| of != horizon) {
+            return Err(failed(CalibrationError::Varies));
+        }
+        let whole = factors.regular_family(p.law.linearised(), *horizon)?;
+        let vectors = whole.vectors();
+        let bonds = vectors.iter().map(|(xi, v)| (*xi, whole.of(xi).0 * v));
+        let bonds: Vec<_> = bonds.collect();
+        let law = law
+            .to_lattice(&RegularFamily {
+                bonds: &bonds,
+                plane_energy: whole.plane_energy(),
+                horizon: *horizon,
+            })
+            .map_err(failed)?;
+        if let Some(p) = &mut self.peridynamics {
+            p.law = law;
+        }
+        Ok(())
     }
 
     /// Spacing of the lattice of a point of the cloud \[m\], of several the point's own.

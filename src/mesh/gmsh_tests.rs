@@ -400,7 +400,7 @@ fn truncated_and_empty_files() {
         missing.starts_with("no/such.msh") && missing.contains("check that"),
         "{missing}"
     );
-    let odd = written("mesh.inp", b"");
+    let odd = written("mesh.unv", b"");
     let odd = read::<2>(&odd.1).unwrap_err().to_string();
     assert!(odd.contains("use .msh"), "{odd}");
 }

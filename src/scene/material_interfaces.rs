@@ -83,7 +83,15 @@ fn interface<const D: usize>(
             .help(format!("use two of {}", known.join(", ")))
         })
     };
-    let [first, second] = &typed.between;
+    let [first, second] = &typed.between[..] else {
+        let count = typed.between.len();
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`interfaces.{name}.between` names {count} materials"),
+        )
+        .label(name.span.clone(), "bonds join two")
+        .help("name two materials, and add a table for each other pair"));
+    };
     let (a, b) = (number(first)?, number(second)?);
     if a == b {
         return Err(SceneError::new(
@@ -222,7 +230,7 @@ pub(crate) fn law_of_points<const D: usize>(
             )
             .label(span_of(spec, &a.name), "one")
             .label(span_of(spec, &b.name), "another")
-            .help("give both the same law with their own constants, or keep the nonlocal and transition zones within one of them"))
+            .help("keep the nonlocal and transition zones within one of them, or give both the same law; a softening-bond does not mix"))
         }
     }
 }
@@ -286,10 +294,10 @@ pub(crate) fn unused<const D: usize>(
         .iter()
         .filter(|(_, i)| !i.between.iter().all(has_points));
     idle.map(|(name, i)| {
-        let [a, b] = &i.between;
+        let names: Vec<String> = i.between.iter().map(|m| format!("`{m}`")).collect();
         format!(
-            "the interface `{name}` is not used: no points of `{}` and `{}` have bonds with each other",
-            a.value, b.value
+            "the interface `{name}` is not used: no points of {} have bonds with each other",
+            names.join(" and ")
         )
     })
     .collect()

@@ -210,9 +210,13 @@ impl<'a> Reader<'a> {
             let Some((at, line)) = self.data()? else {
                 break;
             };
-            let numbers: Vec<f64> = fields(line)
+            let mut numbers: Vec<f64> = fields(line)
                 .map(|word| self.real(at, word))
                 .collect::<Result<_, _>>()?;
+            if count == 3 && (1..3).contains(&numbers.len()) {
+                // what a card leaves out is zero
+                numbers.resize(3, 0.0);
+            }
             let motion = found.get_or_insert(Motion::default());
             match (count, &numbers[..]) {
                 (3, &[x, y, z]) => motion.translation = [x, y, z],

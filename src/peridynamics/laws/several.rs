@@ -85,7 +85,7 @@ fn difference<const D: usize>(a: &dyn Law<D>, b: &dyn Law<D>) -> Option<&'static
         return Some("their laws differ, so that the weights of a lattice do not suit both");
     }
     if a.calibrate().is_some() {
-        return Some("their strength is that of a lattice of one material");
+        return Some("the strength of their bonds is calibrated to a lattice of one material");
     }
     if history(a) != history(b) {
         return Some("their points remember different numbers");
@@ -114,7 +114,7 @@ impl<const D: usize> Several<D> {
         let (count, first) = (laws.len(), used[0]);
         let law = |m: u16| laws[usize::from(m)].as_ref();
         let mut stiffness = vec![1.0; count];
-        for &second in used {
+        for &second in used.iter().filter(|m| **m != first) {
             if let Some(why) = difference(law(first), law(second)) {
                 return Err(NoMixture { first, second, why });
             }

@@ -42,7 +42,7 @@ impl<const D: usize> NamedLaw<D> for SofteningBond<D> {
             default: None,
             least: 1e-100,
             most: 1e100,
-            usual: 0.12,
+            usual: 0.04,
             words: &[],
         },
         Parameter {
@@ -51,7 +51,7 @@ impl<const D: usize> NamedLaw<D> for SofteningBond<D> {
             default: None,
             least: 1e-100,
             most: 1e100,
-            usual: 0.01,
+            usual: 0.0005,
             words: &[],
         },
         Parameter::words(

@@ -55,8 +55,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         PrecisionSpec::Double => Storage::Double,
         PrecisionSpec::Single => Storage::Single,
     };
-    let calibration = (model.peridynamics.as_ref()).and_then(|p| p.law.calibrate()?.found());
-    let breaks = calibration.unwrap_or_else(|| failure_text(critical_stretch.as_ref(), breaking));
+    let breaks = failure_text(model, critical_stretch.as_ref(), breaking);
     let density = |material: u16| rest.density[material as usize];
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
     let is_linear = critical_stretch.is_none()
@@ -116,8 +115,17 @@ pub(crate) fn dynamic<'a, const D: usize>(
         Err(error) => Err(error.into()),
     }
 }
-/// In words: at which stretch bonds break, and what fracture energy that is.
-fn failure_text<const D: usize>(critical: Option<&Critical>, breaking: &Breaking<D>) -> String {
+
+/// In words: at which stretch bonds break, and what fracture energy that is; or what a law was calibrated to.
+fn failure_text<const D: usize>(
+    model: &Model<D>,
+    critical: Option<&Critical>,
+    breaking: &Breaking<D>,
+) -> String {
+    let law = model.peridynamics.as_ref().map(|p| &p.law);
+    if let Some(found) = law.and_then(|law| law.calibrate()?.found()) {
+        return found;
+    }
     let stretches = critical.map(|critical| match critical {
         Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
         Critical::ByHorizon(list) => {

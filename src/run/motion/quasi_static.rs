@@ -88,6 +88,8 @@ fn load_steps<const D: usize>(
     let edge = saved.as_ref().and_then(|s| s.edge);
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
+    let failing = failing_stretch(model, rest)?;
+    let rotations = Rotations::new(model, rest, laid_out.moving.is_linear, failing);
     let mut observer = LoadStepObserver {
         model,
         rest,
@@ -99,12 +101,7 @@ fn load_steps<const D: usize>(
         drive: &drive,
         fields: FieldOutput::new(model, operator),
         recorder,
-        rotations: Rotations::new(
-            model,
-            rest,
-            laid_out.moving.is_linear,
-            failing_stretch(model, rest)?,
-        ),
+        rotations,
         state,
         edge,
         ended: Ended::Finished,

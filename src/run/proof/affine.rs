@@ -320,7 +320,6 @@ fn unbalanced<const D: usize>(
         boundary: &boundary,
         held: &held,
         reach,
-        scale: tensor.amax(),
         centre: centre(model),
     };
     let classified = Classified {

@@ -28,8 +28,6 @@ pub(super) struct Around<'a, const D: usize> {
     pub held: &'a [bool],
     /// How far families reach into each other at a site: sites nearer than this to a boundary lack bonds.
     pub reach: f64,
-    /// The stress of a field is this large.
-    pub scale: f64,
     /// The point that all fields leave in place.
     pub centre: Vector<D>,
 }
@@ -198,13 +196,16 @@ fn largest<const D: usize>(
         relative: 0.0,
         at: model.sites[list[0] as usize].position,
     };
-    let mut compare = |stress: Tensor<D>, exact: Tensor<D>, at: Vector<D>| {
-        let difference = (stress - exact) / around.scale;
+    // over the stress of the place's own material
+    let mut compare = |stress: Tensor<D>, cell: usize, at: Vector<D>| {
+        let tensor = model.tensor_of_cell(cell);
+        let (exact, scale) = (tensor.contract(gradient), tensor.amax());
+        let difference = (stress - exact) / scale;
         for i in 0..D {
             for j in i..D {
                 let size = difference[(i, j)].abs();
                 if size.is_nan() || size > found.relative.abs() * (1.0 + 1e-9) {
-                    let sign = exact[(i, j)].abs() > 0.5 * around.scale;
+                    let sign = exact[(i, j)].abs() > 0.5 * scale;
                     let signed = difference[(i, j)] * exact[(i, j)].signum();
                     found = StressError {
                         relative: if sign { signed } else { size },
@@ -237,8 +238,7 @@ fn largest<const D: usize>(
         match (site.kind, model.point_of(s as usize)) {
             (SiteKind::Point(_), Some((body, p))) => {
                 let Some(c) = cell_of_point(p) else { continue };
-                let exact = model.tensor_of_cell(c).contract(gradient);
-                compare(body.partial_stress(p, u), exact, site.position);
+                compare(body.partial_stress(p, u), c, site.position);
             }
             _ => cells.extend(model.cells_of_site(s as usize).map(|(c, _)| c)),
         }
@@ -247,12 +247,11 @@ fn largest<const D: usize>(
     cells.dedup();
     for c in cells.into_iter().filter(|&c| model.is_element(c)) {
         let node = |n: usize| model.node_transfer.displacement::<D>(n, u);
-        let exact = model.tensor_of_cell(c).contract(gradient);
         let stress = around.operator.cell_stress(c, u).unwrap_or_else(|| {
             let g = fem::displacement_gradient_at_centre(&model.mesh, c, node);
             model.tensor_of_cell(c).contract(&g)
         });
-        compare(stress, exact, model.mesh.centroid(c));
+        compare(stress, c, model.mesh.centroid(c));
     }
     found
 }

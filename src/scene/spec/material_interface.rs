@@ -11,7 +11,7 @@ use crate::scene::value::{Number, Text};
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MaterialInterfaceSpec {
     /// The names of the two materials.
-    pub between: [Text; 2],
+    pub between: Vec<Text>,
     /// The stiffness of these bonds, of laws whose bonds act alone; "harmonic-mean" if left out.
     #[serde(default)]
     #[schemars(with = "Option<StiffnessSpec>")]
