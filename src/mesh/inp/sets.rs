@@ -21,6 +21,12 @@ impl<'a> Reader<'a> {
             _ => Of::Elements,
         };
         let name = card.required(&card.keyword, &self.source)?;
+        // meshio hands on what a file of Gmsh says of its geometry as a set, with negative numbers
+        if name.eq_ignore_ascii_case("gmsh:bounding_entities") {
+            self.ignore(format!("{}={name}", card.keyword), card.at);
+            while self.data()?.is_some() {}
+            return Ok(());
+        }
         let body = self.body_named(card)?;
         let mut members = Vec::new();
         if let Some(cells) = card.get("ELSET").filter(|_| of == Of::Nodes) {

@@ -295,6 +295,12 @@ fn sets_of_numbers_ranges_and_sets() {
         "{:?}",
         mesh.notes
     );
+    let of_meshio = plane(&format!(
+        "{SQUARES}*ELSET, ELSET=gmsh:bounding_entities\n2,-1\n*ELSET, ELSET=one\n10\n"
+    ));
+    assert_eq!(of_meshio.cell_sets["one"], [0]);
+    assert!(!of_meshio.cell_sets.contains_key("gmsh:bounding_entities"));
+    assert!(of_meshio.notes[0].contains("gmsh:bounding_entities"));
     // a range as wide as the numbers go takes no time
     let wide = plane(&format!("{SQUARES}*NSET, NSET=w, GENERATE\n1, 999999999\n"));
     assert_eq!(wide.node_sets["w"].len(), 6);
