@@ -289,7 +289,7 @@ pub enum MeshError {
     },
     /// Two nodes at one place.
     #[error(
-        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart); merge them (in Gmsh: Coherence Mesh)"
+        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart); merge them (in Gmsh: Coherence Mesh; in a deck: Merge Instances), or leave a gap between parts that are not bonded"
     )]
     CoincidentNodes {
         /// Number of one, from 0.
