@@ -179,7 +179,10 @@ impl MotionSummary {
         ] {
             writeln!(f, "{name:<22} {}", number(value))?;
         }
-        if let Some(cracks) = &self.cracks {
+        // of bonds that lose their stiffness by the law, breaking takes nothing more
+        let by_law_alone = self.inelastic_energy.is_some();
+        let cracks = self.cracks.as_ref();
+        if let Some(cracks) = cracks.filter(|c| c.dissipated_energy != 0.0 || !by_law_alone) {
             cracks.write(dimension, f)?;
         }
         if let Some(energy) = self.inelastic_energy {
