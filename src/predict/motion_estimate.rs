@@ -354,6 +354,11 @@ pub(crate) fn load_steps<const D: usize>(
             "the time of {} load steps is not in the estimate: it depends on the bonds that break",
             spec.steps
         ));
+        if laid_out.rest.breaking.damages {
+            // small runs may take minutes where cracks open
+            prediction.no_error =
+                Some("the time of runs with other spacings is not known: --pilots 60".to_owned());
+        }
         holds(&prediction)?;
         Ok(prediction)
     })

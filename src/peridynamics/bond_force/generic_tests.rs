@@ -507,7 +507,11 @@ fn damaged(
         Some(failure),
         false,
         |mut pass| {
-            let u = noise(n, size * H, 8);
+            // all bonds are stretched: some laws are damaged under tension alone
+            let mut u = noise(n, 0.1 * size * H, 8);
+            for (u, x) in u.iter_mut().zip(case.position.iter().flatten()) {
+                *u += size * x;
+            }
             let mut force = vec![0.0; n];
             let mut count = 0;
             match state {
@@ -561,10 +565,10 @@ fn damage_that_laws_keep_of_their_bonds_is_shown_counted_and_put_back() {
         let none = damaged(&case, law, &[], 1e-4, None);
         assert!(none.damage.iter().all(|d| *d == 0.0), "{name}");
         assert_eq!([none.count, none.gone], [0, 0], "{name}");
-        let part = damaged(&case, law, &[], 0.05, None);
+        let part = damaged(&case, law, &[], 0.03, None);
         let partly = part.damage.iter().filter(|d| **d > 0.0 && **d < 1.0);
         assert!(2 * partly.count() > points, "{name}");
-        let again = damaged(&case, law, &[], 0.05, Some(&part.state));
+        let again = damaged(&case, law, &[], 0.03, Some(&part.state));
         assert_eq!(again.damage, part.damage, "{name}");
         let through = damaged(&case, law, &[], 5.0, None);
         assert!(through.damage.iter().all(|d| *d == 1.0), "{name}");

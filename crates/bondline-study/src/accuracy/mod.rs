@@ -108,6 +108,10 @@ pub fn check_source(
         prediction.no_error = Some("the model was counted, not laid out".to_owned());
         return Ok(prediction);
     }
+    if prediction.no_error.is_some() && pilots.is_none() {
+        return Ok(prediction);
+    }
+    prediction.no_error = None;
     progress.stage("coarser and finer runs", None);
     let known = chosen.as_ref().and_then(|(_, c)| c.prediction());
     let found = match (known, pilots) {
