@@ -1,7 +1,7 @@
 //! Interfaces of two materials: what opening one costs, and whether a crack that meets one at a right angle turns into it or goes through.
 //!
 //! A crack in one of two materials of equal elasticity ends at their interface, normal to it. The energy release rate of a crack that turns along the interface is about 0.26 of that of one that goes on straight
-//! [HeHutchinson1989], so it turns where the toughness of the interface is below that part of the toughness of the material behind.
+//! \[HeHutchinson1989\], so it turns where the toughness of the interface is below that part of the toughness of the material behind.
 
 use rayon::prelude::*;
 
