@@ -107,11 +107,8 @@ pub struct Row<const D: usize> {
     places: Vec<u32>,
     place_blocks: Vec<Tensor<D>>,
     /// Stiffnesses of elements, each at its number's remainder: nodes that follow each other have elements in common.
-    elements: Vec<(u32, ElementRows<D>)>,
+    elements: Vec<(u32, Vec<Tensor<D>>)>,
 }
-
-/// The block rows of an element's stiffness, by the nodes of row and column.
-pub type ElementRows<const D: usize> = [[Tensor<D>; 8]; 8];
 
 const EMPTY: u32 = u32::MAX;
 
@@ -132,23 +129,31 @@ impl<const D: usize> Row<D> {
         }
     }
 
-    /// The block row of a local node in the stiffness of an element of the one model that the row is for; `stiffness` is asked where the element is not remembered.
+    /// Calls `add` with each block of the row of a local node in the stiffness of an element of the one model that the row is for; `stiffness` is asked where the element is not remembered.
     ///
-    /// Shapes: one block of `D` by `D` per node of the element, in its order; zeros beyond its last node. Units: \[N/m^(4−D)\], as those of [`crate::fem::stiffness`].
+    /// Shapes: `nodes` are those of the element; `stiffness` overwrites a list of `nodes.len()²` blocks of `D` by `D`, row by row, and `add` gets one with its node. Units: \[N/m^(4−D)\], as those of [`crate::fem::stiffness_into`].
     pub fn element_row(
         &mut self,
-        element: usize,
+        (element, nodes): (usize, &[u32]),
         local_node: usize,
-        stiffness: impl FnOnce() -> ElementRows<D>,
-    ) -> [Tensor<D>; 8] {
+        stiffness: impl FnOnce(&mut Vec<Tensor<D>>),
+        mut add: impl FnMut(&mut Self, u32, &Tensor<D>),
+    ) {
         if self.elements.is_empty() {
-            self.elements = vec![(EMPTY, [[Tensor::zeros(); 8]; 8]); ELEMENTS];
+            self.elements = vec![(EMPTY, Vec::new()); ELEMENTS];
         }
-        let (known, rows) = &mut self.elements[element % ELEMENTS];
+        let (known, blocks) = &mut self.elements[element % ELEMENTS];
         if *known as usize != element {
-            (*known, *rows) = (element as u32, stiffness());
+            *known = element as u32;
+            stiffness(blocks);
         }
-        rows[local_node]
+        // out of the row while it is added to
+        let blocks = std::mem::take(blocks);
+        let own = &blocks[local_node * nodes.len()..][..nodes.len()];
+        for (&node, block) in nodes.iter().zip(own) {
+            add(self, node, block);
+        }
+        self.elements[element % ELEMENTS].1 = blocks;
     }
 
     /// Adds `block · u(site)` to the row.
@@ -472,125 +477,5 @@ pub fn pattern<const D: usize>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A ring of sites, each joined to the next ones; `skew` times an antisymmetric part.
-    fn ring(sites: usize, skew: f64) -> impl Fn(usize, &mut Row<2>) + Sync {
-        move |site, row| {
-            let k = Tensor::<2>::new(2.0, 1.0, 1.0, 3.0);
-            for (step, sign) in [(1, 1.0), (sites - 1, -1.0)] {
-                row.add_site(((site + step) % sites) as u32, &(k * (skew * sign - 1.0)));
-            }
-            row.add_site(((site + 5) % sites) as u32, &Tensor::zeros());
-            row.add_site(site as u32, &(k * 2.0));
-        }
-    }
-
-    #[test]
-    fn remembered_elements_are_told_apart() {
-        let mut row = Row::<2>::new(1);
-        let stiffness = |element: usize| {
-            let entry = |a: usize, b: usize| Tensor::repeat((100 * element + 10 * a + b) as f64);
-            std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b)))
-        };
-        let asked = std::cell::Cell::new(0);
-        // the third takes the place of the first
-        for (element, times) in [(3, 1), (4, 2), (3, 2), (3 + ELEMENTS, 3), (3, 4), (4, 4)] {
-            for local in [0, 5] {
-                let blocks = row.element_row(element, local, || {
-                    asked.set(asked.get() + 1);
-                    stiffness(element)
-                });
-                assert_eq!(blocks, stiffness(element)[local], "{element}");
-            }
-            assert_eq!(asked.get(), times, "{element}");
-        }
-    }
-
-    #[test]
-    fn the_pattern_is_that_of_the_matrix() {
-        for skew in [0.0, 1e-3] {
-            let sites = 10_000;
-            let matrix = assemble(sites, |_| (), ring(sites, skew));
-            let field: Vec<f64> = (0..2 * sites).map(|k| (k as f64).sin()).collect();
-            let found = pattern(
-                sites,
-                std::slice::from_ref(&field),
-                |_| (),
-                ring(sites, skew),
-            );
-            for (a, b) in found.products[0].iter().zip(matrix.multiply(&field)) {
-                assert!((a - b).abs() < 1e-13, "{a} {b}");
-            }
-            assert_eq!(matrix.rows(), sites);
-            assert_eq!(found.row_offsets.len(), sites + 1);
-            assert_eq!(found.stored * 4, matrix.nonzeros());
-            for i in [0, 255, 256, 4095, 4096, 9999] {
-                let mut wanted = vec![
-                    ((i + sites - 1) % sites) as u32,
-                    i as u32,
-                    ((i + 1) % sites) as u32,
-                ];
-                wanted.sort_unstable();
-                let row = found.row_offsets[i]..found.row_offsets[i + 1];
-                assert_eq!(found.columns[row], wanted);
-                assert_eq!(matrix.row(i).0.len(), 4);
-                assert!(matrix.row(i).0.is_sorted());
-            }
-            let exact = matrix.asymmetry();
-            if skew == 0.0 {
-                assert!(
-                    exact == 0.0 && found.asymmetry < 1e-13,
-                    "{}",
-                    found.asymmetry
-                );
-            } else {
-                let ratio = found.asymmetry / exact;
-                assert!((0.01..10.0).contains(&ratio), "{ratio}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_place_is_the_sum_of_its_weights() {
-        let transfer = Transfer::from_rows([
-            vec![(3, 0.25), (1, 0.5), (3, 0.25), (0, 0.0)],
-            vec![],
-            vec![(2, 1.0)],
-        ]);
-        assert_eq!(transfer.len(), 3);
-        assert_eq!(transfer.row(0).collect::<Vec<_>>(), [(1, 0.5), (3, 0.5)]);
-        assert_eq!(transfer.row(1).count(), 0);
-        let u = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
-        assert_eq!(
-            transfer.displacement::<2>(0, &u),
-            Vector::<2>::new(5.0, 6.0)
-        );
-        assert_eq!(
-            transfer.displacement::<2>(2, &u),
-            Vector::<2>::new(5.0, 6.0)
-        );
-    }
-
-    #[test]
-    fn rows_are_sorted_summed_and_reused() {
-        let transfer = Transfer::from_rows([vec![(5, 0.5), (1, 0.5)]]);
-        let matrix = assemble::<2>(
-            600,
-            |_| {},
-            |site, row| {
-                row.add(&transfer, 0, &(Tensor::identity() * site as f64));
-                row.add_site(site as u32, &Tensor::<2>::new(1.0, 2.0, 3.0, 4.0));
-                row.add_site(site as u32, &Tensor::<2>::new(1.0, 2.0, 3.0, 4.0));
-            },
-        );
-        assert_eq!(matrix.rows(), 600);
-        let (columns, blocks) = matrix.row(7);
-        assert_eq!(columns, [1, 5, 7]);
-        assert_eq!(blocks[..4], [3.5, 0.0, 0.0, 3.5]);
-        assert_eq!(blocks[8..], [2.0, 4.0, 6.0, 8.0]);
-        assert_eq!(matrix.row(1).0, [1, 5]);
-        assert_eq!(matrix.row(1).1[..4], [2.5, 4.0, 6.0, 8.5]);
-    }
-}
+#[path = "assembly_tests.rs"]
+mod tests;

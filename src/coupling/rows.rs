@@ -15,11 +15,7 @@ impl<const D: usize> Model<D> {
             if self.roles[c] == CellRole::StressElement || !self.node_takes(c) {
                 continue;
             }
-            let stiffness = || fem::stiffness(&self.mesh, c, self.tensor_of_cell(c));
-            let blocks = row.element_row(c, local, stiffness);
-            for (b, &n) in self.mesh.cell(c).iter().enumerate() {
-                row.add(&self.node_transfer, n as usize, &blocks[b]);
-            }
+            self.add_element_row(c, local, row);
         }
     }
 
@@ -35,12 +31,19 @@ impl<const D: usize> Model<D> {
             if !self.is_element(c) {
                 continue;
             }
-            let stiffness = || fem::stiffness(&self.mesh, c, self.tensor_of_cell(c));
-            let blocks = row.element_row(c, local, stiffness);
-            for (b, &n) in cell.iter().enumerate() {
-                row.add(&self.node_transfer, n as usize, &blocks[b]);
-            }
+            self.add_element_row(c, local, row);
         }
+    }
+
+    /// Adds the row of a local node in the stiffness of cell `c`.
+    fn add_element_row(&self, c: usize, local: usize, row: &mut Row<D>) {
+        let stiffness = |blocks: &mut Vec<_>| {
+            fem::stiffness_into(&self.mesh, c, self.tensor_of_cell(c), blocks);
+        };
+        let add = |row: &mut Row<D>, n: u32, block: &_| {
+            row.add(&self.node_transfer, n as usize, block);
+        };
+        row.element_row((c, self.mesh.cell(c)), local, stiffness, add);
     }
 
     /// Adds the row that a site has in the stiffness: that of the operator times its [`Model::row_scale`].

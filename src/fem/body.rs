@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::cell::Rule;
+use super::cell::{MAX_NODES, Rule};
 use super::element::{
     QuadraturePoint, displacement_gradient, for_each_point, jacobian, quadrature, reference,
     relative_nodes, row_at,
@@ -93,7 +93,7 @@ fn check_cell<const D: usize>(mesh: &Mesh<D>, c: usize) -> Result<(), FemError> 
     let (_, x) = relative_nodes(mesh, c);
     let size = 0.5 * x.iter().map(|x| x.norm()).fold(0.0, f64::max);
     for (xi, _) in cell.stiffness {
-        let ratio = determinant(&jacobian(&x, &(cell.gradients)(xi))) / size.powi(D as i32);
+        let ratio = determinant(&jacobian(&x[..cell.nodes()], &(cell.gradients)(xi))) / size.powi(D as i32);
         // a comparison that also refuses a ratio that is not a number
         if ratio.is_nan() || ratio <= DEGENERATE {
             return Err(FemError::Degenerate {
@@ -183,7 +183,7 @@ pub fn assemble<'a, const D: usize>(
                 if !(first..last).contains(&n) {
                     continue;
                 }
-                let mut blocks = [Tensor::<D>::zeros(); 8];
+                let mut blocks = [Tensor::<D>::zeros(); MAX_NODES];
                 for p in &points {
                     row_at(p, tangent, a, &mut blocks);
                 }

@@ -8,6 +8,14 @@ pub(super) const GAUSS: f64 = 0.577_350_269_189_625_8;
 /// `√(3/5)`, the outer abscissa of the three-point Gauss rule.
 pub(super) const GAUSS_3: f64 = 0.774_596_669_241_483_4;
 
+/// The most nodes that a cell has: what arrays with an entry per node have room for.
+///
+/// Loops run over the nodes of the cell at hand, so that small cells pay for no more than zeros.
+pub const MAX_NODES: usize = 20;
+
+/// One entry per node of a cell; those beyond its nodes are zero.
+pub type PerNode<T> = [T; MAX_NODES];
+
 /// One point of a quadrature rule: reference coordinates (unused ones are zero) and weight.
 pub type RulePoint = ([f64; 3], f64);
 
@@ -20,7 +28,7 @@ pub enum Rule {
     Mass,
 }
 
-/// A cell on its reference domain. All arrays have room for eight nodes; entries beyond the cell's are zero.
+/// A cell on its reference domain.
 #[derive(Debug)]
 pub struct ReferenceCell {
     /// The shape that this describes.
@@ -30,9 +38,9 @@ pub struct ReferenceCell {
     /// Reference coordinates of the centre.
     pub centre: [f64; 3],
     /// Shape functions `N_a(ξ)`.
-    pub values: fn(&[f64; 3]) -> [f64; 8],
+    pub values: fn(&[f64; 3]) -> PerNode<f64>,
     /// Their gradients `∂N_a/∂ξ_j`.
-    pub gradients: fn(&[f64; 3]) -> [[f64; 3]; 8],
+    pub gradients: fn(&[f64; 3]) -> PerNode<[f64; 3]>,
     /// How far ξ lies outside of the reference domain, in units of its extent; negative inside.
     pub outside: fn(&[f64; 3]) -> f64,
     /// The rule of [`Rule::Stiffness`].
@@ -106,7 +114,7 @@ mod tests {
                     up[j] += 1e-4;
                     down[j] -= 1e-4;
                     let (up, down) = ((cell.values)(&up), (cell.values)(&down));
-                    for a in 0..8 {
+                    for a in 0..MAX_NODES {
                         let difference = (up[a] - down[a]) / 2e-4;
                         assert!((difference - g[a][j]).abs() < 1e-11, "{:?}", cell.shape);
                     }

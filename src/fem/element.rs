@@ -1,13 +1,13 @@
 //! Quadrature points in space, block rows of an element's stiffness, and fields inside of a cell.
 
-use super::cell::{ReferenceCell, Rule};
+use super::cell::{MAX_NODES, PerNode, ReferenceCell, Rule};
 use super::reference_cell;
 use crate::mesh::Mesh;
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, padded};
 
 /// A quadrature point of a cell, in space.
 ///
-/// Shapes: `shape` and `gradient` have room for eight nodes; entries from `nodes` on are zero.
+/// Shapes: `shape` and `gradient` have room for the nodes of any cell; entries from `nodes` on are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadraturePoint<const D: usize> {
     /// Position \[m\].
@@ -15,9 +15,9 @@ pub struct QuadraturePoint<const D: usize> {
     /// `|det J| w` [m^D].
     pub weight: f64,
     /// Shape functions `N_a`.
-    pub shape: [f64; 8],
+    pub shape: PerNode<f64>,
     /// Their gradients `∂N_a/∂x` [1/m]; they add up to zero.
-    pub gradient: [Vector<D>; 8],
+    pub gradient: PerNode<Vector<D>>,
     /// Number of nodes.
     pub nodes: usize,
 }
@@ -36,18 +36,18 @@ pub(super) fn reference<const D: usize>(
 pub(super) fn relative_nodes<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,
-) -> (Vector<D>, [Vector<D>; 8]) {
+) -> (Vector<D>, PerNode<Vector<D>>) {
     let nodes = mesh.cell(c);
     let origin = mesh.nodes[nodes[0] as usize];
-    let mut x = [Vector::zeros(); 8];
+    let mut x = [Vector::zeros(); MAX_NODES];
     for (x, &n) in x.iter_mut().zip(nodes) {
         *x = mesh.nodes[n as usize] - origin;
     }
     (origin, x)
 }
 
-/// `J_ij = ∂x_i/∂ξ_j` from node positions and reference gradients.
-pub(super) fn jacobian<const D: usize>(x: &[Vector<D>; 8], gradients: &[[f64; 3]; 8]) -> Tensor<D> {
+/// `J_ij = ∂x_i/∂ξ_j` from the positions of a cell's nodes and reference gradients.
+pub(super) fn jacobian<const D: usize>(x: &[Vector<D>], gradients: &[[f64; 3]]) -> Tensor<D> {
     let mut j = Tensor::zeros();
     for (x, g) in x.iter().zip(gradients) {
         for k in 0..D {
@@ -63,18 +63,19 @@ pub(super) fn jacobian<const D: usize>(x: &[Vector<D>; 8], gradients: &[[f64; 3]
 fn point_at<const D: usize>(
     cell: &ReferenceCell,
     origin: &Vector<D>,
-    x: &[Vector<D>; 8],
+    x: &[Vector<D>],
     xi: &[f64; 3],
     w: f64,
 ) -> QuadraturePoint<D> {
     let shape = (cell.values)(xi);
     let reference_gradients = (cell.gradients)(xi);
     let nodes = cell.nodes();
+    let x = &x[..nodes];
     let mut position = *origin;
     for (n, x) in shape.iter().zip(x) {
         position += x * *n;
     }
-    let mut gradient = [Vector::zeros(); 8];
+    let mut gradient = [Vector::zeros(); MAX_NODES];
     let mut weight = 0.0;
     if let Some((inverse, det)) = inverse(&jacobian(x, &reference_gradients)) {
         weight = det.abs() * w;
@@ -136,10 +137,10 @@ pub fn shape_values<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,
     reference_coordinates: &Vector<D>,
-) -> ([f64; 8], usize) {
+) -> (PerNode<f64>, usize) {
     match reference(mesh, c) {
         Some(cell) => ((cell.values)(&padded(reference_coordinates)), cell.nodes()),
-        None => ([0.0; 8], 0),
+        None => ([0.0; MAX_NODES], 0),
     }
 }
 
@@ -150,7 +151,7 @@ pub fn row_at<const D: usize>(
     point: &QuadraturePoint<D>,
     tangent: &Tensor4<D>,
     local_node: usize,
-    blocks: &mut [Tensor<D>; 8],
+    blocks: &mut [Tensor<D>],
 ) {
     // a_j C_ijkl is common to all blocks of the row; contracting it first halves the work in 3D and more
     let ga = point.gradient[local_node] * point.weight;
@@ -173,19 +174,21 @@ pub fn row_at<const D: usize>(
     }
 }
 
-/// The block rows of the stiffness of cell `c`, `K u = f_external`: `[a][b]` is the block of local nodes a and b; blocks beyond the cell's nodes are zero.
-pub fn stiffness<const D: usize>(
+/// The stiffness of cell `c`, `K u = f_external`, row by row: the block of local nodes a and b is number `a · nodes + b`; overwrites `blocks`.
+pub fn stiffness_into<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,
     tangent: &Tensor4<D>,
-) -> [[Tensor<D>; 8]; 8] {
-    let mut rows = [[Tensor::zeros(); 8]; 8];
+    blocks: &mut Vec<Tensor<D>>,
+) {
+    let nodes = reference(mesh, c).map_or(0, ReferenceCell::nodes);
+    blocks.clear();
+    blocks.resize(nodes * nodes, Tensor::zeros());
     for_each_point(mesh, c, Rule::Stiffness, |p| {
-        for (a, blocks) in rows.iter_mut().enumerate().take(p.nodes) {
-            row_at(p, tangent, a, blocks);
+        for (a, row) in blocks.chunks_exact_mut(nodes).enumerate() {
+            row_at(p, tangent, a, row);
         }
     });
-    rows
 }
 
 /// Length, area or volume of cell `c` [m^D].
@@ -239,6 +242,18 @@ mod tests {
             .unwrap()
             .stiffness(kinematics)
             .unwrap()
+    }
+
+    /// The block rows of a cell's stiffness.
+    fn stiffness<const D: usize>(
+        mesh: &Mesh<D>,
+        c: usize,
+        tangent: &Tensor4<D>,
+    ) -> Vec<Vec<Tensor<D>>> {
+        let mut blocks = Vec::new();
+        stiffness_into(mesh, c, tangent, &mut blocks);
+        let nodes = mesh.cell(c).len();
+        blocks.chunks(nodes).map(<[_]>::to_vec).collect()
     }
 
     #[test]
@@ -329,7 +344,7 @@ mod tests {
                     odd.0[i][j] = Tensor::from_fn(|k, l| noise(9 * i + j, 7 * k + l));
                 }
             }
-            let mut expected = [[Tensor::<D>::zeros(); 8]; 8];
+            let mut expected = vec![vec![Tensor::<D>::zeros(); nodes]; nodes];
             for_each_point(&mesh, c, Rule::Stiffness, |p| {
                 for (row, ga) in expected.iter_mut().zip(&p.gradient) {
                     for (block, gb) in row.iter_mut().zip(&p.gradient) {

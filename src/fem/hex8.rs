@@ -1,6 +1,6 @@
 //! Eight-node hexahedron on `[-1, 1]³`: `N_a = ⅛ (1 + ξ_a ξ) (1 + η_a η) (1 + ζ_a ζ)`.
 
-use super::cell::{GAUSS, ReferenceCell, RulePoint};
+use super::cell::{GAUSS, PerNode, ReferenceCell, RulePoint};
 use crate::mesh::CellShape;
 
 /// The hexahedron.
@@ -38,16 +38,16 @@ const GAUSS_2X2X2: [RulePoint; 8] = {
     rule
 };
 
-fn values(xi: &[f64; 3]) -> [f64; 8] {
-    let mut n = [0.0; 8];
+fn values(xi: &[f64; 3]) -> PerNode<f64> {
+    let mut n = PerNode::<f64>::default();
     for (n, c) in n.iter_mut().zip(&CORNERS) {
         *n = 0.125 * (1.0 + c[0] * xi[0]) * (1.0 + c[1] * xi[1]) * (1.0 + c[2] * xi[2]);
     }
     n
 }
 
-fn gradients(xi: &[f64; 3]) -> [[f64; 3]; 8] {
-    let mut g = [[0.0; 3]; 8];
+fn gradients(xi: &[f64; 3]) -> PerNode<[f64; 3]> {
+    let mut g = PerNode::<[f64; 3]>::default();
     for (g, c) in g.iter_mut().zip(&CORNERS) {
         let f = [1.0 + c[0] * xi[0], 1.0 + c[1] * xi[1], 1.0 + c[2] * xi[2]];
         g[0] = 0.125 * c[0] * f[1] * f[2];

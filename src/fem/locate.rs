@@ -1,5 +1,6 @@
 //! From a point in space to the cell that holds it and its shape functions there.
 
+use super::cell::PerNode;
 use super::element::{jacobian, reference, relative_nodes};
 use crate::mesh::Mesh;
 use crate::tensor::{Vector, inverse, padded};
@@ -16,6 +17,7 @@ const SNAP: f64 = 1e-10;
 pub fn reference_of<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> Option<Vector<D>> {
     let cell = reference(mesh, c)?;
     let (origin, nodes) = relative_nodes(mesh, c);
+    let nodes = &nodes[..cell.nodes()];
     let target = x - origin;
     if !target.iter().all(|t| t.is_finite()) {
         return None;
@@ -24,10 +26,10 @@ pub fn reference_of<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> 
     for _ in 0..30 {
         let at = padded(&xi);
         let mut residual = target;
-        for (n, x) in (cell.values)(&at).iter().zip(&nodes) {
+        for (n, x) in (cell.values)(&at).iter().zip(nodes) {
             residual -= x * *n;
         }
-        let (inverse, _) = inverse(&jacobian(&nodes, &(cell.gradients)(&at)))?;
+        let (inverse, _) = inverse(&jacobian(nodes, &(cell.gradients)(&at)))?;
         let step = inverse * residual;
         xi += step;
         // quadratic convergence: after a step below 1e-9 the error is at rounding
@@ -47,7 +49,7 @@ pub struct Located<const D: usize> {
     /// Cell number in the mesh.
     pub cell: usize,
     /// Weights of the cell's nodes, in their order: `x = Σ shape[a] x_a`; they add up to one.
-    pub shape: [f64; 8],
+    pub shape: PerNode<f64>,
     /// Number of nodes.
     pub nodes: usize,
     /// Reference coordinates.
@@ -261,7 +263,7 @@ fn located<const D: usize>(
 }
 
 /// Sets shape functions near 0 to exactly that; the largest makes up their sum to one, and is one if it is alone.
-fn snap(shape: &mut [f64; 8], nodes: usize) {
+fn snap(shape: &mut PerNode<f64>, nodes: usize) {
     let mut largest = 0;
     for a in 0..nodes {
         if shape[a].abs() < SNAP {

@@ -60,10 +60,10 @@ mod tri3;
 pub(crate) mod sample;
 
 pub use body::{FemError, assemble, check, internal_force, lumped_mass, nodal_volumes};
-pub use cell::{ReferenceCell, Rule, RulePoint};
+pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
 pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at_centre,
-    for_each_point, quadrature, quadrature_of, row_at, shape_values, stiffness,
+    for_each_point, quadrature, quadrature_of, row_at, shape_values, stiffness_into,
 };
 pub use load::{FacetPoint, body_force_vector, facet_area, facet_points, traction_vector};
 pub use locate::{Located, Locator, reference_of};

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::cell::Rule;
+use super::cell::{MAX_NODES, Rule};
 use super::element::{displacement_gradient, for_each_point};
 use crate::{
     material::LocalLaw,
@@ -30,17 +30,17 @@ struct Element {
     law: u32,
     /// The first of its numbers of history.
     first: usize,
+    /// The first of its nodes in the list of forces.
+    node: usize,
     /// Numbers of history of each of its quadrature points.
     each: usize,
     /// Whether its energy is part of the body's: an element that only overlaps has none.
     counts: bool,
 }
 
-/// The excess of one element: nodal forces, energies.
+/// The excess of one element but for its nodal forces.
 #[derive(Clone, Copy, Debug)]
 struct Excess<const D: usize> {
-    /// Of each node \[N\].
-    force: [Vector<D>; 8],
     /// Stored energy less that of the linear element \[J\].
     stored: f64,
     /// Energy dissipated within the interval \[J\].
@@ -61,10 +61,12 @@ pub struct NonlinearElements<const D: usize> {
     past: Vec<f64>,
     present: Vec<f64>,
     excess: Vec<Excess<D>>,
+    /// Of each node of each element \[N\], of the last response.
+    forces: Vec<Vector<D>>,
     /// For each node of the mesh where its elements begin in `of_node`.
     offsets: Vec<u32>,
-    /// Elements around the nodes, with the node's number within each.
-    of_node: Vec<(u32, u8)>,
+    /// The places of the nodes in `forces`, by ascending element.
+    of_node: Vec<u32>,
 }
 
 impl<const D: usize> NonlinearElements<D> {
@@ -75,7 +77,7 @@ impl<const D: usize> NonlinearElements<D> {
         law_of: impl Fn(usize) -> Option<Arc<dyn LocalLaw<D>>>,
     ) -> Option<Self> {
         let mut laws: Vec<Arc<dyn LocalLaw<D>>> = Vec::new();
-        let (mut elements, mut numbers) = (Vec::new(), 0);
+        let (mut elements, mut numbers, mut held) = (Vec::new(), 0, 0);
         let mut count = vec![0u32; mesh.nodes.len() + 1];
         for (cell, counts) in cells {
             let Some(law) = law_of(cell).filter(|law| !law.is_linear()) else {
@@ -93,10 +95,12 @@ impl<const D: usize> NonlinearElements<D> {
                 cell: cell as u32,
                 law: number as u32,
                 first: numbers,
+                node: held,
                 each,
                 counts,
             });
             numbers += points * each;
+            held += mesh.cell(cell).len();
             for &n in mesh.cell(cell) {
                 count[n as usize + 1] += 1;
             }
@@ -108,17 +112,18 @@ impl<const D: usize> NonlinearElements<D> {
             count[n] += count[n - 1];
         }
         let offsets = count.clone();
-        let mut of_node = vec![(0, 0); offsets[mesh.nodes.len()] as usize];
-        for (e, element) in elements.iter().enumerate() {
+        let mut of_node = vec![0; held];
+        for element in &elements {
             for (a, &n) in mesh.cell(element.cell as usize).iter().enumerate() {
                 let next = &mut count[n as usize];
-                of_node[*next as usize] = (e as u32, a as u8);
+                of_node[*next as usize] = (element.node + a) as u32;
                 *next += 1;
             }
         }
         Some(Self {
             laws,
             excess: Vec::new(),
+            forces: vec![Vector::zeros(); held],
             elements,
             past: vec![0.0; numbers],
             present: vec![0.0; numbers],
@@ -142,7 +147,7 @@ impl<const D: usize> NonlinearElements<D> {
         self.elements.len() * (size_of::<Element>() + size_of::<Excess<D>>())
             + 16 * self.past.len()
             + 4 * self.offsets.len()
-            + 8 * self.of_node.len()
+            + (4 + size_of::<Vector<D>>()) * self.of_node.len()
     }
 
     /// The cells, ascending.
@@ -161,18 +166,30 @@ impl<const D: usize> NonlinearElements<D> {
         let mut present = std::mem::take(&mut self.present);
         let mut slices = Vec::with_capacity(self.elements.len());
         let mut rest = present.as_mut_slice();
+        let mut forces = self.forces.as_mut_slice();
         for (e, element) in self.elements.iter().enumerate() {
-            let end = self.elements.get(e + 1).map_or(past.len(), |e| e.first);
+            let next = self.elements.get(e + 1);
+            let end = next.map_or(past.len(), |e| e.first);
             let (own, others) = rest.split_at_mut(end - element.first);
-            slices.push(own);
-            rest = others;
+            let nodes = mesh.cell(element.cell as usize).len();
+            let (force, other_forces) = forces.split_at_mut(nodes);
+            slices.push((own, force));
+            (rest, forces) = (others, other_forces);
         }
         self.elements
             .par_iter()
             .zip(slices)
-            .map(|(element, present)| {
+            .map(|(element, (present, force))| {
                 let law = laws[element.law as usize].as_ref();
-                excess(mesh, element, law, &displacement, step, past, present)
+                excess(
+                    mesh,
+                    element,
+                    law,
+                    &displacement,
+                    step,
+                    past,
+                    (present, force),
+                )
             })
             .collect_into_vec(&mut self.excess);
         self.present = present;
@@ -184,7 +201,7 @@ impl<const D: usize> NonlinearElements<D> {
         let around = &self.of_node[self.offsets[n] as usize..self.offsets[n + 1] as usize];
         let forces = around.iter();
         forces
-            .map(|&(e, a)| self.excess[e as usize].force[a as usize])
+            .map(|&place| self.forces[place as usize])
             .sum()
     }
 
@@ -231,7 +248,10 @@ impl<const D: usize> NonlinearElements<D> {
                 for_each_point(mesh, cell, Rule::Stiffness, |_| points += 1);
                 let mut present = vec![0.0; points * element.each];
                 let past = &self.past;
-                let found = excess(mesh, element, law, displacement, 0.0, past, &mut present);
+                let mut force = [Vector::zeros(); MAX_NODES];
+                let force = &mut force[..mesh.cell(cell).len()];
+                let into = (present.as_mut_slice(), force);
+                let found = excess(mesh, element, law, displacement, 0.0, past, into);
                 (element.cell, found)
             })
             .collect()
@@ -278,7 +298,7 @@ impl<const D: usize> NonlinearElements<D> {
     }
 }
 
-/// What an element has beyond the linear one; overwrites what its points remember at present.
+/// What an element has beyond the linear one; overwrites what its points remember at present, and its nodal forces \[N\].
 fn excess<const D: usize>(
     mesh: &Mesh<D>,
     element: &Element,
@@ -286,24 +306,24 @@ fn excess<const D: usize>(
     displacement: &impl Fn(u32) -> Vector<D>,
     step: f64,
     past: &[f64],
-    present: &mut [f64],
+    (present, forces): (&mut [f64], &mut [Vector<D>]),
 ) -> Excess<D> {
     let nodes = mesh.cell(element.cell as usize);
-    let mut u = [Vector::zeros(); 8];
+    let mut u = [Vector::zeros(); MAX_NODES];
     for (u, &n) in u.iter_mut().zip(nodes) {
         *u = displacement(n);
     }
     let mut sum = Excess {
-        force: [Vector::zeros(); 8],
         stored: 0.0,
         dissipated: 0.0,
         stress: Tensor::zeros(),
         volume: 0.0,
     };
+    forces.fill(Vector::zeros());
     let each = element.each;
     let mut point = 0;
     // means of the gradients of the shape functions
-    let mut mean = [Vector::<D>::zeros(); 8];
+    let mut mean = [Vector::<D>::zeros(); MAX_NODES];
     let is_objective = law.is_objective();
     let has_mean_dilatation = law.flows_at_constant_volume();
     if has_mean_dilatation {
@@ -314,9 +334,9 @@ fn excess<const D: usize>(
             }
             volume += p.weight;
         });
-        mean.iter_mut().for_each(|mean| *mean /= volume);
+        mean[..nodes.len()].iter_mut().for_each(|mean| *mean /= volume);
     }
-    let mean_dilatation: f64 = mean.iter().zip(&u).map(|(g, u)| g.dot(u)).sum();
+    let mean_dilatation: f64 = mean[..nodes.len()].iter().zip(&u).map(|(g, u)| g.dot(u)).sum();
     for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
         let gradient = displacement_gradient(p, |a| u[a]);
         let own = point * each..(point + 1) * each;
@@ -329,13 +349,13 @@ fn excess<const D: usize>(
         let taken = gradient + Tensor::identity() * shift;
         let found = law.respond(&taken, step, past, &mut present[own]);
         let beyond = (found.stress - linear) * p.weight;
-        for (force, g) in sum.force.iter_mut().zip(&p.gradient).take(p.nodes) {
+        for (force, g) in forces.iter_mut().zip(&p.gradient) {
             *force += beyond * g;
         }
         if has_mean_dilatation {
             let pressure = found.stress.trace() / D as f64 * p.weight;
-            let gradients = mean.iter().zip(&p.gradient).take(p.nodes);
-            for (force, (mean, g)) in sum.force.iter_mut().zip(gradients) {
+            let gradients = mean.iter().zip(&p.gradient);
+            for (force, (mean, g)) in forces.iter_mut().zip(gradients) {
                 *force += (mean - g) * pressure;
             }
         }
@@ -350,7 +370,7 @@ fn excess<const D: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::element::{cell_volume, stiffness};
+    use super::super::element::{cell_volume, stiffness_into};
     use super::super::sample::{boxes, noise};
     use super::*;
     use crate::material::J2;
@@ -375,10 +395,12 @@ mod tests {
             .map(|e| e.stored + e.dissipated)
             .sum();
         for c in 0..mesh.cell_count() {
-            let rows = stiffness(mesh, c, &tangent);
+            let nodes = mesh.cell(c).len();
+            let mut blocks = Vec::new();
+            stiffness_into(mesh, c, &tangent, &mut blocks);
             for (a, &n) in mesh.cell(c).iter().enumerate() {
                 let pull: Vector<D> = (mesh.cell(c).iter().enumerate())
-                    .map(|(b, &m)| rows[a][b] * u[m as usize])
+                    .map(|(b, &m)| blocks[a * nodes + b] * u[m as usize])
                     .sum();
                 energy += 0.5 * pull.dot(&u[n as usize]);
                 force[n as usize] += pull;

@@ -1,6 +1,6 @@
 //! Four-node quadrilateral on `[-1, 1]²`: `N_a = ¼ (1 + ξ_a ξ) (1 + η_a η)`.
 
-use super::cell::{GAUSS, ReferenceCell, RulePoint};
+use super::cell::{GAUSS, PerNode, ReferenceCell, RulePoint};
 use crate::mesh::CellShape;
 
 /// The quadrilateral.
@@ -30,16 +30,16 @@ const GAUSS_2X2: [RulePoint; 4] = [
     ([-GAUSS, GAUSS, 0.0], 1.0),
 ];
 
-fn values(xi: &[f64; 3]) -> [f64; 8] {
-    let mut n = [0.0; 8];
+fn values(xi: &[f64; 3]) -> PerNode<f64> {
+    let mut n = PerNode::<f64>::default();
     for (n, c) in n.iter_mut().zip(&CORNERS) {
         *n = 0.25 * (1.0 + c[0] * xi[0]) * (1.0 + c[1] * xi[1]);
     }
     n
 }
 
-fn gradients(xi: &[f64; 3]) -> [[f64; 3]; 8] {
-    let mut g = [[0.0; 3]; 8];
+fn gradients(xi: &[f64; 3]) -> PerNode<[f64; 3]> {
+    let mut g = PerNode::<[f64; 3]>::default();
     for (g, c) in g.iter_mut().zip(&CORNERS) {
         g[0] = 0.25 * c[0] * (1.0 + c[1] * xi[1]);
         g[1] = 0.25 * c[1] * (1.0 + c[0] * xi[0]);

@@ -1,6 +1,6 @@
 //! Four-node tetrahedron on `ξ, η, ζ ≥ 0, ξ + η + ζ ≤ 1`: `N = (1 − ξ − η − ζ, ξ, η, ζ)`.
 
-use super::cell::{ReferenceCell, RulePoint};
+use super::cell::{PerNode, ReferenceCell, RulePoint};
 use crate::mesh::CellShape;
 
 /// The tetrahedron.
@@ -30,22 +30,22 @@ const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
 
 /// Four inner points, exact to degree 2.
-const FOUR: [RulePoint; 4] = [
+pub(super) const FOUR: [RulePoint; 4] = [
     ([FAR, FAR, FAR], 1.0 / 24.0),
     ([NEAR, FAR, FAR], 1.0 / 24.0),
     ([FAR, NEAR, FAR], 1.0 / 24.0),
     ([FAR, FAR, NEAR], 1.0 / 24.0),
 ];
 
-fn values(xi: &[f64; 3]) -> [f64; 8] {
-    let mut n = [0.0; 8];
+fn values(xi: &[f64; 3]) -> PerNode<f64> {
+    let mut n = PerNode::<f64>::default();
     n[0] = 1.0 - xi[0] - xi[1] - xi[2];
     n[1..4].copy_from_slice(xi);
     n
 }
 
-fn gradients(_xi: &[f64; 3]) -> [[f64; 3]; 8] {
-    let mut g = [[0.0; 3]; 8];
+fn gradients(_xi: &[f64; 3]) -> PerNode<[f64; 3]> {
+    let mut g = PerNode::<[f64; 3]>::default();
     g[0] = [-1.0; 3];
     g[1][0] = 1.0;
     g[2][1] = 1.0;

@@ -364,7 +364,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             }
         }
         for c in (0..mesh.cell_count()).filter(|&c| shown.includes(c) && model.is_element(c)) {
-            let mut nodes = [0u32; 8];
+            let mut nodes = [0u32; fem::MAX_NODES];
             for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
                 let entry = &mut point_of_node[n as usize];
                 if *entry == u32::MAX {
