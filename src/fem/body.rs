@@ -93,7 +93,8 @@ fn check_cell<const D: usize>(mesh: &Mesh<D>, c: usize) -> Result<(), FemError> 
     let (_, x) = relative_nodes(mesh, c);
     let size = 0.5 * x.iter().map(|x| x.norm()).fold(0.0, f64::max);
     for (xi, _) in cell.stiffness {
-        let ratio = determinant(&jacobian(&x[..cell.nodes()], &(cell.gradients)(xi))) / size.powi(D as i32);
+        let ratio =
+            determinant(&jacobian(&x[..cell.nodes()], &(cell.gradients)(xi))) / size.powi(D as i32);
         // a comparison that also refuses a ratio that is not a number
         if ratio.is_nan() || ratio <= DEGENERATE {
             return Err(FemError::Degenerate {

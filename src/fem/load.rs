@@ -4,6 +4,7 @@ use super::cell::{GAUSS_3, ReferenceCell, Rule, RulePoint};
 use super::element::for_each_point;
 use super::{line2, quad4, tri3};
 use crate::mesh::Mesh;
+use crate::mesh::boundary::BoundaryFacet;
 use crate::tensor::Vector;
 
 /// Three Gauss points: exact to degree 5, so that a traction of degree 4 is integrated exactly.
@@ -30,6 +31,8 @@ pub struct FacetPoint<const D: usize> {
     pub weight: f64,
     /// Shape functions of the facet's nodes.
     pub shape: [f64; 4],
+    /// Unit normal, to the side to which the order of the nodes turns right-handed; zero in 1D.
+    pub normal: Vector<D>,
 }
 
 /// Calls `visit` with each quadrature point of a facet, given by its nodes in order.
@@ -48,6 +51,7 @@ pub fn facet_points<const D: usize>(
             position: mesh.nodes[facet[0] as usize],
             weight: 1.0,
             shape: [1.0, 0.0, 0.0, 0.0],
+            normal: Vector::zeros(),
         }),
         (2, 2) => {
             for (x, w) in LINE {
@@ -111,7 +115,34 @@ fn facet_point<const D: usize>(
         position,
         weight: stretch * w,
         shape,
+        normal: normal(&p, &q),
     }
+}
+
+/// The unit normal of a facet with these tangents: on the right of `p` in 2D, along `p × q` in 3D.
+fn normal<const D: usize>(p: &Vector<D>, q: &Vector<D>) -> Vector<D> {
+    let normal: Vector<D> = match D {
+        2 => Vector::from_fn(|k, _| if k == 0 { p[1] } else { -p[0] }),
+        3 => Vector::from_fn(|k, _| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            p[i] * q[j] - p[j] * q[i]
+        }),
+        _ => Vector::zeros(),
+    };
+    normal.try_normalize(0.0).unwrap_or_else(Vector::zeros)
+}
+
+/// Visits the quadrature points of a facet with its outward unit normal there, in 1D too.
+pub fn outward_points<const D: usize>(
+    mesh: &Mesh<D>,
+    facet: &BoundaryFacet,
+    mut visit: impl FnMut(&FacetPoint<D>),
+) {
+    let of_point = (D == 1).then(|| mesh.facet_normal_area(facet));
+    facet_points(mesh, &facet.nodes, |p| match of_point {
+        Some(normal) => visit(&FacetPoint { normal, ..*p }),
+        None => visit(p),
+    });
 }
 
 /// Length or area of a facet [m^(D−1)]; 1 for a point in 1D.
@@ -132,6 +163,25 @@ pub fn traction_vector<const D: usize>(
     let mut forces: Vec<(u32, Vector<D>)> = facet.iter().map(|&n| (n, Vector::zeros())).collect();
     facet_points(mesh, facet, |p| {
         let t = traction(&p.position) * p.weight;
+        for ((_, f), n) in forces.iter_mut().zip(&p.shape) {
+            *f += t * *n;
+        }
+    });
+    forces
+}
+
+/// Consistent nodal forces `f_a = ∫ N_a t(x, n) dA` of a traction that knows the outward unit normal n: one (node, force) per node of the facet.
+///
+/// `traction` is t(x, n) [N/m²], `−p n` of a pressure p. Forces \[N\].
+pub fn outward_traction_vector<const D: usize>(
+    mesh: &Mesh<D>,
+    facet: &BoundaryFacet,
+    traction: impl Fn(&Vector<D>, &Vector<D>) -> Vector<D>,
+) -> Vec<(u32, Vector<D>)> {
+    let nodes = facet.nodes.iter();
+    let mut forces: Vec<(u32, Vector<D>)> = nodes.map(|&n| (n, Vector::zeros())).collect();
+    outward_points(mesh, facet, |p| {
+        let t = traction(&p.position, &p.normal) * p.weight;
         for ((_, f), n) in forces.iter_mut().zip(&p.shape) {
             *f += t * *n;
         }

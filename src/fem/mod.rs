@@ -65,7 +65,10 @@ pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at_centre,
     for_each_point, quadrature, quadrature_of, row_at, shape_values, stiffness_into,
 };
-pub use load::{FacetPoint, body_force_vector, facet_area, facet_points, traction_vector};
+pub use load::{
+    FacetPoint, body_force_vector, facet_area, facet_points, outward_points,
+    outward_traction_vector, traction_vector,
+};
 pub use locate::{Located, Locator, reference_of};
 pub use nonlinear::NonlinearElements;
 

@@ -200,9 +200,7 @@ impl<const D: usize> NonlinearElements<D> {
         let n = node as usize;
         let around = &self.of_node[self.offsets[n] as usize..self.offsets[n + 1] as usize];
         let forces = around.iter();
-        forces
-            .map(|&place| self.forces[place as usize])
-            .sum()
+        forces.map(|&place| self.forces[place as usize]).sum()
     }
 
     /// The end of an interval: what the last response found is remembered from now on. Returns the energy dissipated \[J\].
@@ -334,9 +332,15 @@ fn excess<const D: usize>(
             }
             volume += p.weight;
         });
-        mean[..nodes.len()].iter_mut().for_each(|mean| *mean /= volume);
+        mean[..nodes.len()]
+            .iter_mut()
+            .for_each(|mean| *mean /= volume);
     }
-    let mean_dilatation: f64 = mean[..nodes.len()].iter().zip(&u).map(|(g, u)| g.dot(u)).sum();
+    let mean_dilatation: f64 = mean[..nodes.len()]
+        .iter()
+        .zip(&u)
+        .map(|(g, u)| g.dot(u))
+        .sum();
     for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
         let gradient = displacement_gradient(p, |a| u[a]);
         let own = point * each..(point + 1) * each;

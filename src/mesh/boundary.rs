@@ -284,7 +284,7 @@ impl<const D: usize> Mesh<D> {
 }
 
 /// Normal times area of an edge (2D), triangle or quadrilateral (3D); zero where there is none.
-pub(super) fn normal_area<const D: usize>(x: &[Vector<D>]) -> Vector<D> {
+pub(crate) fn normal_area<const D: usize>(x: &[Vector<D>]) -> Vector<D> {
     let mut n = Vector::zeros();
     match (D, x) {
         (2, [a, b]) => {

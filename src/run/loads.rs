@@ -190,6 +190,8 @@ struct LoadTarget<const D: usize> {
     condition: usize,
     /// Facets of finite elements.
     facets: Vec<Facet>,
+    /// Facets of finite elements under a load that knows their normals.
+    pressed: Vec<BoundaryFacet>,
     /// Finite elements.
     cells: Vec<usize>,
     /// The rest, of which points have the load.
@@ -216,15 +218,25 @@ impl<'a, const D: usize> Loads<'a, D> {
             targets: Vec::new(),
         };
         for (number, condition) in conditions.iter().enumerate() {
-            let detail = match condition.components.depends_on_position() {
+            let detail = match condition.varies_in_space() {
                 true => Detail::Quadrature,
                 false => Detail::Centre,
             };
+            let mut pressed = Vec::new();
             let (facets, cells, parts) = match &condition.prescribed {
                 Prescribed::Traction(facets) => {
                     let (own, zone) = split_facets(model, facets);
                     let parts = Parts::of_facets(model, &zone, detail);
                     (own, Vec::new(), parts)
+                }
+                Prescribed::Pressure(facets) => {
+                    let (own, zone): (Vec<_>, Vec<_>) = facets
+                        .iter()
+                        .cloned()
+                        .partition(|f| model.is_element(f.cell as usize));
+                    pressed = own;
+                    let parts = Parts::of_facets(model, &zone, detail);
+                    (Vec::new(), Vec::new(), parts)
                 }
                 Prescribed::BodyForce(region) => {
                     let inside = cells_of(model, region);
@@ -244,12 +256,13 @@ impl<'a, const D: usize> Loads<'a, D> {
             let target = LoadTarget {
                 condition: number,
                 facets,
+                pressed,
                 cells,
                 parts,
                 detail,
             };
             let mut met = false;
-            loads.each(&target, |_| Vector::zeros(), |_, _| met = true);
+            loads.each(&target, |_, _| Vector::zeros(), |_, _| met = true);
             if !met {
                 return Err(RunError::Idle {
                     condition: condition.name.clone(),
@@ -266,11 +279,11 @@ impl<'a, const D: usize> Loads<'a, D> {
         self.targets.iter().map(|b| b.condition)
     }
 
-    /// Adds the force of one condition with the field `field` to `load`; returns the sum of what it added.
+    /// Adds the force of one condition with the field `field`, of place and outward unit normal, to `load`; returns the sum of what it added.
     pub fn add(
         &self,
         condition: usize,
-        field: impl Fn(&Vector<D>) -> Vector<D>,
+        field: impl Fn(&Vector<D>, &Vector<D>) -> Vector<D>,
         load: &mut [f64],
     ) -> Vector<D> {
         let mut sum = Vector::zeros();
@@ -289,7 +302,7 @@ impl<'a, const D: usize> Loads<'a, D> {
     fn each(
         &self,
         target: &LoadTarget<D>,
-        field: impl Fn(&Vector<D>) -> Vector<D>,
+        field: impl Fn(&Vector<D>, &Vector<D>) -> Vector<D>,
         mut add: impl FnMut(usize, Vector<D>),
     ) {
         let mesh = &self.model.mesh;
@@ -299,13 +312,19 @@ impl<'a, const D: usize> Loads<'a, D> {
                 add(site as usize, f * w);
             }
         };
+        let none = Vector::zeros();
         for facet in &target.facets {
-            for (n, f) in fem::traction_vector(mesh, facet, &field) {
+            for (n, f) in fem::traction_vector(mesh, facet, |x| field(x, &none)) {
+                on_node(n, f);
+            }
+        }
+        for facet in &target.pressed {
+            for (n, f) in fem::outward_traction_vector(mesh, facet, &field) {
                 on_node(n, f);
             }
         }
         for &c in &target.cells {
-            for (n, f) in fem::body_force_vector(mesh, c, &field) {
+            for (n, f) in fem::body_force_vector(mesh, c, |x| field(x, &none)) {
                 on_node(n, f);
             }
         }
@@ -359,7 +378,7 @@ pub fn loads<const D: usize>(
     let mut applied = Vec::new();
     for number in loads.conditions() {
         let condition = &conditions[number];
-        let field = |x: &Vector<D>| condition.components.vector(x, t);
+        let field = |x: &Vector<D>, n: &Vector<D>| condition.force_density(x, n, t);
         let force = loads.add(number, field, &mut load);
         applied.push(Applied {
             condition: condition.name.clone(),

@@ -1,16 +1,15 @@
 //! Conditions of a validated scene.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::{Region, region, unknown_set};
-use super::solve::{Clock, Pacing};
-use super::source::Span;
-use super::spec::{ConditionSpec, DisplacementSpec, ShapeSpec, VelocitySpec};
+use super::solve::Clock;
+use super::spec::ShapeSpec;
 use super::value::Text;
+use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::{Facet, Mesh};
 use crate::tensor::{Vector, padded};
 
@@ -108,6 +107,8 @@ pub enum Prescribed<const D: usize> {
     Field(Field<D>),
     /// Force per area on facets.
     Traction(Vec<Facet>),
+    /// Pressure on facets at the boundary of the mesh, their normals outwards; the first component is its value.
+    Pressure(Vec<BoundaryFacet>),
     /// Force per volume inside a region.
     BodyForce(Region<D>),
 }
@@ -119,6 +120,28 @@ impl<const D: usize> Condition<D> {
             Prescribed::Displacement(support) | Prescribed::Velocity(support) => Some(support),
             _ => None,
         }
+    }
+
+    /// The force per area or volume of a load at `x` with the outward unit normal `n`, at time `t`: `−p n` of a pressure.
+    pub fn force_density(&self, x: &Vector<D>, n: &Vector<D>, t: f64) -> Vector<D> {
+        match self.prescribed {
+            Prescribed::Pressure(_) => n * -self.components.at_time(0, x, t).unwrap_or(0.0),
+            _ => self.components.vector(x, t),
+        }
+    }
+
+    /// The force per area or volume of a unit of one component, where the outward unit normal is `n`.
+    pub fn unit_density(&self, component: usize, n: &Vector<D>) -> Vector<D> {
+        match self.prescribed {
+            Prescribed::Pressure(_) if component == 0 => -n,
+            Prescribed::Pressure(_) => Vector::zeros(),
+            _ => Vector::from_fn(|k, _| f64::from(u8::from(k == component))),
+        }
+    }
+
+    /// Whether the force of a load differs from place to place.
+    pub fn varies_in_space(&self) -> bool {
+        matches!(self.prescribed, Prescribed::Pressure(_)) || self.components.depends_on_position()
     }
 
     /// Whether the condition prescribes how sites move.
@@ -147,31 +170,8 @@ pub struct Condition<const D: usize> {
     pub components: Components<D>,
 }
 
-/// All conditions.
-pub(crate) fn conditions<const D: usize>(
-    spec: &BTreeMap<Text, ConditionSpec>,
-    mesh: &Mesh<D>,
-    clock: Clock,
-) -> Result<Vec<Condition<D>>, SceneError> {
-    let mut found = Vec::with_capacity(spec.len());
-    for (name, condition) in spec {
-        found.push(one(name, condition, mesh, clock)?);
-    }
-    let holds = |c: &Condition<D>| matches!(c.prescribed, Prescribed::Displacement(_));
-    if clock.pacing != Pacing::Moving && !found.iter().any(holds) {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            "no condition prescribes a displacement: nothing holds the body",
-        )
-        .label(0..0, "no [conditions.NAME.displacement] in this scene")
-        .help("add one, for example [conditions.base.displacement] with on = \"bottom\", y = 0"));
-    }
-    agree(spec, &found, mesh, clock)?;
-    Ok(found)
-}
-
 /// Where a condition holds: a set of the mesh, or a shape.
-fn support<const D: usize>(
+pub(super) fn support<const D: usize>(
     place: &str,
     name: &Text,
     on: Option<&Text>,
@@ -205,118 +205,6 @@ fn support<const D: usize>(
             );
         }
     })
-}
-
-/// A condition: what is prescribed, where, and by which components.
-fn one<const D: usize>(
-    name: &Text,
-    spec: &ConditionSpec,
-    mesh: &Mesh<D>,
-    clock: Clock,
-) -> Result<Condition<D>, SceneError> {
-    let (kind, given) = match spec {
-        ConditionSpec::Displacement(c) => ("displacement", [&c.x, &c.y, &c.z]),
-        ConditionSpec::Velocity(c) => ("velocity", [&c.x, &c.y, &c.z]),
-        ConditionSpec::Traction(c) => ("traction", [&c.x, &c.y, &c.z]),
-        ConditionSpec::BodyForce(c) => ("body-force", [&c.x, &c.y, &c.z]),
-    };
-    let place = format!("conditions.{name}.{kind}");
-    let components = components::<D>(&place, name, given)?;
-    for (axis, e) in ["x", "y", "z"].iter().zip(&components.0) {
-        if let Some(e) = e {
-            clock.admits(&format!("{place}.{axis}"), e)?;
-        }
-    }
-    let prescribed = match spec {
-        ConditionSpec::Displacement(DisplacementSpec { on, inside, .. })
-        | ConditionSpec::Velocity(VelocitySpec { on, inside, .. }) => {
-            if kind == "velocity" {
-                moves(&place, name, &components, clock)?;
-            }
-            let support = support(&place, name, on.as_ref(), inside.as_ref(), mesh)?;
-            if let Support::Set { nodes, .. } = &support {
-                finite(
-                    &place,
-                    name,
-                    &components,
-                    clock,
-                    nodes.iter().map(|&n| mesh.nodes[n as usize]),
-                )?;
-            }
-            if kind == "velocity" {
-                Prescribed::Velocity(support)
-            } else {
-                Prescribed::Displacement(support)
-            }
-        }
-        ConditionSpec::Traction(c) => {
-            let Some(facets) = mesh.facet_sets.get(&c.on.value) else {
-                let known: Vec<&str> = mesh.facet_sets.keys().map(String::as_str).collect();
-                let wanted = ["set of end points", "set of edges", "set of faces"][D - 1];
-                return Err(unknown_set(
-                    &format!("{place}.on"),
-                    &c.on,
-                    wanted,
-                    &known,
-                    mesh,
-                ));
-            };
-            not_empty(&format!("{place}.on"), &c.on, facets.len())?;
-            let nodes = facets.iter().flatten().map(|&n| mesh.nodes[n as usize]);
-            finite(&place, name, &components, clock, nodes)?;
-            Prescribed::Traction(facets.clone())
-        }
-        ConditionSpec::BodyForce(c) => {
-            let region = match &c.inside {
-                Some(shape) => inside(&place, name, shape, mesh)?,
-                None => Region::Shape {
-                    shape: crate::shape::Shape::Everywhere,
-                    margin: 0.0,
-                },
-            };
-            let within = (0..mesh.cell_count())
-                .map(|i| mesh.centroid(i))
-                .filter(|x| region.contains(x, 0.0));
-            finite(&place, name, &components, clock, within)?;
-            Prescribed::BodyForce(region)
-        }
-    };
-    Ok(Condition {
-        name: name.value.clone(),
-        prescribed,
-        components,
-    })
-}
-
-/// Checks that a velocity is one that a run can follow.
-fn moves<const D: usize>(
-    place: &str,
-    name: &Text,
-    components: &Components<D>,
-    clock: Clock,
-) -> Result<(), SceneError> {
-    if clock.pacing != Pacing::Moving {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` in a scene that does not move"),
-        )
-        .label(name.span.clone(), "a velocity")
-        .help("add [solve.explicit] with duration = ..., or prescribe a displacement"));
-    }
-    match components
-        .0
-        .iter()
-        .flatten()
-        .find(|e| e.depends_on_time() && e.depends_on_position())
-    {
-        None => Ok(()),
-        Some(e) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` depends on time and on position"),
-        )
-        .label(e.span.clone(), "has no displacement in closed form")
-        .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
-    }
 }
 
 pub(crate) fn components<const D: usize>(
@@ -391,6 +279,22 @@ pub(crate) fn extent<const D: usize>(mesh: &Mesh<D>) -> String {
     )
 }
 
+/// The facets of a named set, of which there are some.
+pub(super) fn facet_set<'m, const D: usize>(
+    place: &str,
+    on: &Text,
+    mesh: &'m Mesh<D>,
+) -> Result<&'m [Facet], SceneError> {
+    let place = format!("{place}.on");
+    let Some(facets) = mesh.facet_sets.get(&on.value) else {
+        let known: Vec<&str> = mesh.facet_sets.keys().map(String::as_str).collect();
+        let wanted = ["set of end points", "set of edges", "set of faces"][D - 1];
+        return Err(unknown_set(&place, on, wanted, &known, mesh));
+    };
+    not_empty(&place, on, facets.len())?;
+    Ok(facets)
+}
+
 fn not_empty(place: &str, set: &Text, count: usize) -> Result<(), SceneError> {
     if count > 0 {
         return Ok(());
@@ -441,77 +345,4 @@ pub(crate) fn finite<const D: usize>(
         }
     }
     Ok(())
-}
-
-/// Refuses two motions of one node that differ.
-fn agree<const D: usize>(
-    spec: &BTreeMap<Text, ConditionSpec>,
-    conditions: &[Condition<D>],
-    mesh: &Mesh<D>,
-    clock: Clock,
-) -> Result<(), SceneError> {
-    let mut seen: BTreeMap<(u32, usize), usize> = BTreeMap::new();
-    for (number, condition) in conditions.iter().enumerate() {
-        let Some(Support::Set { nodes, .. }) = condition.support() else {
-            continue;
-        };
-        for &n in nodes {
-            for k in (0..D).filter(|&k| condition.components.0[k].is_some()) {
-                let Some(other) = seen.insert((n, k), number).map(|o| &conditions[o]) else {
-                    continue;
-                };
-                let x = &mesh.nodes[n as usize];
-                let Some((before, value, t)) = difference(other, condition, k, x, clock) else {
-                    continue;
-                };
-                let span = |name: &str| -> Span {
-                    spec.get_key_value(name)
-                        .map_or(0..0, |(k, _)| k.span.clone())
-                };
-                let (first, second) = (&other.name, &condition.name);
-                let when = if t > 0.0 {
-                    format!(", t = {t}")
-                } else {
-                    String::new()
-                };
-                return Err(SceneError::new(
-                    SceneErrorKind::Conflict,
-                    format!(
-                        "`{first}` and `{second}` prescribe the {} displacements {before} and {value} at {:?}{when}",
-                        ["x", "y", "z"][k],
-                        x.as_slice()
-                    ),
-                )
-                .label(span(second), "one")
-                .label(span(first), "the other")
-                .help("let both agree where their sets meet, or leave the component out of one"));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Two values that differ, and when.
-fn difference<const D: usize>(
-    a: &Condition<D>,
-    b: &Condition<D>,
-    axis: usize,
-    x: &Vector<D>,
-    clock: Clock,
-) -> Option<(f64, f64, f64)> {
-    let kinds = [a, b].map(|c| matches!(c.prescribed, Prescribed::Velocity(_)));
-    let moving = [a, b].iter().any(|c| c.components.depends_on_time());
-    clock.instants(moving).iter().find_map(|&t| {
-        let (p, q) = (
-            a.components.at_time(axis, x, t)?,
-            b.components.at_time(axis, x, t)?,
-        );
-        // a displacement and a velocity agree only where both are zero
-        let agree = if kinds[0] == kinds[1] {
-            (p - q).abs() <= 1e-9 * p.abs().max(q.abs())
-        } else {
-            p == 0.0 && q == 0.0
-        };
-        (!agree).then_some((p, q, t))
-    })
 }

@@ -7,7 +7,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::bounds_checks;
-use super::conditions::{self, Condition};
+use super::condition_list;
+use super::conditions::Condition;
 use super::error::{SceneError, SceneErrorKind};
 use super::initial::Initial;
 use super::material_interfaces::MaterialInterface;
@@ -86,7 +87,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         let has_large_strains = materials.iter().any(is_objective);
         let solve = solve::solve(spec.solve.as_ref(), has_large_strains)?;
         let clock = solve.clock();
-        let conditions = conditions::conditions(&spec.conditions, &mesh, clock)?;
+        let conditions = condition_list::conditions(&spec.conditions, &mesh, clock)?;
         let initial = initial::initial(&spec.initial, &mesh, clock)?;
         meshing::add_mesh(&mesh, &mut fingerprint);
         Ok(Self {

@@ -20,6 +20,7 @@
 pub(crate) mod adaptive_zone;
 pub(crate) mod agreement;
 pub(crate) mod bounds_checks;
+mod condition_list;
 pub(crate) mod conditions;
 pub(crate) mod coupling_selection;
 pub(crate) mod cracks_and_voids;
@@ -42,6 +43,7 @@ pub(crate) mod selected_coupling;
 pub(crate) mod solve;
 pub(crate) mod source;
 pub mod spec;
+mod surface_conditions;
 pub(crate) mod tagged_table;
 pub(crate) mod template;
 pub(crate) mod unused;

@@ -45,6 +45,8 @@ pub(super) struct Found<const D: usize> {
     /// `∫ (x − middle of the cell)`.
     pub moment: Vector<D>,
     pub quadrature: Vec<(Vector<D>, f64)>,
+    /// Of a part of a surface, the outward unit normal at each quadrature point.
+    pub normals: Vec<Vector<D>>,
 }
 
 impl<const D: usize> Default for Found<D> {
@@ -53,6 +55,7 @@ impl<const D: usize> Default for Found<D> {
             size: 0.0,
             moment: Vector::zeros(),
             quadrature: Vec::new(),
+            normals: Vec::new(),
         }
     }
 }
@@ -67,10 +70,23 @@ impl<const D: usize> Found<D> {
         }
     }
 
+    /// Adds a part of a surface with the outward unit normal `normal`.
+    pub fn add_facet(
+        &mut self,
+        simplex: &Simplex<D>,
+        middle: &Vector<D>,
+        normal: &Vector<D>,
+        detail: Detail,
+    ) {
+        self.add(simplex, middle, detail);
+        self.normals.resize(self.quadrature.len(), *normal);
+    }
+
     pub(super) fn take_in(&mut self, other: Self) {
         self.size += other.size;
         self.moment += other.moment;
         self.quadrature.extend(other.quadrature);
+        self.normals.extend(other.normals);
     }
 }
 

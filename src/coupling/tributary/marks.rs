@@ -153,7 +153,7 @@ impl<const D: usize> Marks<D> {
                     let mut piece = Found {
                         size,
                         moment: ((low + high) / 2.0 - middle) * size,
-                        quadrature: Vec::new(),
+                        ..Found::default()
                     };
                     if detail == Detail::Quadrature {
                         box_quadrature(&low, &high, |x, w| piece.quadrature.push((x, w)));

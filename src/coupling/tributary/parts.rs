@@ -9,12 +9,12 @@ use super::{
     around::{Around, centroid_sites},
     grid::{Beyond, Follows, Grid},
     marks::Marks,
-    simplex::{Cells, box_quadrature, facet_simplices, moments_of_cells},
+    simplex::{Cells, Simplex, box_quadrature, facet_simplices, moments_of_cells},
 };
 use crate::{
     coupling::{Model, PointSource, SiteKind},
     fem,
-    mesh::boundary::BoundaryFacet,
+    mesh::boundary::{BoundaryFacet, normal_area},
     shape::Shape,
     tensor::{Tensor, Vector},
 };
@@ -32,6 +32,8 @@ pub struct Parts<const D: usize> {
     follows: Vec<Follows<D>>,
     quadrature_offsets: Vec<usize>,
     quadrature: Vec<(Vector<D>, f64)>,
+    /// Of parts of a surface, the outward unit normal at each quadrature point.
+    normals: Vec<Vector<D>>,
 }
 
 /// The cells of a lattice that the edge of a region or a void cuts, and the corners of the box around the region.
@@ -126,7 +128,8 @@ impl<const D: usize> Parts<D> {
             for facet in facets {
                 let mut found = Found::default();
                 for simplex in facet_simplices(&model.mesh, &facet.nodes) {
-                    found.add(&simplex, &Vector::zeros(), detail);
+                    let normal = outward(model, facet, &simplex);
+                    found.add_facet(&simplex, &Vector::zeros(), &normal, detail);
                 }
                 if found.size > 0.0 {
                     let x = found.moment / found.size;
@@ -148,10 +151,12 @@ impl<const D: usize> Parts<D> {
                 // of two cells between which a facet lies, the inner one
                 let inwards = normal * (-1e-6 * cells.spacing / normal.norm());
                 for simplex in facet_simplices(&model.mesh, &facet.nodes) {
+                    let out = outward(model, facet, &simplex);
                     cells.dice(&simplex, &|_, _| true, &mut |_, part| {
                         let index = cells.index(&(part.centre() + inwards));
                         let middle = cells.centre(&index);
-                        found.entry(index).or_default().add(part, &middle, detail);
+                        let piece = found.entry(index).or_default();
+                        piece.add_facet(part, &middle, &out, detail);
                     });
                 }
             }
@@ -187,16 +192,19 @@ impl<const D: usize> Parts<D> {
     }
 
     /// Adds what the force of a field does to each site; `detail` has to suit the field.
+    ///
+    /// `field` is given the place and, of a part of a surface taken at its quadrature points, the outward unit normal there; else zero.
     pub fn each(
         &self,
         detail: Detail,
-        field: impl Fn(&Vector<D>) -> Vector<D>,
+        field: impl Fn(&Vector<D>, &Vector<D>) -> Vector<D>,
         mut add: impl FnMut(usize, Vector<D>),
     ) {
+        let none = Vector::zeros();
         for k in 0..self.size.len() {
             let follows = &self.follows[self.offsets[k]..self.offsets[k + 1]];
             if detail == Detail::Centre {
-                let force = field(&self.centre[k]) * self.size[k];
+                let force = field(&self.centre[k], &none) * self.size[k];
                 for (site, w, _) in follows {
                     if *w != 0.0 {
                         add(*site as usize, force * *w);
@@ -206,8 +214,9 @@ impl<const D: usize> Parts<D> {
             }
             let (mut force, mut moment) = (Vector::zeros(), Tensor::zeros());
             let points = self.quadrature_offsets[k]..self.quadrature_offsets[k + 1];
-            for (x, weight) in &self.quadrature[points] {
-                let f = field(x) * *weight;
+            for q in points {
+                let (x, weight) = &self.quadrature[q];
+                let f = field(x, self.normals.get(q).unwrap_or(&none)) * *weight;
                 force += f;
                 moment += f * (x - self.centre[k]).transpose();
             }
@@ -259,6 +268,7 @@ impl<const D: usize> Parts<D> {
         let needed = |f: &Follows<D>| detail == Detail::Quadrature || f.1 != 0.0;
         self.follows.extend(follows.into_iter().filter(needed));
         self.quadrature.extend(found.quadrature);
+        self.normals.extend(found.normals);
         self.close();
     }
 
@@ -391,6 +401,19 @@ impl<const D: usize> Parts<D> {
             }
         }
     }
+}
+
+/// The outward unit normal of a simplex of a facet; zero of one without an area.
+fn outward<const D: usize>(
+    model: &Model<D>,
+    facet: &BoundaryFacet,
+    simplex: &Simplex<D>,
+) -> Vector<D> {
+    let area = match D {
+        1 => model.mesh.facet_normal_area(facet),
+        _ => normal_area(&simplex.corners[..simplex.count]),
+    };
+    area.try_normalize(0.0).unwrap_or_else(Vector::zeros)
 }
 
 /// Spreads what parts miss of the region's volume and first moment over those that its edge cuts.

@@ -60,14 +60,15 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         for number in loads.conditions() {
             let components = &conditions[number].components;
             if !components.depends_on_time() {
-                loads.add(number, |x| components.vector(x, 0.0), &mut steady);
+                let field = |x: &_, n: &_| conditions[number].force_density(x, n, 0.0);
+                loads.add(number, field, &mut steady);
             } else if components.depends_on_position() {
                 by_both.push(number);
             } else {
                 for axis in (0..D).filter(|&k| components.0[k].is_some()) {
                     let mut unit = vec![0.0; dofs];
-                    let along = Vector::<D>::from_fn(|k, _| f64::from(u8::from(k == axis)));
-                    loads.add(number, |_| along, &mut unit);
+                    let field = |_: &_, n: &_| conditions[number].unit_density(axis, n);
+                    loads.add(number, field, &mut unit);
                     let forces = unit.iter().enumerate().filter(|(_, f)| **f != 0.0);
                     let forces = forces.map(|(dof, f)| (dof as u32, *f)).collect();
                     by_time.push(TimedLoad {
@@ -250,8 +251,8 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
             }
         }
         for &number in &self.by_both {
-            let components = &self.conditions[number].components;
-            self.loads.add(number, |x| components.vector(x, time), load);
+            let field = |x: &_, n: &_| self.conditions[number].force_density(x, n, time);
+            self.loads.add(number, field, load);
         }
     }
 

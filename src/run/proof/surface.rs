@@ -172,11 +172,14 @@ fn kinds<const D: usize>(
         sorted.insert(key(&facet.nodes), number);
     }
     for condition in conditions {
-        if let Prescribed::Traction(loaded) = &condition.prescribed {
-            for nodes in loaded {
-                if let Some(&f) = sorted.get(&key(nodes)) {
-                    kinds[f] = FacetKind::Loaded;
-                }
+        let loaded: Vec<&[u32]> = match &condition.prescribed {
+            Prescribed::Traction(loaded) => loaded.iter().map(AsRef::as_ref).collect(),
+            Prescribed::Pressure(loaded) => loaded.iter().map(|f| f.nodes.as_ref()).collect(),
+            _ => Vec::new(),
+        };
+        for nodes in loaded {
+            if let Some(&f) = sorted.get(&key(nodes)) {
+                kinds[f] = FacetKind::Loaded;
             }
         }
     }

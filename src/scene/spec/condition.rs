@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::scene::expression::Expression;
 use crate::scene::spec::region::ShapeSpec;
-use crate::scene::value::Text;
+use crate::scene::value::{Coordinates, Text};
 
 /// What is prescribed somewhere.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -17,8 +17,14 @@ pub enum ConditionSpec {
     Velocity(VelocitySpec),
     /// Force per area (per length of thickness 1 in 2D; a force in 1D) on a set of facets.
     Traction(TractionSpec),
+    /// Pressure on a set of facets: a force per area against the outward normal, in the reference configuration.
+    Pressure(PressureSpec),
     /// Force per volume.
     BodyForce(BodyForceSpec),
+    /// A plane of symmetry: no displacement along its normal.
+    Symmetry(SymmetrySpec),
+    /// Rigid rotation about a centre, as an axis or a grip imposes it.
+    Rotation(RotationSpec),
 }
 
 /// Prescribed displacement: exactly one of `on` and `inside`.
@@ -78,6 +84,45 @@ pub struct TractionSpec {
     /// Traction along z.
     #[serde(default)]
     pub z: Option<Expression>,
+}
+
+/// A pressure on a set of facets at the boundary of the body.
+///
+/// A dead load: area and normal are those of the reference configuration, whatever the body has moved.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct PressureSpec {
+    /// A named set of facets of the mesh.
+    pub on: Text,
+    /// Pressure, positive where it presses on the body; may depend on place and time.
+    pub value: Expression,
+}
+
+/// A plane of symmetry along the axes.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SymmetrySpec {
+    /// A named set of the mesh, all of whose nodes lie in one plane x, y or z = constant.
+    pub on: Text,
+}
+
+/// A rigid rotation: exactly one of `on` and `inside`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RotationSpec {
+    /// A named set of the mesh.
+    #[serde(default)]
+    pub on: Option<Text>,
+    /// All sites inside a shape.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// A point of the axis.
+    pub center: Coordinates,
+    /// Direction of the axis in 3D, of any length; in a plane the axis is z.
+    #[serde(default)]
+    pub axis: Option<Coordinates>,
+    /// Angle in degrees, right-handed about the axis (counter-clockwise in a plane); may depend on the time.
+    pub angle: Expression,
 }
 
 /// A force per volume.

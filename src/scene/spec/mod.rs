@@ -14,7 +14,8 @@ mod region;
 mod user_material;
 
 pub use condition::{
-    BodyForceSpec, ConditionSpec, DisplacementSpec, TractionSpec, VelocitySpec, VoidSpec,
+    BodyForceSpec, ConditionSpec, DisplacementSpec, PressureSpec, RotationSpec, SymmetrySpec,
+    TractionSpec, VelocitySpec, VoidSpec,
 };
 pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec, UnprovenSpec};
 pub use coupling::{
