@@ -7,8 +7,8 @@ use crate::{
     coupling::{ModelError, Peridynamics, PointSource, point_cloud::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, visibility::SegmentCutter},
     peridynamics::{
-        BondWeights, Families, Family, LinearForceState, PartialVolume, StatePart, TIE_TOLERANCE,
-        collapsed_tensor, isotropic_shell_factors, offset_table::OffsetTable,
+        BondWeights, Families, Family, LatticeBonds, LinearForceState, PartialVolume, StatePart,
+        TIE_TOLERANCE, collapsed_tensor, isotropic_shell_factors, offset_table::OffsetTable,
         partial_volume::lattice_shells, plane_energy,
     },
     shape::Barriers,
@@ -205,12 +205,12 @@ impl<const D: usize> LatticeFactors<D> {
             .transpose()
     }
 
-    /// The whole family of a point of a regular lattice of the same spacing and horizon: the lattice's own if the points are one.
-    pub fn regular_family(
+    /// The whole family of a point of a regular lattice of the same spacing and horizon, with the coefficients of a law: the lattice's own if the points are one.
+    pub fn bonds(
         &self,
         law: &dyn LinearForceState<D>,
         horizon: f64,
-    ) -> Result<WholeFamily<D>, ModelError> {
+    ) -> Result<(LatticeBonds<D>, Tensor4<D>), ModelError> {
         let axes = self.axes.unwrap_or_else(Tensor::identity);
         let (lattice, _) =
             lattice_shells::<D>(self.volumes, horizon / self.spacing, TIE_TOLERANCE)?;
@@ -245,9 +245,26 @@ impl<const D: usize> LatticeFactors<D> {
                 source,
             })?;
         let tensor = collapsed_tensor(&family, &pair, state.as_ref());
-        let mut bonds: Vec<_> = bonds
-            .iter()
-            .zip(pair.iter().zip(&omega))
+        let bonds = LatticeBonds {
+            bonds,
+            volumes,
+            pair,
+            omega,
+            state,
+        };
+        Ok((bonds, tensor))
+    }
+
+    /// The whole family of a point of such a lattice by its integer offsets.
+    pub fn regular_family(
+        &self,
+        law: &dyn LinearForceState<D>,
+        horizon: f64,
+    ) -> Result<WholeFamily<D>, ModelError> {
+        let (family, tensor) = self.bonds(law, horizon)?;
+        let coefficients = family.pair.iter().zip(&family.omega);
+        let mut bonds: Vec<_> = (family.bonds.iter())
+            .zip(coefficients)
             .map(|(xi, (&p, &w))| (self.offset(xi), (p, w)))
             .collect();
         bonds.sort_unstable_by_key(|b| b.0);
@@ -255,7 +272,7 @@ impl<const D: usize> LatticeFactors<D> {
             spacing: self.spacing,
             coefficients: OffsetTable::new(&bonds),
             bonds,
-            state,
+            state: family.state,
             tensor,
         })
     }

@@ -15,6 +15,7 @@
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
 //! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
+//! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
 //! | `semidiscrete.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
 //! | `state_transfer.rs` | a motion handed from one layout of zones to another | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
@@ -27,6 +28,7 @@
 pub mod balanced;
 pub mod blending;
 mod bond_cutting;
+mod cauchy_born;
 pub mod error_indicator;
 pub mod field_evaluation;
 mod interface_interpolation;

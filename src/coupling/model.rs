@@ -1,7 +1,7 @@
 //! What all couplings share: sites, peridynamic points, their families, and the places at the seam that follow sites.
 
 use std::any::Any;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use rustc_hash::FxHashMap;
 
@@ -18,6 +18,7 @@ use crate::{
         tributary::Tributary,
     },
     fem,
+    material::LocalLaw,
     mesh::{CellShape, Mesh},
     peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody},
     progress::Progress,
@@ -62,7 +63,7 @@ pub struct Model<const D: usize> {
     pub node_transfer: Transfer,
     /// The peridynamic part of the problem.
     pub peridynamics: Option<Peridynamics<D>>,
-    tensors: Vec<Tensor4<D>>,
+    pub(super) tensors: Vec<Tensor4<D>>,
     pub(super) cell_material: Vec<u16>,
     peridynamic_material: u16,
     body: Option<PdBody<D>>,
@@ -86,6 +87,8 @@ pub struct Model<const D: usize> {
     pub(super) row_scale: Option<Vec<f64>>,
     /// Bond factors and horizon of each lattice.
     pub(super) factors: Vec<(LatticeFactors<D>, f64)>,
+    /// The laws of elements that follow the bonds, by the number of a material; empty where elements are linear.
+    pub(super) cauchy_born: Vec<Option<Arc<dyn LocalLaw<D>>>>,
     /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
     pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
 }
@@ -157,6 +160,7 @@ impl<const D: usize> Model<D> {
             tributary: Tributary::default(),
             row_scale: None,
             factors: Vec::new(),
+            cauchy_born: Vec::new(),
             operator_cache: OnceLock::new(),
         };
         let has_points = model.roles.contains(&CellRole::Points);

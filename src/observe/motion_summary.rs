@@ -104,7 +104,7 @@ impl Rotation {
             None => String::new(),
         };
         format!(
-            "a finite element at ({}) has rotated by {:.1} degrees{when}: elements are linear, and rotated by so much they are {} % too large{failure}{energy}; where that matters let coupling = \"nonlocal\" carry what rotates",
+            "a finite element at ({}) has rotated by {:.1} degrees{when}: elements are linear, and rotated by so much they are {} % too large{failure}{energy}; where that matters use bonds = \"exact\" and elements = \"cauchy-born\" in [peridynamics], or let coupling = \"nonlocal\" carry what rotates",
             components(&self.place),
             self.degrees,
             number(100.0 * self.length_error)

@@ -20,6 +20,7 @@
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
+//! | `cauchy_born.rs` | a law of elements with the stress of whole families | eq. (2.10) |
 //! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |
 //! | `bond_force/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
 
@@ -27,6 +28,7 @@ pub(crate) mod alike;
 pub mod body;
 pub mod bond_force;
 pub mod bounded_least_norm;
+mod cauchy_born;
 mod cell_list;
 pub mod contact;
 mod crack_area;
@@ -48,6 +50,7 @@ pub mod softening;
 mod tearing_parameter;
 
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
+pub use cauchy_born::{CauchyBorn, LatticeBonds};
 pub use crack_area::CrackArea;
 pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};

@@ -116,7 +116,7 @@ pub(crate) fn predict<const D: usize>(
     let joining = scene.coupling.joining();
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
     let (problem, rest) = setup::problem(scene);
-    let (model, coupling) = Model::new(problem, progress)?;
+    let (model, coupling) = setup::model(problem, &rest, progress)?;
     let operator = coupling.operator(&model)?;
     watch.lap(&mut timings, "sites and bonds");
     let laid_out = resident_memory_bytes().unwrap_or(0);

@@ -1,6 +1,6 @@
 //! The model of a scene about rest: what studies of stiffness, eigenvalues and waves look at.
 
-use super::setup::problem;
+use super::setup::{self, problem};
 use crate::coupling::semidiscrete::masses;
 use crate::coupling::{Coupling, Model, Operator};
 use crate::progress::Silent;
@@ -27,7 +27,7 @@ impl<const D: usize> SceneModel<D> {
     /// [`RunError::Model`] of the sites or their families.
     pub fn new(scene: Scene<D>) -> Result<Self, RunError> {
         let (problem, rest) = problem(scene);
-        let (model, coupling) = Model::new(problem, &Silent)?;
+        let (model, coupling) = setup::model(problem, &rest, &Silent)?;
         Ok(Self {
             model,
             coupling,

@@ -2,18 +2,21 @@
 
 use std::sync::Arc;
 
-use crate::coupling::{self, Model, PointSource, Problem, Surfaces};
+use crate::coupling::{self, Coupling, Model, PointSource, Problem, Surfaces};
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
+use crate::peridynamics::bond_force::Kinematics;
 use crate::peridynamics::{BondWeights, PartialVolume};
+use crate::progress::Progress;
+use crate::run::error::RunError;
 use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
 use crate::scene::failure::Breaking;
 use crate::scene::initial::Initial;
 use crate::scene::materials::{Material, Ratio};
 use crate::scene::points::Points;
-use crate::scene::spec::{BondsSpec, CouplingTraits, SurfacesSpec, WeightsSpec};
+use crate::scene::spec::{BondsSpec, CouplingTraits, ElementsSpec, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
 use crate::tensor::{Vector, padded};
 
@@ -35,7 +38,9 @@ pub struct RunSettings<const D: usize> {
     pub follow: Option<Follow>,
     /// A number for all that determines the results.
     pub fingerprint: Fingerprint,
-    /// The local law of each material's elements, of those whose elements are not linear.
+    /// What elements of the points' materials follow.
+    pub elements: ElementsSpec,
+    /// The local law of each material's elements, of those whose elements are not linear by their material.
     pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
     /// Density of each material.
     pub density: Vec<f64>,
@@ -55,15 +60,16 @@ impl<const D: usize> RunSettings<D> {
 
     /// Whether elements of the model follow a law that is not linear.
     pub fn has_nonlinear_elements(&self, model: &Model<D>) -> bool {
-        let bends = |c: usize| self.local_laws[model.material_of_cell(c) as usize].is_some();
-        self.local_laws.iter().any(Option::is_some)
+        let laws = model.local_laws(&self.local_laws);
+        let bends = |c: usize| laws[model.material_of_cell(c) as usize].is_some();
+        laws.iter().any(Option::is_some)
             && (0..model.mesh.cell_count()).any(|c| model.is_element(c) && bends(c))
     }
 
     /// Whether the element of a cell follows a law for strains and rotations of any size.
     pub fn is_objective(&self, model: &Model<D>, cell: usize) -> bool {
-        let law = self.local_laws.get(model.material_of_cell(cell) as usize);
-        law.is_some_and(|law| law.as_ref().is_some_and(|law| law.is_objective()))
+        let law = model.local_law(&self.local_laws, model.material_of_cell(cell));
+        law.is_some_and(|law| law.is_objective())
     }
 
     /// What makes the forces of bonds that are intact, or of elements, depend on the displacement otherwise than linearly, as a choice; none where they do not.
@@ -80,7 +86,10 @@ impl<const D: usize> RunSettings<D> {
         let elements = || {
             self.has_nonlinear_elements(model).then_some((
                 "elements that are not linear",
-                "as the local law of their material says",
+                match self.elements {
+                    ElementsSpec::CauchyBorn => "elements = \"cauchy-born\"",
+                    ElementsSpec::Linear => "as the local law of their material says",
+                },
             ))
         };
         let (choice, why) = bonds.or_else(elements)?;
@@ -88,6 +97,14 @@ impl<const D: usize> RunSettings<D> {
             choice: choice.to_owned(),
             why: why.to_owned(),
         })
+    }
+
+    /// How bonds deform.
+    pub fn kinematics(&self) -> Kinematics {
+        match self.breaking.bonds {
+            BondsSpec::Exact => Kinematics::Exact,
+            BondsSpec::Linear => Kinematics::Linear,
+        }
     }
 
     /// The coupling as a choice: why it was made, or what it does if the scene names it.
@@ -166,6 +183,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             ratio,
             follow: scene.follow,
             fingerprint: scene.fingerprint,
+            elements: scene.elements,
             local_laws,
             density,
             chosen,
@@ -173,6 +191,22 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             choices: scene.choices,
         },
     )
+}
+
+/// The model of a problem, whose elements follow what the scene says of them.
+///
+/// # Errors
+/// [`RunError::Model`] for one that cannot be laid out.
+pub(crate) fn model<const D: usize>(
+    problem: Problem<D>,
+    rest: &RunSettings<D>,
+    progress: &dyn Progress,
+) -> Result<(Model<D>, Box<dyn Coupling<D>>), RunError> {
+    let (mut model, coupling) = Model::new(problem, progress)?;
+    if rest.elements == ElementsSpec::CauchyBorn {
+        model.follow_bonds(rest.kinematics())?;
+    }
+    Ok((model, coupling))
 }
 
 /// Says how many points lie on a border of two materials, if any do.

@@ -5,7 +5,7 @@ use super::equilibrium::{Equilibrium, StaticInput, equilibrium};
 use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
-use super::setup::{RunSettings, border_choice, problem, volumes_choice};
+use super::setup::{RunSettings, border_choice, model, problem, volumes_choice};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
@@ -22,7 +22,7 @@ use crate::run::definiteness;
 use crate::run::error::RunError;
 use crate::run::warnings::{indefinite, out_of_balance, warnings};
 use crate::scene::solve::Solve;
-use crate::scene::spec::CouplingTraits;
+use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
 use crate::system::{BlockCsr, SemiDiscrete};
 use crate::tensor::Vector;
@@ -59,7 +59,11 @@ pub fn solve_with<const D: usize>(
     let mut visit = Some(visit);
     let PlacedScene { scene, mut kept } = scene.into();
     with_choice(scene, |scene| {
-        solve_chosen(scene, kept.take(), progress, |output, solved| {
+        // what placed the zone knows of linear elements only
+        let kept = kept
+            .take()
+            .filter(|_| scene.elements == ElementsSpec::Linear);
+        solve_chosen(scene, kept, progress, |output, solved| {
             match visit.take() {
                 Some(visit) => visit(output, solved),
                 // a solved scene is not solved again
@@ -89,7 +93,7 @@ fn solve_chosen<const D: usize>(
     let (model, coupling) = match &kept {
         Some(k) => (&k.model, k.coupling.as_ref()),
         None => {
-            fresh = Model::new(problem, progress)?;
+            fresh = model(problem, &rest, progress)?;
             (&fresh.0, fresh.1.as_ref())
         }
     };

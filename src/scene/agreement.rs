@@ -3,7 +3,9 @@
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
-use super::spec::{BondsSpec, CouplingSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded};
+use super::spec::{
+    BondsSpec, CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded,
+};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
@@ -23,8 +25,10 @@ pub(crate) fn balanced_seam<const D: usize>(
         || matches!(joining.zones, ZonesNeeded::Everywhere(_));
     // a splice gives both sides the stress of one local law
     let is_same = |m: &u16| std::ptr::eq(material, &raw const materials[*m as usize]);
+    let elements = spec.peridynamics.as_ref().and_then(|p| p.elements.as_ref());
+    let follows_bonds = elements.is_some_and(|e| *e.get_ref() == ElementsSpec::CauchyBorn);
     let agrees = matches!(coupling, CouplingSpec::Splice(_))
-        && material.law.local_law().is_some()
+        && (material.law.local_law().is_some() || follows_bonds)
         && cell_material.iter().all(is_same);
     // elements are linear, and damage at their edge is found
     if balances || agrees || material.law.is_linear_until_damaged() {
@@ -41,7 +45,7 @@ pub(crate) fn balanced_seam<const D: usize>(
         ),
     )
     .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
-    .help("use coupling = \"truncated\", whose seam is in equilibrium at any stretch, or \"nonlocal\""))
+    .help("use coupling = \"truncated\", whose seam is in equilibrium at any stretch, or \"nonlocal\"; or, of a law without memory, coupling = \"splice\" with peridynamics.elements = \"cauchy-born\""))
 }
 
 /// Refuses finite elements of a law whose classical stress is not linear: they would stay elastic where the points yield.

@@ -11,12 +11,13 @@ use super::peridynamics;
 use super::selected_coupling::SelectedCoupling;
 use super::source::Span;
 use super::spec::{
-    CouplingSpec, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec, TruncatedSpec,
-    WeightsSpec,
+    CouplingSpec, ElementsSpec, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec,
+    TruncatedSpec, WeightsSpec,
 };
 use super::zones::{self, Placed};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::peridynamics::Accelerator;
 use crate::scene::points::Points;
 use crate::tensor::Vector;
 
@@ -135,6 +136,11 @@ fn obstacle<const D: usize>(
     placed: Option<&Placed>,
 ) -> Result<Option<Obstacle>, SceneError> {
     let certain = |reason: &str| Ok(Some(Obstacle::Certain(reason.to_owned())));
+    let follows_bonds = |e: &toml::Spanned<ElementsSpec>| *e.get_ref() == ElementsSpec::CauchyBorn;
+    let is_apart = |m: &Material<D>| m.law.accelerator() != Some(Accelerator::Pairwise);
+    if p.elements.as_ref().is_some_and(follows_bonds) && found.iter().any(is_apart) {
+        return certain("elements that follow the bonds of such a law at any stretch");
+    }
     let mut negative = None;
     for m in found {
         let (lambda, mu) = m.lame;

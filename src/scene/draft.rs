@@ -16,13 +16,15 @@ use super::materials::{self, Material};
 use super::meshing;
 use super::peridynamics::{self, Peridynamics};
 use super::solve::Solve;
-use super::spec::{CouplingSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded};
+use super::spec::{
+    BondsSpec, CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
+};
 use super::unused::Parts;
 use super::user_material;
 use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
-    adaptive_zone, agreement, coupling_selection, cracks_and_voids, failure, initial,
+    adaptive_zone, agreement, coupling_selection, cracks_and_voids, elements, failure, initial,
     lattice_regions, material_interfaces, output, solve, zones,
 };
 use crate::coupling::Zone;
@@ -178,6 +180,19 @@ impl<'a, const D: usize> Draft<'a, D> {
         agreement::memory(spec, materials, cells, zones)
     }
 
+    /// What elements follow; refuses energies of points where bonds that are exact have a fast pass.
+    fn elements(
+        &self,
+        coupling: &CouplingSpec,
+        used: &[u16],
+        law: &dyn Law<D>,
+        bonds: BondsSpec,
+    ) -> Result<ElementsSpec, SceneError> {
+        let first = &self.materials[usize::from(used[0])];
+        agreement::energy_density(self.spec, first, bonds)?;
+        elements::elements(self.spec, coupling, (&self.materials, used), law, bonds)
+    }
+
     /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
     fn with_coupling(
         &self,
@@ -218,7 +233,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         let peridynamic = used[0];
         self.check_laws(&joined.coupling, &used, &zones)?;
         let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
-        agreement::energy_density(spec, &self.materials[peridynamic as usize], breaking.bonds)?;
+        let elements = self.elements(&joined.coupling, &used, law.as_ref(), breaking.bonds)?;
         let follow = adaptive_zone::follow(
             spec,
             &mut joined,
@@ -249,6 +264,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             solve: self.solve.clone(),
             initial: self.initial.clone(),
             breaking,
+            elements,
             follow,
             solver: self.solver,
             output,

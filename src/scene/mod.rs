@@ -12,6 +12,7 @@
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
+//! | `elements.rs` | what finite elements follow |
 //! | `agreement.rs` | whether parts that are right alone agree |
 //! | `unused.rs` | parts of a scene that touch nothing |
 //! | `template.rs` | commented scenes to start from |
@@ -26,6 +27,7 @@ pub(crate) mod coupling_selection;
 pub(crate) mod cracks_and_voids;
 pub mod default_points;
 pub(crate) mod draft;
+pub(crate) mod elements;
 pub(crate) mod error;
 pub(crate) mod expression;
 pub(crate) mod failure;

@@ -11,7 +11,7 @@ use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::region::Region;
 use super::solve::Solve;
-use super::spec::{CouplingSpec, UnprovenSpec};
+use super::spec::{CouplingSpec, ElementsSpec, UnprovenSpec};
 use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -63,6 +63,8 @@ pub struct Scene<const D: usize> {
     pub initial: Vec<Initial<D>>,
     /// How bonds deform and break.
     pub breaking: Breaking<D>,
+    /// What elements of the points' materials follow.
+    pub elements: ElementsSpec,
     /// How the nonlocal zone follows the crack, if it does.
     pub follow: Option<Follow>,
     /// The linear solver.

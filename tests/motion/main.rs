@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+mod cauchy_born;
 mod contact;
 mod continuum_damage;
 mod driven;

@@ -10,6 +10,7 @@
 //! | `softening` | softening bonds: a notched strip pulled to separation, a notched beam in three-point bending |
 //! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
 //! | `layers` | two lattices of different horizons with a layer of elements between |
+//! | `large-deformation` | stretches and rotations of any size at seams whose elements follow the bonds |
 //! | `interfaces` | two materials: energy of an interface, a crack that meets one |
 //! | `weights` | the elastic tensor of a lattice with isotropic weights |
 //! | `tangents` | stiffness against finite differences of energies, symmetry, rigid motion, momentum, threads |
@@ -44,6 +45,7 @@ pub mod extremes;
 pub mod fields;
 pub mod horizons;
 pub mod interfaces;
+pub mod large_deformation;
 pub mod layers;
 pub mod meshes;
 mod observed;
@@ -132,6 +134,11 @@ pub const SUITES: &[Suite] = &[
         name: "layers",
         about: "two lattices, horizons 4:1, with a layer of elements between: reciprocity, affine fields, reflection",
         run: layers::run,
+    },
+    Suite {
+        name: "large-deformation",
+        about: "a stretch of 1.3 with a rotation of 0.7 rad at each seam whose elements follow the bonds: forces, stress on both sides, energy of the rotation",
+        run: large_deformation::run,
     },
     Suite {
         name: "interfaces",

@@ -45,7 +45,7 @@ mod reference_force;
 #[allow(unsafe_code)]
 mod simd;
 mod stencil;
-mod stretch;
+pub(super) mod stretch;
 #[cfg(test)]
 mod tests;
 

@@ -31,7 +31,7 @@ pub(super) const SHORTEST: f64 = 1e-30;
 
 /// `ψ(t) = (1 − (1 + t)^(−1/2))/t`, to the last bit but one.
 #[inline(always)]
-pub(super) fn psi(t: f64) -> f64 {
+pub(in crate::peridynamics) fn psi(t: f64) -> f64 {
     if t.abs() <= SERIES_RANGE {
         // not fused: without the right target that is a call, five of them a bond (20 ns instead of 6)
         PSI[..5].iter().rev().fold(PSI[5], |p, c| p * t + c)

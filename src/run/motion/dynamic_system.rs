@@ -46,7 +46,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
 ) -> Result<DynamicSystem<'a>, RunError> {
     let breaking = &rest.breaking;
     let critical_stretch = critical_stretch(model, rest)?;
-    let kinematics = kinematics(rest);
+    let kinematics = rest.kinematics();
     let bonds = match kinematics {
         Kinematics::Exact => "geometrically exact bonds",
         Kinematics::Linear => "bonds linear in the displacement",
@@ -83,7 +83,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     );
     match moving {
         Ok(motion) => {
-            let motion = motion.with_local_laws(&rest.local_laws);
+            let motion = motion.with_local_laws(&model.local_laws(&rest.local_laws));
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms
@@ -235,7 +235,7 @@ pub(crate) fn still<'a, const D: usize>(
     operator: &dyn Operator<D>,
     rest: &RunSettings<D>,
 ) -> Result<Option<CoupledSystem<'a, D>>, RunError> {
-    let kinematics = kinematics(rest);
+    let kinematics = rest.kinematics();
     if rest.nonlinear(model).is_none() {
         return Ok(None);
     }
@@ -250,15 +250,9 @@ pub(crate) fn still<'a, const D: usize>(
     let density = |material: u16| rest.density[material as usize];
     let symmetry = coupling.symmetry();
     let system = CoupledSystem::new(model, operator, symmetry, density, &behaviour)?;
-    Ok(Some(system.with_local_laws(&rest.local_laws)))
-}
-
-/// How bonds deform.
-fn kinematics<const D: usize>(rest: &RunSettings<D>) -> Kinematics {
-    match rest.breaking.bonds {
-        BondsSpec::Exact => Kinematics::Exact,
-        BondsSpec::Linear => Kinematics::Linear,
-    }
+    Ok(Some(
+        system.with_local_laws(&model.local_laws(&rest.local_laws)),
+    ))
 }
 
 /// Why bonds are not passed over, without the remedy: nothing is wrong.

@@ -149,7 +149,7 @@ fn run_segment<'r, const D: usize>(
 ) -> Result<RunSegment<'r, D>, RunError> {
     let model = laid_out.model;
     take_segment(laid_out, from, rest, spec, options, progress)
-        .map_err(|error| explained(error, model, &rest.local_laws))
+        .map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
 }
 
 /// Whether the balance of energy is watched: what is proved of the undeformed body need not hold of one whose law changes with its strain.
@@ -302,7 +302,7 @@ impl SegmentRecord {
         let rotation = observer.guard.rotation();
         self.proof.parts.extend(self.growth.take());
         let mut told = warnings(model, self.joining, &self.proof);
-        told.extend(locking(model, &rest.local_laws));
+        told.extend(locking(model, &model.local_laws(&rest.local_laws)));
         told.extend(without_response(motion.system(), &motion.state().u));
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
         told.extend(rotation.as_ref().map(Rotation::warning));

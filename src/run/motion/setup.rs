@@ -94,7 +94,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         mut timings,
         mut watch,
     } = begun;
-    let (model, coupling) = Model::new(problem, progress)?;
+    let (model, coupling) = setup::model(problem, rest, progress)?;
     choices.extend(setup::volumes_choice(&model));
     choices.extend(setup::border_choice(&model));
     watch.lap(&mut timings, "sites and bonds");

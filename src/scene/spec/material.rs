@@ -342,6 +342,10 @@ pub struct PeridynamicsSpec {
     #[serde(default)]
     #[schemars(with = "Option<super::motion::BondsSpec>")]
     pub bonds: Option<toml::Spanned<super::motion::BondsSpec>>,
+    /// What finite elements of the points' materials follow; "linear" if left out.
+    #[serde(default)]
+    #[schemars(with = "Option<super::motion::ElementsSpec>")]
+    pub elements: Option<toml::Spanned<super::motion::ElementsSpec>>,
     /// How the weights of bonds are kept in motion.
     #[serde(default)]
     #[schemars(with = "Option<super::motion::PrecisionSpec>")]

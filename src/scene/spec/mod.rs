@@ -33,9 +33,9 @@ pub use mesh::{
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
-    BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ExplicitSpec, GrowingModesSpec,
-    InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec, SolveSpec,
-    TipSpec,
+    BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec,
+    GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec,
+    SolveSpec, TipSpec,
 };
 pub use named_law::Given;
 pub use region::{

@@ -161,6 +161,17 @@ pub enum BondsSpec {
     Linear,
 }
 
+/// What finite elements of the points' materials follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ElementsSpec {
+    /// Linear elasticity, whose body must not rotate; or the local law of their material, if it has one.
+    #[default]
+    Linear,
+    /// The bonds of the lattice under the deformation of the element, at any stretch and rotation.
+    CauchyBorn,
+}
+
 /// How the weights of bonds are kept in motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

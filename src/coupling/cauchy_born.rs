@@ -1,0 +1,95 @@
+//! Elements that follow the bonds of the points beside them at any stretch and rotation.
+
+use std::sync::Arc;
+
+use crate::{
+    coupling::{Model, ModelError},
+    material::LocalLaw,
+    peridynamics::{BondWeights, CauchyBorn, Law, bond_force::Kinematics},
+};
+
+/// Largest difference, over the size of the tensor, between what a family carries and the elements' own stiffness that is taken for round-off.
+const ROUND_OFF: f64 = 1e-9;
+
+impl<const D: usize> Model<D> {
+    /// Gives the finite elements of the points' materials the Cauchy–Born law of the lattice's whole family, with bonds that deform as `kinematics` says.
+    ///
+    /// # Errors
+    /// [`ModelError::Unsupported`] for points that have no such family in common, and for a law that remembers; [`ModelError::Family`] for a family that is too small.
+    pub fn follow_bonds(&mut self, kinematics: Kinematics) -> Result<(), ModelError> {
+        let Some(p) = &self.peridynamics else {
+            return Ok(());
+        };
+        let refused = |what, remedy| Err(ModelError::Unsupported { what, remedy });
+        let [(factors, horizon)] = &self.factors[..] else {
+            return refused(
+                "elements with the Cauchy–Born law of points that are not there, or of several lattices",
+                "draw one nonlocal zone with one horizon, or leave peridynamics.elements out",
+            );
+        };
+        let is_uniform = self
+            .body()
+            .is_some_and(|body| body.cloud.horizon.iter().all(|h| h == horizon));
+        if !factors.is_lattice() || p.weights == BondWeights::Fitted || !is_uniform {
+            return refused(
+                "elements with the Cauchy–Born law of points whose families differ",
+                "give peridynamics.points a lattice, a horizon that is a number, and isotropic or plain weights",
+            );
+        }
+        let of_points: Vec<(u16, &dyn Law<D>)> = match p.law.several() {
+            Some(several) => (several.used().iter())
+                .map(|&m| (m, several.law(m)))
+                .collect(),
+            None => vec![(self.peridynamic_material(), p.law.as_ref())],
+        };
+        let mut laws: Vec<Option<Arc<dyn LocalLaw<D>>>> = vec![None; self.tensors.len()];
+        for (material, law) in of_points {
+            let (bonds, carried) = factors.bonds(law.linearised(), *horizon)?;
+            // the rows of the elements have this one, so that the law is what they lack of it
+            let tangent = self.tensors[usize::from(material)];
+            let mut difference = carried;
+            difference.add_scaled(-1.0, &tangent);
+            if difference.amax() > ROUND_OFF * tangent.amax() {
+                return refused(
+                    "elements with the Cauchy–Born law of a lattice that does not carry the typed constants",
+                    "use peridynamics.weights = \"plain\", or a horizon of three spacings",
+                );
+            }
+            let own = match p.law.several() {
+                Some(_) => material,
+                None => 0,
+            };
+            let Some(law) = CauchyBorn::new(&p.law, own, &bonds, tangent, kinematics) else {
+                return refused(
+                    "elements with the Cauchy–Born law of a material that remembers, or is for small strains",
+                    "use a material without memory, or leave peridynamics.elements out",
+                );
+            };
+            laws[usize::from(material)] = Some(Arc::new(law));
+        }
+        self.cauchy_born = laws;
+        Ok(())
+    }
+
+    /// The local law of elements of a material by its number: that of the bonds, where [`Model::follow_bonds`] gave one, and otherwise that of those `typed`.
+    pub fn local_law<'a>(
+        &'a self,
+        typed: &'a [Option<Arc<dyn LocalLaw<D>>>],
+        material: u16,
+    ) -> Option<&'a Arc<dyn LocalLaw<D>>> {
+        let of = |laws: &'a [Option<Arc<dyn LocalLaw<D>>>]| laws.get(usize::from(material));
+        let own = of(&self.cauchy_born).and_then(Option::as_ref);
+        own.or_else(|| of(typed).and_then(Option::as_ref))
+    }
+
+    /// [`Model::local_law`] of every material.
+    pub fn local_laws(
+        &self,
+        typed: &[Option<Arc<dyn LocalLaw<D>>>],
+    ) -> Vec<Option<Arc<dyn LocalLaw<D>>>> {
+        let materials = 0..self.tensors.len() as u16;
+        materials
+            .map(|m| self.local_law(typed, m).cloned())
+            .collect()
+    }
+}

@@ -1,0 +1,256 @@
+//! The Cauchy–Born law of a peridynamic material: what the whole family of a lattice point does under a uniform deformation, as a law of finite elements.
+//!
+//! ```text
+//! P(F) = Σ T⟨ξ⟩ ⊗ ξ V ,     T the force state of  y(x + ξ) − y(x) = F ξ
+//! ```
+//!
+//! Source: [SAND2015-7998] eq. (2.10), the collapsed stress, as a sum over the bonds of the lattice instead of an integral over the horizon. An element of this law has the stress of
+//! points of the same material at any stretch and rotation, to round-off, for it sums the same bonds. Under a uniform deformation opposite bonds have opposite forces, so that one of each pair counts twice.
+
+use std::sync::Arc;
+
+use super::bond_force::{Kinematics, stretch::psi};
+use crate::{
+    material::{LocalLaw, LocalResponse},
+    peridynamics::{Accelerator, DeformedFamily, EnergyDensity, Law, Past, Present, StatePart},
+    tensor::{Tensor, Tensor4, Vector, determinant},
+};
+
+/// The whole family of a lattice point, with the coefficients of its law.
+///
+/// Shapes: one entry per bond; `omega` is not read by a pairwise law.
+#[derive(Clone, Debug)]
+pub struct LatticeBonds<const D: usize> {
+    /// Bond vectors ξ \[m\], each with its opposite.
+    pub bonds: Vec<Vector<D>>,
+    /// Volumes V of their far points \[m^D\].
+    pub volumes: Vec<f64>,
+    /// `p` of the linearised law.
+    pub pair: Vec<f64>,
+    /// `ω` of the linearised law.
+    pub omega: Vec<f64>,
+    /// Its state part.
+    pub state: Option<StatePart<D>>,
+}
+
+impl<const D: usize> LatticeBonds<D> {
+    /// One bond of each pair of opposite ones, with the volume of both.
+    fn halved(&self) -> Self {
+        let leads = |xi: &Vector<D>| xi.iter().find(|x| **x != 0.0).is_some_and(|x| *x > 0.0);
+        let kept: Vec<usize> = (0..self.bonds.len())
+            .filter(|&k| leads(&self.bonds[k]))
+            .collect();
+        let of = |list: &[f64], times: f64| kept.iter().map(|&k| times * list[k]).collect();
+        Self {
+            bonds: kept.iter().map(|&k| self.bonds[k]).collect(),
+            volumes: of(&self.volumes, 2.0),
+            pair: of(&self.pair, 1.0),
+            omega: of(&self.omega, 1.0),
+            state: self.state.clone(),
+        }
+    }
+}
+
+/// A bond of a law with a fast pass.
+#[derive(Clone, Copy, Debug)]
+struct FastBond<const D: usize> {
+    /// `ξ ⊗ ξ/|ξ|²`.
+    dyad: Tensor<D>,
+    /// `p |ξ|⁴ V`.
+    pair: f64,
+    /// `ω |ξ|² V`; zero for a pairwise law.
+    omega: f64,
+}
+
+/// The Cauchy–Born law of a material without memory.
+#[derive(Clone, Debug)]
+pub struct CauchyBorn<const D: usize> {
+    law: Arc<dyn Law<D>>,
+    material: u16,
+    kinematics: Kinematics,
+    tangent: Tensor4<D>,
+    half: LatticeBonds<D>,
+    /// The same bonds, and `κ` of `½ κ θ²`, for exact bonds of a law with an accelerator.
+    fast: Option<(Vec<FastBond<D>>, f64)>,
+}
+
+impl<const D: usize> CauchyBorn<D> {
+    /// Of bonds of the number `material` (0 in a body of one); `tangent` is their collapsed tensor \[Pa\]. None for a law that remembers or has no nonlinear response, and for exact bonds of one that is for small strains.
+    pub fn new(
+        law: &Arc<dyn Law<D>>,
+        material: u16,
+        family: &LatticeBonds<D>,
+        tangent: Tensor4<D>,
+        kinematics: Kinematics,
+    ) -> Option<Self> {
+        let states = law.force_state()?;
+        let is_exact = kinematics == Kinematics::Exact;
+        if !states.history().is_empty() || (is_exact && !states.is_objective()) {
+            return None;
+        }
+        let half = family.halved();
+        let fast = law.accelerator().filter(|_| is_exact).map(|accelerator| {
+            let is_solid = matches!(accelerator, Accelerator::Solid { .. });
+            let bond = |(k, xi): (usize, &Vector<D>)| {
+                let (square, volume) = (xi.norm_squared(), half.volumes[k]);
+                FastBond {
+                    dyad: xi * xi.transpose() / square,
+                    pair: half.pair[k] * square * square * volume,
+                    omega: match is_solid {
+                        true => half.omega[k] * square * volume,
+                        false => 0.0,
+                    },
+                }
+            };
+            let state = half.state.as_ref().filter(|_| is_solid);
+            let bonds = half.bonds.iter().enumerate().map(bond).collect();
+            (bonds, state.map_or(0.0, |s| s.modulus.get(0, 0, 0, 0)))
+        });
+        Some(Self {
+            law: Arc::clone(law),
+            material,
+            kinematics,
+            tangent,
+            half,
+            fast,
+        })
+    }
+
+    /// `S` of `P = F S`, and the energy, of bonds whose force is linear in their extension, [`super::laws::LinearPeridynamicSolid`] or bonds that act alone.
+    ///
+    /// With `t = 2 ξ·Eξ/|ξ|²` and the Green–Lagrange strain E, all that a bond does follows from E: a rotation changes nothing.
+    fn fast(bonds: &[FastBond<D>], modulus: f64, gradient: &Tensor<D>) -> (Tensor<D>, f64) {
+        // 2 E without the difference of two ones
+        let strain = gradient + gradient.transpose() + gradient.transpose() * gradient;
+        let (mut pairs, mut isotropic) = (Tensor::zeros(), Tensor::zeros());
+        let (mut theta, mut stored) = (0.0, 0.0);
+        for bond in bonds {
+            let t = strain.dot(&bond.dyad);
+            let psi = psi(t);
+            let extension = t * (1.0 - (1.0 + t) * psi);
+            pairs += bond.dyad * (bond.pair * t * psi);
+            isotropic += bond.dyad * (bond.omega * (1.0 - t * psi));
+            theta += bond.omega * extension;
+            stored += bond.pair * extension * extension;
+        }
+        let stress = pairs + isotropic * (modulus * theta);
+        (stress, 0.5 * (stored + modulus * theta * theta))
+    }
+
+    /// The stress `P` and the energy by the force state of the law.
+    fn by_states(&self, gradient: &Tensor<D>) -> (Tensor<D>, EnergyDensity) {
+        let half = &self.half;
+        let bonds = half.bonds.len();
+        let difference: Vec<Vector<D>> = half.bonds.iter().map(|xi| gradient * xi).collect();
+        let (mut extension, mut direction) = (vec![0.0; bonds], half.bonds.clone());
+        for (k, eta) in difference.iter().enumerate() {
+            let xi = &half.bonds[k];
+            let length = xi.norm();
+            let cross = 2.0 * xi.dot(eta);
+            match self.kinematics {
+                Kinematics::Exact => {
+                    let t = (cross + eta.norm_squared()) / (length * length);
+                    let psi = psi(t);
+                    extension[k] = length * t * (1.0 - (1.0 + t) * psi);
+                    direction[k] = (xi + eta) * ((1.0 - t * psi) / length);
+                }
+                Kinematics::Linear => {
+                    extension[k] = 0.5 * cross / length;
+                    direction[k] /= length;
+                }
+            }
+        }
+        let mut force = vec![Vector::zeros(); bonds];
+        let family = DeformedFamily {
+            bonds: &half.bonds,
+            volumes: &half.volumes,
+            pair: &half.pair,
+            omega: &half.omega,
+            state: half.state.as_ref(),
+            difference: &difference,
+            extension: &extension,
+            direction: &direction,
+            is_whole: true,
+            damage: 0.0,
+            keeps_damage: false,
+            material: self.material,
+        };
+        let past = Past {
+            point: &[],
+            bonds: &[],
+        };
+        let present = Present {
+            point: &mut [],
+            bonds: &mut [],
+            principal_stress: None,
+        };
+        let energy = self
+            .law
+            .force_state()
+            .map_or(EnergyDensity::default(), |states| {
+                states.respond(&family, 0.0, past, present, &mut force)
+            });
+        let forces = force.iter().zip(&half.bonds).zip(&half.volumes);
+        let stress = forces.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
+            sum + force * xi.transpose() * *volume
+        });
+        (stress, energy)
+    }
+}
+
+impl<const D: usize> LocalLaw<D> for CauchyBorn<D> {
+    fn tangent(&self) -> &Tensor4<D> {
+        &self.tangent
+    }
+
+    fn is_linear(&self) -> bool {
+        self.kinematics == Kinematics::Linear && self.law.is_linear()
+    }
+
+    fn is_objective(&self) -> bool {
+        self.kinematics == Kinematics::Exact
+    }
+
+    fn history(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn flows_at_constant_volume(&self) -> bool {
+        false
+    }
+
+    fn respond(
+        &self,
+        gradient: &Tensor<D>,
+        _step: f64,
+        _past: &[f64],
+        _present: &mut [f64],
+    ) -> LocalResponse<D> {
+        let deformation = Tensor::identity() + gradient;
+        let (stress, stored) = match &self.fast {
+            Some((bonds, modulus)) => {
+                let (second, stored) = Self::fast(bonds, *modulus, gradient);
+                (deformation * second, stored)
+            }
+            None => {
+                let (stress, energy) = self.by_states(gradient);
+                (stress, energy.stored)
+            }
+        };
+        LocalResponse {
+            stress,
+            // bonds of a plane know nothing of what is out of it
+            across: 0.0,
+            volume_ratio: match self.kinematics {
+                Kinematics::Exact => determinant(&deformation),
+                Kinematics::Linear => 1.0,
+            },
+            stored,
+            dissipated: 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "cauchy_born_tests.rs"]
+mod tests;

@@ -1,0 +1,144 @@
+//! What the finite elements of the points' materials follow, and whether the rest of the scene agrees.
+
+use super::error::{SceneError, SceneErrorKind};
+use super::materials::Material;
+use super::spec::{
+    BondsSpec, CouplingSpec, CutBondsSpec, ElementsSpec, SceneSpec, WeightsSpec, ZonesNeeded,
+};
+use crate::coupling::Zone;
+use crate::peridynamics::{Accelerator, Law};
+
+/// What is typed of elements; those that follow the bonds need a coupling that carries their stress, and one lattice of bonds without memory.
+///
+/// # Errors
+/// A [`SceneError`] with the reason and the remedy.
+pub(crate) fn elements<const D: usize>(
+    spec: &SceneSpec,
+    coupling: &CouplingSpec,
+    (materials, used): (&[Material<D>], &[u16]),
+    law: &dyn Law<D>,
+    bonds: BondsSpec,
+) -> Result<ElementsSpec, SceneError> {
+    let typed = spec.peridynamics.as_ref().and_then(|p| p.elements.as_ref());
+    let Some(typed) = typed.filter(|typed| *typed.get_ref() == ElementsSpec::CauchyBorn) else {
+        return Ok(ElementsSpec::Linear);
+    };
+    let obstacle = coupling_without_stress(coupling, law)
+        .or_else(|| law_without_stress((materials, used), law, bonds))
+        .or_else(|| families_that_differ(spec));
+    match obstacle {
+        None => Ok(ElementsSpec::CauchyBorn),
+        Some((why, help)) => Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`peridynamics.elements` is \"cauchy-born\", and {why}"),
+        )
+        .label(typed.span(), "of which bonds?")
+        .help(help)),
+    }
+}
+
+/// A reason and its remedy.
+type Obstacle = Option<(String, &'static str)>;
+
+/// What keeps a coupling from carrying the stress of elements that follow the bonds.
+fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn Law<D>) -> Obstacle {
+    let joining = coupling.joining();
+    match (joining.zones, coupling) {
+        (ZonesNeeded::Everywhere(Zone::Local), _) => Some((
+            "there are no points whose bonds the elements could follow".to_owned(),
+            "draw a nonlocal zone and couple it by splice, or remove this",
+        )),
+        (ZonesNeeded::Everywhere(_), _) => {
+            Some(("there are no elements".to_owned(), "remove this"))
+        }
+        (_, CouplingSpec::Splice(_)) => None,
+        (_, CouplingSpec::Truncated(typed)) => {
+            let why = truncated_bonds(typed.cut_bonds, law).err()?;
+            let help =
+                "use coupling = \"splice\", or elements = \"linear\" for rotations below 2 degrees";
+            Some((why, help))
+        }
+        _ => Some((
+            format!(
+                "the rows of coupling `{}` at the seam are linear: elements and points would rotate, and the seam would not",
+                joining.name
+            ),
+            "use coupling = \"splice\" or \"truncated\", or elements = \"linear\" for rotations below 2 degrees",
+        )),
+    }
+}
+
+/// What keeps a law from giving elements a stress of its bonds.
+fn law_without_stress<const D: usize>(
+    (materials, used): (&[Material<D>], &[u16]),
+    law: &dyn Law<D>,
+    bonds: BondsSpec,
+) -> Obstacle {
+    let mut own = used.iter().map(|&m| &materials[usize::from(m)]);
+    if let Some(own) = own.find(|m| m.law.local_law().is_some()) {
+        let why = format!(
+            "elements of the material `{}` already have the local law of its points, {}",
+            own.name,
+            own.law.name()
+        );
+        return Some((why, "remove this"));
+    }
+    let states = law.force_state();
+    if states.is_none_or(|states| !states.history().is_empty()) {
+        let why = format!(
+            "bonds of the material `{}` ({}) remember, which a law of elements without their history cannot",
+            materials[usize::from(used[0])].name,
+            law.name()
+        );
+        let help = "use a bond-based, hardening, lps or pals material, or elements = \"linear\"";
+        return Some((why, help));
+    }
+    (bonds == BondsSpec::Linear && law.is_linear()).then(|| {
+        (
+            "the bonds themselves are linear, so that it changes nothing".to_owned(),
+            "add bonds = \"exact\", or remove this",
+        )
+    })
+}
+
+/// What keeps points from having one family in common.
+fn families_that_differ(spec: &SceneSpec) -> Obstacle {
+    if !spec.zones.bodies.is_empty() {
+        return Some((
+            "zones.bodies has several lattices".to_owned(),
+            "draw one nonlocal zone, or use elements = \"linear\"",
+        ));
+    }
+    let p = spec.peridynamics.as_ref()?;
+    let why = if p.horizon.as_constant().is_none() {
+        "the horizon varies, so that there is no one family"
+    } else if p.weights == WeightsSpec::Fitted {
+        "weights that are fitted differ from family to family"
+    } else {
+        return None;
+    };
+    let help =
+        "use a horizon that is a number and weights = \"isotropic\", or elements = \"linear\"";
+    Some((why.to_owned(), help))
+}
+
+/// Whether bonds that end on faces rotate with the body; if not, why.
+fn truncated_bonds<const D: usize>(
+    cut_bonds: Option<CutBondsSpec>,
+    law: &dyn Law<D>,
+) -> Result<(), String> {
+    if cut_bonds == Some(CutBondsSpec::Linear) {
+        return Err("cut-bonds = \"linear\" keeps the bonds at the seam from rotating".to_owned());
+    }
+    match law.accelerator() {
+        Some(Accelerator::Pairwise) => Ok(()),
+        Some(Accelerator::Solid { .. }) => Err(
+            "dilatations of elements at the seam, to which bonds of an lps belong that end there, are linear"
+                .to_owned(),
+        ),
+        None => Err(format!(
+            "bonds that end on faces follow the law {} to first order only",
+            law.name()
+        )),
+    }
+}
