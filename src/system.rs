@@ -5,9 +5,11 @@
 
 use rayon::prelude::*;
 
+pub mod ranks;
 mod shared_blocks;
 mod spmv;
 
+pub use ranks::{Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
 
 /// Whether the tangent of a system is symmetric; solvers choose by it.

@@ -66,6 +66,40 @@ impl<const D: usize> Model<D> {
         matrix
     }
 
+    /// Assembles the rows of some sites, in the order of `sites`: as [`Model::assemble`] does those of all.
+    pub fn assemble_sites(
+        &self,
+        operator: &dyn Operator<D>,
+        sites: &[u32],
+        progress: &dyn Progress,
+    ) -> BlockCsr {
+        progress.stage("assembly", Some(sites.len() as u64));
+        let matrix = assembly::assemble_rows(
+            sites.len(),
+            self.sites.len(),
+            |by| progress.advance(by),
+            |r, row| self.add_scaled_row(operator, sites[r] as usize, row),
+        );
+        progress.finish();
+        matrix
+    }
+
+    /// About what the row of each site costs to compute and to keep: the places that it sees.
+    pub fn work_of_sites(&self) -> Vec<f64> {
+        let of_site = |site: usize| match self.point_of(site) {
+            Some((body, point)) => 1 + body.families.of(point).len(),
+            None => {
+                1 + self
+                    .cells_of_site(site)
+                    .map(|(c, _)| self.mesh.cell(c).len())
+                    .sum::<usize>()
+            }
+        };
+        (0..self.sites.len())
+            .map(|site| of_site(site) as f64)
+            .collect()
+    }
+
     /// Assembles the rows as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
     pub fn assemble_unscaled(&self, operator: &dyn Operator<D>) -> BlockCsr {
         assembly::assemble(

@@ -274,6 +274,7 @@ fn proved<const D: usize>(
             operator,
             rest,
             stiffness: None,
+            product: None,
             system: None,
             affine_forces: &pattern.products,
         },

@@ -155,7 +155,10 @@ impl AnyScene {
         options: &RunOptions<'_>,
         progress: &dyn Progress,
     ) -> Result<RunSummary, RunError> {
-        self.fits()?;
+        // what a process of several needs is not known beforehand
+        if options.ranks.is_none() {
+            self.fits()?;
+        }
         let unused = self.unused().to_vec();
         let mut summary = match self {
             Self::Bar(s) => statics::run(*s, options, progress),

@@ -15,9 +15,10 @@ use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{self, LoadState, QuasiStaticError, QuasiStaticParams};
 use crate::solve::statics::{
-    self, Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticProblem, StaticSolution,
+    self, Method, MethodUsed, SpreadProblem, SpreadRows, StaticError, StaticInfo, StaticParams,
+    StaticProblem, StaticSolution,
 };
-use crate::system::{BlockCsr, SemiDiscrete, Symmetry};
+use crate::system::{BlockCsr, Partition, Ranks, SemiDiscrete, Spread, Symmetry};
 use crate::tensor::padded;
 
 /// A model at rest under its conditions, about to be solved.
@@ -29,10 +30,21 @@ pub(crate) struct StaticInput<'a, const D: usize> {
     pub solver: &'a Solver,
     /// The time at which conditions are taken.
     pub time: f64,
+    /// The processes that solve it together, if there are several.
+    pub ranks: Option<&'a dyn Ranks>,
+}
+
+/// What of a stiffness is there to be proved: all of it, or its products.
+pub(crate) enum Assembled<'a> {
+    /// All rows.
+    Whole(&'a BlockCsr),
+    /// The rows of this process.
+    Spread(&'a SpreadRows<'a>),
 }
 
 /// A model at rest, solved.
 pub(crate) struct Equilibrium {
+    /// All rows, or those of this process.
     pub stiffness: BlockCsr,
     pub symmetry: Symmetry,
     pub load: Vec<f64>,
@@ -66,9 +78,13 @@ pub(crate) fn equilibrium<const D: usize>(
     at: &StaticInput<'_, D>,
     system: Option<&mut dyn SemiDiscrete>,
     mut timings: Timings,
-    prove: impl FnOnce(&BlockCsr) -> Result<f64, RunError>,
+    prove: impl FnOnce(&Assembled<'_>) -> Result<f64, RunError>,
     progress: &dyn Progress,
 ) -> Result<Equilibrium, RunError> {
+    // forces that are not linear are solved for by every process, with all rows
+    if let (Some(ranks), None) = (at.ranks, &system) {
+        return spread(at, ranks, timings, prove, progress);
+    }
     let mut watch = Stopwatch::start();
     let model = at.model;
     let stiffness = model.assemble(at.operator, progress);
@@ -79,7 +95,7 @@ pub(crate) fn equilibrium<const D: usize>(
     let mut choices = Vec::new();
     let symmetry = symmetry(at.coupling, || stiffness.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");
-    timings.add("proof", prove(&stiffness)?);
+    timings.add("proof", prove(&Assembled::Whole(&stiffness))?);
     let static_problem = StaticProblem {
         stiffness: &stiffness,
         symmetry,
@@ -103,6 +119,66 @@ pub(crate) fn equilibrium<const D: usize>(
     timings.add("ordering", info.ordering_seconds);
     timings.add("factorisation", info.factor_seconds);
     timings.add("solve", info.solve_seconds);
+    Ok(Equilibrium {
+        stiffness,
+        symmetry,
+        load,
+        applied,
+        holder,
+        solution,
+        internal,
+        energy,
+        choices,
+        timings,
+    })
+}
+
+/// As [`equilibrium`], of linear forces, each process with the rows of its own sites.
+fn spread<const D: usize>(
+    at: &StaticInput<'_, D>,
+    ranks: &dyn Ranks,
+    mut timings: Timings,
+    prove: impl FnOnce(&Assembled<'_>) -> Result<f64, RunError>,
+    progress: &dyn Progress,
+) -> Result<Equilibrium, RunError> {
+    let mut watch = Stopwatch::start();
+    let model = at.model;
+    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+    let partition = Partition::by_bisection(&positions, &model.work_of_sites(), ranks.count());
+    let spread = Spread {
+        ranks,
+        partition: &partition,
+    };
+    let stiffness = model.assemble_sites(at.operator, spread.own(), progress);
+    watch.lap(&mut timings, "assembly");
+    let (load, applied) = loads(model, at.conditions, at.time)?;
+    let (prescribed, holder) = supports(model, at.conditions, at.time)?;
+    let rows = SpreadRows {
+        matrix: &stiffness,
+        spread,
+    };
+    let mut choices = vec![Decision {
+        choice: format!("{} processes", ranks.count()),
+        why: "each has the rows of its own sites".to_owned(),
+    }];
+    let symmetry = symmetry(at.coupling, || rows.asymmetry(), &mut choices);
+    watch.lap(&mut timings, "conditions");
+    timings.add("proof", prove(&Assembled::Spread(&rows))?);
+    let problem = SpreadProblem {
+        rows,
+        symmetry,
+        positions: &positions,
+        load: &load,
+        prescribed: &prescribed,
+    };
+    let solution = statics::solve_spread(&problem, &params(at.solver), progress)?;
+    let u = &solution.displacement;
+    let mut internal = vec![0.0; u.len()];
+    rows.apply_into(u, &mut internal);
+    let energy = (symmetry == Symmetry::Symmetric)
+        .then(|| 0.5 * u.iter().zip(&internal).map(|(u, f)| u * f).sum::<f64>());
+    timings.add("factorisation", solution.info.factor_seconds);
+    timings.add("solve", solution.info.solve_seconds);
     Ok(Equilibrium {
         stiffness,
         symmetry,

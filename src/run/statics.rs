@@ -1,7 +1,7 @@
 //! From a validated scene to its solution: the only place where scene, core, solver and observers meet.
 
 use super::chosen::with_choice;
-use super::equilibrium::{Equilibrium, StaticInput, equilibrium};
+use super::equilibrium::{Assembled, Equilibrium, StaticInput, equilibrium};
 use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
@@ -24,7 +24,8 @@ use crate::run::warnings::{indefinite, out_of_balance, warnings};
 use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
-use crate::system::{BlockCsr, SemiDiscrete};
+use crate::solve::statics::StaticInfo;
+use crate::system::{Ranks, SemiDiscrete};
 use crate::tensor::Vector;
 
 /// Runs a scene and writes its outputs.
@@ -42,7 +43,7 @@ pub(crate) fn run<const D: usize>(
     if moves {
         return with_choice(scene.scene, |scene| motion::run(scene, options, progress));
     }
-    solve_with(scene, progress, |output, solved| {
+    solve_over(scene, options.ranks, progress, |output, solved| {
         super::write::write_for(output, solved, options)
     })
 }
@@ -56,6 +57,16 @@ pub fn solve_with<const D: usize>(
     progress: &dyn Progress,
     visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
 ) -> Result<RunSummary, RunError> {
+    solve_over(scene, None, progress, visit)
+}
+
+/// As [`solve_with`], by several processes, if there are.
+fn solve_over<const D: usize>(
+    scene: impl Into<PlacedScene<D>>,
+    ranks: Option<&dyn Ranks>,
+    progress: &dyn Progress,
+    visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
+) -> Result<RunSummary, RunError> {
     let mut visit = Some(visit);
     let PlacedScene { scene, mut kept } = scene.into();
     with_choice(scene, |scene| {
@@ -63,7 +74,7 @@ pub fn solve_with<const D: usize>(
         let kept = kept
             .take()
             .filter(|_| scene.elements == ElementsSpec::Linear);
-        solve_chosen(scene, kept, progress, |output, solved| {
+        solve_chosen(scene, kept, ranks, progress, |output, solved| {
             match visit.take() {
                 Some(visit) => visit(output, solved),
                 // a solved scene is not solved again
@@ -77,6 +88,7 @@ pub fn solve_with<const D: usize>(
 fn solve_chosen<const D: usize>(
     scene: Scene<D>,
     kept: Option<Arc<CachedSolution<D>>>,
+    ranks: Option<&dyn Ranks>,
     progress: &dyn Progress,
     visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
 ) -> Result<RunSummary, RunError> {
@@ -109,6 +121,7 @@ fn solve_chosen<const D: usize>(
         coupling,
         operator: operator.as_ref(),
         rest: &rest,
+        ranks,
     };
     // what placed the zone was solved with linear forces
     let cached = kept.as_ref().filter(|_| is_linear).map(|k| &k.equilibrium);
@@ -141,7 +154,7 @@ fn solve_chosen<const D: usize>(
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
-    let sizes = body.sizes([nodes, cells], &equilibrium.stiffness);
+    let sizes = body.sizes([nodes, cells], &equilibrium.solution.info);
     Ok(RunSummary {
         scene: name,
         sizes,
@@ -160,6 +173,7 @@ struct StaticBody<'a, const D: usize> {
     coupling: &'a dyn Coupling<D>,
     operator: &'a dyn Operator<D>,
     rest: &'a RunSettings<D>,
+    ranks: Option<&'a dyn Ranks>,
 }
 
 impl<const D: usize> StaticBody<'_, D> {
@@ -169,7 +183,7 @@ impl<const D: usize> StaticBody<'_, D> {
     /// [`RunError::Proof`] for one that refuses the model.
     fn prove(
         &self,
-        stiffness: &BlockCsr,
+        assembled: &Assembled<'_>,
         progress: &dyn Progress,
     ) -> Result<(Proof, f64), RunError> {
         let mut clock = Stopwatch::start();
@@ -180,7 +194,14 @@ impl<const D: usize> StaticBody<'_, D> {
                 coupling: self.coupling,
                 operator: self.operator,
                 rest: self.rest,
-                stiffness: Some(stiffness),
+                stiffness: match assembled {
+                    Assembled::Whole(stiffness) => Some(stiffness),
+                    Assembled::Spread(_) => None,
+                },
+                product: match assembled {
+                    Assembled::Whole(_) => None,
+                    Assembled::Spread(rows) => Some(*rows),
+                },
                 system: None,
                 affine_forces: &[],
             },
@@ -198,7 +219,7 @@ impl<const D: usize> StaticBody<'_, D> {
         timings: &mut Timings,
         progress: &dyn Progress,
     ) -> Result<Proof, RunError> {
-        let (proof, seconds) = self.prove(&known.stiffness, progress)?;
+        let (proof, seconds) = self.prove(&Assembled::Whole(&known.stiffness), progress)?;
         known.timings.add_to(timings);
         timings.add("proof", seconds);
         Ok(proof)
@@ -215,8 +236,8 @@ impl<const D: usize> StaticBody<'_, D> {
         progress: &dyn Progress,
     ) -> Result<(Equilibrium, Proof), RunError> {
         let mut proof = Proof::default();
-        let prove = |stiffness: &BlockCsr| {
-            let (found, seconds) = self.prove(stiffness, progress)?;
+        let prove = |assembled: &Assembled<'_>| {
+            let (found, seconds) = self.prove(assembled, progress)?;
             proof = found;
             Ok(seconds)
         };
@@ -228,6 +249,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 conditions: &self.rest.conditions,
                 solver: &self.rest.solver,
                 time: 0.0,
+                ranks: self.ranks,
             },
             system,
             Timings::default(),
@@ -295,7 +317,7 @@ impl<const D: usize> StaticBody<'_, D> {
     }
 
     /// Sizes of a model with so many nodes and cells.
-    fn sizes(&self, [nodes, cells]: [usize; 2], stiffness: &BlockCsr) -> Sizes {
+    fn sizes(&self, [nodes, cells]: [usize; 2], info: &StaticInfo) -> Sizes {
         let model = self.model;
         Sizes {
             nodes,
@@ -307,8 +329,8 @@ impl<const D: usize> StaticBody<'_, D> {
                 .filter(|s| matches!(s.kind, SiteKind::Point(_)))
                 .count(),
             bonds: model.body().map_or(0, |b| b.bond_count()) + self.operator.additional_bonds(),
-            dofs: stiffness.dofs(),
-            nonzeros: stiffness.nonzeros(),
+            dofs: model.sites.len() * D,
+            nonzeros: info.matrix_nnz,
         }
     }
 

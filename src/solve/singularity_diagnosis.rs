@@ -8,7 +8,7 @@ use crate::solve::FreeDofs;
 use crate::solve::direct::{Analysis, Factor};
 use crate::solve::direct_params::DirectParams;
 use crate::solve::ordering::Ordering;
-use crate::system::BlockCsr;
+use crate::system::{BlockCsr, Spread};
 use nalgebra::{DMatrix, DVector};
 
 /// Sites that can move without resistance.
@@ -61,9 +61,43 @@ fn mode_name(block: usize, mode: usize) -> String {
     }
 }
 
+/// The rows of a matrix that this process holds: all, or those of its own sites.
+#[derive(Clone, Copy)]
+pub(crate) struct HeldRows<'a> {
+    pub matrix: &'a BlockCsr,
+    /// Where sites are spread over ranks; every function of these rows is then collective.
+    pub spread: Option<Spread<'a>>,
+}
+
+impl HeldRows<'_> {
+    /// Number of sites, held or not.
+    fn sites(&self) -> usize {
+        self.spread
+            .map_or(self.matrix.rows(), |s| s.partition.sites())
+    }
+
+    /// The site of a row.
+    fn site(&self, row: usize) -> usize {
+        self.spread.map_or(row, |s| s.own()[row] as usize)
+    }
+
+    /// The row of a site, if it is held.
+    fn row(&self, site: usize) -> Option<usize> {
+        match self.spread {
+            None => Some(site),
+            Some(s) => s.partition.row(s.ranks.rank(), site as u32),
+        }
+    }
+
+    /// The largest of a number over all who hold rows.
+    fn largest(&self, own: f64) -> f64 {
+        self.spread.map_or(own, |s| s.largest(own))
+    }
+}
+
 /// Connected bodies: the body number of each site, and how many there are. Zero blocks connect nothing.
-fn bodies(matrix: &BlockCsr) -> (Vec<u32>, usize) {
-    let n = matrix.rows();
+fn bodies(rows: &HeldRows<'_>) -> (Vec<u32>, usize) {
+    let (matrix, n) = (rows.matrix, rows.sites());
     let mut root: Vec<u32> = (0..n as u32).collect();
     fn find(root: &mut [u32], mut i: u32) -> u32 {
         while root[i as usize] != i {
@@ -72,15 +106,30 @@ fn bodies(matrix: &BlockCsr) -> (Vec<u32>, usize) {
         }
         i
     }
+    // the smaller site number leads, so that bodies are numbered by their first site
+    fn join(root: &mut [u32], i: u32, j: u32) {
+        let (a, b) = (find(root, i), find(root, j));
+        root[a.max(b) as usize] = a.min(b);
+    }
     let size = matrix.block * matrix.block;
-    for i in 0..n {
-        let (columns, blocks) = matrix.row(i);
+    for r in 0..matrix.rows() {
+        let i = rows.site(r) as u32;
+        let (columns, blocks) = matrix.row(r);
         for (e, &c) in columns.iter().enumerate() {
-            let (a, b) = (find(&mut root, i as u32), find(&mut root, c));
-            if a != b && blocks[e * size..(e + 1) * size].iter().any(|&k| k != 0.0) {
-                // the smaller site number leads, so that bodies are numbered by their first site
-                root[a.max(b) as usize] = a.min(b);
+            if find(&mut root, i) != find(&mut root, c)
+                && blocks[e * size..(e + 1) * size].iter().any(|&k| k != 0.0)
+            {
+                join(&mut root, i, c);
             }
+        }
+    }
+    if let Some(spread) = rows.spread {
+        let joined = (0..n as u32).filter(|&i| root[i as usize] != i);
+        let own: Vec<u64> = joined
+            .map(|i| u64::from(i) << 32 | u64::from(root[i as usize]))
+            .collect();
+        for pair in spread.ranks.gather_words(&own).into_iter().flatten() {
+            join(&mut root, (pair >> 32) as u32, pair as u32);
         }
     }
     let mut number = vec![0u32; n];
@@ -99,11 +148,12 @@ fn bodies(matrix: &BlockCsr) -> (Vec<u32>, usize) {
 
 /// Finds bodies that the prescribed dofs do not hold, and free dofs without any stiffness; nothing if there are none.
 pub(crate) fn unheld_bodies(
-    matrix: &BlockCsr,
+    rows: &HeldRows<'_>,
     free: &FreeDofs,
     positions: &[[f64; 3]],
 ) -> Option<FreeMotion> {
-    let (body, count) = bodies(matrix);
+    let matrix = rows.matrix;
+    let (body, count) = bodies(rows);
     let mut members = vec![Vec::new(); count];
     for (i, &b) in body.iter().enumerate() {
         members[b as usize].push(i);
@@ -118,7 +168,7 @@ pub(crate) fn unheld_bodies(
         if sites.iter().all(|&i| free.count_of_site(i) == 0) {
             continue;
         }
-        let motions = free_rigid_motions(matrix, free, positions, sites);
+        let motions = free_rigid_motions(rows, free, positions, sites);
         if motions.is_empty() {
             continue;
         }
@@ -133,7 +183,7 @@ pub(crate) fn unheld_bodies(
             .extend(sites.iter().copied().filter(|&i| free.count_of_site(i) > 0));
     }
     if unheld > 0 {
-        let all = found.sites.len() == matrix.rows();
+        let all = found.sites.len() == rows.sites();
         found.remedy = if all {
             "prescribe displacements that hold these motions".to_owned()
         } else {
@@ -145,17 +195,24 @@ pub(crate) fn unheld_bodies(
         found.sites.sort_unstable();
         return Some(found);
     }
-    let empty: Vec<usize> = (0..matrix.rows())
-        .filter(|&i| {
+    let mut empty: Vec<usize> = (0..matrix.rows())
+        .filter(|&r| {
             let d = matrix.block;
-            let (_, blocks) = matrix.row(i);
-            free.of_site(i).any(|a| {
+            let (_, blocks) = matrix.row(r);
+            free.of_site(rows.site(r)).any(|a| {
                 blocks
                     .chunks(d * d)
                     .all(|k| k[a * d..(a + 1) * d].iter().all(|&v| v == 0.0))
             })
         })
+        .map(|r| rows.site(r))
         .collect();
+    if let Some(spread) = rows.spread {
+        let own: Vec<u64> = empty.iter().map(|&site| site as u64).collect();
+        let all = spread.ranks.gather_words(&own).into_iter().flatten();
+        empty = all.map(|site| site as usize).collect();
+        empty.sort_unstable();
+    }
     (!empty.is_empty()).then(|| FreeMotion {
         sites: empty,
         modes: vec!["a displacement component without any stiffness".to_owned()],
@@ -165,12 +222,12 @@ pub(crate) fn unheld_bodies(
 
 /// Names of the rigid modes that `sites` keep: those that vanish on the prescribed dofs and meet no force.
 fn free_rigid_motions(
-    matrix: &BlockCsr,
+    rows: &HeldRows<'_>,
     free: &FreeDofs,
     positions: &[[f64; 3]],
     sites: &[usize],
 ) -> Vec<String> {
-    let d = matrix.block;
+    let d = rows.matrix.block;
     let inverse = 1.0 / sites.len() as f64;
     let centre: [f64; 3] =
         std::array::from_fn(|k| sites.iter().map(|&i| positions[i][k]).sum::<f64>() * inverse);
@@ -221,7 +278,7 @@ fn free_rigid_motions(
             let r = rigid_modes(d, relative(i), scale);
             std::array::from_fn(|a| (0..modes).map(|m| c[m] * r[m][a]).sum())
         };
-        if meets_no_force(matrix, free, sites, motion) {
+        if meets_no_force(rows, free, sites, motion) {
             // a mode is named by its parts; tiny parts are round-off
             let largest = c.amax();
             for m in 0..modes {
@@ -237,15 +294,19 @@ fn free_rigid_motions(
 
 /// Whether the internal force of a motion of `sites` vanishes on their free dofs.
 fn meets_no_force(
-    matrix: &BlockCsr,
+    rows: &HeldRows<'_>,
     free: &FreeDofs,
     sites: &[usize],
     motion: impl Fn(usize) -> [f64; 3],
 ) -> bool {
+    let matrix = rows.matrix;
     let d = matrix.block;
     let (mut force, mut stiffness, mut size) = (0.0_f64, 0.0_f64, 0.0_f64);
     for &i in sites {
-        let (columns, blocks) = matrix.row(i);
+        let Some(row) = rows.row(i) else {
+            continue;
+        };
+        let (columns, blocks) = matrix.row(row);
         let mut f = [0.0; 3];
         for (e, &c) in columns.iter().enumerate() {
             let u = motion(c as usize);
@@ -262,6 +323,7 @@ fn meets_no_force(
             force = force.max(f[a].abs());
         }
     }
+    let [force, stiffness, size] = [force, stiffness, size].map(|own| rows.largest(own));
     force <= NO_FORCE * stiffness * size
 }
 
@@ -282,7 +344,11 @@ pub(crate) fn mechanism(
     let largest = size.iter().fold(0.0, |a: f64, &b| a.max(b));
     let all: Vec<usize> = (0..size.len()).collect();
     let motion = |i: usize| std::array::from_fn(|a| if a < d { v[i * d + a] } else { 0.0 });
-    meets_no_force(matrix, free, &all, motion).then(|| {
+    let rows = HeldRows {
+        matrix,
+        spread: None,
+    };
+    meets_no_force(&rows, free, &all, motion).then(|| {
         moving(
             (0..size.len())
                 .filter(|&i| size[i] > 1e-3 * largest)

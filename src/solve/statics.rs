@@ -5,12 +5,14 @@ use crate::solve::FreeDofs;
 use crate::solve::direct_params::DirectError;
 use crate::solve::multigrid::MultigridError;
 use crate::solve::ordering::{Ordering, OrderingError};
-use crate::solve::singularity_diagnosis::{self, FreeMotion};
+use crate::solve::singularity_diagnosis::{self, FreeMotion, HeldRows};
 use crate::system::{BlockCsr, Symmetry};
 
 mod methods;
+mod spread;
 
 pub use methods::{expected_method, factors};
+pub use spread::{SpreadProblem, SpreadRows, solve_spread};
 
 /// A static problem; borrowed, so that assembling it is the caller's to time.
 ///
@@ -92,6 +94,12 @@ pub enum MethodUsed {
     ConjugateGradients,
     /// Restarted GMRES with multigrid.
     Gmres,
+    /// Conjugate gradients with algebraic multigrid, over ranks.
+    RankConjugateGradients,
+    /// Restarted GMRES with algebraic multigrid, over ranks.
+    RankGmres,
+    /// A factorisation over ranks.
+    RankDirect,
     /// Newton's method, led by factors of the stiffness or by its row sums.
     Newton,
     /// Nothing was free.
@@ -106,6 +114,9 @@ impl MethodUsed {
             Self::Lu => "LU factorisation",
             Self::ConjugateGradients => "conjugate gradients with multigrid",
             Self::Gmres => "GMRES with multigrid",
+            Self::RankConjugateGradients => "conjugate gradients with algebraic multigrid of PETSc",
+            Self::RankGmres => "GMRES with algebraic multigrid of PETSc",
+            Self::RankDirect => "factorisation by MUMPS",
             Self::Newton => "Newton's method",
             Self::None => "no solver",
         }
@@ -203,6 +214,27 @@ pub enum StaticError {
         /// Iterations or refinement steps done.
         iterations: usize,
     },
+    /// The ranks have no solver for the problem.
+    #[error("no solver over ranks: {message}")]
+    Ranks {
+        /// What it complains of.
+        message: String,
+    },
+    /// The residual of a solver over ranks stayed above the tolerance.
+    #[error(
+        "the residual stayed at {residual:.1e} of the load after {iterations} iterations over ranks ({why}), {tolerance:.1e} was asked for; \
+         factorise instead (solver.method = \"direct\"), give other options in PETSC_OPTIONS, or check for near-mechanisms and extreme contrasts of stiffness"
+    )]
+    RanksNotConverged {
+        /// Relative residual reached.
+        residual: f64,
+        /// Relative residual asked for.
+        tolerance: f64,
+        /// Iterations done.
+        iterations: usize,
+        /// What the solver says.
+        why: String,
+    },
     /// Newton's method found no equilibrium of forces that are not linear.
     #[error(
         "no equilibrium was found: the residual is {residual:.1e} of the forces after {iterations} iterations, largest \
@@ -297,7 +329,11 @@ pub fn well_posed(problem: &StaticProblem<'_>) -> Result<FreeDofs, StaticError> 
     check(problem)?;
     let matrix = problem.stiffness;
     let free = FreeDofs::from_prescribed(problem.prescribed, matrix.block.max(1));
-    match singularity_diagnosis::unheld_bodies(matrix, &free, problem.positions) {
+    let rows = HeldRows {
+        matrix,
+        spread: None,
+    };
+    match singularity_diagnosis::unheld_bodies(&rows, &free, problem.positions) {
         Some(motion) if free.count() > 0 => Err(singular_error(motion, problem.positions)),
         _ => Ok(free),
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use imports::{Imports, ItemPath};
 
 /// Modules of the library and, above them, the other crates, the lowest first.
-const FLOORS: [&str; 21] = [
+const FLOORS: [&str; 22] = [
     "tensor",
     "progress",
     "regular_file",
@@ -26,6 +26,7 @@ const FLOORS: [&str; 21] = [
     "scene",
     "run",
     "predict",
+    "petsc",
     "terminal",
     "study",
     "verify",
@@ -34,7 +35,7 @@ const FLOORS: [&str; 21] = [
 ];
 
 /// Crates that stand on the library.
-const CRATES: [&str; 5] = ["terminal", "study", "verify", "cli", "python"];
+const CRATES: [&str; 6] = ["petsc", "terminal", "study", "verify", "cli", "python"];
 
 /// Crates that may not take from each other.
 const APART: [[&str; 2]; 2] = [["verify", "cli"], ["verify", "python"]];

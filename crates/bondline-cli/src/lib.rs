@@ -9,8 +9,10 @@ use std::sync::atomic::Ordering;
 use bondline::observe::checkpoint::Pace;
 use bondline::observe::report as tables;
 use bondline::observe::summary::Ended;
+use bondline::progress::Silent;
 use bondline::run::{AnyScene, RunOptions, StartFrom};
 use bondline::scene::{self, Template};
+use bondline::system::Ranks;
 use bondline_study::pareto::{self, CostBy, Reference, TradeEnd, TradeParams};
 use bondline_study::{CheckError, ConvergeError, ConvergeParams, Refinement};
 use bondline_terminal::memory;
@@ -19,6 +21,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use command::interrupt::{self, INTERRUPTED};
+use command::ranks::Processes;
 use command::threads::{self, Oversubscribe};
 use command::verify;
 
@@ -302,6 +305,7 @@ fn run(
     (threads, oversubscribe): (Option<usize>, bool),
     checkpoint_every: Option<Pace>,
     resume: bool,
+    ranks: Option<&dyn Ranks>,
 ) -> miette::Result<u8> {
     let oversubscribe = match oversubscribe {
         true => Oversubscribe::Allowed,
@@ -317,7 +321,9 @@ fn run(
             "a static scene has no checkpoints: leave out --resume and --checkpoint-every, or add [solve.explicit]"
         ));
     }
-    let interrupt = scene.moves().then(interrupt::listen).transpose()?;
+    // several processes would not hear of a signal in the same step
+    let listens = scene.moves() && ranks.is_none();
+    let interrupt = listens.then(interrupt::listen).transpose()?;
     let options = RunOptions {
         start: if resume {
             StartFrom::Checkpoint
@@ -328,19 +334,23 @@ fn run(
         interrupt: interrupt.map(|i| &i.asked),
         heeds: interrupt.map(|i| &i.heeded),
         observer: None,
+        ranks,
     };
-    let summary = scene
-        .run_with(&options, &TerminalProgress::on_stderr())
-        .map_err(|e| miette::miette!("{e}"))?;
+    let is_first = ranks.is_none_or(|ranks| ranks.rank() == 0);
+    let summary = match is_first {
+        true => scene.run_with(&options, &TerminalProgress::on_stderr()),
+        false => scene.run_with(&options, &Silent),
+    };
+    let summary = summary.map_err(|e| miette::miette!("{e}"))?;
     let code = match summary.motion.as_ref().map(|m| m.ended) {
         None | Some(Ended::Finished) => DONE,
         Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => AT_EDGE,
         Some(Ended::Interrupted) => INTERRUPTED,
     };
-    if json {
-        print(summary.json().map_err(|e| miette::miette!("{e}"))?)?;
-    } else {
-        print(summary)?;
+    match (is_first, json) {
+        (false, _) => {}
+        (true, true) => print(summary.json().map_err(|e| miette::miette!("{e}"))?)?,
+        (true, false) => print(summary)?,
     }
     Ok(code)
 }
@@ -400,14 +410,17 @@ fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Resul
             checkpoint_every,
             resume,
         } => {
-            return run(
+            let processes = Processes::start()?;
+            let result = run(
                 scene,
                 json,
                 output,
                 (threads, oversubscribe),
                 checkpoint_every,
                 resume,
+                processes.ranks(),
             );
+            return processes.end(result);
         }
         Command::Check {
             scene,

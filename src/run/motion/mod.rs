@@ -46,6 +46,7 @@ use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::solve::Solve;
 use crate::scene::validated::Scene;
+use crate::system::Ranks;
 
 /// Where a run starts from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,12 +71,15 @@ pub struct RunOptions<'a> {
     pub heeds: Option<&'a AtomicBool>,
     /// Takes the results, and says whether they are written to files as well.
     pub observer: Option<&'a dyn Observer>,
+    /// The processes that compute the run together, if there are several: all of them call the run, the first one writes files.
+    pub ranks: Option<&'a dyn Ranks>,
 }
 
 impl RunOptions<'_> {
     /// Whether the run writes files.
     pub(crate) fn writes(&self) -> bool {
-        self.observer.is_none_or(Observer::wants_files)
+        self.ranks.is_none_or(|ranks| ranks.rank() == 0)
+            && self.observer.is_none_or(Observer::wants_files)
     }
 
     /// Appends a row to a table, and shows it to the observer.
@@ -103,12 +107,29 @@ pub const STILL: RunError = RunError::Later {
     remedy: "use AnyScene::run, which solves it",
 };
 
+/// Whether checkpoints are written by the clock.
+fn paces_by_clock(solve: &Solve, options: &RunOptions<'_>) -> bool {
+    let typed = match solve {
+        Solve::Explicit(spec) => spec.checkpoint_every,
+        Solve::QuasiStatic(spec) => spec.checkpoint_every,
+        Solve::Static => None,
+    };
+    let pace = options.checkpoint_every.or(typed);
+    matches!(pace, Some(Pace::Clock(_)))
+}
+
 /// Runs a scene in time or under a load that grows.
 pub(crate) fn run<const D: usize>(
     scene: Scene<D>,
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
+    if options.ranks.is_some() && paces_by_clock(&scene.solve, options) {
+        return Err(RunError::Later {
+            what: "checkpoints by the clock in a run of several processes, which would not write them in the same step",
+            remedy: "count steps instead: checkpoint-every = 1000",
+        });
+    }
     match scene.solve.clone() {
         Solve::Explicit(solve) => explicit::run(scene, &solve, options, progress),
         Solve::QuasiStatic(solve) => quasi_static::run(scene, &solve, options, progress),

@@ -118,6 +118,7 @@ pub(crate) fn lay_out<const D: usize, T>(
             operator: operator.as_ref(),
             rest,
             stiffness: None,
+            product: None,
             system: Some(moving.system.as_ref()),
             affine_forces: &[],
         },

@@ -94,12 +94,14 @@ pub(super) fn part<const D: usize>(
     let apply = |number: usize, u: &[f64], force: &mut Vec<f64>| match (
         proved.affine_forces.get(number),
         proved.stiffness,
+        proved.product,
         proved.system,
     ) {
         (Some(known), ..) => force.clone_from(known),
-        (None, Some(stiffness), _) => stiffness.multiply_into(u, force),
-        (None, None, Some(system)) => system.tangent_into(u, force),
-        (None, None, None) => {
+        (None, Some(stiffness), ..) => stiffness.multiply_into(u, force),
+        (None, None, Some(product), _) => product.apply_into(u, force),
+        (None, None, None, Some(system)) => system.tangent_into(u, force),
+        (None, None, None, None) => {
             let rows = |s: usize, row: &mut Row<D>| {
                 model.add_scaled_row(subject.operator, s, row);
                 row.take_products([u])[0]

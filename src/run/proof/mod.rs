@@ -28,6 +28,7 @@ use crate::observe::proof::{Part, Proof, Severity};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::spec::UnprovenSpec;
+use crate::solve::krylov::LinearMap;
 use crate::system::{BlockCsr, SemiDiscrete};
 
 pub use self::affine::displacements as affine_displacements;
@@ -44,6 +45,8 @@ pub struct Subject<'a, const D: usize> {
     pub rest: &'a RunSettings<D>,
     /// The assembled stiffness, where the run has one; else rows come from the operator.
     pub stiffness: Option<&'a BlockCsr>,
+    /// The products with the stiffness, where its rows are spread over processes.
+    pub product: Option<&'a dyn LinearMap>,
     /// What moves, in a scene that does; its tangent at rest has the rows.
     pub system: Option<&'a dyn SemiDiscrete>,
     /// Forces of the fields of [`affine_displacements`], where they are known already.

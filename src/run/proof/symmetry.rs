@@ -22,10 +22,11 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Option<Part> {
     let (x, y) = (vector(0), vector(1));
     let product = |u: &[f64]| {
         let mut force = vec![0.0; dofs];
-        match (subject.stiffness, subject.system) {
-            (Some(stiffness), _) => stiffness.multiply_into(u, &mut force),
-            (None, Some(system)) => system.tangent_into(u, &mut force),
-            (None, None) => return None,
+        match (subject.stiffness, subject.product, subject.system) {
+            (Some(stiffness), ..) => stiffness.multiply_into(u, &mut force),
+            (None, Some(product), _) => product.apply_into(u, &mut force),
+            (None, None, Some(system)) => system.tangent_into(u, &mut force),
+            (None, None, None) => return None,
         }
         Some(force)
     };

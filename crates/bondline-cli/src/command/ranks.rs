@@ -1,0 +1,93 @@
+//! A run by several processes, where the program is built for it and `mpirun` has started it.
+
+#[cfg(feature = "petsc")]
+pub use petsc::Processes;
+
+#[cfg(not(feature = "petsc"))]
+pub use alone::Processes;
+
+#[cfg(feature = "petsc")]
+mod petsc {
+    use bondline::system::Ranks;
+    use bondline_petsc::{PetscRanks, is_under_mpi};
+    use bondline_terminal::tell;
+
+    use crate::WRONG;
+
+    /// The processes of this run: one, unless `mpirun` has started several.
+    pub struct Processes(Option<PetscRanks>);
+
+    impl Processes {
+        /// Starts MPI, where there is any.
+        ///
+        /// # Errors
+        /// Where it does not start.
+        pub fn start() -> miette::Result<Self> {
+            if !is_under_mpi() {
+                return Ok(Self(None));
+            }
+            let ranks = PetscRanks::start();
+            let ranks = ranks.map_err(|e| miette::miette!("cannot start MPI and PETSc: {e}"))?;
+            if std::env::var_os("RAYON_NUM_THREADS").is_none() {
+                // else the threads of every process would take all cores
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+                pool.build_global()
+                    .map_err(|e| miette::miette!("cannot start a thread: {e}"))?;
+            }
+            Ok(Self(Some(ranks)))
+        }
+
+        /// The processes, if there are several.
+        pub fn ranks(&self) -> Option<&dyn Ranks> {
+            self.0.as_ref().map(|ranks| ranks as &dyn Ranks)
+        }
+
+        /// Ends MPI; with an error, all processes.
+        ///
+        /// # Errors
+        /// Those of a run by one process.
+        pub fn end(self, result: miette::Result<u8>) -> miette::Result<u8> {
+            match (self.0, result) {
+                (Some(ranks), Err(report)) => {
+                    ranks.fail(|| tell(format_args!("{report:?}")), WRONG)
+                }
+                (Some(ranks), Ok(code)) => {
+                    ranks.stop();
+                    Ok(code)
+                }
+                (None, result) => result,
+            }
+        }
+    }
+}
+
+#[cfg(not(feature = "petsc"))]
+mod alone {
+    use bondline::system::Ranks;
+
+    /// The one process of this run.
+    pub struct Processes;
+
+    impl Processes {
+        /// Nothing is to be started.
+        ///
+        /// # Errors
+        /// None.
+        pub fn start() -> miette::Result<Self> {
+            Ok(Self)
+        }
+
+        /// There are no others.
+        pub fn ranks(&self) -> Option<&dyn Ranks> {
+            None
+        }
+
+        /// Gives the result back.
+        ///
+        /// # Errors
+        /// That of the result.
+        pub fn end(self, result: miette::Result<u8>) -> miette::Result<u8> {
+            result
+        }
+    }
+}

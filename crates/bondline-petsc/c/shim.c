@@ -1,0 +1,181 @@
+/* What bondline sees of PETSc and MPI: ints, doubles and opaque pointers. Compiled against the headers of the installation at hand, so that handles, enumerations and
+ * PetscInt (32 or 64 bits) are the compiler's business, with OpenMPI or MPICH. Every function returns zero, or PETSc's code of an error whose text bl_message has. */
+#include <petscksp.h>
+#include <stdlib.h>
+#include <string.h>
+
+_Static_assert(sizeof(PetscScalar) == sizeof(double), "a PETSc of real doubles is wanted");
+
+#define OK(e)                                                                                                          \
+  do {                                                                                                                 \
+    int bl_e = (int)(e);                                                                                               \
+    if (bl_e) return bl_e;                                                                                             \
+  } while (0)
+
+static char text[4096];
+
+/* keeps what PETSc says of an error, the innermost message first */
+static PetscErrorCode keep(MPI_Comm c, int line, const char *function, const char *file, PetscErrorCode n, PetscErrorType p, const char *message, void *ctx) {
+  (void)c; (void)line; (void)file; (void)ctx;
+  if (p == PETSC_ERROR_INITIAL) {
+    strncpy(text, function ? function : "PETSc", sizeof text - 1);
+    if (message) {
+      strncat(text, ": ", sizeof text - 1 - strlen(text));
+      strncat(text, message, sizeof text - 1 - strlen(text));
+    }
+  }
+  return n;
+}
+
+const char *bl_message(void) { return text; }
+
+/* collective; threads call one at a time */
+int bl_start(int *rank, int *size, int *threads) {
+  int level = 0;
+  OK(MPI_Init_thread(NULL, NULL, MPI_THREAD_SERIALIZED, &level));
+  *threads = level >= MPI_THREAD_SERIALIZED;
+  OK(PetscInitialize(NULL, NULL, NULL, NULL));
+  OK(PetscPopSignalHandler());
+  OK(PetscPushErrorHandler(keep, NULL));
+  OK(MPI_Comm_rank(PETSC_COMM_WORLD, rank));
+  return MPI_Comm_size(PETSC_COMM_WORLD, size);
+}
+
+int bl_stop(void) {
+  OK(PetscFinalize());
+  return MPI_Finalize();
+}
+
+void bl_abort(int code) { MPI_Abort(MPI_COMM_WORLD, code); }
+
+int bl_counts(int own, int *all) { return MPI_Allgather(&own, 1, MPI_INT, all, 1, MPI_INT, PETSC_COMM_WORLD); }
+
+int bl_gather(const double *own, int n, double *all, const int *counts, const int *starts) {
+  return MPI_Allgatherv(own, n, MPI_DOUBLE, all, counts, starts, MPI_DOUBLE, PETSC_COMM_WORLD);
+}
+
+int bl_gather_words(const unsigned long long *own, int n, unsigned long long *all, const int *counts, const int *starts) {
+  return MPI_Allgatherv(own, n, MPI_UNSIGNED_LONG_LONG, all, counts, starts, MPI_UNSIGNED_LONG_LONG, PETSC_COMM_WORLD);
+}
+
+typedef struct {
+  Mat a;
+  Vec b, x;
+  KSP ksp;
+  int bs, mine;
+} Bl;
+
+void bl_free(Bl *s) {
+  if (!s) return;
+  KSPDestroy(&s->ksp);
+  VecDestroy(&s->b);
+  VecDestroy(&s->x);
+  MatDestroy(&s->a);
+  free(s);
+}
+
+/* `own` and `other`: blocks of each row in columns of this rank and of others */
+int bl_matrix(int bs, int mine, const int *own, const int *other, int symmetric, Bl **out) {
+  Bl *s = calloc(1, sizeof *s);
+  PetscInt *d = malloc(2 * ((size_t)mine + 1) * sizeof *d);
+  if (!s || !d) return PETSC_ERR_MEM;
+  for (int i = 0; i < mine; i++) {
+    d[i] = own[i];
+    d[mine + i] = other[i];
+  }
+  s->bs = bs;
+  s->mine = mine;
+  *out = s;
+  OK(MatCreate(PETSC_COMM_WORLD, &s->a));
+  OK(MatSetSizes(s->a, (PetscInt)bs * mine, (PetscInt)bs * mine, PETSC_DETERMINE, PETSC_DETERMINE));
+  OK(MatSetType(s->a, MATAIJ)); /* GAMG takes no blocks, but knows their size */
+  OK(MatSetBlockSize(s->a, bs));
+  OK(MatSetFromOptions(s->a));
+  OK(MatXAIJSetPreallocation(s->a, bs, d, d + mine, NULL, NULL));
+  OK(MatSetOption(s->a, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  OK(MatSetOption(s->a, MAT_SYMMETRIC, symmetric ? PETSC_TRUE : PETSC_FALSE));
+  free(d);
+  return 0;
+}
+
+/* one block row: `strip` has bs rows of bs * n numbers */
+int bl_row(Bl *s, long long row, int n, const long long *columns, const double *strip) {
+  PetscInt r = (PetscInt)row, *c = malloc(((size_t)n + 1) * sizeof *c);
+  if (!c) return PETSC_ERR_MEM;
+  for (int i = 0; i < n; i++) c[i] = (PetscInt)columns[i];
+  int e = (int)MatSetValuesBlocked(s->a, 1, &r, n, c, strip, INSERT_VALUES);
+  free(c);
+  return e;
+}
+
+/* an option that is not typed already, in PETSC_OPTIONS or a file */
+static int option(const char *name, const char *value) {
+  PetscBool typed;
+  OK(PetscOptionsHasName(NULL, NULL, name, &typed));
+  return typed ? 0 : (int)PetscOptionsSetValue(NULL, name, value);
+}
+
+/* `xyz`: bs coordinates per own site, for the rigid motions that multigrid has to keep */
+int bl_finish(Bl *s, const double *xyz, int direct, int symmetric) {
+  Vec c;
+  MatNullSpace null;
+  PetscScalar *p;
+  OK(MatAssemblyBegin(s->a, MAT_FINAL_ASSEMBLY));
+  OK(MatAssemblyEnd(s->a, MAT_FINAL_ASSEMBLY));
+  OK(MatCreateVecs(s->a, &s->x, &s->b));
+  OK(KSPCreate(PETSC_COMM_WORLD, &s->ksp));
+  OK(KSPSetOperators(s->ksp, s->a, s->a));
+  if (direct) {
+    PC pc;
+    OK(KSPSetType(s->ksp, KSPPREONLY));
+    OK(KSPGetPC(s->ksp, &pc));
+    OK(PCSetType(pc, symmetric ? PCCHOLESKY : PCLU));
+    OK(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+    OK(KSPSetUp(s->ksp)); /* options are for iterations */
+    return 0;
+  }
+  OK(VecDuplicate(s->b, &c));
+  OK(VecSetBlockSize(c, s->bs));
+  OK(VecGetArray(c, &p));
+  for (int i = 0; i < s->bs * s->mine; i++) p[i] = xyz[i];
+  OK(VecRestoreArray(c, &p));
+  OK(MatNullSpaceCreateRigidBody(c, &null));
+  OK(MatSetNearNullSpace(s->a, null));
+  OK(MatNullSpaceDestroy(&null));
+  OK(VecDestroy(&c));
+  OK(option("-pc_type", "gamg"));
+  /* A smoother that suits seams: Chebyshev goes by real eigenvalues, and Gauss-Seidel fails where rows of coarse levels are empty. */
+  OK(option("-mg_levels_ksp_type", symmetric ? "chebyshev" : "gmres"));
+  OK(option("-mg_levels_ksp_max_it", symmetric ? "2" : "4"));
+  OK(option("-mg_levels_pc_type", symmetric ? "sor" : "jacobi"));
+  OK(option("-mg_coarse_sub_pc_type", "lu"));
+  if (!symmetric) OK(option("-pc_gamg_sym_graph", "true"));
+  if (!symmetric) OK(option("-pc_gamg_symmetrize_graph", "true")); /* its name from PETSc 3.19 on */
+  /* a smoother that iterates changes from call to call, which plain GMRES does not allow */
+  OK(KSPSetType(s->ksp, symmetric ? KSPCG : KSPFGMRES));
+  OK(KSPGMRESSetRestart(s->ksp, 100));
+  OK(KSPSetFromOptions(s->ksp));
+  return (int)KSPSetUp(s->ksp);
+}
+
+int bl_solve(Bl *s, const double *b, double *x, double tolerance, int most, int *iterations, const char **why) {
+  PetscScalar *p;
+  const PetscScalar *q;
+  PetscInt n;
+  KSPConvergedReason k;
+  const char *told;
+  OK(VecGetArray(s->b, &p));
+  for (int i = 0; i < s->bs * s->mine; i++) p[i] = b[i];
+  OK(VecRestoreArray(s->b, &p));
+  OK(KSPSetTolerances(s->ksp, tolerance, PETSC_DEFAULT, PETSC_DEFAULT, most));
+  OK(KSPSolve(s->ksp, s->b, s->x));
+  OK(KSPGetIterationNumber(s->ksp, &n));
+  OK(KSPGetConvergedReason(s->ksp, &k));
+  OK(KSPGetConvergedReasonString(s->ksp, &told));
+  OK(VecGetArrayRead(s->x, &q));
+  for (int i = 0; i < s->bs * s->mine; i++) x[i] = q[i];
+  OK(VecRestoreArrayRead(s->x, &q));
+  *iterations = (int)n;
+  *why = k < 0 ? told : NULL;
+  return 0;
+}

@@ -1,0 +1,206 @@
+//! Processes under `mpirun`, and PETSc's solvers over them.
+
+use std::process::exit;
+use std::time::Duration;
+
+use bondline::system::{RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Symmetry};
+
+use crate::shim::{self, System};
+
+/// Variables by which the starters of OpenMPI, MPICH, Intel MPI and PMIx tell a process that it is one of several.
+const STARTED: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMI_RANK", "PMIX_RANK"];
+
+/// How long a process with an error waits for the first one to tell of it: most errors are those of all.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// Exit status of a panic.
+const PANICKED: u8 = 101;
+
+/// Whether this process was started by `mpirun` or the like.
+pub fn is_under_mpi() -> bool {
+    STARTED.iter().any(|name| std::env::var_os(name).is_some())
+}
+
+/// The processes of an MPI job.
+#[derive(Debug)]
+pub struct PetscRanks {
+    rank: usize,
+    count: usize,
+}
+
+impl PetscRanks {
+    /// Starts MPI and PETSc; once in a process. From then on a panic ends all processes.
+    ///
+    /// # Errors
+    /// In words, where MPI or PETSc does not start, or MPI cannot be called from the threads that compute.
+    pub fn start() -> Result<Self, String> {
+        let (rank, count, threads) = shim::start()?;
+        if !threads {
+            return Err(
+                "this MPI may be called from one thread only; build it with threads".to_owned(),
+            );
+        }
+        let told = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            told(panic);
+            eprintln!("bondline: process {rank} of {count} panicked; all end");
+            shim::abort(PANICKED);
+            exit(i32::from(PANICKED));
+        }));
+        Ok(Self { rank, count })
+    }
+
+    /// Ends MPI and PETSc, where all processes have come to their end.
+    pub fn stop(self) {
+        shim::stop();
+    }
+
+    /// Ends all processes for an error of this one. The first process tells of it at once; another waits for that, and tells of it if it is its own alone.
+    pub fn fail(self, tell: impl FnOnce(), code: u8) -> ! {
+        if self.rank > 0 {
+            std::thread::sleep(PATIENCE);
+            eprintln!("bondline: process {} of {}:", self.rank, self.count);
+        }
+        tell();
+        shim::abort(code);
+        exit(i32::from(code))
+    }
+
+    /// What no process can go on without.
+    fn must<T>(&self, result: Result<T, String>) -> T {
+        match result {
+            Ok(value) => value,
+            Err(message) => {
+                eprintln!(
+                    "bondline: process {} of {}: {message}",
+                    self.rank, self.count
+                );
+                shim::abort(1);
+                exit(1)
+            }
+        }
+    }
+}
+
+impl Ranks for PetscRanks {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn gather_into(&self, own: &[f64], lengths: &[usize], all: &mut [f64]) {
+        self.must(shim::gather(own, lengths, all));
+    }
+
+    fn gather_words(&self, own: &[u64]) -> Vec<Vec<u64>> {
+        let lengths = self.must(shim::counts(own.len(), self.count));
+        let all = self.must(shim::gather_words(own, &lengths));
+        let mut rest = all.as_slice();
+        let parts = lengths.iter().map(|&n| {
+            let (part, tail) = rest.split_at(n);
+            rest = tail;
+            part.to_vec()
+        });
+        parts.collect()
+    }
+
+    fn solver(
+        &self,
+        rows: &RankRows<'_>,
+        kind: RankSolverKind,
+    ) -> Result<Box<dyn RankSolver>, String> {
+        Ok(Box::new(solver(rows, kind, self.rank)?))
+    }
+}
+
+/// The matrix of the rows, and what solves with it.
+fn solver(rows: &RankRows<'_>, kind: RankSolverKind, rank: usize) -> Result<System, String> {
+    let (matrix, partition) = (rows.matrix, rows.partition);
+    let own = partition.of(rank);
+    let d = matrix.block;
+    let is_own = |c: &&u32| partition.owner(**c) == rank;
+    let count = |r: usize| matrix.row(r).0.iter().filter(is_own).count();
+    let others: Vec<usize> = (0..own.len())
+        .map(|r| matrix.row(r).0.len() - count(r))
+        .collect();
+    // a row without stiffness at its own site, all of whose unknowns are prescribed
+    let lacks = |r: usize| matrix.row(r).0.binary_search(&own[r]).is_err();
+    let mine: Vec<usize> = (0..own.len())
+        .map(|r| count(r) + usize::from(lacks(r)))
+        .collect();
+    let is_symmetric = rows.symmetry == Symmetry::Symmetric;
+    let mut system = System::new(d, &mine, &others, is_symmetric)?;
+    let (mut columns, mut strip) = (Vec::new(), Vec::new());
+    for (r, &site) in own.iter().enumerate() {
+        let (sites, blocks) = matrix.row(r);
+        columns.clear();
+        let own_column = lacks(r).then_some(site);
+        columns.extend(
+            sites
+                .iter()
+                .chain(&own_column)
+                .map(|&c| i64::from(partition.number(c))),
+        );
+        let width = d * columns.len();
+        strip.clear();
+        strip.resize(d * width, 0.0);
+        if own_column.is_some() {
+            (0..d).for_each(|a| strip[a * width + d * sites.len() + a] = 1.0);
+        }
+        for (e, (&c, block)) in sites.iter().zip(blocks.chunks_exact(d * d)).enumerate() {
+            for a in 0..d {
+                for b in 0..d {
+                    let (row, column) = (site as usize * d + a, c as usize * d + b);
+                    strip[a * width + e * d + b] =
+                        match (rows.prescribed[row], rows.prescribed[column]) {
+                            (false, false) => block[a * d + b],
+                            // of the size of its neighbours
+                            _ if row == column => diagonal(block, d, a),
+                            _ => 0.0,
+                        };
+                }
+            }
+        }
+        system.set_row(partition.number(site), &columns, &strip)?;
+    }
+    let positions = own
+        .iter()
+        .flat_map(|&s| rows.positions[s as usize].into_iter().take(d));
+    let xyz: Vec<f64> = positions.collect();
+    system.finish(&xyz, kind == RankSolverKind::Direct, is_symmetric)?;
+    Ok(system)
+}
+
+/// The diagonal of a prescribed unknown: its own stiffness, or one if it has none.
+fn diagonal(block: &[f64], d: usize, a: usize) -> f64 {
+    let own = block[a * d + a].abs();
+    if own > 0.0 { own } else { 1.0 }
+}
+
+impl RankSolver for System {
+    fn solve_into(
+        &mut self,
+        b: &[f64],
+        x: &mut [f64],
+        tolerance: f64,
+        max_iterations: usize,
+    ) -> RankSolve {
+        match self.solve(b, x, tolerance, max_iterations) {
+            Ok((iterations, failure)) => RankSolve {
+                iterations,
+                failure,
+            },
+            Err(message) => {
+                // an error inside of a collective call leaves the ranks apart
+                x.fill(f64::NAN);
+                RankSolve {
+                    iterations: 0,
+                    failure: Some(message),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! The functions of `c/shim.c`, each behind a safe one that checks lengths.
+
+use std::ffi::{CStr, c_char, c_double, c_int, c_longlong, c_ulonglong};
+use std::ptr::{NonNull, null, null_mut};
+
+/// A matrix with its solver, on the side of C.
+#[repr(C)]
+struct Bl {
+    _private: [u8; 0],
+}
+
+unsafe extern "C" {
+    fn bl_message() -> *const c_char;
+    fn bl_start(rank: *mut c_int, size: *mut c_int, threads: *mut c_int) -> c_int;
+    fn bl_stop() -> c_int;
+    fn bl_abort(code: c_int);
+    fn bl_counts(own: c_int, all: *mut c_int) -> c_int;
+    fn bl_gather(
+        own: *const c_double,
+        n: c_int,
+        all: *mut c_double,
+        counts: *const c_int,
+        starts: *const c_int,
+    ) -> c_int;
+    fn bl_gather_words(
+        own: *const c_ulonglong,
+        n: c_int,
+        all: *mut c_ulonglong,
+        counts: *const c_int,
+        starts: *const c_int,
+    ) -> c_int;
+    fn bl_matrix(
+        block: c_int,
+        mine: c_int,
+        own: *const c_int,
+        other: *const c_int,
+        symmetric: c_int,
+        out: *mut *mut Bl,
+    ) -> c_int;
+    fn bl_row(
+        s: *mut Bl,
+        row: c_longlong,
+        n: c_int,
+        columns: *const c_longlong,
+        strip: *const c_double,
+    ) -> c_int;
+    fn bl_finish(s: *mut Bl, xyz: *const c_double, direct: c_int, symmetric: c_int) -> c_int;
+    fn bl_solve(
+        s: *mut Bl,
+        b: *const c_double,
+        x: *mut c_double,
+        tolerance: c_double,
+        most: c_int,
+        iterations: *mut c_int,
+        why: *mut *const c_char,
+    ) -> c_int;
+    fn bl_free(s: *mut Bl);
+}
+
+/// What is told of a code of PETSc or MPI that is not zero.
+fn told(code: c_int) -> Result<(), String> {
+    if code == 0 {
+        return Ok(());
+    }
+    // SAFETY: a static buffer that ends with a zero
+    let text = unsafe { CStr::from_ptr(bl_message()) };
+    Err(format!(
+        "{} (error {code} of PETSc)",
+        text.to_string_lossy()
+    ))
+}
+
+/// A number as C's `int`; MPI 3 counts by these.
+fn int(n: usize) -> Result<c_int, String> {
+    c_int::try_from(n).map_err(|_| format!("{n} entries are more than MPI counts in one message"))
+}
+
+fn ints(numbers: &[usize]) -> Result<Vec<c_int>, String> {
+    numbers.iter().map(|&n| int(n)).collect()
+}
+
+/// Starts MPI and PETSc: rank, count, and whether threads may call them, one at a time.
+pub fn start() -> Result<(usize, usize, bool), String> {
+    let (mut rank, mut size, mut threads) = (0, 0, 0);
+    // SAFETY: three places to write to
+    told(unsafe { bl_start(&raw mut rank, &raw mut size, &raw mut threads) })?;
+    Ok((rank as usize, size as usize, threads != 0))
+}
+
+/// Ends PETSc and MPI.
+pub fn stop() {
+    // SAFETY: nothing is asked of either after this; the process ends whatever they say
+    unsafe { bl_stop() };
+}
+
+/// Ends all processes of the job.
+pub fn abort(code: u8) {
+    // SAFETY: no arguments that could be wrong
+    unsafe { bl_abort(c_int::from(code)) };
+}
+
+/// A number from each rank.
+pub fn counts(own: usize, ranks: usize) -> Result<Vec<usize>, String> {
+    let mut all = vec![0; ranks];
+    // SAFETY: one place for each rank
+    told(unsafe { bl_counts(int(own)?, all.as_mut_ptr()) })?;
+    Ok(all.into_iter().map(|n| n as usize).collect())
+}
+
+/// The counts of a message and where each rank's part starts, if they add up to `all`.
+fn parts(lengths: &[usize], all: usize) -> Result<(Vec<c_int>, Vec<c_int>), String> {
+    let mut starts = Vec::with_capacity(lengths.len());
+    let mut end = 0;
+    for n in lengths {
+        starts.push(end);
+        end += n;
+    }
+    assert_eq!(end, all, "the parts of a message make its whole");
+    Ok((ints(lengths)?, ints(&starts)?))
+}
+
+/// The numbers of all ranks.
+pub fn gather(own: &[f64], lengths: &[usize], all: &mut [f64]) -> Result<(), String> {
+    let (counts, starts) = parts(lengths, all.len())?;
+    // SAFETY: `all` takes the sum of the counts
+    told(unsafe {
+        bl_gather(
+            own.as_ptr(),
+            int(own.len())?,
+            all.as_mut_ptr(),
+            counts.as_ptr(),
+            starts.as_ptr(),
+        )
+    })
+}
+
+/// The words of all ranks.
+pub fn gather_words(own: &[u64], lengths: &[usize]) -> Result<Vec<u64>, String> {
+    let mut all = vec![0; lengths.iter().sum()];
+    let (counts, starts) = parts(lengths, all.len())?;
+    // SAFETY: `all` takes the sum of the counts
+    told(unsafe {
+        bl_gather_words(
+            own.as_ptr(),
+            int(own.len())?,
+            all.as_mut_ptr(),
+            counts.as_ptr(),
+            starts.as_ptr(),
+        )
+    })?;
+    Ok(all)
+}
+
+/// A matrix with its solver.
+#[derive(Debug)]
+pub struct System {
+    bl: NonNull<Bl>,
+    /// Numbers of this rank.
+    dofs: usize,
+    rows: usize,
+    block: usize,
+}
+
+impl System {
+    /// A matrix of blocks with so many entries in each row, in columns of this rank and of others.
+    pub fn new(
+        block: usize,
+        own: &[usize],
+        other: &[usize],
+        symmetric: bool,
+    ) -> Result<Self, String> {
+        assert_eq!(own.len(), other.len(), "two counts for each row");
+        let (own, other) = (ints(own)?, ints(other)?);
+        let mut out = null_mut();
+        // SAFETY: both lists have one entry per row
+        let code = unsafe {
+            bl_matrix(
+                int(block)?,
+                int(own.len())?,
+                own.as_ptr(),
+                other.as_ptr(),
+                c_int::from(symmetric),
+                &raw mut out,
+            )
+        };
+        let bl = NonNull::new(out).ok_or("no memory for a matrix")?;
+        let system = Self {
+            bl,
+            dofs: block * own.len(),
+            rows: own.len(),
+            block,
+        };
+        told(code)?;
+        Ok(system)
+    }
+
+    /// Sets a block row of the whole matrix; `strip` has a row of numbers for each unknown of the site.
+    pub fn set_row(&mut self, row: u32, columns: &[i64], strip: &[f64]) -> Result<(), String> {
+        assert_eq!(
+            strip.len(),
+            self.block * self.block * columns.len(),
+            "a block for each column"
+        );
+        // SAFETY: lengths as C reads them
+        told(unsafe {
+            bl_row(
+                self.bl.as_ptr(),
+                c_longlong::from(row),
+                int(columns.len())?,
+                columns.as_ptr(),
+                strip.as_ptr(),
+            )
+        })
+    }
+
+    /// Ends the matrix and sets its solver up; `xyz` has the coordinates of the own sites, as many as unknowns.
+    pub fn finish(&mut self, xyz: &[f64], direct: bool, symmetric: bool) -> Result<(), String> {
+        assert_eq!(xyz.len(), self.dofs, "coordinates of {} sites", self.rows);
+        // SAFETY: a coordinate for each unknown
+        told(unsafe {
+            bl_finish(
+                self.bl.as_ptr(),
+                xyz.as_ptr(),
+                c_int::from(direct),
+                c_int::from(symmetric),
+            )
+        })
+    }
+
+    /// Solves; the iterations, and why it did not converge, if it did not.
+    pub fn solve(
+        &mut self,
+        b: &[f64],
+        x: &mut [f64],
+        tolerance: f64,
+        most: usize,
+    ) -> Result<(usize, Option<String>), String> {
+        assert_eq!(
+            [b.len(), x.len()],
+            [self.dofs; 2],
+            "numbers of the own sites"
+        );
+        let (mut iterations, mut why) = (0, null());
+        // SAFETY: both vectors have the length of the rows
+        told(unsafe {
+            bl_solve(
+                self.bl.as_ptr(),
+                b.as_ptr(),
+                x.as_mut_ptr(),
+                tolerance,
+                int(most)?,
+                &raw mut iterations,
+                &raw mut why,
+            )
+        })?;
+        let why = (!why.is_null()).then(|| {
+            // SAFETY: a static text of PETSc
+            let text = unsafe { CStr::from_ptr(why) };
+            text.to_string_lossy().into_owned()
+        });
+        Ok((iterations as usize, why))
+    }
+}
+
+impl Drop for System {
+    fn drop(&mut self) {
+        // SAFETY: made by `new`, freed once
+        unsafe { bl_free(self.bl.as_ptr()) };
+    }
+}

@@ -1,0 +1,328 @@
+//! Several processes that compute one run together: what the library asks of them, and which sites each of them has.
+//!
+//! All of them do the same, in the same order, with the same mesh; each computes the rows of its own sites. Whoever starts them supplies [`Ranks`]: the library
+//! knows no message passing. Sites are numbered anew for such a run, rank by rank, so that the rows of a rank follow one another.
+
+use super::{BlockCsr, Symmetry};
+
+/// The processes of a run, as one of them sees them.
+///
+/// A method that is *collective* is called by all ranks, in the same order; it returns once all have called it.
+pub trait Ranks: Send + Sync + std::fmt::Debug {
+    /// The number of this process, from zero.
+    fn rank(&self) -> usize;
+
+    /// How many processes there are.
+    fn count(&self) -> usize;
+
+    /// Collective: overwrites `all` with the numbers of all ranks, one rank after another; the same on every rank.
+    ///
+    /// Shapes: rank `r` gives `lengths[r]` numbers, `all` takes the sum of them.
+    fn gather_into(&self, own: &[f64], lengths: &[usize], all: &mut [f64]);
+
+    /// Collective: the words of each rank, whatever their number.
+    fn gather_words(&self, own: &[u64]) -> Vec<Vec<u64>>;
+
+    /// Collective: what solves systems with a matrix of which each rank holds its own rows.
+    ///
+    /// # Errors
+    /// In words, if there is no such solver, or it cannot be set up for this matrix.
+    fn solver(
+        &self,
+        rows: &RankRows<'_>,
+        kind: RankSolverKind,
+    ) -> Result<Box<dyn RankSolver>, String>;
+}
+
+/// How a system that is spread over ranks is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RankSolverKind {
+    /// Conjugate gradients or restarted GMRES, by the symmetry, preconditioned by algebraic multigrid.
+    Krylov,
+    /// A factorisation.
+    Direct,
+}
+
+/// The rows of a square matrix that one rank holds.
+///
+/// Rows and columns of prescribed unknowns are those of a diagonal matrix, so that the system is one of all unknowns and keeps its symmetry.
+#[derive(Clone, Copy, Debug)]
+pub struct RankRows<'a> {
+    /// The rows of the own sites, ascending by site; columns are sites.
+    pub matrix: &'a BlockCsr,
+    /// Which rank has which sites.
+    pub partition: &'a Partition,
+    /// Whether the whole matrix is symmetric.
+    pub symmetry: Symmetry,
+    /// Position of each site \[m\], padded with zeros.
+    pub positions: &'a [[f64; 3]],
+    /// Whether each unknown is prescribed.
+    pub prescribed: &'a [bool],
+}
+
+/// What a solver of [`Ranks`] did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RankSolve {
+    /// Iterations.
+    pub iterations: usize,
+    /// Why it stopped short of the tolerance, in the solver's own words, if it did.
+    pub failure: Option<String>,
+}
+
+/// Solves systems with one matrix.
+pub trait RankSolver {
+    /// Collective: overwrites `x` with a solution of `K x = b` on the own sites, to a relative residual of about `tolerance`.
+    ///
+    /// Shapes: a block of numbers per own site, ascending by site.
+    fn solve_into(
+        &mut self,
+        b: &[f64],
+        x: &mut [f64],
+        tolerance: f64,
+        max_iterations: usize,
+    ) -> RankSolve;
+}
+
+/// Which rank has which sites.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Partition {
+    /// The rank of each site.
+    owner: Vec<u32>,
+    /// Number of each site in the order of the ranks.
+    number: Vec<u32>,
+    /// Sites in the order of the ranks, ascending within each.
+    order: Vec<u32>,
+    /// Start of each rank's sites in that order, and their end.
+    starts: Vec<usize>,
+}
+
+impl Partition {
+    /// By coordinate bisection: the longest side of a box is cut where the work on both sides is in the proportion of their ranks.
+    ///
+    /// Shapes: `positions` and `work` have one entry per site. The same on every rank. Ranks beyond the number of sites have none.
+    pub fn by_bisection(positions: &[[f64; 3]], work: &[f64], ranks: usize) -> Self {
+        let mut owner = vec![0; positions.len()];
+        let mut sites: Vec<u32> = (0..positions.len() as u32).collect();
+        bisect(positions, work, &mut sites, 0, ranks.max(1), &mut owner);
+        Self::of_owners(owner, ranks.max(1))
+    }
+
+    /// Of the rank of each site.
+    fn of_owners(owner: Vec<u32>, ranks: usize) -> Self {
+        let mut starts = vec![0; ranks + 1];
+        for &r in &owner {
+            starts[r as usize + 1] += 1;
+        }
+        for r in 0..ranks {
+            starts[r + 1] += starts[r];
+        }
+        let mut next = starts.clone();
+        let mut number = vec![0; owner.len()];
+        let mut order = vec![0; owner.len()];
+        for (site, &r) in owner.iter().enumerate() {
+            let place = next[r as usize];
+            next[r as usize] += 1;
+            number[site] = place as u32;
+            order[place] = site as u32;
+        }
+        Self {
+            owner,
+            number,
+            order,
+            starts,
+        }
+    }
+
+    /// Number of ranks.
+    pub fn ranks(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Number of sites.
+    pub fn sites(&self) -> usize {
+        self.owner.len()
+    }
+
+    /// The sites of a rank, ascending.
+    pub fn of(&self, rank: usize) -> &[u32] {
+        &self.order[self.starts[rank]..self.starts[rank + 1]]
+    }
+
+    /// The rank of a site.
+    pub fn owner(&self, site: u32) -> usize {
+        self.owner[site as usize] as usize
+    }
+
+    /// The number of a site in the order of the ranks: those of a rank follow one another.
+    pub fn number(&self, site: u32) -> u32 {
+        self.number[site as usize]
+    }
+
+    /// The row of a site among those of a rank, if the rank has it.
+    pub fn row(&self, rank: usize, site: u32) -> Option<usize> {
+        (self.owner(site) == rank).then(|| self.number(site) as usize - self.starts[rank])
+    }
+
+    /// Numbers of all ranks with `block` per site, for [`Ranks::gather_into`].
+    pub fn lengths(&self, block: usize) -> Vec<usize> {
+        self.starts
+            .windows(2)
+            .map(|s| (s[1] - s[0]) * block)
+            .collect()
+    }
+}
+
+/// Gives `count` ranks from `first` on to `sites`, which are put in order on the way.
+fn bisect(
+    positions: &[[f64; 3]],
+    work: &[f64],
+    sites: &mut [u32],
+    first: usize,
+    count: usize,
+    owner: &mut [u32],
+) {
+    if count == 1 || sites.is_empty() {
+        sites.iter().for_each(|&s| owner[s as usize] = first as u32);
+        return;
+    }
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for &s in sites.iter() {
+        for (a, x) in positions[s as usize].iter().enumerate() {
+            low[a] = low[a].min(*x);
+            high[a] = high[a].max(*x);
+        }
+    }
+    let length = |a: &usize| high[*a] - low[*a];
+    let axis = (0..3).fold(
+        0,
+        |best, a| if length(&a) > length(&best) { a } else { best },
+    );
+    let at = |s: &u32| positions[*s as usize][axis];
+    sites.sort_unstable_by(|s, t| at(s).total_cmp(&at(t)).then(s.cmp(t)));
+    let below = count / 2;
+    let all: f64 = sites.iter().map(|&s| work[s as usize]).sum();
+    let wanted = all * below as f64 / count as f64;
+    let mut sum = 0.0;
+    let split = sites.iter().position(|&s| {
+        // a site goes where more than half of its work is
+        let half = 0.5 * work[s as usize];
+        sum += 2.0 * half;
+        sum - half >= wanted
+    });
+    let (lower, upper) = sites.split_at_mut(split.unwrap_or(sites.len()));
+    bisect(positions, work, lower, first, below, owner);
+    bisect(positions, work, upper, first + below, count - below, owner);
+}
+
+/// Values of sites that are spread over ranks.
+#[derive(Clone, Copy, Debug)]
+pub struct Spread<'a> {
+    /// The processes.
+    pub ranks: &'a dyn Ranks,
+    /// Which of them has which sites.
+    pub partition: &'a Partition,
+}
+
+impl<'a> Spread<'a> {
+    /// The own sites, ascending.
+    pub fn own(&self) -> &'a [u32] {
+        self.partition.of(self.ranks.rank())
+    }
+
+    /// Collective: overwrites `all`, a block of numbers per site, with the `own` ones of each rank, a block per own site.
+    pub fn gather_sites(&self, own: &[f64], all: &mut [f64]) {
+        let block = all.len() / self.partition.sites().max(1);
+        let mut found = vec![0.0; all.len()];
+        let lengths = self.partition.lengths(block);
+        self.ranks.gather_into(own, &lengths, &mut found);
+        for (&site, from) in self
+            .partition
+            .order
+            .iter()
+            .zip(found.chunks_exact(block.max(1)))
+        {
+            all[site as usize * block..][..block].copy_from_slice(from);
+        }
+    }
+
+    /// The numbers of the own sites among those of all.
+    pub fn take_own(&self, all: &[f64]) -> Vec<f64> {
+        let block = all.len() / self.partition.sites().max(1);
+        let own = self.own().iter();
+        own.flat_map(|&s| &all[s as usize * block..][..block])
+            .copied()
+            .collect()
+    }
+
+    /// Collective: the numbers of all ranks, one from each.
+    pub fn each(&self, own: f64) -> Vec<f64> {
+        let count = self.ranks.count();
+        let mut all = vec![0.0; count];
+        self.ranks.gather_into(&[own], &vec![1; count], &mut all);
+        all
+    }
+
+    /// Collective: the sum of a number over ranks, in their order.
+    pub fn sum(&self, own: f64) -> f64 {
+        self.each(own).iter().sum()
+    }
+
+    /// Collective: the largest of a number over ranks.
+    pub fn largest(&self, own: f64) -> f64 {
+        self.each(own).into_iter().fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(n: usize) -> Vec<[f64; 3]> {
+        (0..n * n)
+            .map(|i| [(i % n) as f64, (i / n) as f64, 0.0])
+            .collect()
+    }
+
+    #[test]
+    fn every_site_has_one_rank_and_a_place_among_its_sites() {
+        for ranks in [1, 2, 3, 4, 7] {
+            let p = Partition::by_bisection(&grid(12), &vec![1.0; 144], ranks);
+            let mut seen = vec![0; 144];
+            for r in 0..ranks {
+                assert!(p.of(r).is_sorted());
+                for (row, &site) in p.of(r).iter().enumerate() {
+                    seen[site as usize] += 1;
+                    assert_eq!((p.owner(site), p.row(r, site)), (r, Some(row)));
+                    assert_eq!(p.order[p.number(site) as usize], site);
+                }
+                let share = p.of(r).len() as f64 / (144.0 / ranks as f64);
+                assert!((0.95..1.05).contains(&share), "{ranks} {share}");
+            }
+            assert!(seen.iter().all(|&n| n == 1));
+        }
+    }
+
+    #[test]
+    fn work_and_not_sites_is_halved() {
+        // the left third has ten times the work of the rest
+        let x = grid(30);
+        let work: Vec<f64> = x
+            .iter()
+            .map(|x| if x[0] < 10.0 { 10.0 } else { 1.0 })
+            .collect();
+        let p = Partition::by_bisection(&x, &work, 2);
+        let of = |r: usize| p.of(r).iter().map(|&s| work[s as usize]).sum::<f64>();
+        assert!((of(0) / of(1) - 1.0).abs() < 0.01, "{} {}", of(0), of(1));
+        assert!(p.of(0).len() * 3 < p.of(1).len());
+    }
+
+    #[test]
+    fn more_ranks_than_sites_leave_some_without() {
+        let p = Partition::by_bisection(&grid(2), &[1.0; 4], 6);
+        assert_eq!(p.ranks(), 6);
+        let sites: Vec<usize> = (0..6).map(|r| p.of(r).len()).collect();
+        assert_eq!(sites.iter().sum::<usize>(), 4);
+        assert!(sites.iter().all(|&n| n <= 1), "{sites:?}");
+        assert_eq!(Partition::by_bisection(&[], &[], 3).sites(), 0);
+    }
+}
