@@ -11,6 +11,7 @@ mod spmv;
 
 pub use ranks::{Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
+pub use spmv::ROW_CHUNK;
 
 /// Whether the tangent of a system is symmetric; solvers choose by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -382,7 +383,12 @@ impl BlockCsr {
 
     /// `y = K x`, threaded over rows; the same bits for any number of threads, and whether or not rows share their blocks.
     pub fn multiply_into(&self, x: &[f64], y: &mut [f64]) {
-        spmv::multiply_into(self, x, y);
+        spmv::multiply_into(self, None, x, y);
+    }
+
+    /// As [`BlockCsr::multiply_into`], of those chunks of [`ROW_CHUNK`] rows that are marked; nothing is done to the others.
+    pub fn multiply_chunks_into(&self, marked: Option<&[bool]>, x: &[f64], y: &mut [f64]) {
+        spmv::multiply_into(self, marked, x, y);
     }
 
     /// `y = K x` of a matrix whose [rows add up to zero](Self::rows_add_up_to_zero), with differences of `x` within each row.
@@ -390,7 +396,17 @@ impl BlockCsr {
     /// What `x` has in common along a row drops out of it before it is multiplied, so that the rounding does not grow with it. Rows that share their blocks with those before them are multiplied as by
     /// [`BlockCsr::multiply_into`]. Threaded over rows; the same bits for any number of threads.
     pub fn multiply_differences_into(&self, x: &[f64], y: &mut [f64]) {
-        spmv::multiply_differences_into(self, x, y);
+        spmv::multiply_differences_into(self, None, x, y);
+    }
+
+    /// As [`BlockCsr::multiply_differences_into`], of those chunks of [`ROW_CHUNK`] rows that are marked; nothing is done to the others.
+    pub fn multiply_differences_of_chunks_into(
+        &self,
+        marked: Option<&[bool]>,
+        x: &[f64],
+        y: &mut [f64],
+    ) {
+        spmv::multiply_differences_into(self, marked, x, y);
     }
 
     /// Whether every row gives nothing for an `x` that is the same at all sites, to 1e-12 of the sizes of its entries.

@@ -30,6 +30,7 @@ mod elements;
 mod energy;
 mod force_states;
 mod rows;
+mod split;
 mod stored_energy;
 
 /// A coupled model as a system that moves.
@@ -47,6 +48,8 @@ pub struct CoupledSystem<'a, const D: usize> {
     energy: ElementEnergy,
     /// Elements whose law is not linear, if there are any.
     elements: Option<LocalElements<D>>,
+    /// Who computes which sites, where several processes do.
+    split: Option<split::Split<'a>>,
     /// What breaking bonds has cost so far.
     spent: Dissipation,
     /// See [`SemiDiscrete::difference_length`].
@@ -134,6 +137,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             seam,
             energy,
             elements: None,
+            split: None,
             spent: Dissipation::default(),
         })
     }
@@ -276,7 +280,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         match &mut self.body {
             None => (self.linear).multiply_into::<D>(u, None, &mut self.products, force),
             Some(body) => {
-                broken = body.respond(u, interval, update);
+                broken = body.respond(u, interval, update, self.split.as_ref());
                 let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
                 (self.linear).multiply_into::<D>(u, bonds, &mut self.products, force);
                 if let Some(seam) = &mut self.seam {
@@ -291,7 +295,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         if let Some(elements) = &mut self.elements {
             elements.add_force(self.model, u, interval.length, force);
         }
-        scale_rows(self.model, force);
+        self.finish(force);
         broken
     }
 
@@ -307,6 +311,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         let Some(body) = &self.body else {
             self.linear.multiply_into::<D>(x, None, &mut Vec::new(), y);
+            self.finish(y);
             return;
         };
         let mut points = vec![0.0; body.displacement.len()];
@@ -318,7 +323,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         if let Some(seam) = &self.seam {
             seam.add_tangent(x, y);
         }
-        scale_rows(self.model, y);
+        self.finish(y);
     }
 
     fn difference_length(&self) -> Option<f64> {

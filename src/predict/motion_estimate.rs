@@ -70,7 +70,7 @@ fn explicit<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
     let nothing = |_: &_, _: &mut Vec<Decision>| Ok(());
-    laid_out(scene, progress, nothing, |laid_out, ()| {
+    laid_out(scene, None, progress, nothing, |laid_out, ()| {
         steps(laid_out, spec, progress)
     })
 }
@@ -344,7 +344,7 @@ pub(crate) fn load_steps<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
     let nothing = |_: &_, _: &mut Vec<Decision>| Ok(());
-    laid_out(scene, progress, nothing, |laid_out, ()| {
+    laid_out(scene, None, progress, nothing, |laid_out, ()| {
         let held = held(laid_out.model, &laid_out.rest.conditions)?;
         progress.finish();
         let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);

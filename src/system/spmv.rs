@@ -7,8 +7,14 @@ use rayon::prelude::*;
 
 use super::BlockCsr;
 
-/// Rows per task.
-const ROWS: usize = 256;
+/// Rows per task: some tasks may be left out.
+pub const ROW_CHUNK: usize = 256;
+const ROWS: usize = ROW_CHUNK;
+
+/// Whether a task is to be done.
+fn is_marked(marked: Option<&[bool]>, chunk: usize) -> bool {
+    marked.is_none_or(|marked| marked[chunk])
+}
 
 /// Rows of a run that are summed at a time, in registers: 16 reach 30 Gflop/s in 2D (|ξ| ≤ 6) and 20 in 3D (|ξ| ≤ 3) on one core of an EPYC with AVX2, 8 reach 27 and 18, a
 /// single row 3 (measured on the stencils alone).
@@ -17,18 +23,24 @@ const TILE: usize = 16;
 /// `y_i = Σ_j K_ij (x_j − x_r)`, r a column in the middle of row i; the same bits for any number of threads.
 ///
 /// Rows that mostly share their blocks are multiplied as by [`multiply_into`]: differences make their stencils two to three times slower (measured; rows with blocks of their own wait for these, and differences cost nothing).
-pub(super) fn multiply_differences_into(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
+pub(super) fn multiply_differences_into(
+    k: &BlockCsr,
+    marked: Option<&[bool]>,
+    x: &[f64],
+    y: &mut [f64],
+) {
     match (k.block, runs(k)) {
-        (1, None) => of_differences::<1>(k, x, y),
-        (2, None) => of_differences::<2>(k, x, y),
-        (3, None) => of_differences::<3>(k, x, y),
-        _ => multiply_into(k, x, y),
+        (1, None) => of_differences::<1>(k, marked, x, y),
+        (2, None) => of_differences::<2>(k, marked, x, y),
+        (3, None) => of_differences::<3>(k, marked, x, y),
+        _ => multiply_into(k, marked, x, y),
     }
 }
 
-fn of_differences<const D: usize>(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
+fn of_differences<const D: usize>(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y: &mut [f64]) {
     y.par_chunks_mut(ROWS * D)
         .enumerate()
+        .filter(|(chunk, _)| is_marked(marked, *chunk))
         .for_each(|(chunk, y)| {
             for (i, y) in y.chunks_exact_mut(D).enumerate() {
                 y.copy_from_slice(&of_row_differences::<D>(k, chunk * ROWS + i, x));
@@ -64,12 +76,12 @@ fn runs(k: &BlockCsr) -> Option<&[bool]> {
 }
 
 /// `y = K x`; the same bits for any number of threads.
-pub(super) fn multiply_into(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
+pub(super) fn multiply_into(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y: &mut [f64]) {
     match k.block {
-        1 => of_block::<1>(k, x, y),
-        2 => of_block::<2>(k, x, y),
-        3 => of_block::<3>(k, x, y),
-        6 => of_block::<6>(k, x, y),
+        1 => of_block::<1>(k, marked, x, y),
+        2 => of_block::<2>(k, marked, x, y),
+        3 => of_block::<3>(k, marked, x, y),
+        6 => of_block::<6>(k, marked, x, y),
         d => y.par_chunks_mut(d.max(1)).enumerate().for_each(|(i, yi)| {
             yi.fill(0.0);
             let (columns, blocks) = k.row(i);
@@ -86,10 +98,11 @@ pub(super) fn multiply_into(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
 }
 
 /// The product with blocks of a size known to the compiler, which unrolls them.
-fn of_block<const D: usize>(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
+fn of_block<const D: usize>(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y: &mut [f64]) {
     let Some(follows) = runs(k) else {
         y.par_chunks_mut(ROWS * D)
             .enumerate()
+            .filter(|(chunk, _)| is_marked(marked, *chunk))
             .for_each(|(chunk, y)| {
                 for (i, y) in y.chunks_exact_mut(D).enumerate() {
                     y.copy_from_slice(&of_row::<D>(k, chunk * ROWS + i, x));
@@ -110,6 +123,7 @@ fn of_block<const D: usize>(k: &BlockCsr, x: &[f64], y: &mut [f64]) {
     let arch = pulp::Arch::new();
     y.par_chunks_mut(ROWS * D)
         .enumerate()
+        .filter(|(chunk, _)| is_marked(marked, *chunk))
         .for_each(|(chunk, y)| {
             arch.dispatch(
                 #[inline(always)]

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::split::Split;
 use crate::coupling::semidiscrete::behaviour::{BondBehaviour, CHUNK, Critical, NONE, SystemError};
 use crate::{
     assembly::Transfer,
@@ -306,10 +307,21 @@ impl<const D: usize> MovingBody<D> {
     }
 
     /// Overwrites the forces of the points with those of bonds and contact at the displacement `u` of the sites; returns how many bonds broke.
-    pub fn respond(&mut self, u: &[f64], interval: Interval, update: FailureUpdate) -> u64 {
+    ///
+    /// Of points that are `split` among processes, the forces of others are left open, and what they broke is broken here too.
+    pub fn respond(
+        &mut self,
+        u: &[f64],
+        interval: Interval,
+        update: FailureUpdate,
+        split: Option<&Split<'_>>,
+    ) -> u64 {
         let mut points = std::mem::take(&mut self.displacement);
         self.spread(u, &mut points);
-        let broken = (self.pass).force_into(&points, &mut self.force, interval, update);
+        let mut broken = (self.pass).force_into(&points, &mut self.force, interval, update);
+        if let Some(split) = split {
+            broken = split.exchange_breaks(self.pass.as_mut(), broken, update);
+        }
         if let Some(contact) = &self.contact {
             let pass = &self.pass;
             contact

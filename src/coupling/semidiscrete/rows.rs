@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::coupling::semidiscrete::behaviour::{CHUNK, NONE};
 use crate::{
     assembly::{self, Row},
-    system::BlockCsr,
+    system::{BlockCsr, ROW_CHUNK},
     tensor::{Tensor, Vector},
 };
 
@@ -16,6 +16,8 @@ pub(super) struct SiteRows {
     matrix: BlockCsr,
     /// Whether no row feels a translation, so that a body that drifts far need not lose digits to its drift.
     is_translation_free: bool,
+    /// Whether each chunk of [`ROW_CHUNK`] rows is computed here; all are where others compute none.
+    computed: Option<Vec<bool>>,
 }
 
 impl SiteRows {
@@ -40,7 +42,19 @@ impl SiteRows {
             row_of_site,
             is_translation_free: matrix.rows_add_up_to_zero(),
             matrix,
+            computed: None,
         }
+    }
+
+    /// Leaves the products of all but `own` sites to others: those of chunks without any are then anything.
+    pub fn compute_only(&mut self, own: impl Fn(usize) -> bool) {
+        let mut computed = vec![false; self.matrix.rows().div_ceil(ROW_CHUNK)];
+        for (site, &row) in self.row_of_site.iter().enumerate() {
+            if row != NONE && own(site) {
+                computed[row as usize / ROW_CHUNK] = true;
+            }
+        }
+        self.computed = Some(computed);
     }
 
     /// Bytes held.
@@ -58,10 +72,11 @@ impl SiteRows {
         force: &mut [f64],
     ) {
         products.resize(self.matrix.rows() * D, 0.0);
+        let computed = self.computed.as_deref();
         if self.is_translation_free {
-            self.matrix.multiply_differences_into(u, products);
+            (self.matrix).multiply_differences_of_chunks_into(computed, u, products);
         } else {
-            self.matrix.multiply_into(u, products);
+            self.matrix.multiply_chunks_into(computed, u, products);
         }
         let entry = |from: &[f64], of: u32| -> Vector<D> {
             match of {

@@ -42,4 +42,6 @@ pub(super) struct List<const D: usize> {
     pub(super) reference: u64,
     /// Points and bonds that the last pass broke, ascending.
     pub(super) last: Vec<(u32, usize)>,
+    /// What is computed of each point, see `own_points.rs`; empty if all is.
+    pub(super) parts: Vec<u8>,
 }

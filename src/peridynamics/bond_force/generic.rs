@@ -496,6 +496,10 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         self.restore(state)
     }
 
+    fn own_points(&mut self) -> Option<&mut dyn super::OwnPoints> {
+        None
+    }
+
     fn force_states(&self) -> Option<&dyn ForceStates<D>> {
         Some(self)
     }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     BondPass, Kinematics,
-    lattice_simd::{Bits, Broken, CARE, FULL, Field, Task, job},
+    lattice_simd::{Bits, Broken, CARE, FOREIGN, FULL, Field, IDLE, Task, job},
     simd::{LANES, Source, dispatch},
     stencil::{NONE, Stencil},
 };
@@ -49,6 +49,8 @@ pub(super) struct Lattice<const D: usize> {
     pub(super) reference: u64,
     /// What the last pass broke.
     pub(super) broken: Vec<Broken>,
+    /// Lanes of each group that are not left to others; empty if all are.
+    pub(super) own: Vec<u8>,
 }
 
 impl<const D: usize> Lattice<D> {
@@ -244,7 +246,7 @@ impl<const D: usize> Lattice<D> {
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
         let mut field_u = std::array::from_fn(|_| vec![0.0; self.stencil.point_of.len()]);
         Self::spread(&self.stencil.point_of, u, &mut field_u);
-        let mut flags = self.flags.clone();
+        let mut flags: Vec<u8> = self.flags.iter().map(|f| f & !(IDLE | FOREIGN)).collect();
         let mut sums = vec![[0.0; LANES]; self.stencil.groups.len() * 2];
         let field = self.field(&field_u, &[], f64::INFINITY);
         self.sweep::<EXACT, { job::MOMENTS }>(&field, &mut flags, &mut sums);
@@ -548,6 +550,10 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
 
     fn remembers(&self) -> bool {
         false
+    }
+
+    fn own_points(&mut self) -> Option<&mut dyn super::OwnPoints> {
+        Some(self)
     }
 
     fn force_states(&self) -> Option<&dyn super::ForceStates<D>> {

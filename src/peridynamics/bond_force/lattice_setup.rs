@@ -223,6 +223,7 @@ impl<const D: usize> Lattice<D> {
             reference,
             stencil,
             broken: Vec::new(),
+            own: Vec::new(),
         };
         lattice.mark_full();
         Ok(lattice)

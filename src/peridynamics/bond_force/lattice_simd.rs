@@ -25,6 +25,10 @@ pub(super) const FULL: u8 = 1;
 pub(super) const EVEN: u8 = 2;
 /// Some bond needs care: beyond the range of the series, or beyond its critical stretch.
 pub(super) const CARE: u8 = 4;
+/// Nothing of the group is computed here: others do.
+pub(super) const IDLE: u8 = 8;
+/// Forces of the group are computed by others.
+pub(super) const FOREIGN: u8 = 16;
 
 /// What all tasks of a sweep read.
 #[derive(Clone, Copy)]
@@ -305,7 +309,11 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
         let high = l.splat(range.min(field.limit));
         let low = l.splat(-range);
         let mut broken = Vec::new();
+        let skipped = if JOB == job::MOMENTS { IDLE } else { FOREIGN };
         for (g, &cell) in groups.iter().enumerate() {
+            if flags[g] & skipped != 0 {
+                continue;
+            }
             let cell = cell as usize;
             let span = g * stencil..(g + 1) * stencil;
             let here = match &bits {

@@ -175,6 +175,7 @@ impl<const D: usize> List<D> {
             intact,
             reference: families.neighbours.len() as u64,
             last: Vec::new(),
+            parts: Vec::new(),
         }
     }
 
@@ -524,6 +525,10 @@ impl<const D: usize> BondPass<D> for List<D> {
 
     fn remembers(&self) -> bool {
         false
+    }
+
+    fn own_points(&mut self) -> Option<&mut dyn super::OwnPoints> {
+        Some(self)
     }
 
     fn force_states(&self) -> Option<&dyn super::ForceStates<D>> {

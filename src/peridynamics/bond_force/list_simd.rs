@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::lattice_simd::Bits;
+use super::own_points::part;
 use super::simd::{LANES, Lanes, Work, dispatch};
 use super::stretch::{CHI, PSI, SERIES_RANGE, SHORTEST};
 use crate::peridynamics::bond_force::bond_list::{Limit, List};
@@ -139,8 +140,13 @@ impl<const D: usize, const EXACT: bool> Work for Points<'_, D, EXACT> {
         let width = if matches!(what, Sum::Extension) { 1 } else { D };
         let mut broken = Vec::new();
         for (i, result) in points.zip(sums.chunks_exact_mut(width)) {
-            let is_breaking = matches!(bits, Bits::Breaking(_)) && !list.no_fail[i];
-            let is_summed = list.row[i] || matches!(what, Sum::Extension);
+            let computed = list.parts.get(i).copied().unwrap_or(part::OWN);
+            let is_breaking =
+                matches!(bits, Bits::Breaking(_)) && !list.no_fail[i] && computed >= part::SEEN;
+            let is_summed = match what {
+                Sum::Extension => computed >= part::SEEN,
+                _ => list.row[i] && computed == part::OWN,
+            };
             result.fill(0.0);
             if !(is_breaking || is_summed) {
                 continue;

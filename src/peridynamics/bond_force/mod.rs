@@ -13,6 +13,7 @@
 //! | `compressed_list.rs` | neighbours and weights of a list in few bytes |
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
 //! | `lattice_setup.rs` | how that one is made |
+//! | `own_points.rs` | points shared out among several passes |
 //! | `stencil.rs` | the lattice's padded box, its offsets and bits |
 //! | `lattice_simd.rs` | the inner loops of the lattice pass |
 //! | `simd.rs` | eight numbers at a time, by the machine's widest instructions |
@@ -40,6 +41,7 @@ mod lattice_setup;
 mod lattice_simd;
 mod list;
 mod list_simd;
+mod own_points;
 #[cfg(test)]
 mod reference_force;
 #[allow(unsafe_code)]
@@ -54,6 +56,7 @@ pub use force_problem::{
     Storage,
 };
 
+pub use own_points::OwnPoints;
 pub use stencil::BlockSetup;
 
 pub(crate) use list::{extension, ratio, stretched};
@@ -124,6 +127,9 @@ pub trait BondPass<const D: usize>: Send + Sync {
 
     /// Puts back what [`BondPass::damage_state`] gave; false, and nothing changed, if it belongs to another pass.
     fn restore_damage(&mut self, state: &[u64]) -> bool;
+
+    /// The pass as one that may leave points to others; none where it computes all of them together.
+    fn own_points(&mut self) -> Option<&mut dyn OwnPoints>;
 
     /// The force states that it computes one by one, for what is told of them; none of an accelerator.
     fn force_states(&self) -> Option<&dyn ForceStates<D>>;

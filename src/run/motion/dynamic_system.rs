@@ -19,7 +19,7 @@ use crate::scene::initial::{Initial, InitialKind};
 use crate::scene::materials::Fracture;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
-use crate::system::{LinearMotion, SemiDiscrete};
+use crate::system::{LinearMotion, Ranks, SemiDiscrete};
 
 /// What moves, and what it holds.
 pub struct DynamicSystem<'a> {
@@ -31,7 +31,16 @@ pub struct DynamicSystem<'a> {
     pub is_linear: bool,
 }
 
-/// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks; `broken` bonds are broken from the start.
+/// What a layout of the zones begins with, beside the scene.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct LayoutStart<'a, const D: usize> {
+    /// Bonds that are broken from the start.
+    pub broken: Option<&'a BrokenBonds<D>>,
+    /// The processes that compute together, if there are several.
+    pub ranks: Option<&'a dyn Ranks>,
+}
+
+/// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks.
 ///
 /// # Errors
 /// [`RunError::System`] for bonds that cannot stretch or break, [`RunError::Fracture`].
@@ -40,7 +49,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     coupling: &dyn Coupling<D>,
     operator: &dyn Operator<D>,
     rest: &RunSettings<D>,
-    broken: Option<&BrokenBonds<D>>,
+    start: LayoutStart<'a, D>,
     choices: &mut Vec<Decision>,
     progress: &dyn Progress,
 ) -> Result<DynamicSystem<'a>, RunError> {
@@ -78,12 +87,13 @@ pub(crate) fn dynamic<'a, const D: usize>(
                 stiffness: c.stiffness_factor,
             }),
             storage,
-            broken,
+            broken: start.broken,
         },
     );
     match moving {
         Ok(motion) => {
-            let motion = motion.with_local_laws(&model.local_laws(&rest.local_laws));
+            let laws = model.local_laws(&rest.local_laws);
+            let motion = motion.with_local_laws(&laws).with_ranks(start.ranks);
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms

@@ -2,7 +2,7 @@
 
 use super::RunOptions;
 use super::breaks::{Breaks, breaks};
-use super::dynamic_system::{PlaneEnergy, plane_energy};
+use super::dynamic_system::{LayoutStart, PlaneEnergy, plane_energy};
 use super::guard::Balance;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
@@ -86,15 +86,22 @@ pub(crate) fn run<const D: usize>(
         }
     }
     let mut from = From::Start(file, saved.map(Box::new));
+    let start = LayoutStart {
+        broken: None,
+        ranks: options.ranks,
+    };
     loop {
         let (segment, back) = match from {
-            From::Start(..) => lay_out(begun, problem, &rest, None, progress, |laid_out| {
+            From::Start(..) => lay_out(begun, problem, &rest, start, progress, |laid_out| {
                 run_segment(laid_out, from, &rest, spec, options, progress)
             })?,
             From::Switch(mut between) => {
                 let bonds = std::mem::take(&mut between.broken);
-                let broken = Some(&bonds);
-                lay_out(begun, problem, &rest, broken, progress, |laid_out| {
+                let start = LayoutStart {
+                    broken: Some(&bonds),
+                    ..start
+                };
+                lay_out(begun, problem, &rest, start, progress, |laid_out| {
                     run_segment(
                         laid_out,
                         From::Switch(between),

@@ -49,6 +49,7 @@ pub(crate) fn run<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     laid_out(
         scene,
+        options.ranks,
         progress,
         |rest, choices| opened(rest, options, choices),
         |laid_out, (file, saved)| load_steps(laid_out, file, saved, spec, options, progress),

@@ -1,9 +1,9 @@
 //! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
 
-use super::dynamic_system::{DynamicSystem, dynamic};
+use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
 use super::writer::Saved;
 use super::{RunOptions, StartFrom};
-use crate::coupling::{BrokenBonds, Model, Operator, Problem};
+use crate::coupling::{Model, Operator, Problem};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
@@ -13,7 +13,7 @@ use crate::run::proof::{self, Subject, growth};
 use crate::run::setup::{self, RunSettings};
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
-use crate::system::SemiDiscrete;
+use crate::system::{Ranks, SemiDiscrete};
 
 /// A scene with all that it computes before its first step.
 pub struct ModelSetup<'a, const D: usize> {
@@ -77,12 +77,12 @@ pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, R
     (begun, problem, rest)
 }
 
-/// Lays a problem out and hands it on, and gives it back afterwards; `broken` bonds are broken from the start.
+/// Lays a problem out and hands it on, and gives it back afterwards.
 pub(crate) fn lay_out<const D: usize, T>(
     begun: RunSetup,
     problem: Problem<D>,
     rest: &RunSettings<D>,
-    broken: Option<&BrokenBonds<D>>,
+    start: LayoutStart<'_, D>,
     progress: &dyn Progress,
     then: impl FnOnce(ModelSetup<'_, D>) -> Result<T, RunError>,
 ) -> Result<(T, Problem<D>), RunError> {
@@ -105,7 +105,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         coupling.as_ref(),
         operator.as_ref(),
         rest,
-        broken,
+        start,
         &mut choices,
         progress,
     )?;
@@ -148,13 +148,18 @@ pub(crate) fn lay_out<const D: usize, T>(
 /// Lays a scene out and hands it on; `first` has a say before anything is computed.
 pub fn laid_out<const D: usize, S, T>(
     scene: Scene<D>,
+    ranks: Option<&dyn Ranks>,
     progress: &dyn Progress,
     first: impl FnOnce(&RunSettings<D>, &mut Vec<Decision>) -> Result<S, RunError>,
     then: impl FnOnce(ModelSetup<'_, D>, S) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
     let (mut begun, problem, rest) = begun(scene);
     let ready = first(&rest, &mut begun.choices)?;
-    let done = lay_out(begun, problem, &rest, None, progress, |laid_out| {
+    let start = LayoutStart {
+        broken: None,
+        ranks,
+    };
+    let done = lay_out(begun, problem, &rest, start, progress, |laid_out| {
         then(laid_out, ready)
     })?;
     Ok(done.0)
@@ -176,6 +181,17 @@ pub(crate) fn opened<const D: usize>(
         StartFrom::Beginning => None,
         StartFrom::Checkpoint => read(&file, choices)?,
     };
+    if let Some(ranks) = options.ranks {
+        // each has read the file for itself
+        let step = saved.as_ref().map_or(u64::MAX, |saved| saved.state.step);
+        let all = ranks.gather_words(&[rest.fingerprint.value(), step]);
+        if all.iter().any(|words| *words != all[0]) {
+            return Err(RunError::Later {
+                what: "the processes do not read the same scene or the same checkpoint",
+                remedy: "run them in a folder that all of them see",
+            });
+        }
+    }
     Ok((file, saved))
 }
 
