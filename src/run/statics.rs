@@ -94,8 +94,7 @@ fn solve_chosen<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
-    let name = scene.title.clone();
-    let joining = scene.coupling.joining();
+    let (name, joining) = (scene.title.clone(), scene.coupling.joining());
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);

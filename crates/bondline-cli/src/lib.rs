@@ -420,7 +420,7 @@ fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Resul
                 resume,
                 processes.ranks(),
             );
-            return processes.end(result);
+            return processes.end(result, WRONG);
         }
         Command::Check {
             scene,

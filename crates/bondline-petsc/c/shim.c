@@ -147,7 +147,7 @@ int bl_finish(Bl *s, const double *xyz, int direct, int symmetric) {
   /* A smoother that suits seams: Chebyshev goes by real eigenvalues, and Gauss-Seidel fails where rows of coarse levels are empty. */
   OK(option("-mg_levels_ksp_type", symmetric ? "chebyshev" : "gmres"));
   OK(option("-mg_levels_ksp_max_it", symmetric ? "2" : "4"));
-  OK(option("-mg_levels_pc_type", symmetric ? "sor" : "jacobi"));
+  OK(option("-mg_levels_pc_type", "jacobi"));
   OK(option("-mg_coarse_sub_pc_type", "lu"));
   if (!symmetric) OK(option("-pc_gamg_sym_graph", "true"));
   if (!symmetric) OK(option("-pc_gamg_symmetrize_graph", "true")); /* its name from PETSc 3.19 on */

@@ -310,11 +310,10 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
         let low = l.splat(-range);
         let mut broken = Vec::new();
         let skipped = if JOB == job::MOMENTS { IDLE } else { FOREIGN };
-        for (g, &cell) in groups.iter().enumerate() {
+        for (g, cell) in groups.iter().map(|cell| *cell as usize).enumerate() {
             if flags[g] & skipped != 0 {
                 continue;
             }
-            let cell = cell as usize;
             let span = g * stencil..(g + 1) * stencil;
             let here = match &bits {
                 Bits::Held(b) => &b[span.clone()],

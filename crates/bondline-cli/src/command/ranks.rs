@@ -12,8 +12,6 @@ mod petsc {
     use bondline_petsc::{PetscRanks, is_under_mpi};
     use bondline_terminal::tell;
 
-    use crate::WRONG;
-
     /// The processes of this run: one, unless `mpirun` has started several.
     pub struct Processes(Option<PetscRanks>);
 
@@ -42,14 +40,14 @@ mod petsc {
             self.0.as_ref().map(|ranks| ranks as &dyn Ranks)
         }
 
-        /// Ends MPI; with an error, all processes.
+        /// Ends MPI; with an error all processes, with the exit status `wrong`.
         ///
         /// # Errors
         /// Those of a run by one process.
-        pub fn end(self, result: miette::Result<u8>) -> miette::Result<u8> {
+        pub fn end(self, result: miette::Result<u8>, wrong: u8) -> miette::Result<u8> {
             match (self.0, result) {
                 (Some(ranks), Err(report)) => {
-                    ranks.fail(|| tell(format_args!("{report:?}")), WRONG)
+                    ranks.fail(|| tell(format_args!("{report:?}")), wrong)
                 }
                 (Some(ranks), Ok(code)) => {
                     ranks.stop();
@@ -86,7 +84,7 @@ mod alone {
         ///
         /// # Errors
         /// That of the result.
-        pub fn end(self, result: miette::Result<u8>) -> miette::Result<u8> {
+        pub fn end(self, result: miette::Result<u8>, _wrong: u8) -> miette::Result<u8> {
             result
         }
     }
