@@ -30,6 +30,7 @@ mod elements;
 mod energy;
 mod force_states;
 mod rows;
+mod shared_work;
 mod split;
 mod stored_energy;
 

@@ -1,22 +1,14 @@
-//! The work of a step shared out among processes: each computes the forces of its own sites, and has those of the others from them.
-//!
-//! Every process has the whole model. Bonds are passed over, and rows multiplied, by the owner of their site alone; what is left (the bonds of a seam that are
-//! exact, laws without a pass of their own, energies) every process computes for itself. Forces are gathered, and broken bonds told, so that all processes
-//! have the same bits, which are those of one process.
+//! Who computes which sites of a coupled system, and what is told of bonds that break.
 
-use super::CoupledSystem;
-use super::scale_rows;
-use crate::coupling::semidiscrete::behaviour::NONE;
 use crate::peridynamics::bond_force::BondPass;
-use crate::system::{FailureUpdate, Partition, Ranks, Spread};
-use crate::tensor::padded;
+use crate::system::{FailureUpdate, Partition, Ranks};
 
 /// Who computes which sites.
 pub(super) struct Split<'a> {
-    ranks: &'a dyn Ranks,
-    partition: Partition,
+    pub ranks: &'a dyn Ranks,
+    pub partition: Partition,
     /// Whether bonds may break.
-    breaks: bool,
+    pub breaks: bool,
 }
 
 impl Split<'_> {
@@ -35,47 +27,5 @@ impl Split<'_> {
         };
         let words = self.ranks.gather_words(&own.broken_at_own()).concat();
         own.take_broken(&words)
-    }
-}
-
-impl<'a, const D: usize> CoupledSystem<'a, D> {
-    /// Shares the work of each pass out among processes, if there are several; all of them make the same calls from now on.
-    #[must_use]
-    pub fn with_ranks(mut self, ranks: Option<&'a dyn Ranks>) -> Self {
-        let Some(ranks) = ranks else {
-            return self;
-        };
-        let sites = &self.model.sites;
-        let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
-        let work = self.model.work_of_sites();
-        let partition = Partition::by_bisection(&positions, &work, ranks.count());
-        let is_own = |site: u32| partition.owner(site) == ranks.rank();
-        self.linear.compute_only(|site| is_own(site as u32));
-        let breaks = self.breaks();
-        if let Some(body) = &mut self.body {
-            let sites = body.site_of_point.iter();
-            let own: Vec<bool> = sites.map(|&s| s != NONE && is_own(s)).collect();
-            if let Some(pass) = body.pass.own_points() {
-                pass.compute_only(&own);
-            }
-        }
-        self.split = Some(Split {
-            ranks,
-            partition,
-            breaks,
-        });
-        self
-    }
-
-    /// Scales rows where those of the model are scaled; of processes, each then has the numbers of all.
-    pub(super) fn finish(&self, values: &mut [f64]) {
-        scale_rows(self.model, values);
-        if let Some(split) = &self.split {
-            let spread = Spread {
-                ranks: split.ranks,
-                partition: &split.partition,
-            };
-            spread.gather_sites(&spread.take_own(values), values);
-        }
     }
 }

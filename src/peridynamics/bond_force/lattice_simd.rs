@@ -47,6 +47,11 @@ pub(super) struct Field<'a, const D: usize> {
     pub no_fail: &'a [bool],
 }
 
+/// The flag of groups that a sweep leaves out.
+const fn skipped(of: u8) -> u8 {
+    if of == job::MOMENTS { IDLE } else { FOREIGN }
+}
+
 /// Bonds of one group along one offset that a sweep has broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Broken {
@@ -309,9 +314,8 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
         let high = l.splat(range.min(field.limit));
         let low = l.splat(-range);
         let mut broken = Vec::new();
-        let skipped = if JOB == job::MOMENTS { IDLE } else { FOREIGN };
         for (g, cell) in groups.iter().map(|cell| *cell as usize).enumerate() {
-            if flags[g] & skipped != 0 {
+            if flags[g] & skipped(JOB) != 0 {
                 continue;
             }
             let span = g * stencil..(g + 1) * stencil;

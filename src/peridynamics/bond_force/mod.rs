@@ -56,7 +56,6 @@ pub use force_problem::{
     Storage,
 };
 
-pub use own_points::OwnPoints;
 pub use stencil::BlockSetup;
 
 pub(crate) use list::{extension, ratio, stretched};
@@ -136,6 +135,18 @@ pub trait BondPass<const D: usize>: Send + Sync {
 
     /// Bytes that the pass holds.
     fn memory_bytes(&self) -> usize;
+}
+
+/// A pass that computes some of its points only.
+pub trait OwnPoints {
+    /// Leaves all but the points marked to others: their forces are anything from now on, and products with the tangent too. Energies and row sums are still those of all.
+    fn compute_only(&mut self, own: &[bool]);
+
+    /// The bonds of own points that the last pass broke, in words that mean the same to every pass of the same body.
+    fn broken_at_own(&self) -> Vec<u64>;
+
+    /// Breaks the bonds that all passes broke at their own points, this one's included; from now on they are what the last pass broke. Returns how many.
+    fn take_broken(&mut self, words: &[u64]) -> u64;
 }
 
 /// What force states tell of a body.

@@ -3,23 +3,12 @@
 //! The sums of a point are the same whoever computes them. A state-based law takes the dilatations of the neighbours of own points too, and bonds of these break
 //! here as they do where they are owned, since both ends and all who look at a bond see the same numbers.
 
+use super::OwnPoints;
 use super::bond_list::List;
 use super::lattice::Lattice;
 use super::lattice_simd::{Broken, FOREIGN, FULL, IDLE};
 use super::simd::LANES;
 use super::stencil::NONE;
-
-/// A pass that computes some of its points only.
-pub trait OwnPoints {
-    /// Leaves all but the points marked to others: their forces are anything from now on, and products with the tangent too. Energies and row sums are still those of all.
-    fn compute_only(&mut self, own: &[bool]);
-
-    /// The bonds of own points that the last pass broke, in words that mean the same to every pass of the same body.
-    fn broken_at_own(&self) -> Vec<u64>;
-
-    /// Breaks the bonds that all passes broke at their own points, this one's included; from now on they are what the last pass broke. Returns how many.
-    fn take_broken(&mut self, words: &[u64]) -> u64;
-}
 
 /// What a list pass computes of a point.
 pub(super) mod part {

@@ -60,10 +60,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         Kinematics::Exact => "geometrically exact bonds",
         Kinematics::Linear => "bonds linear in the displacement",
     };
-    let storage = match breaking.precision {
-        PrecisionSpec::Double => Storage::Double,
-        PrecisionSpec::Single => Storage::Single,
-    };
+    let storage = storage(breaking.precision);
     let breaks = failure_text(model, critical_stretch.as_ref(), breaking);
     let density = |material: u16| rest.density[material as usize];
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
@@ -123,6 +120,14 @@ pub(crate) fn dynamic<'a, const D: usize>(
             model, coupling, operator, rest, &error, choices, progress,
         )),
         Err(error) => Err(error.into()),
+    }
+}
+
+/// How the weights of bonds are kept.
+fn storage(precision: PrecisionSpec) -> Storage {
+    match precision {
+        PrecisionSpec::Double => Storage::Double,
+        PrecisionSpec::Single => Storage::Single,
     }
 }
 
