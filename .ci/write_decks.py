@@ -19,6 +19,7 @@ import meshio
 import numpy as np
 
 DIMENSION = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3}
+DIMENSION |= {"line3": 1, "triangle6": 2, "quad8": 2, "tetra10": 3, "hexahedron20": 3}
 
 
 def write_mesh(path, folder):

@@ -5,7 +5,7 @@ use bondline::{
     progress::Silent,
 };
 use bondline_verify::{
-    Effort, balance, extremes, layers, partial_volumes, surface_layer, tangents, weights,
+    Effort, balance, extremes, layers, partial_volumes, quadratic, surface_layer, tangents, weights,
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -88,6 +88,18 @@ fn partial_volumes_fill_the_ball() {
     // exact in three dimensions, the ramp of HHB in one; rectangles, boxes, hexahedra
     assert_eq!(count(&tables, "largest", Verdict::Pass), 4 + 1);
     assert_eq!(count(&tables, "sum against", Verdict::Pass), 2);
+}
+
+#[test]
+fn cells_of_second_order_pass_every_seam_and_have_their_order() {
+    let tables = quadratic::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    // four cells, six couplings; nine where the zone reaches a surface or its elements are too narrow, as beside linear cells
+    assert_eq!(count(&tables, "error", Verdict::Pass), 15 + 9);
+    // four linear cells, four of second order, curved ones
+    assert_eq!(count(&tables, "order", Verdict::Pass), 9);
+    assert_eq!(count(&tables, "over 3", Verdict::Pass), 4);
+    assert_eq!(count(&tables, "deflection", Verdict::Pass), 4);
 }
 
 #[test]

@@ -256,8 +256,9 @@ impl<const D: usize> Criteria<'_, D> {
                 if !self.is_candidate(c) {
                     return found;
                 }
-                let nodes = mesh.cell(c);
-                for (slot, facet) in found.iter_mut().zip(mesh.shapes[c].facets()) {
+                let nodes = mesh.corners(c);
+                let facets = mesh.shapes[c].linear().facets();
+                for (slot, facet) in found.iter_mut().zip(facets) {
                     let other = cells_of(node_cells, nodes[facet[0]]).iter().find(|&&k| {
                         let theirs = mesh.cell(k as usize);
                         k as usize != c
@@ -273,7 +274,7 @@ impl<const D: usize> Criteria<'_, D> {
 }
 
 fn is_simplex(shape: CellShape) -> bool {
-    matches!(shape, CellShape::Tri3 | CellShape::Tet4)
+    matches!(shape.linear(), CellShape::Tri3 | CellShape::Tet4)
 }
 
 fn cells_of((offsets, cells): &(Vec<u32>, Vec<u32>), node: u32) -> &[u32] {

@@ -8,7 +8,7 @@ use crate::{
     assembly::Transfer,
     coupling::{
         CellRole, FitDegree, Interface, ModelError, Site, SiteKind, least_squares_gradient,
-        point_cloud::PointCloud,
+        point_cloud::PointCloud, seam_order::Ties,
     },
     mesh::Mesh,
     shape::Barriers,
@@ -24,6 +24,8 @@ pub(super) struct Sites<'a, const D: usize> {
     pub sites: &'a [Site<D>],
     /// The site of each node, `u32::MAX` for one that is none.
     pub node_site: &'a [u32],
+    /// Nodes in the middle of edges that follow the ends.
+    pub ties: &'a Ties,
     /// Cracks and voids: no node follows what lies behind them.
     pub barriers: &'a Barriers<D>,
 }
@@ -111,6 +113,9 @@ pub(super) fn fit_nodes<const D: usize>(
         .map(|n| {
             if at.node_site[n] != NONE {
                 return Ok(vec![(at.node_site[n], 1.0)]);
+            }
+            if let Some(row) = at.ties.row(n as u32, at.node_site) {
+                return Ok(row);
             }
             if !wanted[n] {
                 return Ok(vec![]);

@@ -44,6 +44,7 @@ mod point_materials;
 pub mod problem;
 mod recovery;
 mod rows;
+mod seam_order;
 pub mod semidiscrete;
 pub mod splice;
 pub mod state_transfer;

@@ -15,6 +15,7 @@ use crate::{
         point_cloud::{PointCloud, Volumes},
         point_generation::{self, Beyond},
         recovery::Patch,
+        seam_order::{self, Ties},
         tributary::Tributary,
     },
     fem,
@@ -72,6 +73,7 @@ pub struct Model<const D: usize> {
     point_zone: Vec<Zone>,
     pub(super) points_on_border: usize,
     node_cells: (Vec<u32>, Vec<u32>),
+    pub(super) ties: Ties,
     pub(super) interface: Interface,
     passing: Option<ContinuedLattice<D>>,
     /// What interpolation lacks in elements, where elements carry the partial stress of points between their nodes.
@@ -133,8 +135,10 @@ impl<const D: usize> Model<D> {
                 .fold(0.0, f64::max)
         });
         let roles = coupling.roles(&mesh, &zones, largest);
+        let mesh = seam_order::linear_at_seam(mesh, &roles)?;
         let node_cells = mesh.node_cells();
         let mut model = Self {
+            ties: Ties::new(&mesh),
             node_transfer: Transfer::new(),
             mesh,
             zones,
@@ -182,11 +186,11 @@ impl<const D: usize> Model<D> {
                 progress,
             )?;
         } else {
-            model.node_transfer = Transfer::from_rows(
-                node_site
-                    .iter()
-                    .map(|&s| if s == NONE { vec![] } else { vec![(s, 1.0)] }),
-            );
+            let rows = (0..node_site.len() as u32).map(|n| match node_site[n as usize] {
+                NONE => model.ties.row(n, &node_site).unwrap_or_default(),
+                site => vec![(site, 1.0)],
+            });
+            model.node_transfer = Transfer::from_rows(rows);
         }
         model.share_out();
         Ok((model, coupling))
@@ -242,11 +246,17 @@ impl<const D: usize> Model<D> {
             }
         }
         let own = (0..self.mesh.cell_count()).filter(|&c| self.node_takes(c));
-        let volumes = fem::nodal_volumes(&self.mesh, own);
+        let mut volumes = fem::nodal_volumes(&self.mesh, own);
+        for n in 0..volumes.len() as u32 {
+            for &tied in self.ties.followers(n) {
+                volumes[n as usize] += 0.5 * volumes[tied as usize];
+            }
+        }
         let mut node_site = vec![NONE; self.mesh.nodes.len()];
         for n in 0..self.mesh.nodes.len() {
             let constrained = matches!(interface, Interface::Constrained(_)) && points[n];
-            if element[n] && !constrained {
+            let tied = self.ties.ends(n as u32).is_some();
+            if element[n] && !constrained && !tied {
                 node_site[n] = self.sites.len() as u32;
                 self.sites.push(Site {
                     position: self.mesh.nodes[n],
@@ -392,6 +402,7 @@ impl<const D: usize> Model<D> {
             roles: &self.roles,
             sites: &self.sites,
             node_site,
+            ties: &self.ties,
             barriers: &barriers,
         };
         self.node_transfer =
@@ -510,18 +521,29 @@ impl<const D: usize> Model<D> {
             SiteKind::Node(n) => Some(n),
             SiteKind::Point(_) => None,
         };
-        node.into_iter().flat_map(move |n| {
-            let (offsets, cells) = &self.node_cells;
-            cells[offsets[n as usize] as usize..offsets[n as usize + 1] as usize]
-                .iter()
-                .filter_map(move |&c| {
-                    self.mesh
-                        .cell(c as usize)
-                        .iter()
-                        .position(|&m| m == n)
-                        .map(|a| (c as usize, a))
-                })
-        })
+        node.into_iter().flat_map(|n| self.cells_of_node(n))
+    }
+
+    /// The cells around a node, with the node's number within each.
+    pub(super) fn cells_of_node(&self, n: u32) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let (offsets, cells) = &self.node_cells;
+        cells[offsets[n as usize] as usize..offsets[n as usize + 1] as usize]
+            .iter()
+            .filter_map(move |&c| {
+                self.mesh
+                    .cell(c as usize)
+                    .iter()
+                    .position(|&m| m == n)
+                    .map(|a| (c as usize, a))
+            })
+    }
+
+    /// The nodes in the middle of edges that follow a site by half, see [`mesh::Tie`](crate::mesh::Tie); none of a point.
+    pub fn followers_of_site(&self, site: usize) -> &[u32] {
+        match self.sites[site].kind {
+            SiteKind::Node(n) => self.ties.followers(n),
+            SiteKind::Point(_) => &[],
+        }
     }
 
     /// Whether the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.

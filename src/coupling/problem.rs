@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::{
     coupling::{Coupling, Zone},
-    mesh::Mesh,
+    mesh::{CellShape, Mesh},
     peridynamics::{Accelerator, BondWeights, BoxCell, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
     tensor::{Tensor4, Vector},
@@ -185,6 +185,19 @@ pub enum ModelError {
         position: Vec<f64>,
         /// Number of sites found.
         found: usize,
+    },
+    /// A cell at the seam has curved sides.
+    #[error(
+        "cell {cell} ({shape:?}) lies in the peridynamic zone or beside it, where cells of second order are made linear, but its node at ({}) is {distance:.1e} of its edge's length away from the middle of the edge; keep the zone away from curved sides, or read the mesh with order = \"linear\"", join(.position))]
+    CurvedSeam {
+        /// Number of the cell.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Where the node lies.
+        position: Vec<f64>,
+        /// Its distance from the middle over the length of the edge.
+        distance: f64,
     },
     /// Derivatives cannot be taken at a point of the blending region.
     #[error("the point at ({}) lies where the models are blended, but its {bonds} bonds do not determine a quadratic field: widen the horizon or the body there", join(.position))]

@@ -6,16 +6,20 @@ use crate::{
     fem,
     progress::Progress,
     system::BlockCsr,
+    tensor::Tensor,
 };
 
 impl<const D: usize> Model<D> {
     /// Adds the finite-element row of a node: all cells around it but those whose stress is a partial stress.
     pub fn add_element_rows(&self, site: usize, row: &mut Row<D>) {
-        for (c, local) in self.cells_of_site(site) {
-            if self.roles[c] == CellRole::StressElement || !self.node_takes(c) {
-                continue;
+        let takes = |c: usize| self.roles[c] != CellRole::StressElement && self.node_takes(c);
+        for (c, local) in self.cells_of_site(site).filter(|(c, _)| takes(*c)) {
+            self.add_element_row(c, local, 1.0, row);
+        }
+        for &tied in self.followers_of_site(site) {
+            for (c, local) in self.cells_of_node(tied).filter(|(c, _)| takes(*c)) {
+                self.add_element_row(c, local, 0.5, row);
             }
-            self.add_element_row(c, local, row);
         }
     }
 
@@ -31,17 +35,18 @@ impl<const D: usize> Model<D> {
             if !self.is_element(c) {
                 continue;
             }
-            self.add_element_row(c, local, row);
+            self.add_element_row(c, local, 1.0, row);
         }
     }
 
-    /// Adds the row of a local node in the stiffness of cell `c`.
-    fn add_element_row(&self, c: usize, local: usize, row: &mut Row<D>) {
+    /// Adds the row of a local node in the stiffness of cell `c`, times a weight.
+    fn add_element_row(&self, c: usize, local: usize, weight: f64, row: &mut Row<D>) {
         let stiffness = |blocks: &mut Vec<_>| {
             fem::stiffness_into(&self.mesh, c, self.tensor_of_cell(c), blocks);
         };
-        let add = |row: &mut Row<D>, n: u32, block: &_| {
-            row.add(&self.node_transfer, n as usize, block);
+        let add = |row: &mut Row<D>, n: u32, block: &Tensor<D>| match weight == 1.0 {
+            true => row.add(&self.node_transfer, n as usize, block),
+            false => row.add(&self.node_transfer, n as usize, &(block * weight)),
         };
         row.element_row((c, self.mesh.cell(c)), local, stiffness, add);
     }

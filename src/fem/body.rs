@@ -1,4 +1,4 @@
-//! A whole finite-element body: checks, stiffness, internal force, lumped volumes and masses.
+//! A whole finite-element body: checks, stiffness, internal force.
 
 use rayon::prelude::*;
 
@@ -92,7 +92,9 @@ fn check_cell<const D: usize>(mesh: &Mesh<D>, c: usize) -> Result<(), FemError> 
     };
     let (_, x) = relative_nodes(mesh, c);
     let size = 0.5 * x.iter().map(|x| x.norm()).fold(0.0, f64::max);
-    for (xi, _) in cell.stiffness {
+    // a curved cell may be folded where only masses and loads look
+    let more = if shape.is_quadratic() { cell.mass } else { &[] };
+    for (xi, _) in cell.stiffness.iter().chain(more) {
         let ratio =
             determinant(&jacobian(&x[..cell.nodes()], &(cell.gradients)(xi))) / size.powi(D as i32);
         // a comparison that also refuses a ratio that is not a number
@@ -239,39 +241,10 @@ pub fn internal_force<'a, const D: usize>(
     force
 }
 
-/// Lumped volume of every node over the given cells, `V_a = Σ ∫ N_a dV` [m^D]: they add up to the cells' volume.
-pub fn nodal_volumes<const D: usize>(
-    mesh: &Mesh<D>,
-    cells: impl Iterator<Item = usize>,
-) -> Vec<f64> {
-    let mut volumes = vec![0.0; mesh.nodes.len()];
-    for c in cells {
-        add_nodal(mesh, c, 1.0, &mut volumes);
-    }
-    volumes
-}
-
-/// Lumped mass of every node, `M_a = Σ ρ ∫ N_a dV` \[kg\]; `density` gives each cell's ρ [kg/m^D].
-pub fn lumped_mass<const D: usize>(mesh: &Mesh<D>, density: impl Fn(usize) -> f64) -> Vec<f64> {
-    let mut mass = vec![0.0; mesh.nodes.len()];
-    for c in 0..mesh.cell_count() {
-        add_nodal(mesh, c, density(c), &mut mass);
-    }
-    mass
-}
-
-fn add_nodal<const D: usize>(mesh: &Mesh<D>, c: usize, scale: f64, totals: &mut [f64]) {
-    for_each_point(mesh, c, Rule::Mass, |p| {
-        for (&n, shape) in mesh.cell(c).iter().zip(&p.shape) {
-            totals[n as usize] += scale * shape * p.weight;
-        }
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::sample::{boxes, noise, solve, unit_box};
-    use super::super::{body_force_vector, traction_vector};
+    use super::super::{body_force_vector, lumped_mass, nodal_volumes, traction_vector};
     use super::*;
     use crate::material::{Elastic, Kinematics, LinearElastic};
 
@@ -406,7 +379,11 @@ mod tests {
             for (v, x) in volumes.iter().zip(&mesh.nodes) {
                 first += v * x[0];
             }
-            assert!((first - 0.5).abs() < 1e-14, "{:?}", mesh.shapes[0]);
+            // shares in the ratio of a diagonal keep the first moment of affine cells only
+            let is_affine = !matches!(mesh.shapes[0], CellShape::Quad8 | CellShape::Hex20);
+            let tolerance = if is_affine { 1e-14 } else { 1e-3 };
+            let error: f64 = first - 0.5;
+            assert!(error.abs() < tolerance, "{:?} {error}", mesh.shapes[0]);
             let mass = lumped_mass(&mesh, |_| 2440.0);
             assert!((mass.iter().sum::<f64>() / 2440.0 - 1.0).abs() < 1e-14);
         }

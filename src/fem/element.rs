@@ -116,7 +116,7 @@ pub fn for_each_point<const D: usize>(
 
 /// The points of the full-integration rule of cell `c`; overwrites `points`.
 ///
-/// Line 2, triangle 1, quadrilateral 2 × 2, tetrahedron 1, hexahedron 2 × 2 × 2 points.
+/// Line 2, triangle 1, quadrilateral 2 × 2, tetrahedron 1, hexahedron 2 × 2 × 2 points; of second order 3, 3, 3 × 3, 4, 3 × 3 × 3.
 pub fn quadrature<const D: usize>(mesh: &Mesh<D>, c: usize, points: &mut Vec<QuadraturePoint<D>>) {
     quadrature_of(mesh, c, Rule::Stiffness, points);
 }
@@ -194,7 +194,12 @@ pub fn stiffness_into<const D: usize>(
 /// Length, area or volume of cell `c` [m^D].
 pub fn cell_volume<const D: usize>(mesh: &Mesh<D>, c: usize) -> f64 {
     let mut volume = 0.0;
-    for_each_point(mesh, c, Rule::Stiffness, |p| volume += p.weight);
+    // det J of a curved cell is of a higher degree than its stiffness needs
+    let rule = match mesh.shapes[c].is_quadratic() {
+        true => Rule::Mass,
+        false => Rule::Stiffness,
+    };
+    for_each_point(mesh, c, rule, |p| volume += p.weight);
     volume
 }
 
@@ -221,12 +226,27 @@ pub fn displacement_gradient_at_centre<const D: usize>(
     c: usize,
     displacement: impl Fn(usize) -> Vector<D>,
 ) -> Tensor<D> {
+    match reference(mesh, c) {
+        Some(cell) => displacement_gradient_at(mesh, c, &cell.centre, displacement),
+        None => Tensor::zeros(),
+    }
+}
+
+/// The displacement gradient of cell `c` at reference coordinates `xi`.
+///
+/// Shapes: as [`displacement_gradient_at_centre`].
+pub fn displacement_gradient_at<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+    xi: &[f64; 3],
+    displacement: impl Fn(usize) -> Vector<D>,
+) -> Tensor<D> {
     let Some(cell) = reference(mesh, c) else {
         return Tensor::zeros();
     };
     let (origin, x) = relative_nodes(mesh, c);
-    let centre = point_at(cell, &origin, &x, &cell.centre, 1.0);
-    displacement_gradient(&centre, |a| displacement(mesh.cell(c)[a] as usize))
+    let point = point_at(cell, &origin, &x, xi, 1.0);
+    displacement_gradient(&point, |a| displacement(mesh.cell(c)[a] as usize))
 }
 
 #[cfg(test)]

@@ -1,28 +1,15 @@
 //! Consistent nodal forces of tractions and body forces.
 
-use super::cell::{GAUSS_3, ReferenceCell, Rule, RulePoint};
+use super::cell::{ReferenceCell, Rule, RulePoint};
 use super::element::for_each_point;
-use super::{line2, quad4, tri3};
+use super::{line2, line3, quad4, quad8, tri3, tri6};
 use crate::mesh::Mesh;
 use crate::mesh::boundary::BoundaryFacet;
 use crate::tensor::Vector;
 
-/// Three Gauss points: exact to degree 5, so that a traction of degree 4 is integrated exactly.
-const LINE: [(f64, f64); 3] = [
-    (-GAUSS_3, 5.0 / 9.0),
-    (0.0, 8.0 / 9.0),
-    (GAUSS_3, 5.0 / 9.0),
-];
-
-/// Six points on the triangle, exact to degree 4: two orbits `(a, a, 1 − 2a)`.
-const TRIANGLE: [(f64, f64); 2] = [
-    (0.445_948_490_915_964_9, 0.111_690_794_839_005_73),
-    (0.091_576_213_509_770_74, 0.054_975_871_827_660_93),
-];
-
 /// A quadrature point of a facet.
 ///
-/// Shapes: `shape` has one entry per node of the facet (up to four).
+/// Shapes: `shape` has one entry per node of the facet (up to eight).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FacetPoint<const D: usize> {
     /// Position \[m\].
@@ -30,14 +17,14 @@ pub struct FacetPoint<const D: usize> {
     /// Weight [m^(D−1)]; 1 for the single point of a facet in 1D.
     pub weight: f64,
     /// Shape functions of the facet's nodes.
-    pub shape: [f64; 4],
+    pub shape: [f64; 8],
     /// Unit normal, to the side to which the order of the nodes turns right-handed; zero in 1D.
     pub normal: Vector<D>,
 }
 
 /// Calls `visit` with each quadrature point of a facet, given by its nodes in order.
 ///
-/// Point in 1D; edge in 2D with 3 Gauss points; triangle with 6 and quadrilateral with 3 × 3 points in 3D.
+/// Point in 1D; edge in 2D with 3 Gauss points, exact to degree 5; triangle with 6 points, exact to degree 4, and quadrilateral with 3 × 3 points in 3D. Facets of second order may be curved.
 ///
 /// # Panics
 /// For a facet of another number of nodes, which no cell of [`super::CELLS`] has: a traction on it would be no force.
@@ -46,40 +33,38 @@ pub fn facet_points<const D: usize>(
     facet: &[u32],
     mut visit: impl FnMut(&FacetPoint<D>),
 ) {
-    match (D, facet.len()) {
-        (1, 1) => visit(&FacetPoint {
+    if D == 1 && facet.len() == 1 {
+        let mut shape = [0.0; 8];
+        shape[0] = 1.0;
+        return visit(&FacetPoint {
             position: mesh.nodes[facet[0] as usize],
             weight: 1.0,
-            shape: [1.0, 0.0, 0.0, 0.0],
+            shape,
             normal: Vector::zeros(),
-        }),
-        (2, 2) => {
-            for (x, w) in LINE {
-                visit(&facet_point(mesh, facet, &line2::CELL, &([x, 0.0, 0.0], w)));
-            }
-        }
-        (3, 3) => {
-            for (a, w) in TRIANGLE {
-                let b = 1.0 - 2.0 * a;
-                for xi in [[a, a, 0.0], [b, a, 0.0], [a, b, 0.0]] {
-                    visit(&facet_point(mesh, facet, &tri3::CELL, &(xi, w)));
-                }
-            }
-        }
-        (3, 4) => {
-            for (x, wx) in LINE {
-                for (y, wy) in LINE {
-                    visit(&facet_point(
-                        mesh,
-                        facet,
-                        &quad4::CELL,
-                        &([x, y, 0.0], wx * wy),
-                    ));
-                }
-            }
-        }
-        (_, nodes) => panic!("a facet of {nodes} nodes in {D} dimensions has no quadrature"),
+        });
     }
+    let nodes = facet.len();
+    let Some((cell, rule)) = facet_rule::<D>(nodes) else {
+        panic!("a facet of {nodes} nodes in {D} dimensions has no quadrature");
+    };
+    for point in rule {
+        visit(&facet_point(mesh, facet, cell, point));
+    }
+}
+
+/// The cell and the rule of an edge or a face by its number of nodes.
+fn facet_rule<const D: usize>(
+    nodes: usize,
+) -> Option<(&'static ReferenceCell, &'static [RulePoint])> {
+    Some(match (D, nodes) {
+        (2, 2) => (&line2::CELL, line3::CELL.mass),
+        (2, 3) => (&line3::CELL, line3::CELL.mass),
+        (3, 3) => (&tri3::CELL, tri6::CELL.mass),
+        (3, 6) => (&tri6::CELL, tri6::CELL.mass),
+        (3, 4) => (&quad4::CELL, quad8::CELL.mass),
+        (3, 8) => (&quad8::CELL, quad8::CELL.mass),
+        _ => return None,
+    })
 }
 
 fn facet_point<const D: usize>(
@@ -93,7 +78,7 @@ fn facet_point<const D: usize>(
     let origin = mesh.nodes[facet[0] as usize];
     let mut position = origin;
     let mut tangents: [Vector<D>; 2] = [Vector::zeros(); 2];
-    let mut shape = [0.0; 4];
+    let mut shape = [0.0; 8];
     for (a, &n) in facet.iter().enumerate() {
         let x = mesh.nodes[n as usize] - origin;
         shape[a] = values[a];
@@ -143,6 +128,19 @@ pub fn outward_points<const D: usize>(
         Some(normal) => visit(&FacetPoint { normal, ..*p }),
         None => visit(p),
     });
+}
+
+/// `∫ N_a n dA` of each node of a facet \[m^(D−1)\], n being the unit normal that its order gives.
+///
+/// Exact for facets of second order too, curved or not. Zero in 1D, where a point has no order.
+pub fn facet_normals<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> Vec<Vector<D>> {
+    let mut sums = vec![Vector::zeros(); facet.len()];
+    facet_points(mesh, facet, |p| {
+        for (sum, value) in sums.iter_mut().zip(&p.shape) {
+            *sum += p.normal * (value * p.weight);
+        }
+    });
+    sums
 }
 
 /// Length or area of a facet [m^(D−1)]; 1 for a point in 1D.
@@ -258,6 +256,90 @@ mod tests {
         f.extend(traction_vector(&mesh, &[0, 2, 3], t));
         let (total, moment) = sums(&f);
         assert!((total - 8.0 / 3.0 * 4.5).abs() < 1e-12 && (moment - 18.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn uniform_tractions_on_straight_facets_of_second_order_are_those_of_the_textbook() {
+        let forces = |corners: &[[f64; 3]], sides: &[[usize; 2]]| -> Vec<f64> {
+            let mut mesh = Mesh::<3> {
+                nodes: corners.iter().map(|x| Vector::<3>::from(*x)).collect(),
+                ..Mesh::default()
+            };
+            for &[p, q] in sides {
+                mesh.nodes.push((mesh.nodes[p] + mesh.nodes[q]) * 0.5);
+            }
+            let facet: Vec<u32> = (0..mesh.nodes.len() as u32).collect();
+            let area = facet_area(&mesh, &facet);
+            let up = |_: &Vector<3>| Vector::<3>::new(0.0, 0.0, 1.0);
+            let forces = traction_vector(&mesh, &facet, up);
+            forces.iter().map(|(_, f)| f[2] / area).collect()
+        };
+        let triangle = forces(
+            &[[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.5, 3.0, 1.0]],
+            &[[0, 1], [1, 2], [2, 0]],
+        );
+        for (f, expected) in triangle.iter().zip([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]) {
+            assert!((f - expected / 3.0).abs() < 1e-15);
+        }
+        let square = forces(
+            &[
+                [0.0, 0.0, 1.0],
+                [2.0, 0.0, 1.0],
+                [2.5, 3.0, 1.0],
+                [0.5, 3.0, 1.0],
+            ],
+            &[[0, 1], [1, 2], [2, 3], [3, 0]],
+        );
+        for (a, f) in square.iter().enumerate() {
+            let expected = if a < 4 { -1.0 / 12.0 } else { 1.0 / 3.0 };
+            assert!((f - expected).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn a_curved_edge_has_the_length_and_the_normals_of_its_parabola() {
+        // y = x (1 − x) / 4 from 0 to 1: x(ξ) is linear, the arc's length ∫ √(1 + y'²) dx with y' from 1/4 to −1/4
+        let mesh = Mesh::<2> {
+            nodes: [[0.0, 0.0], [1.0, 0.0], [0.5, 0.0625]]
+                .map(|x| Vector::<2>::new(x[0], x[1]))
+                .to_vec(),
+            ..Mesh::default()
+        };
+        let (slope, root) = (0.25f64, 1.0625f64.sqrt());
+        let length = 0.5 * root + 0.5 * slope.asinh() / slope;
+        assert!((facet_area(&mesh, &[0, 1, 2]) - length).abs() < 1e-6);
+        let shares = facet_normals(&mesh, &[0, 1, 2]);
+        let total: Vector<2> = shares.iter().sum();
+        assert!((total - Vector::<2>::new(0.0, -1.0)).amax() < 1e-15);
+        // ∫ N_a n ds = ∫ N_a (y', −1) dx, with N of a line of length one
+        assert!((shares[0] - Vector::<2>::new(slope / 6.0, -1.0 / 6.0)).amax() < 1e-15);
+        assert!((shares[2] - Vector::<2>::new(0.0, -2.0 / 3.0)).amax() < 1e-15);
+    }
+
+    #[test]
+    fn normals_of_curved_faces_add_up_to_the_volume() {
+        use super::super::sample::{noise, unit_box};
+        use crate::mesh::CellShape;
+        for shape in [CellShape::Tet10, CellShape::Hex20] {
+            let mut mesh = unit_box::<3>(shape, 1, 0.0);
+            for (n, x) in mesh.nodes.iter_mut().enumerate() {
+                *x += Vector::<3>::from_fn(|i, _| 0.04 * noise(n, i));
+            }
+            let volume: f64 = (0..mesh.cell_count())
+                .map(|c| super::super::cell_volume(&mesh, c))
+                .sum();
+            // ∮ n dA = 0 and ∮ x · n dA = 3 V
+            let (mut total, mut product) = (Vector::<3>::zeros(), 0.0);
+            for facet in mesh.outer_facets() {
+                let shares = facet_normals(&mesh, &facet.nodes);
+                for (&n, share) in facet.nodes.iter().zip(&shares) {
+                    total += share;
+                    product += share.dot(&mesh.nodes[n as usize]);
+                }
+            }
+            assert!(total.amax() < 1e-14, "{shape:?}: {total:?}");
+            assert!((product - 3.0 * volume).abs() < 1e-13, "{shape:?}");
+        }
     }
 
     fn body<const D: usize>() {

@@ -13,7 +13,7 @@ const SNAP: f64 = 1e-10;
 /// Reference coordinates of the point `x` in cell `c`, or `None` if Newton's method finds none.
 ///
 /// The point may lie outside of the cell; far outside of a distorted quadrilateral or hexahedron there may be no
-/// answer. On lines, triangles and tetrahedra the map is affine and the first step is exact.
+/// answer. On lines, triangles and tetrahedra with straight sides the map is affine and the first step is exact.
 pub fn reference_of<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> Option<Vector<D>> {
     let cell = reference(mesh, c)?;
     let (origin, nodes) = relative_nodes(mesh, c);
@@ -222,6 +222,12 @@ fn bounding_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> (Vector<D>, Vector<
     for &n in mesh.cell(c) {
         low = low.inf(&mesh.nodes[n as usize]);
         high = high.sup(&mesh.nodes[n as usize]);
+    }
+    if mesh.shapes[c].is_quadratic() {
+        // curved sides reach beyond their nodes
+        let beyond = mesh.bulge(c);
+        low -= beyond;
+        high += beyond;
     }
     (low, high)
 }

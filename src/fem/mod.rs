@@ -35,41 +35,53 @@
 //! | file | what |
 //! |---|---|
 //! | `cell.rs` | what a cell tells of itself |
-//! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one cell each |
+//! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one linear cell each |
+//! | `line3.rs`, `tri6.rs`, `quad8.rs`, `tet10.rs`, `hex20.rs` | one cell of second order each |
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
 //! | `nonlinear.rs` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
 //! | `locate.rs` | from a point in space to a cell and its shape functions |
-//! | `body.rs` | a whole body: checks, stiffness, lumped volumes and masses |
+//! | `lumping.rs` | lumped volumes and masses |
+//! | `body.rs` | a whole body: checks, stiffness, internal force |
 //!
 //! A new cell is one file, one line in [`CELLS`], and its variant of [`CellShape`].
 
 mod body;
 mod cell;
 mod element;
+mod hex20;
 mod hex8;
 mod line2;
+mod line3;
 mod load;
 mod locate;
+mod lumping;
 mod nonlinear;
 mod quad4;
+mod quad8;
+mod tet10;
 mod tet4;
 mod tri3;
+mod tri6;
 
 #[cfg(test)]
 pub(crate) mod sample;
+#[cfg(test)]
+mod second_order_tests;
 
-pub use body::{FemError, assemble, check, internal_force, lumped_mass, nodal_volumes};
+pub use body::{FemError, assemble, check, internal_force};
 pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
 pub use element::{
-    QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at_centre,
-    for_each_point, quadrature, quadrature_of, row_at, shape_values, stiffness_into,
+    QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at,
+    displacement_gradient_at_centre, for_each_point, quadrature, quadrature_of, row_at,
+    shape_values, stiffness_into,
 };
 pub use load::{
-    FacetPoint, body_force_vector, facet_area, facet_points, outward_points,
+    FacetPoint, body_force_vector, facet_area, facet_normals, facet_points, outward_points,
     outward_traction_vector, traction_vector,
 };
 pub use locate::{Located, Locator, reference_of};
+pub use lumping::{for_each_share, lumped_mass, nodal_volumes};
 pub use nonlinear::NonlinearElements;
 
 use crate::mesh::CellShape;
@@ -81,6 +93,11 @@ pub static CELLS: &[&ReferenceCell] = &[
     &quad4::CELL,
     &tet4::CELL,
     &hex8::CELL,
+    &line3::CELL,
+    &tri6::CELL,
+    &quad8::CELL,
+    &tet10::CELL,
+    &hex20::CELL,
 ];
 
 /// The cell of a shape; `None` for a shape on which no element lives (a vertex).

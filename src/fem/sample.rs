@@ -10,7 +10,7 @@ pub fn noise(a: usize, b: usize) -> f64 {
     2.0 * (x - x.floor()) - 1.0
 }
 
-/// `n^D` cells of shape `shape` on the unit box; inner nodes are moved by up to `jitter` spacings.
+/// `n^D` cells of shape `shape` on the unit box; inner corners are moved by up to `jitter` spacings, and nodes in the middle of edges lie there.
 pub fn unit_box<const D: usize>(shape: CellShape, n: usize, jitter: f64) -> Mesh<D> {
     let h = 1.0 / n as f64;
     let mut mesh = Mesh::default();
@@ -40,7 +40,7 @@ pub fn unit_box<const D: usize>(shape: CellShape, n: usize, jitter: f64) -> Mesh
             at(i + 1, j + 1, k + 1),
             at(i, j + 1, k + 1),
         ];
-        let picks: &[&[usize]] = match shape {
+        let picks: &[&[usize]] = match shape.linear() {
             CellShape::Tri3 => &[&[0, 1, 2], &[0, 2, 3]],
             // six tetrahedra around the diagonal from node 0 to node 6
             CellShape::Tet4 => &[
@@ -57,8 +57,11 @@ pub fn unit_box<const D: usize>(shape: CellShape, n: usize, jitter: f64) -> Mesh
         };
         for pick in picks {
             let nodes: Vec<u32> = pick.iter().map(|&p| hex[p]).collect();
-            mesh.push_cell(shape, &nodes);
+            mesh.push_cell(shape.linear(), &nodes);
         }
+    }
+    if shape.is_quadratic() {
+        mesh.raise_order();
     }
     mesh
 }

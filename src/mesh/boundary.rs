@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use super::{Facet, Mesh, MeshError};
+use super::{Facet, Mesh, MeshError, facet_corners};
 use crate::tensor::Vector;
 
 /// A facet seen from one of its cells.
@@ -80,7 +80,7 @@ impl<const D: usize> Mesh<D> {
     }
 
     /// The facet of a cell with this number in [`CellShape::facets`](super::CellShape::facets), its normal outwards.
-    fn facet(&self, (cell, local): (u32, u8)) -> BoundaryFacet {
+    pub fn facet(&self, (cell, local): (u32, u8)) -> BoundaryFacet {
         let nodes = self.cell(cell as usize);
         let places = self.shapes[cell as usize].facets()[usize::from(local)];
         BoundaryFacet {
@@ -93,8 +93,9 @@ impl<const D: usize> Mesh<D> {
     /// The facets of a cell by their numbers, with their keys.
     fn keys_of_cell(&self, c: u32) -> impl Iterator<Item = ((u32, u8), [u32; 4])> + '_ {
         let nodes = self.cell(c as usize);
-        let facets = self.shapes[c as usize].facets().iter().enumerate();
-        facets.map(move |(local, places)| {
+        // corners tell facets apart, whatever the order of their cells
+        let facets = self.shapes[c as usize].linear().facets();
+        facets.iter().enumerate().map(move |(local, places)| {
             let key = key(places.iter().map(|&i| nodes[i]));
             ((c, local as u8), key)
         })
@@ -146,16 +147,16 @@ impl<const D: usize> Mesh<D> {
         let mut waiting: FxHashMap<[u32; 2], (Vector<D>, Vector<D>)> = FxHashMap::default();
         let mut found = Vec::new();
         for facet in self.outer_facets() {
-            let count = facet.nodes.len();
-            let centre = facet
-                .nodes
+            let corners = facet_corners::<D>(&facet.nodes);
+            let count = corners.len();
+            let centre = corners
                 .iter()
                 .map(|&n| self.nodes[n as usize])
                 .sum::<Vector<D>>()
                 / count as f64;
             let normal = self.facet_normal_area(&facet).normalize();
             for i in 0..count {
-                let mut edge = [facet.nodes[i], facet.nodes[(i + 1) % count]];
+                let mut edge = [corners[i], corners[(i + 1) % count]];
                 if D == 2 {
                     edge[1] = edge[0];
                 }
@@ -221,7 +222,7 @@ impl<const D: usize> Mesh<D> {
     pub fn locate_facets(&self, facets: &[Facet]) -> Result<Vec<BoundaryFacet>, MeshError> {
         let mut wanted: FxHashMap<[u32; 4], Option<BoundaryFacet>> = facets
             .iter()
-            .map(|f| (key(f.iter().copied()), None))
+            .map(|f| (key(facet_corners::<D>(f).iter().copied()), None))
             .collect();
         for c in 0..self.cell_count() {
             for (facet, key) in self.keys_of_cell(c as u32) {
@@ -233,7 +234,7 @@ impl<const D: usize> Mesh<D> {
         facets
             .iter()
             .map(|f| {
-                wanted[&key(f.iter().copied())]
+                wanted[&key(facet_corners::<D>(f).iter().copied())]
                     .clone()
                     .ok_or_else(|| MeshError::LooseFacet { nodes: f.clone() })
             })
@@ -242,7 +243,7 @@ impl<const D: usize> Mesh<D> {
 
     /// Outward normal of a facet times its area [length^(D−1)]; `±1` in 1D.
     ///
-    /// For a warped quadrilateral the integral of the normal, `½ (x₂ − x₀) × (x₃ − x₁)`, which is exact.
+    /// For a warped quadrilateral the integral of the normal, `½ (x₂ − x₀) × (x₃ − x₁)`, which is exact. Of a facet of second order that of its corners, exact where its edges are straight, and in 2D.
     pub fn facet_normal_area(&self, facet: &BoundaryFacet) -> Vector<D> {
         let x = |i: usize| self.nodes[facet.nodes[i] as usize];
         if facet.nodes.len() == 1 {
@@ -250,16 +251,16 @@ impl<const D: usize> Mesh<D> {
             return out / out.norm();
         }
         normal_area(
-            &facet
-                .nodes
+            &facet_corners::<D>(&facet.nodes)
                 .iter()
                 .map(|&n| self.nodes[n as usize])
                 .collect::<Vec<_>>(),
         )
     }
 
-    /// Area of a facet of a set (length in 2D, 1 in 1D), by two triangles for a quadrilateral.
+    /// Area of a facet of a set (length in 2D, 1 in 1D), by two triangles for a quadrilateral; of one of second order that of its corners.
     pub fn facet_area(&self, nodes: &[u32]) -> f64 {
+        let nodes = facet_corners::<D>(nodes);
         let x: Vec<Vector<D>> = nodes.iter().map(|&n| self.nodes[n as usize]).collect();
         match x.as_slice() {
             [_] => 1.0,
@@ -269,8 +270,9 @@ impl<const D: usize> Mesh<D> {
         }
     }
 
-    /// Distance from `x` to a facet: a point, an edge, a triangle, or a quadrilateral as two triangles.
+    /// Distance from `x` to a facet: a point, an edge, a triangle, or a quadrilateral as two triangles; those of the corners where it is of second order.
     pub fn distance_to_facet(&self, x: &Vector<D>, nodes: &[u32]) -> f64 {
+        let nodes = facet_corners::<D>(nodes);
         let p = |i: usize| self.nodes[nodes[i] as usize];
         let to = |corners: &[Vector<D>]| (x - closest_point(x, corners).0).norm();
         match nodes.len() {

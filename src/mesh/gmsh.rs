@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::MeshError;
-use super::gmsh_kinds::shape;
+use super::gmsh_kinds::{reorder, shape};
 use crate::mesh::raw::{Encoding, RawElement, RawMesh, RawNode, Source};
 
 /// What a wrong word in a text file calls for.
@@ -281,6 +281,7 @@ impl<'a> Reader<'a> {
                     let node = self.size("a node of an element")? as u64;
                     self.raw.element_nodes.push(node);
                 }
+                reorder(shape, &mut self.raw.element_nodes[start..]);
                 self.raw.elements.push(RawElement {
                     tag,
                     shape,
@@ -356,6 +357,7 @@ impl<'a> Reader<'a> {
                     let node = self.integer("a node of an element")? as u64;
                     self.raw.element_nodes.push(node);
                 }
+                reorder(shape, &mut self.raw.element_nodes[start..]);
                 self.raw.elements.push(RawElement {
                     tag: tag as u64,
                     shape,

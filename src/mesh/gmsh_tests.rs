@@ -281,11 +281,11 @@ fn wrong_files_name_place_value_and_remedy() {
         ),
         (
             "3 2 2 6",
-            "3 9 2 6",
+            "3 10 2 6",
             [
                 "line 19",
-                "element 3 is of type 9 (second-order triangle)",
-                "ElementOrder = 1",
+                "element 3 is of type 10 (second-order quadrilateral of nine nodes)",
+                "SecondOrderIncomplete = 1",
             ],
         ),
         (

@@ -15,6 +15,7 @@
 //! | `boundary.rs` | boundary and interface facets, distances to them |
 //! | `visibility.rs` | which bonds leave the mesh |
 //! | `dilate_erode.rs` | sets of cells that grow and shrink |
+//! | `order.rs` | cells of first and second order: corners, mid-side nodes, from the one to the other |
 //! | `error.rs` | what can be wrong |
 
 use std::collections::BTreeMap;
@@ -26,6 +27,7 @@ pub mod generate;
 pub mod gmsh;
 mod gmsh_kinds;
 mod inp;
+mod order;
 mod parts;
 pub mod quality;
 pub(crate) mod raw;
@@ -39,11 +41,12 @@ mod vtu_data;
 mod xml;
 
 pub use error::{MeshError, Place};
+pub use order::{Order, Tie, facet_corners};
 pub use parts::MeshParts;
 
 use crate::tensor::Vector;
 
-/// The shapes of cells. Node order is that of VTK (and, for these shapes, of Gmsh).
+/// The shapes of cells. Node order is that of VTK: corners first, then the nodes in the middle of edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum CellShape {
     /// A single point; only in output, where each peridynamic point is one.
@@ -58,6 +61,16 @@ pub enum CellShape {
     Tet4,
     /// Eight-node hexahedron: bottom face counter-clockwise, then top face.
     Hex8,
+    /// Three-node line: both ends, then the middle.
+    Line3,
+    /// Six-node triangle.
+    Tri6,
+    /// Eight-node quadrilateral.
+    Quad8,
+    /// Ten-node tetrahedron.
+    Tet10,
+    /// Twenty-node hexahedron: the edges of the bottom face, of the top face, then those between.
+    Hex20,
 }
 
 impl CellShape {
@@ -69,6 +82,11 @@ impl CellShape {
             Self::Tri3 => 3,
             Self::Quad4 | Self::Tet4 => 4,
             Self::Hex8 => 8,
+            Self::Line3 => 3,
+            Self::Tri6 => 6,
+            Self::Quad8 => 8,
+            Self::Tet10 => 10,
+            Self::Hex20 => 20,
         }
     }
 
@@ -76,9 +94,10 @@ impl CellShape {
     pub fn dimension(self) -> usize {
         match self {
             Self::Vertex => 0,
-            Self::Line2 => 1,
-            Self::Tri3 | Self::Quad4 => 2,
+            Self::Line2 | Self::Line3 => 1,
+            Self::Tri3 | Self::Quad4 | Self::Tri6 | Self::Quad8 => 2,
             Self::Tet4 | Self::Hex8 => 3,
+            Self::Tet10 | Self::Hex20 => 3,
         }
     }
 
@@ -98,11 +117,28 @@ impl CellShape {
                 &[2, 3, 7, 6],
                 &[3, 0, 4, 7],
             ],
+            Self::Line3 => &[&[0], &[1]],
+            Self::Tri6 => &[&[0, 1, 3], &[1, 2, 4], &[2, 0, 5]],
+            Self::Quad8 => &[&[0, 1, 4], &[1, 2, 5], &[2, 3, 6], &[3, 0, 7]],
+            Self::Tet10 => &[
+                &[0, 2, 1, 6, 5, 4],
+                &[0, 1, 3, 4, 8, 7],
+                &[1, 2, 3, 5, 9, 8],
+                &[0, 3, 2, 7, 9, 6],
+            ],
+            Self::Hex20 => &[
+                &[0, 3, 2, 1, 11, 10, 9, 8],
+                &[4, 5, 6, 7, 12, 13, 14, 15],
+                &[0, 1, 5, 4, 8, 17, 12, 16],
+                &[1, 2, 6, 5, 9, 18, 13, 17],
+                &[2, 3, 7, 6, 10, 19, 14, 18],
+                &[3, 0, 4, 7, 11, 16, 15, 19],
+            ],
         }
     }
 }
 
-/// A facet of the mesh: its nodes, one in 1D, two in 2D, three or four in 3D.
+/// A facet of the mesh: its nodes, one in 1D, two in 2D, three or four in 3D; of a cell of second order also those in the middle of its edges, after the corners.
 pub type Facet = Vec<u32>;
 
 /// A mesh of `D`-dimensional cells with named sets.
@@ -163,9 +199,9 @@ impl<const D: usize> Mesh<D> {
         self.offsets.push(self.connectivity.len() as u32);
     }
 
-    /// Mean of the positions of the nodes of cell `c`.
+    /// Mean of the positions of the corners of cell `c`.
     pub fn centroid(&self, c: usize) -> Vector<D> {
-        let nodes = self.cell(c);
+        let nodes = self.corners(c);
         nodes
             .iter()
             .map(|&n| self.nodes[n as usize])

@@ -1,7 +1,7 @@
 //! A mesh in memory, as another program hands it over: positions, blocks of elements and named sets by numbers.
 
 use super::raw::{Encoding, RawElement, RawMesh, RawNode, Source};
-use super::{CellShape, Mesh, MeshError, quality};
+use super::{CellShape, Mesh, MeshError, Order, quality};
 use rustc_hash::FxHashMap;
 use std::path::PathBuf;
 
@@ -40,13 +40,23 @@ impl MeshParts {
     /// # Errors
     /// [`MeshError`]: numbers of nodes and elements that are not there, another dimension than `D`, repeated or distorted elements, coordinates that are no numbers.
     pub fn mesh<const D: usize>(&self) -> Result<Mesh<D>, MeshError> {
+        self.mesh_of(Order::Kept)
+    }
+
+    /// As [`MeshParts::mesh`], with the order that cells of second order are to have.
+    ///
+    /// # Errors
+    /// As [`MeshParts::mesh`].
+    pub fn mesh_of<const D: usize>(&self, order: Order) -> Result<Mesh<D>, MeshError> {
         let source = Source {
             path: PathBuf::from(&self.name),
             bytes: &[],
             encoding: Encoding::Memory,
             pieces: &[],
         };
-        let mesh = self.raw(&source)?.assemble(&source)?;
+        let mut raw = self.raw(&source)?;
+        raw.set_order(order);
+        let mesh = raw.assemble(&source)?;
         quality::check(&mesh)?;
         Ok(mesh)
     }

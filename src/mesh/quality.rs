@@ -31,8 +31,7 @@ pub struct Quality {
 
 /// For each corner, its neighbours along edges, ordered so that their determinant is positive in a good cell.
 fn corners(shape: CellShape) -> &'static [(usize, &'static [usize])] {
-    match shape {
-        CellShape::Vertex => &[],
+    match shape.linear() {
         CellShape::Line2 => &[(0, &[1])],
         CellShape::Tri3 => &[(0, &[1, 2]), (1, &[2, 0]), (2, &[0, 1])],
         CellShape::Quad4 => &[(0, &[1, 3]), (1, &[2, 0]), (2, &[3, 1]), (3, &[0, 2])],
@@ -52,6 +51,13 @@ fn corners(shape: CellShape) -> &'static [(usize, &'static [usize])] {
             (6, &[5, 7, 2]),
             (7, &[6, 4, 3]),
         ],
+        // no linear shape is one of these
+        CellShape::Vertex
+        | CellShape::Line3
+        | CellShape::Tri6
+        | CellShape::Quad8
+        | CellShape::Tet10
+        | CellShape::Hex20 => &[],
     }
 }
 
@@ -70,7 +76,7 @@ fn determinant<const D: usize>(m: &Tensor<D>) -> f64 {
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Exact signed volume of cell `c` (area in 2D, length in 1D); negative if its nodes run the wrong way round.
+    /// Exact signed volume of cell `c` (area in 2D, length in 1D); negative if its nodes run the wrong way round. Of a cell of second order that of its corners.
     ///
     /// Zero for a cell whose dimension is not `D`. Units: [length^D].
     pub fn cell_volume(&self, c: usize) -> f64 {
@@ -78,11 +84,10 @@ impl<const D: usize> Mesh<D> {
         if shape.dimension() != D {
             return 0.0;
         }
-        let nodes = self.cell(c);
+        let nodes = self.corners(c);
         let x = |i: usize| self.nodes[nodes[i] as usize];
         let spanned = |edges: &[Vector<D>]| determinant(&Tensor::<D>::from_columns(edges));
-        match shape {
-            CellShape::Vertex => 0.0,
+        match shape.linear() {
             CellShape::Line2 => spanned(&[x(1) - x(0)]),
             CellShape::Tri3 => spanned(&[x(1) - x(0), x(2) - x(0)]) / 2.0,
             CellShape::Quad4 => spanned(&[x(2) - x(0), x(3) - x(1)]) / 2.0,
@@ -115,6 +120,12 @@ impl<const D: usize> Mesh<D> {
                 }
                 volume
             }
+            CellShape::Vertex
+            | CellShape::Line3
+            | CellShape::Tri6
+            | CellShape::Quad8
+            | CellShape::Tet10
+            | CellShape::Hex20 => 0.0,
         }
     }
 

@@ -1,7 +1,7 @@
 //! What a mesh file holds before it is a mesh: nodes, elements and groups as they are read, and where in the file an error lies.
 
 use super::error::axis_name;
-use super::{CellShape, Facet, Mesh, MeshError, Place};
+use super::{CellShape, Facet, Mesh, MeshError, Order, Place};
 use crate::tensor::Vector;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
@@ -153,7 +153,7 @@ impl Default for RawMesh {
     }
 }
 
-/// Cells by their sorted nodes, with the groups that name them.
+/// Cells by their sorted corners, with the groups that name them.
 type KnownCells = HashMap<[u32; 8], (u32, HashSet<u32>)>;
 
 /// Sorts the sets of cells and nodes, and leaves one of equal entries in each set.
@@ -177,6 +177,16 @@ fn sort_sets<const D: usize>(mesh: &mut Mesh<D>) {
 }
 
 impl RawMesh {
+    /// Gives cells the order; linear ones are without the nodes in the middle of edges, which come after the corners.
+    pub(super) fn set_order(&mut self, order: Order) {
+        if order == Order::Kept {
+            return;
+        }
+        for element in &mut self.elements {
+            element.shape = element.shape.linear();
+        }
+    }
+
     pub(super) fn dimension(&self, source: &Source) -> Result<usize, MeshError> {
         let found = self.elements.iter().map(|e| e.shape.dimension()).max();
         match found {
@@ -286,7 +296,8 @@ impl RawMesh {
         mesh: &mut Mesh<D>,
     ) -> Result<u32, MeshError> {
         let mut key = [u32::MAX; 8];
-        key[..nodes.len()].copy_from_slice(nodes);
+        let corners = element.shape.linear().node_count();
+        key[..corners].copy_from_slice(&nodes[..corners]);
         key.sort_unstable();
         let cell = match known.entry(key) {
             Entry::Vacant(slot) => {

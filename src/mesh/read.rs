@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::raw::{Piece, RawMesh, Source};
-use super::{Mesh, MeshError, gmsh, inp, vtk};
+use super::{Mesh, MeshError, Order, gmsh, inp, vtk};
 use crate::regular_file;
 
 /// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.inp`, `.vtk` or `.vtu`.
@@ -16,8 +16,17 @@ use crate::regular_file;
 /// See [`MeshError`]; each names the file, the place in it, the value and the remedy. The shapes of cells are not
 /// looked at here: see [`quality::check`](super::quality::check).
 pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>, MeshError> {
+    read_of(path, Order::Kept)
+}
+
+/// As [`read`], with the order that cells of second order are to have.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_of<const D: usize>(path: &Path, order: Order) -> Result<Mesh<D>, MeshError> {
     let text = load(path)?;
-    let (raw, source) = parse(path, &text)?;
+    let (mut raw, source) = parse(path, &text)?;
+    raw.set_order(order);
     raw.assemble(&source)
 }
 

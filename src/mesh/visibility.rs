@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::Mesh;
 use super::boundary::{BoundaryFacet, Feature, closest_point, normal_area};
+use super::{Mesh, facet_corners};
 use crate::shape::TOUCH;
 use crate::tensor::Vector;
 
@@ -51,10 +51,10 @@ impl<const D: usize> SegmentCutter<D> {
         let mut facets = Vec::with_capacity(boundary.len());
         let mut numbers: Vec<Vec<u32>> = Vec::with_capacity(boundary.len());
         for facet in boundary {
-            let n = &facet.nodes;
+            let n = facet_corners::<D>(&facet.nodes);
             let parts = match n.len() {
                 4 => vec![vec![n[0], n[1], n[2]], vec![n[0], n[2], n[3]]],
-                _ => vec![n.clone()],
+                _ => vec![n.to_vec()],
             };
             for part in parts {
                 let corners: [Vector<D>; D] =

@@ -34,6 +34,11 @@ fn shape(kind: u8) -> Option<CellShape> {
         9 => CellShape::Quad4,
         10 => CellShape::Tet4,
         12 => CellShape::Hex8,
+        21 => CellShape::Line3,
+        22 => CellShape::Tri6,
+        23 => CellShape::Quad8,
+        24 => CellShape::Tet10,
+        25 => CellShape::Hex20,
         _ => return None,
     })
 }
@@ -85,7 +90,7 @@ fn add_piece(
                 element,
                 kind: kind.to_string(),
                 name: "by VTK's numbering",
-                remedy: "supported are Vertex, Line, Triangle, Quad, Tetra and Hexahedron of first order: convert the mesh",
+                remedy: "supported are Vertex, Line, Triangle, Quad, Tetra and Hexahedron, and the last five as quadratic cells without nodes inside of faces: convert the mesh",
             });
         };
         if end - start != shape.node_count() as u64 {

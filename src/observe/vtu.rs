@@ -238,6 +238,11 @@ fn vtk_type(shape: CellShape) -> u8 {
         CellShape::Quad4 => 9,
         CellShape::Tet4 => 10,
         CellShape::Hex8 => 12,
+        CellShape::Line3 => 21,
+        CellShape::Tri6 => 22,
+        CellShape::Quad8 => 23,
+        CellShape::Tet10 => 24,
+        CellShape::Hex20 => 25,
     }
 }
 

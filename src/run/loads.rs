@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use crate::coupling::tributary::{Detail, Parts};
 use crate::coupling::{CellRole, Model, SiteKind};
 use crate::fem;
-use crate::mesh::Facet;
 use crate::mesh::boundary::BoundaryFacet;
+use crate::mesh::{Facet, facet_corners};
 use crate::observe::summary::Applied;
 use crate::run::error::RunError;
 use crate::scene::conditions::{Condition, Prescribed, Support};
@@ -73,7 +73,10 @@ pub(crate) fn nearest_points<const D: usize>(
         return Vec::new();
     }
     let parts = if facets.is_empty() {
-        let free = nodes.iter().filter(|&&n| site_of[n as usize].is_none());
+        // a node in the middle of an edge follows the ends, or is no node of the model's mesh
+        let free = nodes
+            .iter()
+            .filter(|&&n| site_of[n as usize].is_none() && model.is_placed(n));
         let free: Vec<Vector<D>> = free.map(|&n| model.mesh.nodes[n as usize]).collect();
         Parts::of_places(model, &free)
     } else if !may_bound_zone(model, facets) {
@@ -230,10 +233,10 @@ impl<'a, const D: usize> Loads<'a, D> {
                     (own, Vec::new(), parts)
                 }
                 Prescribed::Pressure(facets) => {
-                    let (own, zone): (Vec<_>, Vec<_>) = facets
-                        .iter()
-                        .cloned()
-                        .partition(|f| model.is_element(f.cell as usize));
+                    // with the nodes that its cell has in the model: cells at the seam are linear
+                    let present = facets.iter().map(|f| model.mesh.facet((f.cell, f.local)));
+                    let (own, zone): (Vec<_>, Vec<_>) =
+                        present.partition(|f| model.is_element(f.cell as usize));
                     pressed = own;
                     let parts = Parts::of_facets(model, &zone, detail);
                     (Vec::new(), Vec::new(), parts)
@@ -342,7 +345,10 @@ pub(crate) fn cells_of<const D: usize>(model: &Model<D>, region: &Region<D>) -> 
 
 /// Whether any of the facets may belong to a cell that holds points: all of its nodes do. To find the cells themselves takes all facets of the mesh.
 pub(crate) fn may_bound_zone<const D: usize>(model: &Model<D>, facets: &[Facet]) -> bool {
-    let at_zone = |facet: &Facet| facet.iter().all(|&n| model.touches_points(n));
+    let at_zone = |facet: &Facet| {
+        let corners = facet_corners::<D>(facet);
+        corners.iter().all(|&n| model.touches_points(n))
+    };
     facets.iter().any(at_zone)
 }
 
@@ -352,7 +358,7 @@ pub(crate) fn split_facets<const D: usize>(
     facets: &[Facet],
 ) -> (Vec<Facet>, Vec<BoundaryFacet>) {
     if !may_bound_zone(model, facets) {
-        return (facets.to_vec(), Vec::new());
+        return (model.mesh.present_facets(facets.to_vec()), Vec::new());
     }
     // a facet without a cell is an element's as far as anybody knows
     let Ok(located) = model.mesh.locate_facets(facets) else {

@@ -97,7 +97,7 @@ fn of_cells<const D: usize>(
         if ((h - l) - edges).amax() > ALIKE * edges.min() {
             return None;
         }
-        let follows = mesh.cell(c).iter().all(|&n| {
+        let follows = mesh.corners(c).iter().all(|&n| {
             let k = (mesh.nodes[n as usize] - corner).component_div(&edges);
             k.iter().all(|k| (k - k.round()).abs() <= ALIKE)
         });

@@ -9,10 +9,13 @@ use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{corners, position};
 use super::source::Span;
-use super::spec::{AxisSpec, CutoutSpec, FileMeshSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
+use super::spec::{
+    AxisSpec, CutoutSpec, FileMeshSpec, FileOrderSpec, MeshSpec, PlaneCellSpec, SolidCellSpec,
+};
 use super::value::{Coordinates, Text};
+use crate::fem;
 use crate::mesh::generate::{Axis, CutOut, Grid};
-use crate::mesh::{Mesh, MeshError, quality, read};
+use crate::mesh::{Mesh, MeshError, Order, quality, read};
 use crate::observe::checkpoint::Fingerprint;
 
 /// The most cells that a generated mesh may have: beyond it a typing error is likelier than a wish.
@@ -26,17 +29,33 @@ fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Me
             .label(file.path.span.clone(), "this mesh")
             .help("the path is relative to the scene file")
     };
-    match &file.held {
-        Some(parts) => parts.mesh().map_err(|error| {
+    let order = match file.order {
+        FileOrderSpec::Kept => Order::Kept,
+        FileOrderSpec::Linear => Order::Linear,
+    };
+    let mesh: Mesh<D> = match &file.held {
+        Some(parts) => parts.mesh_of(order).map_err(|error| {
             SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
                 .help("the scene was given this mesh in memory")
-        }),
+        })?,
         None => {
-            let mesh = read::read(&path).map_err(failed)?;
+            let mesh = read::read_of(&path, order).map_err(failed)?;
             quality::check(&mesh).map_err(failed)?;
-            Ok(mesh)
+            mesh
         }
-    }
+    };
+    // corners do not tell of a side that is curved too far
+    fem::check(&mesh, |c| mesh.shapes[c].is_quadratic()).map_err(|error| {
+        SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
+            .label(file.path.span.clone(), "this mesh")
+            .help("straighten the sides of the cell, refine the mesh there, or set order = \"linear\"")
+    })?;
+    Ok(mesh)
+}
+
+fn raised<const D: usize>(mut mesh: Mesh<D>) -> Mesh<D> {
+    mesh.raise_order();
+    mesh
 }
 
 /// The mesh of a scene whose file lies in `directory`.
@@ -68,32 +87,36 @@ pub(crate) fn build<const D: usize>(
         MeshSpec::Rectangle(m) => {
             dimension(2, "rectangle", &m.min)?;
             let cells = match m.cell {
-                PlaneCellSpec::Quad4 => Boxes,
-                PlaneCellSpec::Tri3 => Simplices,
+                PlaneCellSpec::Quad4 | PlaneCellSpec::Quad8 => Boxes,
+                PlaneCellSpec::Tri3 | PlaneCellSpec::Tri6 => Simplices,
             };
-            generate(
+            let is_raised = matches!(m.cell, PlaneCellSpec::Quad8 | PlaneCellSpec::Tri6);
+            let mesh = generate(
                 "mesh.rectangle",
                 &m.min,
                 &m.max,
                 &[&m.x, &m.y],
                 &m.cutouts,
                 cells,
-            )?
+            )?;
+            if is_raised { raised(mesh) } else { mesh }
         }
         MeshSpec::Box(m) => {
             dimension(3, "box", &m.min)?;
             let cells = match m.cell {
-                SolidCellSpec::Hex8 => Boxes,
-                SolidCellSpec::Tet4 => Simplices,
+                SolidCellSpec::Hex8 | SolidCellSpec::Hex20 => Boxes,
+                SolidCellSpec::Tet4 | SolidCellSpec::Tet10 => Simplices,
             };
-            generate(
+            let is_raised = matches!(m.cell, SolidCellSpec::Hex20 | SolidCellSpec::Tet10);
+            let mesh = generate(
                 "mesh.box",
                 &m.min,
                 &m.max,
                 &[&m.x, &m.y, &m.z],
                 &m.cutouts,
                 cells,
-            )?
+            )?;
+            if is_raised { raised(mesh) } else { mesh }
         }
         MeshSpec::File(file) => from_file(file, directory)?,
     };

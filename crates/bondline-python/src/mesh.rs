@@ -8,12 +8,17 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Name in meshio, name in a `Mesh`, and number in VTK of each shape.
-pub const SHAPES: [(CellShape, &str, u8); 6] = [
+pub const SHAPES: [(CellShape, &str, u8); 11] = [
     (CellShape::Line2, "line", 3),
     (CellShape::Tri3, "triangle", 5),
     (CellShape::Quad4, "quad", 9),
     (CellShape::Tet4, "tetra", 10),
     (CellShape::Hex8, "hexahedron", 12),
+    (CellShape::Line3, "line3", 21),
+    (CellShape::Tri6, "triangle6", 22),
+    (CellShape::Quad8, "quad8", 23),
+    (CellShape::Tet10, "tetra10", 24),
+    (CellShape::Hex20, "hexahedron20", 25),
     // a file has them last, too
     (CellShape::Vertex, "vertex", 1),
 ];

@@ -43,6 +43,30 @@ def test_a_mesh_from_meshio_with_its_groups() -> None:
     assert np.abs(by_place(found) - by_place(wanted)).max() < 1e-10
 
 
+def test_cells_of_second_order_come_and_go() -> None:
+    path = ROOT / "tests" / "fixtures" / "ring_hex20_41_ascii.msh"
+    keys = {
+        "kinematics": "solid",
+        "coupling": "local",
+        "materials": {"ring": {"lps": {"youngs-modulus": 1.0, "poisson-ratio": 0.3}}},
+        "conditions": {
+            "foot": {"displacement": {"on": "foot", "x": 0, "y": 0, "z": 0}},
+            "outer": {"traction": {"on": "outer", "x": 1e-3}},
+        },
+    }
+    mesh = bondline.Mesh.from_meshio(meshio.read(path))
+    found = bondline.Scene.from_dict(keys, mesh=mesh).run(progress=False)
+    wanted = bondline.Scene.from_dict({**keys, "mesh": {"file": {"path": str(path)}}}).run(progress=False)
+    assert set(found.cells) == {"hexahedron20"}
+    assert found.to_meshio().cells_dict["hexahedron20"].shape == (8, 20)
+
+    def rows(frame: bondline.Frame) -> np.ndarray[Any, Any]:
+        both = np.hstack([np.round(frame.points, 12), frame.displacement])
+        return both[np.lexsort(both[:, :3].T[::-1])]
+
+    assert np.abs(rows(found) - rows(wanted)).max() < 1e-10
+
+
 def square(n: int = 8) -> meshio.Mesh:
     """A square of triangles with an edge set, a cell set and a point set."""
     x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="xy")

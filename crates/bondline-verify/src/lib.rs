@@ -23,6 +23,7 @@
 //! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `meshes` | scenes as people type them, on meshes that fit nothing |
+//! | `quadratic` | cells of second order: affine fields, orders, known solutions |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
 //! | `wave` | energy and momentum over 100 000 steps |
@@ -52,6 +53,7 @@ mod observed;
 pub mod partial_volumes;
 pub mod patch;
 pub mod position_aware;
+pub mod quadratic;
 pub mod reflection;
 pub mod report_page;
 pub mod scale;
@@ -199,6 +201,11 @@ pub const SUITES: &[Suite] = &[
         name: "meshes",
         about: "scenes as people type them, on meshes that fit nothing: loads, affine fields, order, motion, fracture",
         run: meshes::run,
+    },
+    Suite {
+        name: "quadratic",
+        about: "cells of second order: affine fields beside every coupling, order, Kirsch's hole, a cantilever, Cook's membrane",
+        run: quadratic::run,
     },
     Suite {
         name: "extremes",

@@ -45,7 +45,10 @@ impl<const D: usize> LocalElements<D> {
         chunks.for_each(|(chunk, force)| {
             for (k, force) in force.chunks_exact_mut(D).enumerate() {
                 if let SiteKind::Node(n) = model.sites[chunk * CHUNK + k].kind {
-                    let own: Vector<D> = self.elements.force(n);
+                    let mut own: Vector<D> = self.elements.force(n);
+                    for &tied in model.ties.followers(n) {
+                        own += self.elements.force(tied) * 0.5;
+                    }
                     force.iter_mut().zip(own.iter()).for_each(|(f, x)| *f += x);
                 }
             }

@@ -54,14 +54,12 @@ impl Tributary {
         // nodes by the cells around them; those that follow others pass on what they have
         for c in (0..mesh.cell_count()).filter(|&c| model.is_element(c)) {
             let material = model.material_of_cell(c);
-            fem::for_each_point(mesh, c, fem::Rule::Mass, |p| {
-                for (&n, shape) in mesh.cell(c).iter().zip(&p.shape) {
-                    for (site, w) in model.node_transfer.row(n as usize) {
-                        let share = w * shape * p.weight;
-                        volume[site as usize] += share;
-                        if material != own {
-                            by_material.push((site, material, share));
-                        }
+            fem::for_each_share(mesh, c, |n, part, whole| {
+                for (site, w) in model.node_transfer.row(n as usize) {
+                    let share = w * part * whole;
+                    volume[site as usize] += share;
+                    if material != own {
+                        by_material.push((site, material, share));
                     }
                 }
             });
@@ -189,6 +187,12 @@ impl<const D: usize> Model<D> {
         let own = offsets[node as usize] as usize..offsets[node as usize + 1] as usize;
         let holds = |&c: &u32| self.roles[c as usize] == CellRole::Points;
         cells[own].iter().any(holds)
+    }
+
+    /// Whether a node belongs to a cell and follows no ends of an edge.
+    pub fn is_placed(&self, node: u32) -> bool {
+        let offsets = self.node_cells().0;
+        offsets[node as usize] < offsets[node as usize + 1] && self.ties.ends(node).is_none()
     }
 
     /// Whether all sites that are points lie in the cells that `counts` names.

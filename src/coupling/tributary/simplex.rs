@@ -2,7 +2,7 @@
 
 use crate::{
     fem,
-    mesh::{CellShape, Mesh},
+    mesh::{CellShape, Mesh, facet_corners},
     tensor::Vector,
 };
 
@@ -184,11 +184,11 @@ impl<const D: usize> Cells<D> {
     }
 }
 
-/// A cell of a mesh as simplices: a quadrilateral as two triangles, a hexahedron with plane faces as six tetrahedra around its diagonal. Any other solid is divided from its centre, a bent face from
+/// The corners of a cell of a mesh as simplices: a quadrilateral as two triangles, a hexahedron with plane faces as six tetrahedra around its diagonal. Any other solid is divided from its centre, a bent face from
 /// its own: the volume of a trilinear hexahedron is that of these 24 tetrahedra [Grandy 1997, UCRL-ID-128886], and neighbours divide their face alike.
 pub(super) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simplex<D>> {
     let x: Vec<Vector<D>> = mesh
-        .cell(c)
+        .corners(c)
         .iter()
         .map(|&n| mesh.nodes[n as usize])
         .collect();
@@ -196,7 +196,7 @@ pub(super) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simp
         let corners: Vec<Vector<D>> = corners.iter().map(|&i| x[i]).collect();
         Simplex::of(&corners)
     };
-    match mesh.shapes[c] {
+    match mesh.shapes[c].linear() {
         CellShape::Vertex => Vec::new(),
         CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => vec![Simplex::of(&x)],
         CellShape::Quad4 => {
@@ -253,7 +253,8 @@ fn has_plane_faces<const D: usize>(shape: CellShape, x: &[Vector<D>]) -> bool {
 
 /// A facet as simplices.
 pub(super) fn facet_simplices<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> Vec<Simplex<D>> {
-    let x: Vec<Vector<D>> = facet.iter().map(|&n| mesh.nodes[n as usize]).collect();
+    let facet = facet_corners::<D>(facet).iter();
+    let x: Vec<Vector<D>> = facet.map(|&n| mesh.nodes[n as usize]).collect();
     match x.len() {
         0 => Vec::new(),
         4 => vec![
@@ -266,7 +267,7 @@ pub(super) fn facet_simplices<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> 
 
 /// The corners of a cell that is a box along the axes, if it is one.
 pub(super) fn as_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector<D>, Vector<D>)> {
-    let nodes = mesh.cell(c);
+    let nodes = mesh.corners(c);
     let (low, high) = mesh.bounds_of(nodes);
     let at_corner = |x: &Vector<D>| (0..D).all(|i| x[i] == low[i] || x[i] == high[i]);
     let fills = nodes.len() == 1 << D && nodes.iter().all(|&n| at_corner(&mesh.nodes[n as usize]));

@@ -246,6 +246,9 @@ impl Join<'_, '_> {
                             (Some(2), 2) => CellShape::Line2,
                             (Some(3), 3) => CellShape::Tri3,
                             (Some(4), 3) => CellShape::Quad4,
+                            (Some(3), 2) => CellShape::Line3,
+                            (Some(6), 3) => CellShape::Tri6,
+                            (Some(8), 3) => CellShape::Quad8,
                             _ => return Err(self.no_face(&name, element.number, sides.members.at)),
                         };
                         let nodes = bodies[of].nodes_of(element);

@@ -54,12 +54,19 @@ impl Face {
         ];
         const TET: [&[usize]; 4] = [&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]];
         const ENDS: [&[usize]; 2] = [&[0], &[1]];
-        const ALL: &[usize] = &[0, 1, 2, 3];
-        let plane = matches!(kind.shape, CellShape::Tri3 | CellShape::Quad4);
+        const ALL: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7];
+        let plane = kind.shape.dimension() == 2;
+        // of a solid of second order the facet with the corners of that face
+        let full = |corners: &[usize]| {
+            let has_all = |f: &&&[usize]| corners.iter().all(|i| f.contains(i));
+            kind.shape.facets().iter().find(has_all).copied()
+        };
         match (kind.shape, self) {
+            (CellShape::Hex20, Self::Side(n)) => full(HEX.get(n - 1)?),
+            (CellShape::Tet10, Self::Side(n)) => full(TET.get(n - 1)?),
             (CellShape::Hex8, Self::Side(n)) => HEX.get(n - 1).copied(),
             (CellShape::Tet4, Self::Side(n)) => TET.get(n - 1).copied(),
-            (CellShape::Line2, Self::End(n)) => ENDS.get(n - 1).copied(),
+            (CellShape::Line2 | CellShape::Line3, Self::End(n)) => ENDS.get(n - 1).copied(),
             (_, Self::Edge(n)) if plane => kind.shape.facets().get(n - 1).copied(),
             (_, Self::Whole) if plane => ALL.get(..kind.shape.node_count()),
             (_, Self::Side(1 | 2)) if plane && kind.shell => ALL.get(..kind.shape.node_count()),
@@ -71,7 +78,7 @@ impl Face {
 }
 
 /// Families of types by their stem, their shape and whether they are counted as shells; variants follow by the letters below.
-const STEMS: [(&str, CellShape, bool); 24] = [
+const STEMS: [(&str, CellShape, bool); 43] = [
     ("T2D2", CellShape::Line2, false),
     ("T3D2", CellShape::Line2, false),
     ("B21", CellShape::Line2, false),
@@ -94,44 +101,47 @@ const STEMS: [(&str, CellShape, bool); 24] = [
     ("M3D4", CellShape::Quad4, true),
     ("R3D4", CellShape::Quad4, true),
     ("SFM3D4", CellShape::Quad4, true),
+    ("T2D3", CellShape::Line3, false),
+    ("T3D3", CellShape::Line3, false),
+    ("B22", CellShape::Line3, false),
+    ("B32", CellShape::Line3, false),
+    ("CAX6", CellShape::Tri6, false),
+    ("CAX8", CellShape::Quad8, false),
+    ("CPS6", CellShape::Tri6, false),
+    ("CPE6", CellShape::Tri6, false),
+    ("CPEG6", CellShape::Tri6, false),
+    ("CPS8", CellShape::Quad8, false),
+    ("CPE8", CellShape::Quad8, false),
+    ("CPEG8", CellShape::Quad8, false),
+    ("S6", CellShape::Tri6, true),
+    ("STRI65", CellShape::Tri6, true),
+    ("S8", CellShape::Quad8, true),
+    ("M3D6", CellShape::Tri6, true),
+    ("M3D8", CellShape::Quad8, true),
+    ("C3D10", CellShape::Tet10, false),
+    ("C3D20", CellShape::Hex20, false),
     ("C3D4", CellShape::Tet4, false),
     ("C3D8", CellShape::Hex8, false),
 ];
 
-/// Letters after a stem: reduced integration, incompatible modes, hybrid, with temperature or pore pressure, and what shells add.
-const VARIANTS: [&str; 18] = [
+/// Letters after a stem: reduced integration, incompatible modes, hybrid, with temperature or pore pressure, modified, and what shells add.
+const VARIANTS: [&str; 20] = [
     "", "R", "I", "H", "T", "P", "S", "RH", "IH", "RT", "HT", "RP", "PH", "RHT", "RPH", "RS",
-    "RSW", "R5",
+    "RSW", "R5", "M", "MH",
 ];
 
-/// Stems of elements of second order, with their names.
-const SECOND_ORDER: [(&str, &str); 20] = [
-    ("C3D10", "second-order tetrahedron"),
-    ("C3D20", "second-order hexahedron"),
+/// Stems of elements of second order that are not read, with their names.
+const SECOND_ORDER: [(&str, &str); 3] = [
     ("C3D27", "second-order hexahedron"),
     ("C3D15", "second-order prism"),
-    ("CPS6", "second-order triangle"),
-    ("CPE6", "second-order triangle"),
-    ("CPS8", "second-order quadrilateral"),
-    ("CPE8", "second-order quadrilateral"),
-    ("CAX6", "second-order axisymmetric triangle"),
-    ("CAX8", "second-order axisymmetric quadrilateral"),
-    ("S6", "second-order shell"),
-    ("S8", "second-order shell"),
     ("S9", "second-order shell"),
-    ("STRI65", "second-order shell"),
-    ("M3D6", "second-order membrane"),
-    ("M3D8", "second-order membrane"),
-    ("T2D3", "second-order line"),
-    ("T3D3", "second-order line"),
-    ("B22", "second-order beam"),
-    ("B32", "second-order beam"),
 ];
 
 /// Our shape for a type in capitals, or its name and a remedy.
 pub(super) fn kind(word: &str) -> Result<Kind, (&'static str, &'static str)> {
-    const ORDER: &str = "only first-order elements are read: mesh again with them, or convert the mesh (in Gmsh: SetOrder 1)";
-    const SHAPE: &str = "supported are lines, triangles, quadrilaterals, tetrahedra and hexahedra of first order: mesh without it";
+    const ORDER: &str =
+        "mesh again with elements of first order, or convert the mesh (in Gmsh: SetOrder 1)";
+    const SHAPE: &str = "supported are lines, triangles, quadrilaterals, tetrahedra and hexahedra of first and second order: mesh without it";
     let stem = |stem: &str| {
         let rest = word.strip_prefix(stem)?;
         VARIANTS.contains(&rest).then_some(())

@@ -173,6 +173,11 @@ fn as_meshio<const D: usize>(deck: &Path, model: &Value) {
         ("quad", 2),
         ("tetra", 3),
         ("hexahedron", 3),
+        ("line3", 1),
+        ("triangle6", 2),
+        ("quad8", 2),
+        ("tetra10", 3),
+        ("hexahedron20", 3),
     ];
     let mut cells: Vec<(usize, Vec<u32>)> = Vec::new();
     for block in model["cells"].as_array().unwrap() {
@@ -478,8 +483,8 @@ fn refusals_name_file_line_and_number() {
         ("*SYSTEM\n1,1,1\n", &["*SYSTEM"]),
         ("*NODE, SYSTEM=C\n", &["cylindrical"]),
         (
-            "*ELEMENT, TYPE=C3D10\n30,1,2,3,4,5,6,7,8,9,10\n",
-            &["line 17", "element 30", "C3D10", "second-order tetrahedron"],
+            "*ELEMENT, TYPE=C3D15\n30,1,2,3,4,5,6,7,8,9,10\n",
+            &["line 17", "element 30", "C3D15", "second-order prism"],
         ),
         (
             "*ELEMENT, TYPE=SPRINGA\n31,1,2\n",

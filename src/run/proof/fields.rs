@@ -1,8 +1,9 @@
 //! Affine fields: their gradients, and the exact nodal forces of their constant stress.
 
 use crate::coupling::Model;
-use crate::mesh::Mesh;
+use crate::fem;
 use crate::mesh::boundary::BoundaryFacet;
+use crate::mesh::{Mesh, facet_corners};
 use crate::tensor::{Tensor, Tensor4, Vector};
 
 /// Gradients of all affine fields, `D²` of them: those that give an elastic body one component of stress each, as large as its largest stiffness, and the
@@ -78,8 +79,11 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
 
 /// `∫ N_a n dA` of each node of a facet.
 fn shares<const D: usize>(mesh: &Mesh<D>, facet: &BoundaryFacet) -> Vec<Vector<D>> {
-    let area = mesh.facet_normal_area(facet);
     let count = facet.nodes.len();
+    if facet_corners::<D>(&facet.nodes).len() < count {
+        return fem::facet_normals(mesh, &facet.nodes);
+    }
+    let area = mesh.facet_normal_area(facet);
     if count != 4 || D != 3 {
         // shape functions of an edge or a triangle have equal integrals
         return vec![area / count as f64; count];

@@ -284,11 +284,20 @@ fn mass<const D: usize>(model: &Model<D>, density: &[f64], part: &mut Part) -> (
         if has_voids && model.roles[c] == CellRole::Points {
             continue;
         }
+        // lumped cells of second order keep the first moment where they are affine only: of those it is that of the shares
+        let is_linear = !model.mesh.shapes[c].is_quadratic();
         fem::for_each_point(&model.mesh, c, fem::Rule::Mass, |p| {
             exact += rho * p.weight;
-            turned += (p.position - centre) * (rho * p.weight);
+            if is_linear {
+                turned += (p.position - centre) * (rho * p.weight);
+            }
             extent += (p.position - centre).norm() * (rho * p.weight);
         });
+        if !is_linear {
+            fem::for_each_share(&model.mesh, c, |n, part, whole| {
+                turned += (model.mesh.nodes[n as usize] - centre) * (rho * part * whole);
+            });
+        }
     }
     if has_voids {
         // what voids leave of the zone is known by the parts of the zone alone

@@ -25,6 +25,7 @@ use self::shapes::Marked;
 pub(crate) use self::solutions::CachedSolution;
 use crate::coupling::Zone;
 use crate::coupling::error_indicator::Need;
+use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
 use crate::scene::bounds_checks;
@@ -57,6 +58,19 @@ struct Options {
     tolerance: f64,
 }
 
+/// Refuses cells of second order: the error of a solution is judged by the gradients that linear cells have.
+fn refuse_second_order<const D: usize>(mesh: &Mesh<D>, span: &Span) -> Result<(), SceneError> {
+    match mesh.shapes.iter().find(|shape| shape.is_quadratic()) {
+        Some(shape) => Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`zones.auto` judges the solution of linear cells, and the mesh has {shape:?}"),
+        )
+        .label(span.clone(), "linear cells only")
+        .help("draw the zone: [zones.nonlocal]; or take linear cells: mesh.file.order = \"linear\", or another `cell` of a generated mesh")),
+        None => Ok(()),
+    }
+}
+
 /// The zone of a scene that asks for one; none if it draws its own, or needs none.
 ///
 /// # Errors
@@ -73,6 +87,7 @@ pub(crate) fn placed<const D: usize>(scene: &Draft<'_, D>) -> Result<Option<Foun
         return Ok(None);
     }
     alone(spec, &span)?;
+    refuse_second_order(mesh, &span)?;
     let Some(p) = &spec.peridynamics else {
         return Err(SceneError::new(
             SceneErrorKind::Missing,

@@ -95,9 +95,23 @@ pub struct BoxMeshSpec {
 pub struct FileMeshSpec {
     /// The file, relative to the scene.
     pub path: Text,
+    /// What becomes of cells of second order.
+    #[serde(default)]
+    pub order: FileOrderSpec,
     /// A mesh in memory that stands for the file; the source of the scene has it.
     #[serde(skip)]
     pub held: Option<Arc<MeshParts>>,
+}
+
+/// The order of the cells of a mesh from a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FileOrderSpec {
+    /// As the file has them.
+    #[default]
+    Kept,
+    /// Linear: nodes in the middle of edges are left out.
+    Linear,
 }
 
 /// A box that a generated mesh leaves out.
@@ -147,6 +161,10 @@ pub enum PlaneCellSpec {
     Quad4,
     /// Three-node triangles, two in each quadrilateral.
     Tri3,
+    /// Eight-node quadrilaterals.
+    Quad8,
+    /// Six-node triangles, two in each quadrilateral.
+    Tri6,
 }
 
 /// Cells of a solid mesh.
@@ -158,4 +176,8 @@ pub enum SolidCellSpec {
     Hex8,
     /// Four-node tetrahedra, six in each hexahedron.
     Tet4,
+    /// Twenty-node hexahedra.
+    Hex20,
+    /// Ten-node tetrahedra, six in each hexahedron.
+    Tet10,
 }

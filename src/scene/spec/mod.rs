@@ -29,8 +29,8 @@ pub use material::{
 };
 pub use material_interface::{MaterialInterfaceSpec, StiffnessSpec};
 pub use mesh::{
-    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
-    PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
+    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, FileOrderSpec, GradedSpec, LineMeshSpec,
+    MeshSpec, PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
     BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec,

@@ -81,7 +81,8 @@ class Mesh:
     def from_meshio(cls, mesh: meshio.Mesh, *, name: str = "mesh in memory") -> Mesh:
         """Takes a ``meshio.Mesh`` with its cell sets, point sets and physical groups of Gmsh.
 
-        Raises :class:`SceneError` for cells of other types than vertex, line, triangle, quad, tetra and hexahedron.
+        Raises :class:`SceneError` for cells of other types than vertex, line, triangle, quad, tetra and hexahedron, and of these with nodes in the middle of edges
+        (line3, triangle6, quad8, tetra10, hexahedron20).
         """
         starts = np.cumsum([0] + [len(block.data) for block in mesh.cells])
         sets: dict[str, list[NDArray[Any]]] = {}

@@ -16,7 +16,19 @@ if TYPE_CHECKING:
 
 #: VTK's numbers of the types of cells, by their names in meshio.
 VTK_TYPES: Mapping[str, int] = MappingProxyType(
-    {"line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "vertex": 1}
+    {
+        "line": 3,
+        "triangle": 5,
+        "quad": 9,
+        "tetra": 10,
+        "hexahedron": 12,
+        "line3": 21,
+        "triangle6": 22,
+        "quad8": 23,
+        "tetra10": 24,
+        "hexahedron20": 25,
+        "vertex": 1,
+    }
 )
 
 

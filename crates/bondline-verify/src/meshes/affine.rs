@@ -23,6 +23,7 @@ const GRADIENT: [[f64; 3]; 3] = [
 ];
 
 /// A mesh as a file, and a box in its middle that elements enclose.
+#[derive(Clone)]
 struct Family {
     name: &'static str,
     kinematics: &'static str,
@@ -286,6 +287,50 @@ fn row(family: &Family, law: (&str, &str), coupling: (&str, &str, bool), per_ele
         }
         Err(why) => Row::refused(&name, "error", why),
     }
+}
+
+/// The table of affine fields beside cells of second order, which become linear at the seam: one family for each cell, every coupling.
+pub fn of_second_order(effort: Effort, progress: &dyn Progress) -> Table {
+    let mut table = Table::new(
+        "Cells of second order, affine displacements on the whole boundary of scenes, m = 3: largest error over the largest displacement, or the reason of the refusal",
+        Columns::ByQuantity,
+    );
+    let mut cases = Vec::new();
+    for mut family in families() {
+        let name = match family.name {
+            "Delaunay triangles" => "tri6, Delaunay",
+            "jittered" => "quad8, jittered",
+            "tets of a lug" => "tet10, lug",
+            "hexes of a bent bar" => "hex20, bent bar",
+            _ => continue,
+        };
+        let raised = match family.kinematics {
+            "solid" => gmsh::raised::<3>(&family.mesh, |_| ()),
+            _ => gmsh::raised::<2>(&family.mesh, |_| ()),
+        };
+        family.name = name;
+        match raised {
+            Ok(mesh) => family.mesh = mesh,
+            Err(why) => table.push(Row::refused(name, "mesh", why)),
+        }
+        let laws = if effort == Effort::Full { 3 } else { 1 };
+        for coupling in COUPLINGS {
+            for law in &LAWS[..laws] {
+                cases.push((family.clone(), *law, coupling));
+            }
+        }
+    }
+    progress.stage("affine fields", Some(cases.len() as u64));
+    let rows: Vec<Row> = cases
+        .into_par_iter()
+        .map(|(family, law, coupling)| {
+            let row = row(&family, law, coupling, 2.0);
+            progress.advance(1);
+            row
+        })
+        .collect();
+    rows.into_iter().for_each(|row| table.push(row));
+    table
 }
 
 /// The table of affine fields.

@@ -45,7 +45,11 @@ impl Drop for Folder {
     }
 }
 
-fn load(text: &str, overrides: &[&str], folder: &Folder) -> Result<AnyScene, String> {
+/// A scene beside the files in `folder`.
+///
+/// # Errors
+/// The message of a refusal.
+pub fn load(text: &str, overrides: &[&str], folder: &Folder) -> Result<AnyScene, String> {
     let mut source = Source::new("scene.toml", text);
     for o in overrides {
         source

@@ -1,0 +1,104 @@
+//! What of a cell's volume and mass each of its nodes has.
+
+use super::cell::{MAX_NODES, Rule};
+use super::element::for_each_point;
+use crate::mesh::Mesh;
+
+/// Lumped volume of every node over the given cells \[m^D\], as [`for_each_share`] has it: they add up to the cells' volume.
+pub fn nodal_volumes<const D: usize>(
+    mesh: &Mesh<D>,
+    cells: impl Iterator<Item = usize>,
+) -> Vec<f64> {
+    let mut volumes = vec![0.0; mesh.nodes.len()];
+    for c in cells {
+        add_nodal(mesh, c, 1.0, &mut volumes);
+    }
+    volumes
+}
+
+/// Lumped mass of every node \[kg\], as [`for_each_share`] has it; `density` gives each cell's ρ [kg/m^D].
+pub fn lumped_mass<const D: usize>(mesh: &Mesh<D>, density: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut mass = vec![0.0; mesh.nodes.len()];
+    for c in 0..mesh.cell_count() {
+        add_nodal(mesh, c, density(c), &mut mass);
+    }
+    mass
+}
+
+fn add_nodal<const D: usize>(mesh: &Mesh<D>, c: usize, scale: f64, totals: &mut [f64]) {
+    for_each_share(mesh, c, |n, part, volume| {
+        totals[n as usize] += scale * part * volume
+    });
+}
+
+/// Hands the share of each node of cell `c` in its volume to `add`, perhaps in pieces, as a fraction of a volume \[m^D\]: `∫ N_a dV` of a linear cell.
+///
+/// Those integrals are zero or negative at corners of cells of second order. Their shares are in the ratio of the diagonal of the consistent mass, `∫ N_a² dV / Σ_b ∫ N_b² dV` of the volume: positive, and of the same sum.
+///
+/// Source: \[HintonRockZienkiewicz1976\].
+pub fn for_each_share<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+    mut add: impl FnMut(u32, f64, f64),
+) {
+    let nodes = mesh.cell(c);
+    if !mesh.shapes[c].is_quadratic() {
+        for_each_point(mesh, c, Rule::Mass, |p| {
+            for (&n, shape) in nodes.iter().zip(&p.shape) {
+                add(n, *shape, p.weight);
+            }
+        });
+        return;
+    }
+    let (mut volume, mut squares) = (0.0, [0.0; MAX_NODES]);
+    for_each_point(mesh, c, Rule::Mass, |p| {
+        volume += p.weight;
+        for (square, shape) in squares.iter_mut().zip(&p.shape) {
+            *square += shape * shape * p.weight;
+        }
+    });
+    let total: f64 = squares.iter().sum();
+    for (&n, square) in nodes.iter().zip(&squares) {
+        add(n, square / total, volume);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample::unit_box;
+    use super::*;
+    use crate::mesh::CellShape;
+
+    /// Shares of a corner and of a node in the middle of an edge of an affine cell.
+    fn shares<const D: usize>(shape: CellShape) -> (f64, f64) {
+        let mesh = unit_box::<D>(shape, 1, 0.0);
+        let volume = super::super::cell_volume(&mesh, 0);
+        let mut found = Vec::new();
+        for_each_share(&mesh, 0, |_, part, whole| found.push(part * whole / volume));
+        let corners = shape.linear().node_count();
+        for share in &found[..corners] {
+            assert!((share - found[0]).abs() < 1e-14, "{shape:?}");
+        }
+        for share in &found[corners..] {
+            assert!((share - found[corners]).abs() < 1e-14, "{shape:?}");
+        }
+        (found[0], found[corners])
+    }
+
+    #[test]
+    fn shares_of_cells_of_second_order_are_those_of_the_textbook() {
+        // [CookMalkusPlesha1989] table 13.3-1 in the plane; diagonals 6 : 32 of a tetrahedron's mass (V/420), 1/3 and 8/15 of a line's
+        let close = |(p, q): (f64, f64), (a, b): (f64, f64)| {
+            assert!(
+                (p - a).abs() < 1e-14 && (q - b).abs() < 1e-14,
+                "{p} {q}, {a} {b}"
+            );
+        };
+        close(shares::<1>(CellShape::Line3), (1.0 / 6.0, 2.0 / 3.0));
+        close(shares::<2>(CellShape::Tri6), (1.0 / 19.0, 16.0 / 57.0));
+        close(shares::<2>(CellShape::Quad8), (3.0 / 76.0, 16.0 / 76.0));
+        close(shares::<3>(CellShape::Tet10), (1.0 / 36.0, 4.0 / 27.0));
+        let (corner, side) = shares::<3>(CellShape::Hex20);
+        assert!(corner > 0.0 && (8.0 * corner + 12.0 * side - 1.0).abs() < 1e-14);
+    }
+}
