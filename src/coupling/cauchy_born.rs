@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     coupling::{Model, ModelError},
     material::LocalLaw,
-    peridynamics::{BondWeights, CauchyBorn, Law, bond_force::Kinematics},
+    peridynamics::{Accelerator, BondWeights, CauchyBorn, Law, bond_force::Kinematics},
 };
 
 /// Largest difference, over the size of the tensor, between what a family carries and the elements' own stiffness that is taken for round-off.
@@ -43,6 +43,7 @@ impl<const D: usize> Model<D> {
             None => vec![(self.peridynamic_material(), p.law.as_ref())],
         };
         let mut laws: Vec<Option<Arc<dyn LocalLaw<D>>>> = vec![None; self.tensors.len()];
+        let mut dilatation = None;
         for (material, law) in of_points {
             let (bonds, carried) = factors.bonds(law.linearised(), *horizon)?;
             // the rows of the elements have this one, so that the law is what they lack of it
@@ -65,9 +66,15 @@ impl<const D: usize> Model<D> {
                     "use a material without memory, or leave peridynamics.elements out",
                 );
             };
-            laws[usize::from(material)] = Some(Arc::new(law));
+            let law = Arc::new(law);
+            let is_solid = matches!(p.accelerator(), Some(Accelerator::Solid { .. }));
+            if is_solid && p.law.several().is_none() && kinematics == Kinematics::Exact {
+                dilatation = Some(Arc::clone(&law));
+            }
+            laws[usize::from(material)] = Some(law);
         }
         self.cauchy_born = laws;
+        self.dilatation = dilatation;
         Ok(())
     }
 

@@ -21,7 +21,7 @@ use crate::{
     fem,
     material::LocalLaw,
     mesh::{CellShape, Mesh},
-    peridynamics::{BondWeights, Cloud, Ends, Factors, Families, PdBody},
+    peridynamics::{BondWeights, CauchyBorn, Cloud, Ends, Factors, Families, PdBody},
     progress::Progress,
     shape::Barriers,
     system::Symmetry,
@@ -91,6 +91,8 @@ pub struct Model<const D: usize> {
     pub(super) factors: Vec<(LatticeFactors<D>, f64)>,
     /// The laws of elements that follow the bonds, by the number of a material; empty where elements are linear.
     pub(super) cauchy_born: Vec<Option<Arc<dyn LocalLaw<D>>>>,
+    /// The dilatation of elements that follow the bonds of an LPS.
+    pub(super) dilatation: Option<Arc<CauchyBorn<D>>>,
     /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
     pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
 }
@@ -165,6 +167,7 @@ impl<const D: usize> Model<D> {
             row_scale: None,
             factors: Vec::new(),
             cauchy_born: Vec::new(),
+            dilatation: None,
             operator_cache: OnceLock::new(),
         };
         let has_points = model.roles.contains(&CellRole::Points);

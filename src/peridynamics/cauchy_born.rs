@@ -137,6 +137,26 @@ impl<const D: usize> CauchyBorn<D> {
         (stress, 0.5 * (stored + modulus * theta * theta))
     }
 
+    /// The dilatation `θ = D/m Σ ω |ξ| e V` of an LPS with exact bonds, [SAND2015-7998] eq. (5.17), and `∂θ/∂F`; zero of other laws.
+    ///
+    /// At rest it is the trace of the gradient, and a rotation changes nothing of it.
+    pub fn dilatation(&self, gradient: &Tensor<D>) -> (f64, Tensor<D>) {
+        let (Some((bonds, _)), Some(state)) = (&self.fast, &self.half.state) else {
+            return (0.0, Tensor::zeros());
+        };
+        let strain = gradient + gradient.transpose() + gradient.transpose() * gradient;
+        let (mut theta, mut slope) = (0.0, Tensor::zeros());
+        for bond in bonds {
+            let t = strain.dot(&bond.dyad);
+            let psi = psi(t);
+            theta += bond.omega * (t * (1.0 - (1.0 + t) * psi));
+            slope += bond.dyad * (bond.omega * (1.0 - t * psi));
+        }
+        let over_m = D as f64 / state.shape.trace();
+        let slope = (Tensor::identity() + gradient) * slope;
+        (theta * over_m, slope * over_m)
+    }
+
     /// The stress `P` and the energy by the force state of the law.
     fn by_states(&self, gradient: &Tensor<D>) -> (Tensor<D>, EnergyDensity) {
         let half = &self.half;

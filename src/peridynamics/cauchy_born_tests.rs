@@ -202,6 +202,41 @@ fn an_lps_has_the_stress_of_the_printed_equations() {
 }
 
 #[test]
+fn the_dilatation_of_an_lps_is_that_of_the_printed_equation_and_has_its_slope() {
+    use crate::peridynamics::{Influence, LinearPeridynamicSolid};
+    fn check<const D: usize>() {
+        let law = LinearPeridynamicSolid::<D>::new(Influence::Gaussian, 1.7, 0.9);
+        let law: Arc<dyn Law<D>> = Arc::new(law);
+        let (bonds, tensor) = lattice(law.as_ref());
+        let own = CauchyBorn::new(&law, 0, &bonds, tensor, Kinematics::Exact).unwrap();
+        let g = large::<D>();
+        let f = Tensor::identity() + g;
+        let (mut m, mut sum) = (0.0, 0.0);
+        for (xi, volume) in bonds.bonds.iter().zip(&bonds.volumes) {
+            let omega = Influence::Gaussian.value(xi.norm(), 3.0 * H);
+            m += omega * xi.norm_squared() * volume;
+            sum += omega * xi.norm() * ((f * xi).norm() - xi.norm()) * volume;
+        }
+        let (theta, slope) = own.dilatation(&g);
+        assert!((theta - D as f64 / m * sum).abs() < 1e-13 * theta.abs());
+        for (k, l) in (0..D).flat_map(|k| (0..D).map(move |l| (k, l))) {
+            let mut e = Tensor::<D>::zeros();
+            e[(k, l)] = 1e-5;
+            let found = (own.dilatation(&(g + e)).0 - own.dilatation(&(g - e)).0) / 2e-5;
+            assert!((found - slope[(k, l)]).abs() < 1e-9, "{D}D {k}{l}");
+        }
+        let turned = own.dilatation(&(rotation::<D>() - Tensor::identity()));
+        assert!(turned.0.abs() < 1e-15, "{D}D: {:e}", turned.0);
+        // at rest the trace
+        let small = g * 1e-9;
+        assert!((own.dilatation(&small).0 - small.trace()).abs() < 1e-16);
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+#[test]
 fn laws_that_remember_have_none() {
     let every = laws::every::<2>().into_iter();
     let memories = every.filter(|law| {

@@ -17,7 +17,6 @@ use super::spec::{
 use super::zones::{self, Placed};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
-use crate::peridynamics::Accelerator;
 use crate::scene::points::Points;
 use crate::tensor::Vector;
 
@@ -137,8 +136,8 @@ fn obstacle<const D: usize>(
 ) -> Result<Option<Obstacle>, SceneError> {
     let certain = |reason: &str| Ok(Some(Obstacle::Certain(reason.to_owned())));
     let follows_bonds = |e: &toml::Spanned<ElementsSpec>| *e.get_ref() == ElementsSpec::CauchyBorn;
-    let is_apart = |m: &Material<D>| m.law.accelerator() != Some(Accelerator::Pairwise);
-    if p.elements.as_ref().is_some_and(follows_bonds) && found.iter().any(is_apart) {
+    let is_slow = |m: &Material<D>| m.law.accelerator().is_none();
+    if p.elements.as_ref().is_some_and(follows_bonds) && found.iter().any(is_slow) {
         return certain("elements that follow the bonds of such a law at any stretch");
     }
     let mut negative = None;

@@ -6,7 +6,7 @@ use super::spec::{
     BondsSpec, CouplingSpec, CutBondsSpec, ElementsSpec, SceneSpec, WeightsSpec, ZonesNeeded,
 };
 use crate::coupling::Zone;
-use crate::peridynamics::{Accelerator, Law};
+use crate::peridynamics::Law;
 
 /// What is typed of elements; those that follow the bonds need a coupling that carries their stress, and one lattice of bonds without memory.
 ///
@@ -131,11 +131,7 @@ fn truncated_bonds<const D: usize>(
         return Err("cut-bonds = \"linear\" keeps the bonds at the seam from rotating".to_owned());
     }
     match law.accelerator() {
-        Some(Accelerator::Pairwise) => Ok(()),
-        Some(Accelerator::Solid { .. }) => Err(
-            "dilatations of elements at the seam, to which bonds of an lps belong that end there, are linear"
-                .to_owned(),
-        ),
+        Some(_) => Ok(()),
         None => Err(format!(
             "bonds that end on faces follow the law {} to first order only",
             law.name()

@@ -1,17 +1,18 @@
 //! Dilatations at a seam whose bonds turn, stretch and break.
 //!
 //! A part of the length s hands its elongation over, which to first order is `ξ·D` and in full `q = s |ξ|² ε`, ε its stretch: under any homogeneous deformation s times that of its whole bond. A dilatation is then
-//! `F = Σ b·u + Σ c q` with the energy `½ κ F²`; its first sum is an element's own `∫ div u`, which stays linear.
+//! `F = Σ b·u + Σ c q` with the energy `½ κ F²`; its first sum is an element's own `∫ div u`, which stays linear but for elements that follow the bonds (`element_dilatation.rs`).
 
-use std::collections::BTreeMap;
+use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 
 use rayon::prelude::*;
 
 use super::{
     bond_segments::{BySite, Segments},
     dilatation::{Carrier, Functional, LpsConstants, carried, divergence, stiffness_of_point},
+    element_dilatation::ElementDilatations,
 };
-use crate::tensor::Vector;
+use crate::{peridynamics::bond_force::Kinematics, tensor::Vector};
 
 /// The dilatations of the points at the seam and of the elements behind it.
 pub(super) struct States<const D: usize> {
@@ -28,6 +29,14 @@ pub(super) struct States<const D: usize> {
     parts_of: Vec<usize>,
     /// Dilatations of which each site is an own part.
     of_site: BySite,
+    /// Elements that follow the bonds, if they do, and κ of what their own energy has already and the rows take back.
+    elements: Option<(ElementDilatations<D>, Vec<f64>)>,
+}
+
+/// Elements' own parts of all dilatations under a displacement: their values, and their derivatives by site.
+pub(super) struct OwnParts<'a, const D: usize> {
+    values: Vec<f64>,
+    slopes: Cow<'a, [(u32, Vector<D>)]>,
 }
 
 impl<const D: usize> States<D> {
@@ -68,16 +77,26 @@ impl<const D: usize> States<D> {
             of_part: Vec::new(),
             parts_of: vec![0; parts + 1],
             of_site: BySite::default(),
+            elements: (segments.model.dilatation.as_ref())
+                .map(|law| (ElementDilatations::new(Arc::clone(law)), Vec::new())),
         };
         for (carrier, of) in shares {
+            let first = states.own.len();
+            let (mut cell_of, mut taken_back) = (None, 0.0);
             match carrier {
                 Carrier::Point(i) => states.stiffness.push(stiffness_of_point(segments, i)),
                 Carrier::Cell(cell) => {
                     let (own, size) = divergence(segments, cell);
+                    (cell_of, taken_back) = (Some(cell), common.bulk / size);
                     let size = size + volumes.get(&cell).copied().unwrap_or(0.0);
                     states.stiffness.push(common.bulk / size);
                     states.own.extend(own);
                 }
+            }
+            if let Some((elements, all)) = &mut states.elements {
+                let sites: Vec<u32> = states.own[first..].iter().map(|e| e.0).collect();
+                elements.push(segments, cell_of, &sites);
+                all.push(taken_back);
             }
             states.own_of.push(states.own.len());
             states.shares.extend(of);
@@ -124,17 +143,45 @@ impl<const D: usize> States<D> {
         self.stiffness.len()
     }
 
-    /// `κ F` of all dilatations, from the elongations of the parts.
-    pub fn pressures(&self, u: &[f64], elongation: &[f64]) -> Vec<f64> {
+    /// Elements' own parts under a displacement: `Σ b·u`, or with exact bonds what elements have that follow them.
+    pub fn own_parts(&self, u: &[f64], kinematics: Kinematics) -> OwnParts<'_, D> {
         let at = |site: u32| Vector::<D>::from_column_slice(&u[site as usize * D..][..D]);
+        let linear = |f: usize| self.own_of(f).iter().map(|(s, b)| b.dot(&at(*s))).sum();
+        let Some((elements, _)) =
+            (self.elements.as_ref()).filter(|_| kinematics == Kinematics::Exact)
+        else {
+            return OwnParts {
+                values: (0..self.count()).map(linear).collect(),
+                slopes: Cow::Borrowed(&self.own),
+            };
+        };
+        let mut slopes = self.own.clone();
+        let values = (0..self.count())
+            .map(|f| {
+                let own = &mut slopes[self.own_of[f]..self.own_of[f + 1]];
+                let mut found = vec![Vector::zeros(); own.len()];
+                let value = elements.of(f, |k| at(own[k].0), &mut found);
+                own.iter_mut()
+                    .zip(found)
+                    .for_each(|(own, found)| own.1 = found);
+                value
+            })
+            .collect();
+        OwnParts {
+            values,
+            slopes: Cow::Owned(slopes),
+        }
+    }
+
+    /// `κ F` of all dilatations, from the elements' own parts and the elongations of the others.
+    pub fn pressures(&self, own: &OwnParts<'_, D>, elongation: &[f64]) -> Vec<f64> {
         (0..self.count())
             .into_par_iter()
             .with_min_len(64)
             .map(|f| {
-                let own: f64 = self.own_of(f).iter().map(|(s, b)| b.dot(&at(*s))).sum();
                 let handed = self.shares_of(f).iter();
                 let handed: f64 = handed.map(|&(p, c)| c * elongation[p as usize]).sum();
-                self.stiffness[f] * (own + handed)
+                self.stiffness[f] * (own.values[f] + handed)
             })
             .collect()
     }
@@ -145,23 +192,60 @@ impl<const D: usize> States<D> {
         of.map(|&(f, c)| c * pressures[f as usize]).sum()
     }
 
-    /// Adds the forces of the pressures on the nodes of elements.
-    pub fn add_own_force(&self, pressures: &[f64], force: &mut [f64]) {
-        for (f, pressure) in pressures.iter().enumerate() {
-            for (site, b) in self.own_of(f) {
-                for (to, b) in force[*site as usize * D..].iter_mut().zip(b.iter()) {
-                    *to += pressure * b;
-                }
+    /// Adds the forces of the pressures on the nodes of elements, and what the rows that take elements' own dilatations back lack of those that follow the bonds.
+    pub fn add_own_force(
+        &self,
+        own: &OwnParts<'_, D>,
+        pressures: &[f64],
+        u: &[f64],
+        force: &mut [f64],
+    ) {
+        let mut add = |site: u32, pull: Vector<D>| {
+            for (to, x) in force[site as usize * D..].iter_mut().zip(pull.iter()) {
+                *to += x;
             }
+        };
+        for (f, pressure) in pressures.iter().enumerate() {
+            for (site, b) in &own.slopes[self.own_of[f]..self.own_of[f + 1]] {
+                add(*site, b * *pressure);
+            }
+        }
+        self.for_each_taken_back(own, u, |f, stiffness, linear| {
+            let range = self.own_of[f]..self.own_of[f + 1];
+            for ((site, slope), (_, b)) in own.slopes[range.clone()].iter().zip(&self.own[range]) {
+                add(*site, (b * linear - slope * own.values[f]) * stiffness);
+            }
+        });
+    }
+
+    /// Visits the dilatations of elements that follow the bonds: number, κ of what is taken back, `Σ b·u`.
+    fn for_each_taken_back(
+        &self,
+        own: &OwnParts<'_, D>,
+        u: &[f64],
+        mut visit: impl FnMut(usize, f64, f64),
+    ) {
+        let (Some((_, taken_back)), Cow::Owned(_)) = (&self.elements, &own.slopes) else {
+            return;
+        };
+        let at = |site: u32| Vector::<D>::from_column_slice(&u[site as usize * D..][..D]);
+        for (f, &stiffness) in taken_back.iter().enumerate().filter(|(_, k)| **k != 0.0) {
+            let linear = self.own_of(f).iter().map(|(s, b)| b.dot(&at(*s))).sum();
+            visit(f, stiffness, linear);
         }
     }
 
-    /// `½ κ F²` of all.
-    pub fn energy(&self, pressures: &[f64]) -> f64 {
+    /// `½ κ F²` of all, and what the rows that take back lack.
+    pub fn energy(&self, own: &OwnParts<'_, D>, pressures: &[f64], u: &[f64]) -> f64 {
         let all = pressures.iter().zip(&self.stiffness);
-        all.filter(|(_, k)| **k != 0.0)
+        let mut sum: f64 = all
+            .filter(|(_, k)| **k != 0.0)
             .map(|(p, k)| 0.5 * p * p / k)
-            .sum()
+            .sum();
+        self.for_each_taken_back(own, u, |f, stiffness, linear| {
+            sum -= 0.5 * stiffness * (own.values[f].powi(2) - linear * linear);
+        });
+        sum
     }
 
     /// κ, and b of all sites at rest: `gradient` adds those of a part times a factor.

@@ -7,6 +7,7 @@
 //! | `nonlinear_bonds.rs`, `bond_kinematics.rs` | pieces that turn, stretch and break |
 //! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
 //! | `dilatation_state.rs` | those dilatations where pieces turn, stretch and break |
+//! | `element_dilatation.rs` | those of elements that follow the bonds |
 //! | `corner_correction.rs` | strings along the edges of a zone in 3D |
 //! | `factors.rs` | factors of the normal equations of the fit, and what they cost |
 //! | `feet.rs` | other traces at the ends of pieces, where factors alone do not do |
@@ -31,6 +32,7 @@ pub(crate) mod conditions;
 mod corner_correction;
 mod dilatation;
 mod dilatation_state;
+mod element_dilatation;
 mod factors;
 mod feet;
 mod nonlinear_bonds;

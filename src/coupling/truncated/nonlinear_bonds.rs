@@ -10,7 +10,11 @@ mod construction;
 
 use rayon::prelude::*;
 
-use super::{bond_kinematics::Part, dilatation::Functional, dilatation_state::States};
+use super::{
+    bond_kinematics::Part,
+    dilatation::Functional,
+    dilatation_state::{OwnParts, States},
+};
 use crate::{
     assembly::{Row, Transfer},
     peridynamics::{
@@ -153,9 +157,17 @@ impl<const D: usize> NonlinearSeam<D> {
     }
 
     /// Makes pulls of directions; returns what the dilatations press with.
-    fn pull(&self, u: &[f64], elongation: &[f64], pulls: &mut [[f64; D]]) -> Vec<f64> {
+    fn pull(
+        &self,
+        own: Option<&OwnParts<'_, D>>,
+        elongation: &[f64],
+        pulls: &mut [[f64; D]],
+    ) -> Vec<f64> {
         let states = self.states.as_ref();
-        let pressures = states.map_or(Vec::new(), |s| s.pressures(u, elongation));
+        let pressures = match (states, own) {
+            (Some(states), Some(own)) => states.pressures(own, elongation),
+            _ => Vec::new(),
+        };
         pulls
             .par_chunks_mut(CHUNK)
             .enumerate()
@@ -170,17 +182,25 @@ impl<const D: usize> NonlinearSeam<D> {
         pressures
     }
 
+    /// Adds the forces of pulls, and of the dilatations, to which elements have given their `own` parts.
     fn add_forces(
         &self,
         pulls: &[[f64; D]],
-        pressures: &[f64],
+        (own, pressures): (Option<&OwnParts<'_, D>>, &[f64]),
+        u: &[f64],
         sums: &mut Vec<[f64; D]>,
         force: &mut [f64],
     ) {
         self.scatter(pulls, sums, force);
-        if let Some(states) = &self.states {
-            states.add_own_force(pressures, force);
+        if let (Some(states), Some(own)) = (&self.states, own) {
+            states.add_own_force(own, pressures, u, force);
         }
+    }
+
+    /// Elements' own parts of the dilatations, if there are any.
+    fn own_parts(&self, u: &[f64], kinematics: Kinematics) -> Option<OwnParts<'_, D>> {
+        let states = self.states.as_ref();
+        states.map(|states| states.own_parts(u, kinematics))
     }
 
     /// Adds the internal force; returns how many bonds broke, each counted once for each direction.
@@ -204,8 +224,10 @@ impl<const D: usize> NonlinearSeam<D> {
             FailureUpdate::Update => self.break_bonds(&over, &mut pulls, &mut elongation),
             FailureUpdate::Frozen => 0,
         };
-        let pressures = self.pull(u, &elongation, &mut pulls);
-        self.add_forces(&pulls, &pressures, &mut sums, force);
+        let own = self.own_parts(u, self.kinematics);
+        let pressures = self.pull(own.as_ref(), &elongation, &mut pulls);
+        self.add_forces(&pulls, (own.as_ref(), &pressures), u, &mut sums, force);
+        drop(own);
         (self.pulls, self.elongation, self.over, self.sums) = (pulls, elongation, over, sums);
         broken
     }
@@ -259,8 +281,10 @@ impl<const D: usize> NonlinearSeam<D> {
         let parts = self.parts.len();
         let (mut pulls, mut elongation) = (vec![[0.0; D]; parts], vec![0.0; parts]);
         self.stretch::<false>(x, &mut pulls, &mut elongation, &mut vec![false; parts]);
-        let pressures = self.pull(x, &elongation, &mut pulls);
-        self.add_forces(&pulls, &pressures, &mut Vec::new(), y);
+        let own = self.own_parts(x, Kinematics::Linear);
+        let pressures = self.pull(own.as_ref(), &elongation, &mut pulls);
+        let parts = (own.as_ref(), &pressures[..]);
+        self.add_forces(&pulls, parts, x, &mut Vec::new(), y);
     }
 
     /// κ of a dilatation, and its derivative by the displacement of each site, at rest.
@@ -367,8 +391,11 @@ impl<const D: usize> NonlinearSeam<D> {
             .collect();
         let parts = self.parts.iter().zip(&elongation);
         let parts: f64 = parts.map(|(part, q)| 0.5 * part.stiffness * q * q).sum();
-        let states = self.states.as_ref();
-        parts + states.map_or(0.0, |s| s.energy(&s.pressures(u, &elongation)))
+        let Some(states) = &self.states else {
+            return parts;
+        };
+        let own = states.own_parts(u, self.kinematics);
+        parts + states.energy(&own, &states.pressures(&own, &elongation), u)
     }
 
     /// Forgets what broke in the last pass.
