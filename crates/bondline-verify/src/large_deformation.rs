@@ -111,7 +111,7 @@ fn text(body: &Body, law: &str, coupling: &str) -> String {
         _ => law.to_owned(),
     };
     format!(
-        "kinematics = \"{}\"\ncoupling = \"{coupling}\"\n[mesh]\n{}\n[materials.m.{law}\nyoungs-modulus = {YOUNG}\n[peridynamics]\nhorizon = {}\nbonds = \"exact\"\nelements = \"cauchy-born\"\npoints.lattice = {{ spacing = {} }}\n[zones]\nnonlocal.box = {{ min = {}, max = {} }}\n{around}",
+        "kinematics = \"{}\"\ncoupling = \"{coupling}\"\n[mesh]\n{}\n[materials.m.{law}\nyoungs-modulus = {YOUNG}\ndensity = 1\n[solve.explicit]\nduration = 1\n[peridynamics]\nhorizon = {}\nbonds = \"exact\"\nelements = \"cauchy-born\"\npoints.lattice = {{ spacing = {} }}\n[zones]\nnonlocal.box = {{ min = {}, max = {} }}\n{around}",
         body.kinematics,
         body.mesh,
         3.0 * body.spacing,
@@ -280,12 +280,17 @@ fn rows(body: &Body, law: (&str, &str), coupling: &str) -> Vec<Row> {
         "solid" => measured::<3>(&typed, body.files, linear),
         _ => measured::<2>(&typed, body.files, linear),
     };
+    let is_refused = !matches!(coupling, "splice" | "truncated")
+        || (coupling == "truncated" && !linear)
+        || (body.kinematics == "bar" && law.0 == "PALS");
     let found = match found {
         Ok(found) => found,
-        Err(why) => return vec![Row::refused(case, "residual", why)],
+        Err(why) if is_refused => return vec![Row::refused(case, "residual", why)],
+        Err(why) => return vec![Row::at_most(case, "residual", f64::NAN, LIMIT).because(why)],
     };
-    // where faces do not follow the lattice, bonds that end on them balance to first order
-    let residual = match coupling == "truncated" && body.name == "Delaunay triangles" {
+    // where faces do not follow the lattice, and at edges in space, bonds that end on faces balance to first order
+    let is_exact = coupling == "splice" || matches!(body.kinematics, "bar" | "plane-strain");
+    let residual = match !is_exact {
         true => Row::info(&case, "residual", found.residual),
         false => Row::at_most(&case, "residual", found.residual, LIMIT),
     };
