@@ -93,11 +93,7 @@ impl<const D: usize> States<D> {
                     states.own.extend(own);
                 }
             }
-            if let Some((elements, all)) = &mut states.elements {
-                let sites: Vec<u32> = states.own[first..].iter().map(|e| e.0).collect();
-                elements.push(segments, cell_of, &sites);
-                all.push(taken_back);
-            }
+            states.push_element(segments, first, cell_of, taken_back);
             states.own_of.push(states.own.len());
             states.shares.extend(of);
             states.shares_of.push(states.shares.len());
@@ -123,6 +119,21 @@ impl<const D: usize> States<D> {
                 .for_each(|e| visit(e.0));
         });
         states
+    }
+
+    /// Lets the dilatation whose own part begins at `first` follow the bonds, where elements do.
+    fn push_element(
+        &mut self,
+        segments: &Segments<'_, D>,
+        first: usize,
+        cell: Option<u32>,
+        taken_back: f64,
+    ) {
+        if let Some((elements, all)) = &mut self.elements {
+            let sites: Vec<u32> = self.own[first..].iter().map(|e| e.0).collect();
+            elements.push(segments, cell, &sites);
+            all.push(taken_back);
+        }
     }
 
     fn own_of(&self, f: usize) -> &[(u32, Vector<D>)] {
