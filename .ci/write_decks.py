@@ -45,6 +45,12 @@ def write_mesh(path, folder):
     meshio.Mesh(mesh.points, cells, cell_sets=sets).write(folder / f"{path.stem}_meshio.inp")
 
 
+def times(text, name):
+    """How many cards name a set of elements to put some there."""
+    cards = re.findall(rb"^\*(?:ELEMENT|ELSET)\b[^\n]*ELSET\s*=\s*([^,\s]+)", text, re.IGNORECASE | re.MULTILINE)
+    return sum(card.decode(errors="replace").upper() == name.upper() for card in cards)
+
+
 def write_deck(path, folder):
     text = gzip.open(path).read() if path.suffix == ".gz" else path.read_bytes()
     name = path.name.removesuffix(".gz").removesuffix(".inp")
@@ -61,9 +67,12 @@ def write_deck(path, folder):
         model = {
             "points": mesh.points.tolist(),
             "cells": [[block.type, block.data.tolist()] for block in mesh.cells],
+            # a set that several cards name holds what all of them put there; meshio keeps what the last one did,
+            # and of a set of sets more lists than it has blocks
             "cell_sets": {
                 k: [int(i) + start for start, members in zip(numbers, v) for i in members]
                 for k, v in mesh.cell_sets.items()
+                if times(text, k) < 2 and len(v) == len(mesh.cells)
             },
             "point_sets": {k: [int(i) for i in v] for k, v in mesh.point_sets.items()},
         }
