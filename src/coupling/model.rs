@@ -138,8 +138,8 @@ impl<const D: usize> Model<D> {
         });
         let roles = coupling.roles(&mesh, &zones, largest);
         let mesh = seam_order::linear_at_seam(mesh, &roles)?;
-        let node_cells = mesh.node_cells();
         let mut model = Self {
+            node_cells: mesh.node_cells(),
             ties: Ties::new(&mesh),
             node_transfer: Transfer::new(),
             mesh,
@@ -154,7 +154,6 @@ impl<const D: usize> Model<D> {
             surroundings: None,
             point_zone: Vec::new(),
             points_on_border: 0,
-            node_cells,
             interface: coupling.interface(),
             passing: None,
             patches: FxHashMap::default(),

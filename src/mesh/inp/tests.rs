@@ -159,6 +159,21 @@ fn decks_of_other_programs() {
     assert!(counts[0] > 0 && counts[1] >= 10, "too few: {counts:?}");
 }
 
+/// Names of meshio for the shapes of elements, with their dimension.
+const KINDS: [(&str, usize); 11] = [
+    ("vertex", 0),
+    ("line", 1),
+    ("triangle", 2),
+    ("quad", 2),
+    ("tetra", 3),
+    ("hexahedron", 3),
+    ("line3", 1),
+    ("triangle6", 2),
+    ("quad8", 2),
+    ("tetra10", 3),
+    ("hexahedron20", 3),
+];
+
 /// Nodes in order, cells in order, sets by their members.
 fn as_meshio<const D: usize>(deck: &Path, model: &Value) {
     let mesh = match read::<D>(deck) {
@@ -171,22 +186,9 @@ fn as_meshio<const D: usize>(deck: &Path, model: &Value) {
         let all = v.as_array().unwrap().iter();
         all.map(|n| n.as_u64().unwrap() as u32).collect()
     };
-    let kinds = [
-        ("vertex", 0),
-        ("line", 1),
-        ("triangle", 2),
-        ("quad", 2),
-        ("tetra", 3),
-        ("hexahedron", 3),
-        ("line3", 1),
-        ("triangle6", 2),
-        ("quad8", 2),
-        ("tetra10", 3),
-        ("hexahedron20", 3),
-    ];
     let mut cells: Vec<(usize, Vec<u32>)> = Vec::new();
     for block in model["cells"].as_array().unwrap() {
-        let kind = kinds.iter().find(|(name, _)| block[0] == *name).unwrap();
+        let kind = KINDS.iter().find(|(name, _)| block[0] == *name).unwrap();
         for cell in block[1].as_array().unwrap() {
             cells.push((kind.1, numbers(cell)));
         }
