@@ -1,7 +1,7 @@
 //! What the generic pass tells of the force states of single points.
 
 use super::{
-    ForceStates,
+    BondPass, ForceStates,
     bond_failure::BondFailure,
     generic::{Generic, Scratch, at},
 };
