@@ -1,4 +1,4 @@
-//! Bond passes against the machine and against LAMMPS PERI: `cargo bench --bench bonds -- [roofline|passes|threads|lammps|memory|scaling|correspondence …]` (all without a name).
+//! Bond passes against the machine and against LAMMPS PERI: `cargo bench --bench bonds -- [roofline|passes|threads|lammps|memory|scaling …]` (all without a name).
 //!
 //! `scaling` also draws `docs/figures/bond_scaling.svg`.
 //!
@@ -18,9 +18,6 @@ use bondline::tensor::Vector;
 use bondline_study::line_plot::{LinePlot, Scale, Series, Stroke};
 use std::hint::black_box;
 use std::time::Instant;
-
-#[path = "bonds/plastic.rs"]
-mod plastic;
 
 const H: f64 = 5e-4;
 
@@ -604,14 +601,13 @@ fn main() {
         .skip(1)
         .filter(|a| !a.starts_with('-'))
         .collect();
-    let sections: [(&str, fn()); 7] = [
+    let sections: [(&str, fn()); 6] = [
         ("roofline", roofline),
         ("passes", passes),
         ("threads", threads),
         ("lammps", against_lammps),
         ("memory", memory),
         ("scaling", scaling),
-        ("correspondence", plastic::correspondence),
     ];
     for (name, section) in sections {
         if names.is_empty() || names.iter().any(|n| n == name) {

@@ -38,7 +38,6 @@ pub mod bar;
 pub mod bobaru;
 pub mod continuum_damage;
 pub mod convergence;
-pub mod ductile;
 pub mod emmrich_weckner;
 pub mod enclosed;
 pub mod estimates;
@@ -234,11 +233,6 @@ pub const LONG_SUITES: &[Suite] = &[
         name: "convergence-3d",
         about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about 20 minutes on two cores, only if named",
         run: convergence::run_solid,
-    },
-    Suite {
-        name: "ductile",
-        about: "SAND2015-7998 section 6.3.1: the notched bar, torn, at three spacings: minutes, only if named",
-        run: ductile::run,
     },
     Suite {
         name: "seams",

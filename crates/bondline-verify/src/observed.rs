@@ -63,25 +63,11 @@ impl Seen {
 /// # Errors
 /// What the scene or its run says.
 pub(crate) fn run_scene(text: &str) -> Result<Seen, String> {
-    run_scene_in(text, &[], Path::new(""))
-}
-
-/// The same with keys that are set otherwise, `key=value`, beside the files of a folder.
-///
-/// # Errors
-/// What the scene or its run says.
-pub(crate) fn run_scene_in(
-    text: &str,
-    overrides: &[String],
-    directory: &Path,
-) -> Result<Seen, String> {
     let rows = Rows::default();
     let start = Instant::now();
-    let mut source = Source::new("scene.toml", text.to_owned());
-    for set in overrides {
-        source.push_override(set).map_err(|e| e.to_string())?;
-    }
-    let scene = AnyScene::from_source(&source, directory, "scene").map_err(|e| e.to_string())?;
+    let source = Source::new("scene.toml", text.to_owned());
+    let scene =
+        AnyScene::from_source(&source, Path::new(""), "scene").map_err(|e| e.to_string())?;
     let options = RunOptions {
         observer: Some(&rows),
         ..RunOptions::default()
