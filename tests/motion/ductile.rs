@@ -100,31 +100,6 @@ fn a_bar_that_tears_goes_on_from_its_checkpoint() {
     crate::resumes_with_the_same_bytes(&typed);
 }
 
-#[test]
-fn a_drag_takes_one_time_step_and_goes_on_from_its_checkpoint() {
-    let folder = tempfile::tempdir().unwrap();
-    let with = |control: &str| law(5.0, 5.0, &format!("zero-energy-control = \"{control}\""));
-    let refused = |typed: &str, part: &str| refused(folder.path(), typed, part);
-    refused(
-        &scene("nonlocal", &with("drag"), STEPS),
-        "this scene is at rest in every step",
-    );
-    refused(
-        &scene("nonlocal", &with("drug"), STEPS),
-        "\"length\", \"drag\"",
-    );
-    let dragged = "tearing-parameter = 0.12\nzero-energy-control = \"drag\"\nstabilisation = 0.2";
-    let typed = torn(dragged);
-    refused(
-        &typed.replace("outputs = 6", "outputs = 6\nsub-steps = 2"),
-        "sub-steps have several",
-    );
-    let whole = crate::resumes_with_the_same_bytes(&typed);
-    let path = whole.path().join("out/bar_history.csv");
-    assert!(*column(&path, "broken_bonds").last().unwrap() > 0.0);
-    accounts_for_its_energy(&path, 0.02);
-}
-
 /// A plate of Neo-Hooke that is pulled in two by its ends.
 const PLATE: &str = r#"
 kinematics = "plane-strain"
