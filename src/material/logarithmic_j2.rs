@@ -42,7 +42,7 @@ fn half_logarithm(x: &Tensor<3>) -> Tensor<3> {
 /// The same by `½ ln(I + x) = artanh z = z (I + z²/3 + z⁴/5 + …)`, `z = x (2 I + x)⁻¹`, to round-off up to [`SERIES`]: elastic strains of metals are far below, and principal directions cost ten times as much.
 fn half_logarithm_series(x: &Tensor<3>) -> Option<Tensor<3>> {
     let size = x.norm();
-    if !(size <= SERIES) {
+    if size.is_nan() || size > SERIES {
         return None;
     }
     let (halved, _) = inverse(&(Tensor::identity() * 2.0 + x))?;
