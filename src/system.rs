@@ -156,6 +156,11 @@ pub trait SemiDiscrete: Send + Sync {
         0.0
     }
 
+    /// Upper bound of the eigenvalues of `M⁻¹ C` of forces `C v` against the velocities of the interval \[1/s\].
+    fn drag_rate_bound(&self) -> f64 {
+        0.0
+    }
+
     /// Whether the tangent of each site, its row and its column, never changes; none does if the system does not know.
     fn tangent_is_constant(&self) -> Vec<bool> {
         vec![false; self.mass().len()]

@@ -380,6 +380,16 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
             .fold(0.0, f64::max)
     }
 
+    fn drag_rate_bound(&self) -> f64 {
+        let Some(body) = &self.body else { return 0.0 };
+        // a point that is no site has no row
+        let mass = |point: usize| match body.site_of_point[point] {
+            NONE => f64::INFINITY,
+            site => self.mass[site as usize],
+        };
+        body.pass.drag_rate(&mass)
+    }
+
     fn tangent_is_constant(&self) -> Vec<bool> {
         let breaks = self.breaks();
         let at_seam = |site: usize| self.seam.as_ref().is_some_and(|s| s.touches(site));

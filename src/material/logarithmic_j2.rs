@@ -1,7 +1,7 @@
 //! Von Mises plasticity for strains and rotations of any size, in logarithmic strains.
 
 use super::{Hardening, J2, LocalLaw, LocalResponse};
-use crate::tensor::{Tensor, Tensor4, Vector, inverse};
+use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 
 /// J2 plasticity in logarithmic strains: `F = F_e F_p`, `ε_e = ½ ln b_e`, `b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ`, and [`J2`] between the elastic strain `ε_e` and the Kirchhoff stress `τ = C : ε_e`.
 ///
@@ -27,6 +27,60 @@ const COMPONENTS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2),
 /// `Σ f_a n_a ⊗ n_a` of the principal directions `n_a`, the columns of `directions`.
 fn spectral(directions: &Tensor<3>, values: &Vector<3>) -> Tensor<3> {
     directions * Tensor::from_diagonal(values) * directions.transpose()
+}
+
+/// Largest size of `b − I` whose logarithm is a series; beyond it the principal directions give it.
+const SERIES: f64 = 0.25;
+
+/// `½ ln(I + x)` of a symmetric x, from its principal directions.
+fn half_logarithm(x: &Tensor<3>) -> Tensor<3> {
+    let eigen = x.symmetric_eigen();
+    let values = eigen.eigenvalues.map(|x| 0.5 * x.ln_1p());
+    spectral(&eigen.eigenvectors, &values)
+}
+
+/// The same by `½ ln(I + x) = artanh z = z (I + z²/3 + z⁴/5 + …)`, `z = x (2 I + x)⁻¹`, to round-off up to [`SERIES`]: elastic strains of metals are far below, and principal directions cost ten times as much.
+fn half_logarithm_series(x: &Tensor<3>) -> Option<Tensor<3>> {
+    let size = x.norm();
+    if size.is_nan() || size > SERIES {
+        return None;
+    }
+    let (halved, _) = inverse(&(Tensor::identity() * 2.0 + x))?;
+    let z = x * halved;
+    let square = z * z;
+    // the last term is below 1e-17 of the first
+    let terms = match size {
+        s if s < 1e-3 => 3,
+        s if s < 2e-2 => 5,
+        s if s < 8e-2 => 7,
+        _ => 11,
+    };
+    let mut sum = Tensor::<3>::identity() * (1.0 / f64::from(2 * terms + 1));
+    for k in (0..terms).rev() {
+        sum = sum * square + Tensor::identity() * (1.0 / f64::from(2 * k + 1));
+    }
+    Some(z * sum)
+}
+
+/// Largest size of a tensor whose exponential is a series at once.
+const HALVED: f64 = 0.05;
+
+/// `exp x − I` of a symmetric x, by its series; a large x is halved first, `exp 2 x − I = (exp x − I)² + 2 (exp x − I)`.
+fn exponential_less_one(x: &Tensor<3>) -> Tensor<3> {
+    let (mut x, mut halvings) = (*x, 0);
+    while x.norm() > HALVED && halvings < 64 {
+        x *= 0.5;
+        halvings += 1;
+    }
+    let mut sum = Tensor::<3>::identity();
+    for k in (2..=9).rev() {
+        sum = sum * x * (1.0 / f64::from(k)) + Tensor::identity();
+    }
+    let mut found = x * sum;
+    for _ in 0..halvings {
+        found = found * found + found * 2.0;
+    }
+    found
 }
 
 impl LocalLaw<3> for LogarithmicJ2 {
@@ -86,9 +140,7 @@ impl LocalLaw<3> for LogarithmicJ2 {
             + gradient.transpose()
             + gradient * gradient.transpose()
             + deformation * plastic * deformation.transpose();
-        let eigen = trial.symmetric_eigen();
-        let (directions, squares) = (eigen.eigenvectors, eigen.eigenvalues);
-        let total = spectral(&directions, &squares.map(|x| 0.5 * x.ln_1p()));
+        let total = half_logarithm_series(&trial).unwrap_or_else(|| half_logarithm(&trial));
         let before = past[6];
         let mut at_start = [0.0; 7];
         at_start[6] = before;
@@ -102,12 +154,9 @@ impl LocalLaw<3> for LogarithmicJ2 {
                 flow[(i, j)] = p;
                 flow[(j, i)] = p;
             }
-            // the flow has the principal directions of the trial state: exp(−2 Δε_p) of each
-            let change = Vector::<3>::from_fn(|a, _| {
-                let n = directions.column(a);
-                (1.0 + squares[a]) * (-2.0 * n.dot(&(flow * n))).exp_m1()
-            });
-            let change = spectral(&directions, &change);
+            // the flow has the principal directions of the trial state: b_e exp(−2 Δε_p) is symmetric
+            let change = exponential_less_one(&(flow * -2.0));
+            let change = strain(&((Tensor::identity() + trial) * change));
             let plastic = plastic + reverse * change * reverse.transpose();
             for ((i, j), p) in COMPONENTS.into_iter().zip(present.iter_mut()) {
                 *p = plastic[(i, j)];
@@ -273,6 +322,36 @@ mod tests {
         };
         let (coarse, fine) = (off(400), off(800));
         assert!(fine < 2e-3 && fine < 0.6 * coarse, "{coarse} {fine}");
+    }
+
+    #[test]
+    fn series_give_what_principal_directions_give() {
+        for k in 0..60 {
+            // sizes from 1e-13 to the limit, any directions, some with two equal principal values
+            let size = SERIES / 3f64.sqrt() * 10f64.powf(-f64::from(k % 14));
+            let t = f64::from(k);
+            let turn = path(0.01 * t) + Tensor::identity();
+            let directions = turn.symmetric_eigen().eigenvectors;
+            let third = if k % 3 == 0 { -0.4 } else { (1.7 * t).sin() };
+            let values = Vector::<3>::new(t.sin(), -0.4, third) * size;
+            let x = spectral(&directions, &values);
+            let exact = spectral(&directions, &values.map(|x| 0.5 * x.ln_1p()));
+            let found = half_logarithm_series(&x).unwrap();
+            assert!(
+                (found - exact).amax() < 4e-15 * size,
+                "{k}: {found} {exact}"
+            );
+            assert!((half_logarithm(&x) - exact).amax() < 4e-15 * size, "{k}");
+            for stretch in [1.0, 30.0] {
+                let exact = spectral(&directions, &(values * stretch).map(f64::exp_m1));
+                let found = exponential_less_one(&(x * stretch));
+                assert!(
+                    (found - exact).amax() < 4e-15 * exact.amax(),
+                    "{k}: {found} {exact}"
+                );
+            }
+        }
+        assert!(half_logarithm_series(&(Tensor::identity() * SERIES)).is_none());
     }
 
     #[test]

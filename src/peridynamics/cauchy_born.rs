@@ -194,6 +194,7 @@ impl<const D: usize> CauchyBorn<D> {
             damage: 0.0,
             keeps_damage: false,
             material: self.material,
+            kinematics: self.kinematics,
         };
         let past = Past {
             point: &[],

@@ -4,7 +4,8 @@
 //! breaks bonds, and keeps the history. So a law that is written here runs in load steps and in explicit motion, beside every seam, with damage, energies and checkpoints.
 
 use crate::{
-    peridynamics::StatePart,
+    material::LocalLaw,
+    peridynamics::{StatePart, ZeroEnergyControl, bond_force::Kinematics},
     tensor::{Tensor, Vector},
 };
 
@@ -64,6 +65,8 @@ pub struct DeformedFamily<'a, const D: usize> {
     pub keeps_damage: bool,
     /// The material of the point, 0 in a body of one.
     pub material: u16,
+    /// Whether extensions and directions are those of linear bonds.
+    pub kinematics: Kinematics,
 }
 
 impl<const D: usize> DeformedFamily<'_, D> {
@@ -110,6 +113,15 @@ pub struct EnergyDensity {
     pub dissipated: f64,
 }
 
+/// A response whose force state is a stress of its point, `T⟨ξ⟩ = ω P(F̄) K⁻¹ ξ (1 − D)`, and a zero-energy control.
+#[derive(Clone, Copy, Debug)]
+pub struct PointStress<'a, const D: usize> {
+    /// What gives P.
+    pub law: &'a dyn LocalLaw<D>,
+    /// What resists the rest of the deformation.
+    pub control: ZeroEnergyControl,
+}
+
 /// A law's nonlinear response.
 pub trait ForceState<const D: usize>: Send + Sync {
     /// What it keeps. History starts at zero.
@@ -139,6 +151,11 @@ pub trait ForceState<const D: usize>: Send + Sync {
         bonds.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
             sum + force * xi.transpose() * *volume
         })
+    }
+
+    /// The stress of a point, of a law whose [`ForceState::respond`] is that and nothing else: the pass then asks for it once per point instead of for a force per bond. `material` is that of the point; none asks whether all of them have one control.
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     /// Whether a family that has lost bonds still has a response; if not, its point carries no stress of its own. Runs tell how many do.

@@ -50,6 +50,8 @@ pub struct StatePart<const D: usize> {
     pub modulus: Tensor4<D>,
     /// `q`, the weight of the stabilising part.
     pub stabilisation: f64,
+    /// The strength of a [`crate::peridynamics::ZeroEnergyControl`] that the linearisation does not show: of a length control \[Pa/m^(D+2)\], of a drag that times \[s\].
+    pub control: f64,
     /// `d`, of the products `−d tr Ḡ Σ p |ξ|² ξ·η V` in the energy density: `1/D` for a law whose deviatoric extensions `e − θ |ξ|/D` have another influence function than its dilatation θ, else 0.
     pub deviator: f64,
     /// `K = Σ ω ξ ⊗ ξ V`, the shape tensor of the family.

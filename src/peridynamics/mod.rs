@@ -16,6 +16,7 @@
 //! | `laws/` | the laws, one file each | eq. (3.1), (5.16), section 7.2 |
 //! | `critical_stretch.rs` | critical stretch from the fracture energy | \[Silling2005\] |
 //! | `softening.rs` | softening of bonds from strength and fracture energy | \[BazantOh1983\] |
+//! | `zero_energy.rs` | what resists the zero-energy modes of correspondence | section 6.3 |
 //! | `tearing_parameter.rs` | failure of ductile materials | eq. (6.33) |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
@@ -48,13 +49,16 @@ pub mod shape_tensor;
 pub mod shell_weights;
 pub mod softening;
 mod tearing_parameter;
+pub mod zero_energy;
 
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use cauchy_born::{CauchyBorn, LatticeBonds};
 pub use crack_area::CrackArea;
 pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
-pub use force_state::{DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, Present};
+pub use force_state::{
+    DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, PointStress, Present,
+};
 pub use influence::{Influence, Micromodulus};
 pub use law::{Accelerator, Calibrate, Law, Mixture};
 pub use laws::{
@@ -69,6 +73,7 @@ pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use position_aware_influence::{CalibrationFields, NotPositionAware};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shell_weights::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
+pub use zero_energy::ZeroEnergyControl;
 
 use crate::tensor::Vector;
 

@@ -1,7 +1,7 @@
 //! The shape tensor of a family and its inverse.
 
 use super::moment_fitted_weights::place;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::{Tensor, Vector, inverse, least_eigenvalue};
 
 /// Largest condition number of a shape tensor that is inverted.
 ///
@@ -61,6 +61,25 @@ pub fn invert_shape_tensor<const D: usize>(
             bonds,
             condition,
         }),
+    }
+}
+
+/// Least share of the second moment K that intact bonds have to keep, along the direction along which they keep the least.
+pub const SPANNED: f64 = 0.2;
+
+/// `K⁻¹` of the intact bonds of a family whose bonds had the shape tensor `whole`, those `left` of a family that has lost some; none if they do not span the space by [`SPANNED`].
+pub(crate) fn spanned_inverse<const D: usize>(
+    whole: &Tensor<D>,
+    left: Option<&Tensor<D>>,
+) -> Option<Tensor<D>> {
+    let Some(left) = left else {
+        return Some(inverse(whole)?.0);
+    };
+    // K = L Lᵀ: the least eigenvalue of L⁻¹ K_left L⁻ᵀ
+    let (root, _) = inverse(&whole.cholesky()?.l())?;
+    match least_eigenvalue(&(root * left * root.transpose())) >= SPANNED {
+        true => Some(inverse(left)?.0),
+        false => None,
     }
 }
 

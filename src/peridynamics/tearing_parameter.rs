@@ -22,6 +22,8 @@ pub(crate) struct TearingParameter {
     surface: Vec<f64>,
     /// P of each point at the beginning of the step.
     value: Vec<f64>,
+    /// Kept between steps.
+    share: Vec<Share>,
 }
 
 /// Plastic flow of a point within a step.
@@ -45,6 +47,38 @@ pub(crate) fn tension(principal: &[f64; 3]) -> f64 {
     }
 }
 
+/// What a point adds to the averages of a family.
+#[derive(Clone, Copy, Default)]
+struct Share {
+    volume: f64,
+    strained: f64,
+    /// Of points that have flowed.
+    flowed: f64,
+    tensile: f64,
+}
+
+impl Share {
+    fn of(flow: Flow, volume: f64, surface: f64) -> Self {
+        let (flowed, tensile) = match flow.strain > 0.0 {
+            true => (volume, volume * surface * flow.tension),
+            false => (0.0, 0.0),
+        };
+        Self {
+            volume,
+            strained: volume * flow.growth,
+            flowed,
+            tensile,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.volume += other.volume;
+        self.strained += other.strained;
+        self.flowed += other.flowed;
+        self.tensile += other.tensile;
+    }
+}
+
 impl TearingParameter {
     /// Of points at rest, with the volumes of their whole families, centre included, and the horizon of each.
     pub fn new(critical: f64, family_volume: &[f64], horizon: &[f64]) -> Self {
@@ -64,6 +98,7 @@ impl TearingParameter {
             critical,
             surface: surface.collect(),
             value: vec![0.0; family_volume.len()],
+            share: vec![Share::default(); family_volume.len()],
         }
     }
 
@@ -82,6 +117,13 @@ impl TearingParameter {
         self.value.iter().any(|p| *p >= self.critical)
     }
 
+    /// The least P of a point whose bonds may break: with the largest there is at the other end.
+    pub fn least_that_breaks(&self) -> f64 {
+        let most = self.value.iter().copied().fold(0.0, f64::max);
+        // with a margin for the rounding of a mean
+        (2.0 * self.critical - most) * (1.0 - 1e-12) - 1e-12 * most
+    }
+
     /// Whether the bond of two points breaks.
     pub fn breaks(&self, i: usize, j: usize) -> bool {
         0.5 * (self.value[i] + self.value[j]) >= self.critical
@@ -95,32 +137,34 @@ impl TearingParameter {
         is_intact: impl Fn(usize) -> bool + Sync,
         flow: impl Fn(usize) -> Flow + Sync,
     ) {
+        // what each point adds to the sums of the families that it is in; a point without a family has no flow of its own
         let surface = &self.surface;
-        let grow = |(i, value): (usize, &mut f64)| {
-            let (mut strained, mut all, mut tensile, mut flowed) = (0.0, 0.0, 0.0, 0.0);
-            let mut add = |j: usize| {
-                let (v, flow) = (volume[j], flow(j));
-                all += v;
-                strained += v * flow.growth;
-                if flow.strain > 0.0 {
-                    flowed += v;
-                    tensile += v * surface[j] * flow.tension;
-                }
+        let share_of = |(j, share): (usize, &mut Share)| {
+            *share = match families.of(j).is_empty() {
+                true => Share::default(),
+                false => Share::of(flow(j), volume[j], surface[j]),
             };
+        };
+        let shares = self.share.par_iter_mut().enumerate();
+        shares.with_min_len(64).for_each(share_of);
+        let shares = &self.share;
+        if shares.iter().all(|share| share.strained == 0.0) {
+            return;
+        }
+        let grow = |(i, value): (usize, &mut f64)| {
             let family = families.of(i);
             if family.is_empty() {
                 return;
             }
-            add(i);
+            let mut sum = shares[i];
             let start = families.offsets[i];
             for (k, &j) in family.iter().enumerate() {
-                // a far point without a family has no flow of its own
-                if is_intact(start + k) && !families.of(j as usize).is_empty() {
-                    add(j as usize);
+                if is_intact(start + k) {
+                    sum.add(&shares[j as usize]);
                 }
             }
-            if strained > 0.0 {
-                *value += (tensile / flowed).powi(4) * strained / all;
+            if sum.strained > 0.0 {
+                *value += (sum.tensile / sum.flowed).powi(4) * sum.strained / sum.volume;
             }
         };
         let values = self.value.par_iter_mut().enumerate();

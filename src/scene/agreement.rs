@@ -9,6 +9,7 @@ use super::spec::{
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
+use crate::peridynamics::ZeroEnergyControl;
 use crate::scene::points::Points;
 
 /// Refuses a law that is not linear where rows at the seam would not balance it: those of splice, blending, balanced and partial stress hold a uniform strain whatever stress the two sides have.
@@ -171,6 +172,38 @@ pub(crate) fn memory<const D: usize>(
                 .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]")
         }
     })
+}
+
+/// Refuses a drag where there are no velocities: in a scene at rest and in load steps, and where sites move in sub-steps of their own.
+pub(crate) fn drag<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    points: &[u16],
+) -> Result<(), SceneError> {
+    let drags = |m: &&Material<D>| {
+        let states = m.law.force_state();
+        let stress = states.and_then(|states| states.correspondence(None));
+        stress.is_some_and(|stress| stress.control == ZeroEnergyControl::Drag)
+    };
+    let mut used = points.iter().map(|m| &materials[usize::from(*m)]);
+    let why = match spec.solve.as_ref().map(|s| s.get_ref()) {
+        Some(SolveSpec::Explicit(explicit)) if explicit.sub_steps.is_none() => return Ok(()),
+        Some(SolveSpec::Explicit(_)) => "and sub-steps have several",
+        _ => "and this scene is at rest in every step",
+    };
+    let Some(material) = used.find(drags) else {
+        return Ok(());
+    };
+    let name = spec.materials.get_key_value(material.name.as_str());
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!(
+            "`zero-energy-control` of the material `{}` is \"drag\", which resists velocities of one time step, {why}",
+            material.name
+        ),
+    )
+    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
+    .help("use zero-energy-control = \"bond-force\" or \"length\", or [solve.explicit] without `sub-steps`"))
 }
 
 /// Refuses a horizon below the spacing of the points.

@@ -99,7 +99,13 @@ pub(crate) fn materials<const D: usize>(
     for (number, (name, material)) in spec.iter().enumerate() {
         let number = number as u16;
         let (lame, density) = constants::<D>(name, material, kinematics)?;
-        let (law, cells) = law_and_cells(name, material, influence, kinematics, lame, directory)?;
+        let (law, cells) = law_and_cells(
+            name,
+            material,
+            (influence, kinematics),
+            (lame, density),
+            directory,
+        )?;
         found.push(Material {
             name: name.value.clone(),
             law,
@@ -177,9 +183,8 @@ fn cells_of<const D: usize>(
 fn law_and_cells<'a, const D: usize>(
     name: &Text,
     spec: &'a MaterialSpec,
-    influence: Influence,
-    kinematics: Kinematics,
-    (lambda, mu): (f64, f64),
+    (influence, kinematics): (Influence, Kinematics),
+    ((lambda, mu), density): ((f64, f64), f64),
     directory: &Path,
 ) -> Result<(Arc<dyn Law<D>>, Option<&'a CellsSpec>), SceneError> {
     let constants = Constants {
@@ -187,6 +192,7 @@ fn law_and_cells<'a, const D: usize>(
         shear: mu,
         influence,
         kinematics,
+        density,
     };
     Ok(match spec {
         MaterialSpec::BondBased(m) => {

@@ -21,7 +21,7 @@ pub(crate) fn umat<const D: usize>(
     use super::bounds_checks::{not_negative, positive};
     use super::spec::{EnergiesSpec, StrainsSpec};
     use crate::material::{Reduced, Routine, RoutineError, Umat, UmatEnergies, UmatSettings};
-    use crate::peridynamics::{Correspondence, laws::LocalCorrespondence};
+    use crate::peridynamics::laws::LocalCorrespondence;
 
     let place = |key: &str| format!("materials.{name}.umat.{key}");
     let stabilisation = match &spec.stabilisation {
@@ -79,12 +79,8 @@ pub(crate) fn umat<const D: usize>(
     };
     let solid = Arc::new(Umat::new(routine, settings));
     let local = Arc::new(Reduced::new(solid, constants.kinematics));
-    let linear = Correspondence::new(
-        constants.influence,
-        constants.lambda,
-        constants.shear,
-        stabilisation,
-    );
+    let control = spec.zero_energy_control as usize;
+    let linear = constants.correspondence(stabilisation, control as f64);
     let law = LocalCorrespondence::new("user material (UMAT)", linear, local);
     Ok(Arc::new(law))
 }

@@ -13,9 +13,10 @@ use crate::{
 pub(super) const ENDS: f64 = 1e-12;
 
 /// How bonds follow the motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kinematics {
     /// Bonds rotate and stretch: any displacement.
+    #[default]
     Exact,
     /// Linear in the displacement, as the static operators are.
     Linear,

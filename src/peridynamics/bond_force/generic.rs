@@ -10,6 +10,7 @@ use super::{
     BondPass, BondSetup, ForceStates, Kinematics,
     bond_failure::BondFailure,
     list::{extension, ratio, stretched},
+    point_forces::PointForces,
 };
 use crate::{
     peridynamics::{
@@ -17,7 +18,7 @@ use crate::{
         Present, StatePart, body::split_rows, tearing_parameter::Flow,
     },
     system::{FailureUpdate, Interval},
-    tensor::{Tensor, Vector},
+    tensor::Vector,
 };
 
 /// No bond from the other end.
@@ -32,10 +33,10 @@ pub(super) struct History {
 
 /// What a point did in a step.
 #[derive(Clone, Copy, Default)]
-struct Outcome {
+pub(super) struct Outcome {
     /// Energy dissipated \[J\].
-    dissipated: f64,
-    flow: Flow,
+    pub(super) dissipated: f64,
+    pub(super) flow: Flow,
 }
 
 /// The pass over force states: some hundred bytes per directed bond.
@@ -47,7 +48,7 @@ pub(super) struct Generic<const D: usize> {
     pub(super) row: Vec<bool>,
     pub(super) no_fail: Vec<bool>,
     /// The material of each point; empty if all have one.
-    material: Vec<u16>,
+    pub(super) material: Vec<u16>,
     pub(super) families: Families,
     /// Of each bond, that of its other end, counted over all families; `NONE` if the far point has no family.
     pub(super) reverse: Vec<u32>,
@@ -55,21 +56,25 @@ pub(super) struct Generic<const D: usize> {
     pub(super) omega: Vec<f64>,
     pub(super) state: Vec<Option<StatePart<D>>>,
     pub(super) failure: BondFailure,
-    kinematics: Kinematics,
+    pub(super) kinematics: Kinematics,
+    /// Whether the law holds for rotations of any size.
+    pub(super) is_objective: bool,
     pub(super) intact: Vec<bool>,
     /// Bonds that were told to be broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
     pub(super) damaged_through: Vec<bool>,
     /// Volume of the far points of each family; empty where no bond can be broken.
-    family_volume: Vec<f64>,
+    pub(super) family_volume: Vec<f64>,
     /// Committed, and at the end of the last force.
     pub(super) past: History,
     pub(super) present: History,
     /// What each point did in the last force.
-    outcome: Vec<Outcome>,
+    pub(super) outcome: Vec<Outcome>,
     /// Points and bonds, counted over all families, that the last force broke.
     pub(super) last: Vec<(u32, usize)>,
-    /// `T⟨ξ⟩` of every bond, kept between passes.
-    force_state: Vec<Vector<D>>,
+    /// `T⟨ξ⟩` of every bond, kept between passes; empty where points have a stress.
+    pub(super) force_state: Vec<Vector<D>>,
+    /// Of a law whose points have a stress.
+    pub(super) points: Option<PointForces<D>>,
 }
 
 /// One deformed family in memory that the next one takes over.
@@ -77,6 +82,7 @@ pub(super) struct Generic<const D: usize> {
 pub(super) struct Scratch<const D: usize> {
     keeps_damage: bool,
     material: u16,
+    kinematics: Kinematics,
     bonds: Vec<Vector<D>>,
     volumes: Vec<f64>,
     pair: Vec<f64>,
@@ -96,15 +102,19 @@ pub(super) struct Scratch<const D: usize> {
 }
 
 /// What a law reads of a family, and what it overwrites.
-struct Parts<'a, const D: usize> {
-    family: DeformedFamily<'a, D>,
-    past: &'a [f64],
-    present: Present<'a>,
-    force: &'a mut [Vector<D>],
+pub(super) struct Parts<'a, const D: usize> {
+    pub(super) family: DeformedFamily<'a, D>,
+    pub(super) past: &'a [f64],
+    pub(super) present: Present<'a>,
+    pub(super) force: &'a mut [Vector<D>],
 }
 
 impl<const D: usize> Scratch<D> {
-    fn split<'a>(&'a mut self, state: Option<&'a StatePart<D>>, stress: bool) -> Parts<'a, D> {
+    pub(super) fn split<'a>(
+        &'a mut self,
+        state: Option<&'a StatePart<D>>,
+        stress: bool,
+    ) -> Parts<'a, D> {
         Parts {
             family: DeformedFamily {
                 bonds: &self.bonds,
@@ -119,6 +129,7 @@ impl<const D: usize> Scratch<D> {
                 damage: self.damage,
                 keeps_damage: self.keeps_damage,
                 material: self.material,
+                kinematics: self.kinematics,
             },
             past: &self.past,
             present: Present {
@@ -165,7 +176,9 @@ impl<const D: usize> Generic<D> {
             bonds: vec![0.0; bonds * layout.bond.len()],
         };
         let damaged_through = vec![false; layout.damage.map_or(0, |_| bonds)];
-        Self {
+        let by_points = PointForces::new(states, points);
+        let kept = if by_points.is_some() { 0 } else { bonds };
+        let mut pass = Self {
             law: Arc::clone(law),
             layout,
             position: setup.position.to_vec(),
@@ -197,9 +210,13 @@ impl<const D: usize> Generic<D> {
             past,
             outcome: vec![Outcome::default(); points],
             last: Vec::new(),
-            force_state: vec![Vector::zeros(); bonds],
+            force_state: vec![Vector::zeros(); kept],
+            points: by_points,
+            is_objective: states.is_objective(),
             families,
-        }
+        };
+        pass.recall_intact(None);
+        pass
     }
 
     pub(super) fn xi(&self, i: usize, j: usize) -> Vector<D> {
@@ -229,7 +246,7 @@ impl<const D: usize> Generic<D> {
     }
 
     /// The response of one family, of those of its bonds that count; forces and history lie in the scratch.
-    fn respond(
+    pub(super) fn respond(
         &self,
         i: usize,
         displaced: &dyn Fn(usize) -> Vector<D>,
@@ -248,6 +265,7 @@ impl<const D: usize> Generic<D> {
         s.of.clear();
         s.past.clear();
         s.keeps_damage = self.no_fail[i];
+        s.kinematics = self.kinematics;
         s.material = self.material.get(i).copied().unwrap_or(0);
         let kept = self.layout.bond.len();
         let mut intact_volume = 0.0;
@@ -409,6 +427,18 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             for &(_, bond) in &self.last {
                 self.intact[bond] = false;
             }
+            if !self.last.is_empty() {
+                let last = std::mem::take(&mut self.last);
+                self.recall_intact(Some(&last));
+                self.last = last;
+            }
+        }
+        if let Some(mut points) = self.points.take() {
+            self.respond_points(&mut points, u, interval.length);
+            self.gather_points(&points, u, force);
+            self.add_drag(&mut points, u, interval, force);
+            self.points = Some(points);
+            return self.last.len() as u64;
         }
         self.respond_all(u, interval.length);
         if breakage == FailureUpdate::Update {
@@ -420,6 +450,9 @@ impl<const D: usize> BondPass<D> for Generic<D> {
 
     fn commit(&mut self) -> f64 {
         self.past.clone_from(&self.present);
+        if let Some(drag) = self.points.as_mut().and_then(|p| p.drag.as_mut()) {
+            drag.commit();
+        }
         if let BondFailure::Tearing(tearing) = &mut self.failure {
             let (intact, outcome) = (&self.intact, &self.outcome);
             let flow = |i: usize| outcome[i].flow;
@@ -432,7 +465,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
     }
 
     fn remembers(&self) -> bool {
-        !self.layout.is_empty()
+        let drag = self.points.as_ref().and_then(|p| p.drag.as_ref());
+        !self.layout.is_empty() || drag.is_some()
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
@@ -447,6 +481,9 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         let of_point = |s: &mut Scratch<D>, i: usize| {
             if !self.row[i] {
                 return 0.0;
+            }
+            if let Some(points) = &self.points {
+                return self.point_energy(points, i, u, &self.past, &mut s.point);
             }
             self.energy_of(i, &|j| at(u, j), |bond| self.intact[bond], &self.past, s)
         };
@@ -477,6 +514,10 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         let last = self.last.iter();
         last.map(|&(i, bond)| (i, self.families.neighbours[bond]))
             .collect()
+    }
+
+    fn drag_rate(&self, mass: &dyn Fn(usize) -> f64) -> f64 {
+        self.rate_of_drag(mass)
     }
 
     fn lost_energy(&self, displaced: &dyn Fn(usize) -> [f64; D]) -> f64 {
@@ -515,70 +556,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             + self.families.offsets.len() * 8
             + bonds * 9
             + self.damaged_through.len()
+            + self.points.as_ref().map_or(0, PointForces::memory_bytes)
             + (self.row.len() + self.material.len()) * 2
             + history * 8
-    }
-}
-
-impl<const D: usize> ForceStates<D> for Generic<D> {
-    fn partial_stress(&self, i: usize, u: &[f64]) -> Tensor<D> {
-        let mut s = Scratch::default();
-        self.respond(
-            i,
-            &|j| at(u, j),
-            |bond| self.intact[bond],
-            0.0,
-            &self.past,
-            &mut s,
-        );
-        let own = i * self.layout.point.len()..(i + 1) * self.layout.point.len();
-        let parts = s.split(self.state[i].as_ref(), false);
-        let past = Past {
-            point: &self.past.point[own],
-            bonds: parts.past,
-        };
-        let law = self.law.force_state();
-        law.map_or_else(Tensor::zeros, |law| {
-            law.stress(&parts.family, past, parts.force)
-        })
-    }
-
-    fn energy_density(&self, i: usize, u: &[f64]) -> f64 {
-        let (displaced, intact) = (|j| at(u, j), |bond: usize| self.intact[bond]);
-        let mut s = Scratch::default();
-        self.respond(i, &displaced, intact, 0.0, &self.past, &mut s)
-            .stored
-    }
-
-    fn family_size(&self, point: usize) -> usize {
-        self.range(point).len()
-    }
-
-    fn points_without_response(&self, u: &[f64]) -> usize {
-        let Some(law) = self.law.force_state() else {
-            return 0;
-        };
-        let mut s = Scratch::default();
-        let lacks = |i: &usize| {
-            let intact = |bond: usize| self.intact[bond];
-            self.respond(*i, &|j| at(u, j), intact, 0.0, &self.past, &mut s);
-            !law.responds(&s.split(self.state[*i].as_ref(), false).family)
-        };
-        let damaged = (0..self.position.len()).filter(|&i| self.row[i] && self.is_damaged(i));
-        damaged.filter(lacks).count()
-    }
-
-    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
-        let names = self.layout.point;
-        let column = |k: usize| {
-            let points = self.past.point.chunks_exact(names.len());
-            points.map(|numbers| numbers[k]).collect()
-        };
-        let named = names.iter().enumerate();
-        let mut found: Vec<_> = named.map(|(k, name)| (*name, column(k))).collect();
-        if let BondFailure::Tearing(tearing) = &self.failure {
-            found.push(("tearing parameter", tearing.values().to_vec()));
-        }
-        found
     }
 }

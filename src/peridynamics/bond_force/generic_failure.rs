@@ -31,9 +31,18 @@ impl<const D: usize> Generic<D> {
             BondFailure::Tearing(tearing) if !tearing.is_reached() => return Vec::new(),
             _ => {}
         }
+        let least = match &self.failure {
+            BondFailure::Tearing(tearing) => Some(tearing.least_that_breaks()),
+            _ => None,
+        };
+        let may = |i: usize| match (&self.failure, least) {
+            (BondFailure::Tearing(tearing), Some(least)) => tearing.values()[i] >= least,
+            _ => true,
+        };
         (0..self.position.len())
             .into_par_iter()
             .with_min_len(64)
+            .filter(|&i| may(i))
             .flat_map_iter(|i| {
                 let free = self.range(i).filter(move |_| !self.no_fail[i]);
                 free.filter(move |&bond| {
@@ -95,6 +104,9 @@ impl<const D: usize> Generic<D> {
         };
         let history = self.past.point.iter().chain(&self.past.bonds).chain(torn);
         words.extend(history.map(|x| x.to_bits()));
+        let drag = self.points.as_ref().and_then(|p| p.drag.as_ref());
+        let moved = drag.into_iter().flat_map(|drag| drag.kept());
+        words.extend(moved.map(|x| x.to_bits()));
         words
     }
 
@@ -104,7 +116,9 @@ impl<const D: usize> Generic<D> {
             BondFailure::Tearing(tearing) => tearing.values().len(),
             _ => 0,
         };
-        let kept = self.past.point.len() + self.past.bonds.len() + torn;
+        let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
+        let dragged = drag.map_or(0, |drag| drag.kept().count());
+        let kept = self.past.point.len() + self.past.bonds.len() + torn + dragged;
         let Some(words) = state.len().checked_sub(kept) else {
             return false;
         };
@@ -126,10 +140,13 @@ impl<const D: usize> Generic<D> {
             _ => &mut [],
         };
         let own = self.past.point.iter_mut().chain(&mut self.past.bonds);
-        for (number, word) in own.chain(torn).zip(history) {
+        let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
+        let moved = drag.into_iter().flat_map(|drag| drag.kept_mut());
+        for (number, word) in own.chain(torn).chain(moved).zip(history) {
             *number = f64::from_bits(*word);
         }
         self.present.clone_from(&self.past);
+        self.recall_intact(None);
         self.recall_damaged_through();
         true
     }

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::generic::{Generic, NONE, at};
 use crate::{
-    peridynamics::body::split_rows,
-    tensor::{Tensor, Vector},
+    peridynamics::{StatePart, ZeroEnergyControl, body::split_rows},
+    tensor::{Tensor, Vector, inverse},
 };
 
 impl<const D: usize> Generic<D> {
@@ -45,11 +45,42 @@ impl<const D: usize> Generic<D> {
                             let s = self.pair[bond] * xi.norm_squared();
                             t -= xi * (deviator * gradient.trace() * s);
                         }
+                        t += self.beyond_linear(state, &gradient, &xi, &eta) * self.omega[bond];
                     }
                     states[bond - start] = t;
                 }
             });
         self.gather(&states, y);
+    }
+
+    /// What a length control has at rest beyond the bond force that stands for it in the linearisation: along ξ alone instead of the mean over directions.
+    fn beyond_linear(
+        &self,
+        state: &StatePart<D>,
+        weighted: &Tensor<D>,
+        xi: &Vector<D>,
+        eta: &Vector<D>,
+    ) -> Vector<D> {
+        let length = (self.points.as_ref()).filter(|p| p.control == ZeroEnergyControl::Length);
+        let Some((inverse, _)) = length.and_then(|_| inverse(&state.shape)) else {
+            return Vector::zeros();
+        };
+        let beyond = eta - weighted * inverse * xi;
+        xi * (state.control * xi.dot(&beyond) / xi.norm_squared()) - beyond * state.stabilisation
+    }
+
+    /// The part of the row sums of a bond that this has, of its own end and of the other: of `M ⊗ M` in a row no more than √D, of a difference 2, of a gradient its derivatives.
+    fn beyond_linear_sum(&self, i: usize, xi: &Vector<D>, sums: &[f64; D]) -> f64 {
+        let length = (self.points.as_ref()).filter(|p| p.control == ZeroEnergyControl::Length);
+        let Some(state) = self.state[i].as_ref().filter(|_| length.is_some()) else {
+            return 0.0;
+        };
+        let Some((inverse, _)) = inverse(&state.shape) else {
+            return 0.0;
+        };
+        let reach = inverse * xi;
+        let columns: f64 = reach.iter().zip(sums).map(|(x, sum)| x.abs() * sum).sum();
+        (state.control * (D as f64).sqrt() + state.stabilisation) * (2.0 + columns)
     }
 
     /// `Σ p |ξ|² ξ·η V` over intact bonds, and `d θ Σ p |ξ|⁴ V` over broken ones, whose deviatoric extensions no longer count.
@@ -99,6 +130,9 @@ impl<const D: usize> Generic<D> {
                 if !sums.is_empty() {
                     let q = |p: usize| self.state[p].as_ref().map_or(0.0, |s| s.stabilisation);
                     block += Tensor::identity() * (both(&self.omega, &q) * vv);
+                    let beyond = |p: usize| self.beyond_linear_sum(p, &xi, &sums[p]);
+                    let beyond = both(&self.omega, &beyond) * vv;
+                    row.iter_mut().for_each(|row| *row += beyond);
                     first += xi * (self.omega[bond] * vv);
                     second += xi * (self.pair[bond] * xi.norm_squared() * vv);
                     if self.reverse[bond] != NONE {

@@ -304,10 +304,11 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
         shear,
         influence: crate::peridynamics::Influence::Gaussian,
         kinematics: crate::material::Kinematics::Solid,
+        density: 1.0,
     };
     let bulk = lambda + 2.0 / 3.0 * shear;
     let named = laws::Named::PlasticCorrespondence;
-    let law = named.build::<3>(constants, &[yields, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let law = named.build::<3>(constants, &[yields, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
     let case = block(9);
     let centre = case.position.len() / 2;
     for triaxiality in [0.0, 1.0 / 3.0, 1.0, 4.0 / 3.0, 2.0, -1.0 / 3.0] {

@@ -6,7 +6,9 @@
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
+//! | `point_forces.rs`, `drag.rs` | the same of correspondence, by a stress per point; its drag |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
+//! | `generic_states.rs` | what it tells of single points |
 //! | `generic_damage.rs` | damage that laws keep of their bonds |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
 //! | `list.rs`, `list_simd.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
@@ -27,10 +29,12 @@ mod bond_failure;
 pub(crate) mod bond_list;
 mod breaks;
 mod compressed_list;
+mod drag;
 mod force_problem;
 mod generic;
 mod generic_damage;
 mod generic_failure;
+mod generic_states;
 mod generic_tangent;
 #[cfg(test)]
 mod generic_tests;
@@ -42,6 +46,9 @@ mod lattice_simd;
 mod list;
 mod list_simd;
 mod own_points;
+mod point_forces;
+#[cfg(test)]
+mod point_forces_tests;
 #[cfg(test)]
 mod reference_force;
 #[allow(unsafe_code)]
@@ -113,6 +120,11 @@ pub trait BondPass<const D: usize>: Send + Sync {
 
     /// Directed bonds that the last pass broke, as a point and its neighbour, in a fixed order.
     fn last_broken(&self) -> Vec<(u32, u32)>;
+
+    /// An upper bound on the eigenvalues of `M⁻¹ C` of forces `C v` against velocities, with the mass of each point \[1/s\].
+    fn drag_rate(&self, _mass: &dyn Fn(usize) -> f64) -> f64 {
+        0.0
+    }
 
     /// What the points with rows would store less at the displacement `at` of each point, for the bonds that the last pass broke:
     /// their energy before less that after, all of these bonds removed at once \[J\]. Of a state-based law that is the change of dilatations too.

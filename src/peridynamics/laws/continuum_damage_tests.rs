@@ -35,6 +35,7 @@ impl Point {
             shear: 0.4 * YOUNG,
             influence: Influence::Gaussian,
             kinematics: Kinematics::Solid,
+            density: 1.0,
         };
         // the normal of the weak planes is x
         let values = [ONSET, eta, weakness, 0.0, 0.0];
@@ -108,6 +109,7 @@ impl Point {
             is_whole: true,
             damage: 0.0,
             material: 0,
+            kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
         };
         let mut present = vec![f64::NAN; self.history.len()];
         let mut force = vec![Vector::zeros(); self.bonds.len()];

@@ -3,7 +3,7 @@
 use crate::{
     peridynamics::{
         BondEnergy, Conditions, Family, ForceState, Influence, Law, LinearForceState, PdError,
-        ShellTarget, StatePart, invert_shape_tensor,
+        ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -18,7 +18,11 @@ pub struct Correspondence<const D: usize> {
     pub influence: Influence,
     /// Strength of the stabilising term relative to `D (D+2) μ / m`, that of the pairwise part of an LPS; 0 switches it off.
     pub stabilisation: f64,
+    /// What the term is beyond the first order; that of the linear law is a bond force.
+    pub control: ZeroEnergyControl,
     shear: f64,
+    /// `√(ρ/(λ + 2 μ))` \[s/m\], of a drag.
+    slowness: f64,
     tensor: Tensor4<D>,
 }
 
@@ -28,9 +32,21 @@ impl<const D: usize> Correspondence<D> {
         Self {
             influence,
             stabilisation,
+            control: ZeroEnergyControl::BondForce,
             shear: mu,
+            slowness: 0.0,
             tensor: Tensor4::isotropic(lambda, mu),
         }
+    }
+
+    /// The same with another zero-energy control; `density` is that of the material [kg/m^D], by which a drag is measured.
+    ///
+    /// The linearisation of [`ZeroEnergyControl::Length`] is a bond force of the mean over all directions, `q/D`: what a bond resists along itself alone is no force state of [`LinearForceState`]. A drag has none.
+    #[must_use]
+    pub fn with_control(mut self, control: ZeroEnergyControl, density: f64) -> Self {
+        self.control = control;
+        self.slowness = (density / self.tensor.get(0, 0, 0, 0)).sqrt();
+        self
     }
 }
 
@@ -108,6 +124,11 @@ impl<const D: usize> LinearForceState<D> for Correspondence<D> {
         let inverse = invert_shape_tensor(&shape, family.bonds.len())?;
         let d = D as f64;
         let q = self.stabilisation * d * (d + 2.0) * self.shear / shape.trace();
+        let (q, control) = match self.control {
+            ZeroEnergyControl::BondForce => (q, 0.0),
+            ZeroEnergyControl::Length => (q / d, q),
+            ZeroEnergyControl::Drag => (0.0, q * family.horizon * self.slowness),
+        };
         let mut modulus = Tensor4::zeros();
         for i in 0..D {
             for a in 0..D {
@@ -124,6 +145,7 @@ impl<const D: usize> LinearForceState<D> for Correspondence<D> {
         Ok(Some(StatePart {
             modulus,
             stabilisation: q,
+            control,
             deviator: 0.0,
             shape,
         }))

@@ -96,6 +96,7 @@ impl<const D: usize> NamedLaw<D> for JohnsonCookCorrespondence<D> {
             usual: 1.0,
             ..STRAINS
         },
+        LocalCorrespondence::<D>::CONTROL,
     ];
 
     fn conflict(values: &[f64]) -> Option<(&'static str, String)> {
@@ -124,7 +125,7 @@ impl<const D: usize> NamedLaw<D> for JohnsonCookCorrespondence<D> {
             "Johnson–Cook correspondence",
             constants,
             hardening,
-            values[9],
+            (values[9], values[11]),
             values[10] != 0.0,
         )
     }

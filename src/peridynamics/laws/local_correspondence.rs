@@ -7,17 +7,18 @@ use crate::{
     material::LocalLaw,
     peridynamics::{
         BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Past, Present,
+        LinearForceState, Past, PointStress, Present, ZeroEnergyControl,
+        shape_tensor::spanned_inverse, zero_energy::excess_length,
     },
-    tensor::{Tensor, Vector, determinant, inverse, least_eigenvalue},
+    tensor::{Tensor, Vector, determinant},
 };
 
-/// Correspondence with a [`LocalLaw`]: `F̄ − I = Ḡ K⁻¹`, `T⟨ξ⟩ = ω P(F̄) K⁻¹ ξ + q ω (η − (F̄ − I) ξ)`, the stabilising term elastic.
+/// Correspondence with a [`LocalLaw`]: `F̄ − I = Ḡ K⁻¹`, `T⟨ξ⟩ = ω P(F̄) K⁻¹ ξ + q ω (η − (F̄ − I) ξ)`, the stabilising term that of bond forces, elastic, or another [`ZeroEnergyControl`].
 ///
 /// Source: [SAND2015-7998] section 7.2 (after \[Silling2007\]) and eq. (6.30), (6.32), with the first Piola–Kirchhoff stress of any local law. Its linearisation is [`Correspondence`] with the same constants.
 ///
 /// Broken bonds drop out of `F̄` and K, and the stress falls with the damage, `σ = (1 − D) σ₀` (section 6.3), or what bonds are left would carry more. A family whose intact bonds no longer span the space
-/// (`SPANNED`), or that have turned inside out, has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
+/// ([`SPANNED`](crate::peridynamics::shape_tensor::SPANNED)), or that have turned inside out, has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
 #[derive(Clone, Debug)]
 pub struct LocalCorrespondence<const D: usize> {
     name: &'static str,
@@ -38,13 +39,20 @@ impl<const D: usize> LocalCorrespondence<D> {
     /// The strength of the stabilising term, for scenes.
     pub const STABILISATION: Parameter = Parameter {
         key: "stabilisation",
-        about: "Strength of the stabilising bond force relative to an LPS; 0 switches it off.",
+        about: "Strength of the zero-energy control relative to the bonds of an LPS; 0 switches it off.",
         default: Some(1.0),
         least: 0.0,
         most: 1e6,
         usual: 1.0,
         words: &[],
     };
+
+    /// What resists zero-energy modes, for scenes.
+    pub const CONTROL: Parameter = Parameter::words(
+        "zero-energy-control",
+        "What resists deformations that are not uniform: a bond force, one by the lengths of bonds alone, or a drag (in explicit dynamics).",
+        ZeroEnergyControl::WORDS,
+    );
 }
 
 impl<const D: usize> Law<D> for LocalCorrespondence<D> {
@@ -73,25 +81,17 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
     }
 }
 
-/// Least share of the second moment K that intact bonds have to keep, along the direction along which they keep the least.
-pub const SPANNED: f64 = 0.2;
-
 /// `K⁻¹` of the intact bonds; none if they do not span the space.
 fn inverse_shape<const D: usize>(family: &DeformedFamily<'_, D>) -> Option<Tensor<D>> {
     let whole = &family.state?.shape;
     if family.is_whole {
-        return Some(inverse(whole)?.0);
+        return spanned_inverse(whole, None);
     }
     let mut left = Tensor::<D>::zeros();
     for (k, xi) in family.bonds.iter().enumerate() {
         left += xi * xi.transpose() * (family.omega[k] * family.volumes[k]);
     }
-    // K = L Lᵀ: the least eigenvalue of L⁻¹ K_left L⁻ᵀ
-    let (root, _) = inverse(&whole.cholesky()?.l())?;
-    match least_eigenvalue(&(root * left * root.transpose())) >= SPANNED {
-        true => Some(inverse(&left)?.0),
-        false => None,
-    }
+    spanned_inverse(whole, Some(&left))
 }
 
 /// `F̄ − I` of a family, and `K⁻¹`.
@@ -145,11 +145,23 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         energy.dissipated = left * local.dissipated;
         let through = local.stress * shape * left;
         for (k, force) in force.iter_mut().enumerate() {
-            let (xi, omega) = (family.bonds[k], family.omega[k]);
-            let beyond = family.difference[k] - gradient * xi;
-            let stabilising = beyond * state.stabilisation;
-            *force = (through * xi + stabilising) * omega;
-            energy.stored += 0.5 * omega * stabilising.dot(&beyond) * family.volumes[k];
+            let (xi, eta, omega) = (family.bonds[k], family.difference[k], family.omega[k]);
+            let (resisting, stored) = match self.linear.control {
+                ZeroEnergyControl::BondForce => {
+                    let beyond = eta - gradient * xi;
+                    let resisting = beyond * state.stabilisation;
+                    (resisting, 0.5 * resisting.dot(&beyond))
+                }
+                ZeroEnergyControl::Length => {
+                    let excess = excess_length(&xi, &eta, &gradient, family.kinematics);
+                    let size = state.control * excess;
+                    (family.direction[k] * size, 0.5 * size * excess)
+                }
+                // it asks for velocities, which the pass has
+                ZeroEnergyControl::Drag => (Vector::zeros(), 0.0),
+            };
+            *force = (through * xi + resisting) * omega;
+            energy.stored += omega * stored * family.volumes[k];
         }
         energy
     }
@@ -167,6 +179,13 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         let mut present = past.point.to_vec();
         let found = (self.local).respond(&gradient, 0.0, past.point, &mut present);
         found.cauchy(&gradient, self.local.is_objective()) * (1.0 - family.damage)
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        Some(PointStress {
+            law: self.local.as_ref(),
+            control: self.linear.control,
+        })
     }
 
     fn responds(&self, family: &DeformedFamily<'_, D>) -> bool {

@@ -141,6 +141,7 @@ impl<const D: usize> LinearForceState<D> for LinearPeridynamicSolid<D> {
         Ok(Some(StatePart {
             modulus,
             stabilisation: 0.0,
+            control: 0.0,
             deviator: 0.0,
             shape,
         }))

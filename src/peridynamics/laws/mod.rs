@@ -36,7 +36,7 @@ mod st_venant_kirchhoff;
 use std::sync::Arc;
 
 use crate::material::Kinematics;
-use crate::peridynamics::{Influence, Law, force_state::PLASTIC_STRAIN};
+use crate::peridynamics::{Influence, Law, ZeroEnergyControl, force_state::PLASTIC_STRAIN};
 
 pub use bond_based::BondBased;
 pub use continuum_damage::ContinuumDamage;
@@ -112,9 +112,21 @@ pub struct Constants {
     pub influence: Influence,
     /// What the dimension stands for.
     pub kinematics: Kinematics,
+    /// Density ρ [kg/m^D].
+    pub density: f64,
 }
 
 impl Constants {
+    /// The linearisation of a correspondence material with these constants and a zero-energy control, by its place in [`ZeroEnergyControl::WORDS`].
+    pub fn correspondence<const D: usize>(
+        &self,
+        stabilisation: f64,
+        control: f64,
+    ) -> Correspondence<D> {
+        Correspondence::new(self.influence, self.lambda, self.shear, stabilisation)
+            .with_control(ZeroEnergyControl::of_place(control as usize), self.density)
+    }
+
     /// Lamé's λ of the solid of which the body is made \[Pa\].
     pub fn solid_lambda(&self) -> f64 {
         let (lambda, shear) = (self.lambda, self.shear);
@@ -166,6 +178,7 @@ pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
             2 => Kinematics::PlaneStrain,
             _ => Kinematics::Solid,
         },
+        density: 1.0,
     };
     let Constants { lambda, shear, .. } = constants;
     let typed: [Arc<dyn Law<D>>; 3] = [
@@ -232,6 +245,7 @@ fn mixtures<const D: usize>() -> impl Iterator<Item = Arc<dyn Law<D>>> {
                 2 => Kinematics::PlaneStrain,
                 _ => Kinematics::Solid,
             },
+            density: 1.0,
         };
         let law = Named::PlasticCorrespondence;
         let mut values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
@@ -330,6 +344,7 @@ macro_rules! named_laws {
                     shear: 1.0,
                     influence: Influence::Gaussian,
                     kinematics: Kinematics::Bar,
+                    density: 1.0,
                 };
                 let values: Vec<f64> = self.parameters().iter().map(|p| p.usual).collect();
                 self.build::<1>(constants, &values)

@@ -185,6 +185,7 @@ impl<const D: usize> LinearForceState<D> for PositionAwareSolid<D> {
         Ok(Some(StatePart {
             modulus,
             stabilisation: 0.0,
+            control: 0.0,
             deviator: 1.0 / d,
             shape,
         }))

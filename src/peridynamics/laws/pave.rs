@@ -234,6 +234,7 @@ mod tests {
             shear: 1.3,
             influence: Influence::Gaussian,
             kinematics: Kinematics::Solid,
+            density: 1.0,
         };
         let linear = PositionAwareSolid::<3>::of(constants, 0.0);
         let relaxing = PositionAwareViscoelasticSolid::new(linear.clone(), vec![(0.0, 0.7)]);
@@ -258,6 +259,7 @@ mod tests {
             damage: 0.0,
             keeps_damage: false,
             material: 0,
+            kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
         };
         let respond = |law: &dyn ForceState<3>, numbers: usize| {
             let past = vec![0.0; numbers];

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Constants, Correspondence, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Hardening, J2, Kinematics, LocalLaw, LogarithmicJ2, Reduced},
     peridynamics::Law,
@@ -57,6 +57,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
         },
         LocalCorrespondence::<D>::STABILISATION,
         STRAINS,
+        LocalCorrespondence::<D>::CONTROL,
     ];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
@@ -70,7 +71,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             "plastic correspondence",
             constants,
             hardening,
-            values[4],
+            (values[4], values[6]),
             values[5] != 0.0,
         )
     }
@@ -83,19 +84,19 @@ pub(super) const STRAINS: Parameter = Parameter::words(
     &["small", "large"],
 );
 
-/// A J2 material at points and in finite elements, for small strains or for large ones.
+/// A J2 material at points and in finite elements, for small strains or for large ones, with the strength and the place of its zero-energy control.
 pub(super) fn plastic<const D: usize>(
     name: &'static str,
     constants: Constants,
     hardening: Hardening,
-    stabilisation: f64,
+    (stabilisation, control): (f64, f64),
     is_large: bool,
 ) -> Arc<dyn Law<D>> {
     let Constants {
         lambda,
         shear,
-        influence,
         kinematics,
+        ..
     } = constants;
     let of_solid = || (constants.solid_lambda(), shear, hardening);
     let local: Arc<dyn LocalLaw<D>> = match kinematics {
@@ -111,6 +112,6 @@ pub(super) fn plastic<const D: usize>(
         }
         _ => Arc::new(J2::<D>::with_hardening(lambda, shear, hardening)),
     };
-    let linear = Correspondence::new(influence, lambda, shear, stabilisation);
+    let linear = constants.correspondence(stabilisation, control);
     Arc::new(LocalCorrespondence::new(name, linear, local))
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::{
     peridynamics::{
         Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Mixture, Past, PdError, Present,
-        ShellTarget, StatePart,
+        HistoryLayout, Influence, Law, LinearForceState, Mixture, Past, PdError, PointStress,
+        Present, ShellTarget, StatePart,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -301,6 +301,16 @@ impl<const D: usize> ForceState<D> for Several<D> {
     ) -> Tensor<D> {
         let states = self.states(family.material);
         states.map_or_else(Tensor::zeros, |states| states.stress(family, past, force))
+    }
+
+    fn correspondence(&self, material: Option<u16>) -> Option<PointStress<'_, D>> {
+        let of = |m: u16| self.states(m)?.correspondence(Some(m));
+        let first = of(material.unwrap_or(self.used[0]))?;
+        let is_alike = |m: &u16| of(*m).is_some_and(|s| s.control == first.control);
+        match material {
+            Some(_) => Some(first),
+            None => self.used.iter().all(is_alike).then_some(first),
+        }
     }
 
     fn responds(&self, family: &DeformedFamily<'_, D>) -> bool {

@@ -93,6 +93,7 @@ impl<const D: usize> Point<D> {
             damage: 0.0,
             keeps_damage: false,
             material: 0,
+            kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
         };
         let mut force = vec![Vector::zeros(); self.bonds.len()];
         let mut after = past.to_vec();

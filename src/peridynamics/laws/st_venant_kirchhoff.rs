@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Constants, Correspondence, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Kinematics, Reduced, StVenantKirchhoff},
     peridynamics::Law,
@@ -17,13 +17,16 @@ impl<const D: usize> NamedLaw<D> for StVenantKirchhoffSolid<D> {
     const ABOUT: &'static str = "Correspondence with a St Venant–Kirchhoff solid, for large rotations and moderate strains.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
-    const PARAMETERS: &'static [Parameter] = &[LocalCorrespondence::<D>::STABILISATION];
+    const PARAMETERS: &'static [Parameter] = &[
+        LocalCorrespondence::<D>::STABILISATION,
+        LocalCorrespondence::<D>::CONTROL,
+    ];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
         let shear = constants.shear;
         let solid = Arc::new(StVenantKirchhoff::new(constants.solid_lambda(), shear));
         let local = Arc::new(Reduced::new(solid, constants.kinematics));
-        let linear = Correspondence::new(constants.influence, constants.lambda, shear, values[0]);
+        let linear = constants.correspondence(values[0], values[1]);
         Arc::new(LocalCorrespondence::new(
             "St Venant–Kirchhoff correspondence",
             linear,

@@ -46,15 +46,31 @@ pub struct UmatSpec {
     /// CELENT; not a number if left out.
     #[serde(default)]
     pub element_length: Option<Number>,
-    /// Strength of the stabilising bond force relative to an LPS; 1 if left out, 0 switches it off.
+    /// Strength of the zero-energy control relative to the bonds of an LPS; 1 if left out, 0 switches it off.
     #[serde(default)]
     pub stabilisation: Option<Number>,
+    /// What resists deformations that are not uniform: a bond force, one by the lengths of bonds alone, or a drag (in explicit dynamics).
+    #[serde(default)]
+    pub zero_energy_control: ControlSpec,
     /// Stretch at which a bond breaks.
     #[serde(default)]
     pub critical_stretch: Option<Number>,
     /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
     #[serde(default)]
     pub cells: Option<CellsSpec>,
+}
+
+/// What resists zero-energy modes, in the order of [`crate::peridynamics::ZeroEnergyControl::WORDS`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ControlSpec {
+    /// A bond force.
+    #[default]
+    BondForce,
+    /// The lengths of bonds.
+    Length,
+    /// A drag.
+    Drag,
 }
 
 /// How large strains and rotations may become.

@@ -1,0 +1,71 @@
+//! What the generic pass tells of the force states of single points.
+
+use super::{
+    BondPass, ForceStates,
+    bond_failure::BondFailure,
+    generic::{Generic, Scratch, at},
+};
+use crate::{peridynamics::Past, tensor::Tensor};
+
+impl<const D: usize> ForceStates<D> for Generic<D> {
+    fn partial_stress(&self, i: usize, u: &[f64]) -> Tensor<D> {
+        let mut s = Scratch::default();
+        self.respond(
+            i,
+            &|j| at(u, j),
+            |bond| self.intact[bond],
+            0.0,
+            &self.past,
+            &mut s,
+        );
+        let own = i * self.layout.point.len()..(i + 1) * self.layout.point.len();
+        let parts = s.split(self.state[i].as_ref(), false);
+        let past = Past {
+            point: &self.past.point[own],
+            bonds: parts.past,
+        };
+        let law = self.law.force_state();
+        law.map_or_else(Tensor::zeros, |law| {
+            law.stress(&parts.family, past, parts.force)
+        })
+    }
+
+    fn energy_density(&self, i: usize, u: &[f64]) -> f64 {
+        let (displaced, intact) = (|j| at(u, j), |bond: usize| self.intact[bond]);
+        let mut s = Scratch::default();
+        self.respond(i, &displaced, intact, 0.0, &self.past, &mut s)
+            .stored
+    }
+
+    fn family_size(&self, point: usize) -> usize {
+        self.range(point).len()
+    }
+
+    fn points_without_response(&self, u: &[f64]) -> usize {
+        let Some(law) = self.law.force_state() else {
+            return 0;
+        };
+        let mut s = Scratch::default();
+        let lacks = |i: &usize| {
+            let intact = |bond: usize| self.intact[bond];
+            self.respond(*i, &|j| at(u, j), intact, 0.0, &self.past, &mut s);
+            !law.responds(&s.split(self.state[*i].as_ref(), false).family)
+        };
+        let damaged = (0..self.position.len()).filter(|&i| self.row[i] && self.is_damaged(i));
+        damaged.filter(lacks).count()
+    }
+
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let names = self.layout.point;
+        let column = |k: usize| {
+            let points = self.past.point.chunks_exact(names.len());
+            points.map(|numbers| numbers[k]).collect()
+        };
+        let named = names.iter().enumerate();
+        let mut found: Vec<_> = named.map(|(k, name)| (*name, column(k))).collect();
+        if let BondFailure::Tearing(tearing) = &self.failure {
+            found.push(("tearing parameter", tearing.values().to_vec()));
+        }
+        found
+    }
+}

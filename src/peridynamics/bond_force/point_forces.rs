@@ -1,0 +1,405 @@
+//! The force of laws whose points have a stress: correspondence without a force state per bond.
+//!
+//! `T_i⟨ξ⟩ = ω (B_i ξ + q_i η)` with one tensor `B` and one number `q` per point, so that two loops over the bonds are enough: one adds up the deformation gradient of each family, after which the local law
+//! is asked once per point; the other adds up what the points around give. The own part of a force, `B_i Σ ω ξ V + q_i Σ ω η V`, needs no second loop.
+//! What this computes is what [`crate::peridynamics::ForceState::respond`] says of such laws, bond by bond (`point_forces_tests.rs`).
+
+use rayon::prelude::*;
+
+use super::{
+    Kinematics,
+    bond_failure::BondFailure,
+    drag::Drag,
+    generic::{Generic, History, NONE, Outcome},
+};
+use crate::{
+    material::LocalResponse,
+    peridynamics::{
+        ForceState,
+        body::split_rows,
+        force_state::PLASTIC_STRAIN,
+        shape_tensor::spanned_inverse,
+        tearing_parameter::{Flow, tension},
+        zero_energy::{ZeroEnergyControl, excess_length},
+    },
+    tensor::{Tensor, Vector},
+};
+
+/// What a family has whatever its deformation, by its intact bonds.
+#[derive(Clone, Copy)]
+struct Intact<const D: usize> {
+    /// `K⁻¹`; none if they do not span the space.
+    inverse: Option<Tensor<D>>,
+    /// `Σ ω ξ V` \[m^(D+1)\].
+    first: Vector<D>,
+    /// Share of the family's volume whose bonds are broken.
+    damage: f64,
+}
+
+/// What the bonds of a family take from their centre: `ω (B ξ + q η)`.
+#[derive(Clone, Copy)]
+struct PointTensor<const D: usize> {
+    through: Tensor<D>,
+    strength: f64,
+}
+
+impl<const D: usize> PointTensor<D> {
+    const NONE: Self = Self {
+        through: Tensor::<D>::from_array_storage(nalgebra::ArrayStorage([[0.0; D]; D])),
+        strength: 0.0,
+    };
+}
+
+/// What the pass keeps for it.
+pub(super) struct PointForces<const D: usize> {
+    pub(super) control: ZeroEnergyControl,
+    /// ω V of every bond, V of its far point; 0 of broken ones.
+    pub(super) weight: Vec<f64>,
+    /// The same with the ω that the far family gives to the bond, 0 if there is none; empty if all are equal.
+    pub(super) back: Vec<f64>,
+    intact: Vec<Intact<D>>,
+    /// Of the last force.
+    tensor: Vec<PointTensor<D>>,
+    /// `F̄ − I` of the last force.
+    gradient: Vec<Tensor<D>>,
+    /// The own part of the force per volume.
+    own: Vec<Vector<D>>,
+    pub(super) drag: Option<Drag<D>>,
+}
+
+impl<const D: usize> PointForces<D> {
+    /// For laws that have such points; the bonds as they stand are found by [`Generic::recall_intact`].
+    pub(super) fn new(states: &dyn ForceState<D>, points: usize) -> Option<Self> {
+        let control = states.correspondence(None)?.control;
+        Some(Self {
+            control,
+            weight: Vec::new(),
+            back: Vec::new(),
+            intact: Vec::new(),
+            tensor: vec![PointTensor::NONE; points],
+            gradient: vec![Tensor::zeros(); points],
+            own: vec![Vector::zeros(); points],
+            drag: (control == ZeroEnergyControl::Drag).then(|| Drag::new(points)),
+        })
+    }
+
+    /// ω V as the far ends of the bonds give it.
+    pub(super) fn back(&self) -> &[f64] {
+        match self.back.is_empty() {
+            true => &self.weight,
+            false => &self.back,
+        }
+    }
+
+    /// The strength of a control that the tensors of the points do not hold.
+    pub(super) fn strength(&self, i: usize) -> f64 {
+        self.tensor[i].strength
+    }
+
+    pub(super) fn memory_bytes(&self) -> usize {
+        (self.weight.len() + self.back.len()) * 8
+            + self.intact.len() * std::mem::size_of::<Intact<D>>()
+            + self.tensor.len() * std::mem::size_of::<PointTensor<D>>()
+            + self.gradient.len() * std::mem::size_of::<Tensor<D>>()
+            + self.own.len() * D * 8
+            + self.drag.as_ref().map_or(0, Drag::memory_bytes)
+    }
+}
+
+impl<const D: usize> Generic<D> {
+    /// Goes back to a force state per bond, with which this is compared.
+    #[cfg(test)]
+    pub(super) fn by_bonds(&mut self) {
+        self.points = None;
+        self.force_state = vec![Vector::zeros(); self.families.neighbours.len()];
+    }
+
+    /// Takes up which bonds stand: of all points, or of those of `only`.
+    pub(super) fn recall_intact(&mut self, only: Option<&[(u32, usize)]>) {
+        let Some(mut points) = self.points.take() else {
+            return;
+        };
+        let omega = |bond: usize| match self.intact[bond] {
+            true => self.omega[bond],
+            false => 0.0,
+        };
+        let far = |bond: usize| match self.reverse[bond] {
+            NONE => 0.0,
+            back => omega(back as usize),
+        };
+        let volume = |bond: usize| self.volume[self.neighbour(bond)];
+        match only {
+            None => {
+                let bonds = 0..self.intact.len();
+                let weights = bonds.clone().map(|b| omega(b) * volume(b));
+                points.weight = weights.collect();
+                points.back.clear();
+                if bonds.clone().any(|b| far(b) != omega(b)) {
+                    points.back = bonds.map(|b| far(b) * volume(b)).collect();
+                }
+            }
+            Some(broken) => {
+                for &(_, bond) in broken {
+                    points.weight[bond] = 0.0;
+                }
+                let back = broken.iter().map(|b| self.reverse[b.1]);
+                let back = back.filter(|b| *b != NONE).map(|b| b as usize);
+                if points.back.is_empty() && back.clone().any(|b| self.intact[b]) {
+                    // one end alone broke
+                    let all = 0..self.intact.len();
+                    points.back = all.map(|b| far(b) * volume(b)).collect();
+                } else if !points.back.is_empty() {
+                    back.for_each(|b| points.back[b] = 0.0);
+                }
+            }
+        }
+        let of_point = |i: usize| self.intact_of(i, &points.weight);
+        match only {
+            None => points.intact = (0..self.position.len()).map(of_point).collect(),
+            Some(broken) => {
+                for of in broken.chunk_by(|a, b| a.0 == b.0) {
+                    points.intact[of[0].0 as usize] = of_point(of[0].0 as usize);
+                }
+            }
+        }
+        self.points = Some(points);
+    }
+
+    fn intact_of(&self, i: usize, weights: &[f64]) -> Intact<D> {
+        let range = self.range(i);
+        let is_whole = range.clone().all(|bond| self.intact[bond]);
+        let (mut left, mut first, mut volume) = (Tensor::zeros(), Vector::zeros(), 0.0);
+        for bond in range.filter(|&bond| self.intact[bond]) {
+            let j = self.neighbour(bond);
+            let xi = self.xi(i, j);
+            left += xi * xi.transpose() * weights[bond];
+            first += xi * weights[bond];
+            volume += self.volume[j];
+        }
+        let whole = self.state[i].as_ref().map(|state| &state.shape);
+        Intact {
+            inverse: whole.and_then(|whole| spanned_inverse(whole, (!is_whole).then_some(&left))),
+            first,
+            damage: match is_whole {
+                true => 0.0,
+                false => 1.0 - volume / self.family_volume[i],
+            },
+        }
+    }
+
+    /// The local response of a point at the displacement gradient `gradient`, and the share of its stress that is left; none if its family has no response.
+    fn local_response(
+        &self,
+        i: usize,
+        gradient: &Tensor<D>,
+        damage: f64,
+        step: f64,
+        past: &[f64],
+        present: &mut [f64],
+    ) -> Option<LocalResponse<D>> {
+        let material = self.material.get(i).copied().unwrap_or(0);
+        let states = self.law.force_state()?;
+        let law = states.correspondence(Some(material))?.law;
+        let found = law.respond(gradient, step, past, present);
+        if damage > 0.0 && !found.stored.is_finite() {
+            // what is left of the family is turned inside out
+            present.copy_from_slice(past);
+            return None;
+        }
+        Some(found)
+    }
+
+    /// Stress and history of all points at the end of a step.
+    pub(super) fn respond_points(&mut self, points: &mut PointForces<D>, u: &[f64], step: f64) {
+        let mut present = std::mem::take(&mut self.present);
+        let mut outcome = std::mem::take(&mut self.outcome);
+        let kept = self.layout.point.len();
+        let offsets: Vec<usize> = (0..=outcome.len()).map(|i| i * kept).collect();
+        let histories = split_rows(&mut present.point, &offsets);
+        let PointForces {
+            weight,
+            intact,
+            tensor,
+            gradient,
+            own,
+            ..
+        } = points;
+        let flows = self.layout.point.iter().position(|n| *n == PLASTIC_STRAIN);
+        let flows = flows.filter(|_| matches!(self.failure, BondFailure::Tearing(_)));
+        let all = tensor.par_iter_mut().zip(gradient).zip(own);
+        let all = all.zip(histories).zip(&mut outcome).enumerate();
+        all.with_min_len(16).for_each(|(i, point)| {
+            let ((((tensor, gradient), own), present), outcome) = point;
+            (*tensor, *own, *outcome) = (PointTensor::NONE, Vector::zeros(), Outcome::default());
+            let past = &self.past.point[i * kept..(i + 1) * kept];
+            present.copy_from_slice(past);
+            let (Some(inverse), Some(state)) = (intact[i].inverse, &self.state[i]) else {
+                return;
+            };
+            let (sum, first) = self.moments(i, weight, u);
+            *gradient = sum * inverse;
+            let damage = intact[i].damage;
+            let Some(found) = self.local_response(i, gradient, damage, step, past, present) else {
+                return;
+            };
+            let left = 1.0 - damage;
+            outcome.dissipated = left * found.dissipated * self.volume[i];
+            if let Some(place) = flows {
+                let strain = present[place];
+                outcome.flow = Flow {
+                    strain,
+                    growth: strain - past[place],
+                    // asked for of points that have flowed alone
+                    tension: match strain > 0.0 {
+                        true => tension(&found.principal_stresses(gradient, self.is_objective)),
+                        false => 0.0,
+                    },
+                };
+            }
+            tensor.through = found.stress * inverse * left;
+            tensor.strength = state.stabilisation;
+            match points.control {
+                ZeroEnergyControl::BondForce => {
+                    tensor.through -= *gradient * state.stabilisation;
+                    *own = first * state.stabilisation;
+                }
+                _ => tensor.strength = state.control,
+            }
+            *own += tensor.through * intact[i].first;
+        });
+        self.present = present;
+        self.outcome = outcome;
+    }
+
+    /// `Σ w η ⊗ ξ` and `Σ w η` of a family.
+    fn moments(&self, i: usize, weights: &[f64], u: &[f64]) -> (Tensor<D>, Vector<D>) {
+        let (mut sum, mut first) = ([[0.0; D]; D], [0.0; D]);
+        self.each_bond(i, weights, u, |_, w, xi, eta| {
+            for a in 0..D {
+                let of = w * eta[a];
+                first[a] += of;
+                for b in 0..D {
+                    sum[a][b] += of * xi[b];
+                }
+            }
+        });
+        (Tensor::from_fn(|a, b| sum[a][b]), first.into())
+    }
+
+    /// Goes over a family's bonds: far point, weight, ξ and η of each.
+    #[inline(always)]
+    pub(super) fn each_bond(
+        &self,
+        i: usize,
+        weights: &[f64],
+        u: &[f64],
+        mut f: impl FnMut(usize, f64, &[f64; D], &[f64; D]),
+    ) {
+        let range = self.range(i);
+        let here: [f64; D] = self.position[i].into();
+        let moved: [f64; D] = std::array::from_fn(|a| u[i * D + a]);
+        let far = self.families.neighbours[range.clone()].iter();
+        for (&j, &weight) in far.zip(&weights[range]) {
+            let j = j as usize;
+            let (there, far) = (&self.position[j], &u[j * D..(j + 1) * D]);
+            let xi = std::array::from_fn(|a| there[a] - here[a]);
+            let eta = std::array::from_fn(|a| far[a] - moved[a]);
+            f(j, weight, &xi, &eta);
+        }
+    }
+
+    /// `−V_i Σ V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)` of the points with rows.
+    pub(super) fn gather_points(&self, points: &PointForces<D>, u: &[f64], force: &mut [f64]) {
+        let rows = force.par_chunks_exact_mut(D).with_min_len(64).enumerate();
+        rows.for_each(|(i, force)| {
+            force.fill(0.0);
+            if !self.row[i] {
+                return;
+            }
+            let mut sum: [f64; D] = points.own[i].into();
+            self.each_bond(i, points.back(), u, |j, w, xi, eta| {
+                let PointTensor { through, strength } = &points.tensor[j];
+                let strength = match points.control {
+                    ZeroEnergyControl::BondForce => *strength,
+                    _ => 0.0,
+                };
+                for a in 0..D {
+                    let mut t = strength * eta[a];
+                    for b in 0..D {
+                        t += through[(a, b)] * xi[b];
+                    }
+                    sum[a] += w * t;
+                }
+            });
+            if points.control == ZeroEnergyControl::Length {
+                self.add_lengths(points, i, u, &mut sum);
+            }
+            for (force, sum) in force.iter_mut().zip(sum) {
+                *force = -self.volume[i] * sum;
+            }
+        });
+    }
+
+    /// Adds the force states of the length control of both ends.
+    fn add_lengths(&self, points: &PointForces<D>, i: usize, u: &[f64], sum: &mut [f64; D]) {
+        let start = self.range(i).start;
+        let mut bond = start;
+        let back = points.back();
+        self.each_bond(i, &points.weight, u, |j, own, xi, eta| {
+            let (xi, eta) = (Vector::from(*xi), Vector::from(*eta));
+            let of = |p: usize| {
+                let strength = points.tensor[p].strength;
+                strength * excess_length(&xi, &eta, &points.gradient[p], self.kinematics)
+            };
+            let along = match self.kinematics {
+                Kinematics::Exact => xi + eta,
+                Kinematics::Linear => xi,
+            };
+            let size = (own * of(i) + back[bond] * of(j)) / along.norm();
+            if size != 0.0 {
+                (0..D).for_each(|a| sum[a] += size * along[a]);
+            }
+            bond += 1;
+        });
+    }
+
+    /// Energy that a point stores \[J\], with the history `past` and without letting time pass.
+    pub(super) fn point_energy(
+        &self,
+        points: &PointForces<D>,
+        i: usize,
+        u: &[f64],
+        past: &History,
+        present: &mut Vec<f64>,
+    ) -> f64 {
+        let Intact {
+            inverse, damage, ..
+        } = &points.intact[i];
+        let (Some(inverse), Some(state)) = (inverse, &self.state[i]) else {
+            return 0.0;
+        };
+        let kept = self.layout.point.len();
+        let past = &past.point[i * kept..(i + 1) * kept];
+        present.clear();
+        present.extend(past);
+        let gradient = self.moments(i, &points.weight, u).0 * inverse;
+        let Some(found) = self.local_response(i, &gradient, *damage, 0.0, past, present) else {
+            return 0.0;
+        };
+        let mut squares = 0.0;
+        self.each_bond(i, &points.weight, u, |_, w, xi, eta| {
+            let (xi, eta) = (Vector::from(*xi), Vector::from(*eta));
+            squares += w * match points.control {
+                ZeroEnergyControl::BondForce => {
+                    state.stabilisation * (eta - gradient * xi).norm_squared()
+                }
+                ZeroEnergyControl::Length => {
+                    let excess = excess_length(&xi, &eta, &gradient, self.kinematics);
+                    state.control * excess * excess
+                }
+                ZeroEnergyControl::Drag => 0.0,
+            };
+        });
+        ((1.0 - damage) * found.stored + 0.5 * squares) * self.volume[i]
+    }
+}
