@@ -173,6 +173,7 @@ fn solved<const D: usize>(
             conditions,
             solver,
             time: t,
+            thermal: None,
         },
         None,
         timings,
