@@ -216,6 +216,7 @@ impl OutputCost {
                 zone_of_site: &solution::zone_of_site(model),
                 system: None,
                 broken: &[],
+                stresses: None,
             };
             let mut series = Series::new(folder.path(), "trial");
             let more = [OverSites::Vector("velocity", &u)];

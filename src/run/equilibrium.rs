@@ -9,6 +9,7 @@ use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::summary::{Applied, Decision, Stopwatch, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
+use crate::run::thermal::Thermal;
 use crate::scene::conditions::Condition;
 use crate::scene::validated::Solver;
 use crate::solve::explicit::Drive;
@@ -32,6 +33,8 @@ pub(crate) struct StaticInput<'a, const D: usize> {
     pub time: f64,
     /// The processes that solve it together, if there are several.
     pub ranks: Option<&'a dyn Ranks>,
+    /// What expands by its temperature, if anything does.
+    pub thermal: Option<&'a Thermal<D>>,
 }
 
 /// What of a stiffness is there to be proved: all of it, or its products.
@@ -89,7 +92,11 @@ pub(crate) fn equilibrium<const D: usize>(
     let model = at.model;
     let stiffness = model.assemble(at.operator, progress);
     watch.lap(&mut timings, "assembly");
-    let (load, applied) = loads(model, at.conditions, at.time)?;
+    let (mut load, applied) = loads(model, at.conditions, at.time)?;
+    let expands = (at.thermal).map(|thermal| thermal.forces(model, &stiffness, at.time));
+    if let Some(expands) = &expands {
+        load.iter_mut().zip(expands).for_each(|(f, own)| *f += own);
+    }
     let (prescribed, holder) = supports(model, at.conditions, at.time)?;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
     let mut choices = Vec::new();
@@ -104,7 +111,7 @@ pub(crate) fn equilibrium<const D: usize>(
         prescribed: &prescribed,
     };
     let params = params(at.solver);
-    let (solution, internal, energy) = match system {
+    let (solution, mut internal, mut energy) = match system {
         None => {
             let solution = statics::solve(&static_problem, &params, progress)?;
             let u = &solution.displacement;
@@ -115,6 +122,14 @@ pub(crate) fn equilibrium<const D: usize>(
         }
         Some(system) => nonlinear(system, &static_problem, &params, model, progress)?,
     };
+    if let Some(expands) = expands {
+        // what expansion takes belongs to the forces within the body
+        for ((f, load), own) in internal.iter_mut().zip(&mut load).zip(&expands) {
+            *f -= own;
+            *load -= own;
+        }
+        energy = None;
+    }
     let info = &solution.info;
     timings.add("ordering", info.ordering_seconds);
     timings.add("factorisation", info.factor_seconds);

@@ -10,6 +10,7 @@ use crate::peridynamics::bond_force::Kinematics;
 use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::progress::Progress;
 use crate::run::error::RunError;
+use crate::run::stress_settings::StressSettings;
 use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
 use crate::scene::failure::Breaking;
@@ -44,6 +45,8 @@ pub struct RunSettings<const D: usize> {
     pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
     /// Density of each material.
     pub density: Vec<f64>,
+    /// What expands, and what of the stress is written.
+    pub stresses: StressSettings<D>,
     /// The coupling, where the scene names none.
     pub chosen: Option<Decision>,
     /// How the zone was placed, where the scene draws none.
@@ -118,6 +121,7 @@ impl<const D: usize> RunSettings<D> {
 
 /// The problem of a scene, and what remains of the scene.
 pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) {
+    let stresses = StressSettings::of(&scene);
     let material = scene.point_materials[0];
     let law = Arc::clone(&scene.point_law);
     // of several the one that is farthest below bonds that act alone
@@ -186,6 +190,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             elements: scene.elements,
             local_laws,
             density,
+            stresses,
             chosen,
             placed: scene.placement.map(|p| p.choice),
             choices: scene.choices,

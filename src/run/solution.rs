@@ -1,6 +1,7 @@
 //! A solved scene, and where its sites lie.
 
 use crate::coupling::{Model, Operator, SiteKind, Zone};
+use crate::run::stress_settings::StressSettings;
 use crate::system::SemiDiscrete;
 
 /// A solved scene.
@@ -19,6 +20,8 @@ pub struct Solved<'a, const D: usize> {
     pub system: Option<&'a dyn SemiDiscrete>,
     /// Bonds that broke in motion, by the sites of their ends, each once for each direction.
     pub broken: &'a [(u32, u32)],
+    /// What of the stress is thermal and what is made of it, at a time; none where neither is.
+    pub stresses: Option<(&'a StressSettings<D>, f64)>,
 }
 
 /// The zone that each site lies in; of a node the most nonlocal one of the elements around it.

@@ -149,6 +149,7 @@ fn solve_chosen<const D: usize>(
         zone_of_site: &zone_of_site,
         system: system.as_ref().map(|s| s as &dyn SemiDiscrete),
         broken: &[],
+        stresses: rest.stresses.at(0.0),
     };
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
@@ -249,6 +250,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 solver: &self.rest.solver,
                 time: 0.0,
                 ranks: self.ranks,
+                thermal: self.rest.stresses.thermal.as_ref(),
             },
             system,
             Timings::default(),

@@ -7,6 +7,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::RunOptions;
 use super::solution::Solved;
+use super::stresses::{KnownStresses, Place};
 use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
 use crate::fem::{self, Locator};
 use crate::mesh::CellShape;
@@ -90,6 +91,13 @@ fn table<const D: usize>(
     for (i, first) in AXES[..D].iter().enumerate() {
         header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
     }
+    if solution.solved.has_derived() {
+        for (i, first) in AXES[..D].iter().enumerate() {
+            header.extend(AXES[i..D].iter().map(|second| format!("s{first}{second}")));
+        }
+        let derived = solution.solved.derived_names();
+        header.extend(derived.into_iter().map(|name| name.replace('-', "_")));
+    }
     header.push("model".to_owned());
     let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| solution.at(x)).collect();
     let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
@@ -103,6 +111,12 @@ fn table<const D: usize>(
             .collect();
         for i in 0..D {
             row.extend((i..D).map(|j| e[(i, j)]));
+        }
+        if let Some((stress, derived)) = &sample.stress {
+            for i in 0..D {
+                row.extend((i..D).map(|j| stress[(i, j)]));
+            }
+            row.extend(derived);
         }
         row.push(f64::from(label(sample.zone)));
         Some(row)
@@ -124,12 +138,15 @@ struct Sample<const D: usize> {
     displacement: Vector<D>,
     gradient: Tensor<D>,
     zone: Zone,
+    /// The stress and the numbers made of it, if they are asked for.
+    stress: Option<(Tensor<D>, Vec<f64>)>,
 }
 
 /// The solution at sites and between them.
 struct Solution<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
     intact: Intact,
+    known: KnownStresses,
     sampler: Sampler<'a, D>,
     body: Locator<D>,
     tolerance: f64,
@@ -142,6 +159,10 @@ impl<'a, const D: usize> Solution<'a, D> {
         Self {
             solved,
             intact: Intact::of(solved),
+            known: match solved.has_derived() {
+                true => KnownStresses::of(solved),
+                false => KnownStresses::default(),
+            },
             sampler: Sampler::new(model),
             body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
             tolerance: 1e-9 * (hi - lo).norm(),
@@ -164,17 +185,31 @@ impl<'a, const D: usize> Solution<'a, D> {
             return None;
         }
         let displacement = self.sampler.displacement(x, self.solved.displacement)?;
-        let (gradient, zone) = match self.sampler.carrier(x)? {
-            Carrier::Element(c) => (self.solved.element_gradient(c), self.solved.model.zones[c]),
-            Carrier::Point(site) => (
-                self.solved.point_gradient(site, &self.intact),
-                self.solved.zone_of_site[site],
-            ),
+        let (solved, wanted) = (self.solved, self.solved.has_derived());
+        let (gradient, zone, stress) = match self.sampler.carrier(x)? {
+            Carrier::Element(c) => {
+                let gradient = solved.element_gradient(c);
+                let stress = wanted.then(|| {
+                    let stress = solved.cell_stress(c, &gradient, &self.known);
+                    (stress, solved.derived(&stress, Place::Cell(c)))
+                });
+                (gradient, solved.model.zones[c], stress)
+            }
+            Carrier::Point(site) => {
+                let stress = wanted.then(|| {
+                    let intact = |p, j| self.intact.is_intact(p, j);
+                    let stress = solved.point_stress(site, intact, &self.known);
+                    (stress, solved.derived(&stress, Place::Point(site)))
+                });
+                let gradient = solved.point_gradient(site, &self.intact);
+                (gradient, solved.zone_of_site[site], stress)
+            }
         };
         Some(Sample {
             displacement,
             gradient,
             zone,
+            stress,
         })
     }
 }
@@ -329,6 +364,8 @@ struct SnapshotRows<'a, const D: usize> {
     strains: Vec<Tensor<D>>,
     stresses: Vec<Tensor<D>>,
     shown_cells: Vec<u32>,
+    known: KnownStresses,
+    places: Vec<Place>,
 }
 
 impl<'a, const D: usize> SnapshotRows<'a, D> {
@@ -344,6 +381,8 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             strains: Vec::new(),
             stresses: Vec::new(),
             shown_cells: Vec::new(),
+            known: KnownStresses::of(solved),
+            places: Vec::new(),
         }
     }
 
@@ -352,11 +391,6 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         let solved = self.solved;
         let (model, mesh) = (solved.model, &solved.model.mesh);
         let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
-        let of_cells: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
-            .map(|system| system.cell_stresses(solved.displacement))
-            .unwrap_or_default()
-            .into_iter()
-            .collect();
         let mut site_of_node = vec![None; mesh.nodes.len()];
         for (site, s) in model.sites.iter().enumerate() {
             if let SiteKind::Node(n) = s.kind {
@@ -384,12 +418,9 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             }
             let gradient = solved.element_gradient(c);
             self.strains.push(strain(&gradient));
-            self.stresses.push(match of_cells.get(&(c as u32)) {
-                Some(rows) => Tensor::from_fn(|i, j| rows[i][j]),
-                None => (solved.operator)
-                    .cell_stress(c, solved.displacement)
-                    .unwrap_or_else(|| model.tensor_of_cell(c).contract(&gradient)),
-            });
+            let stress = solved.cell_stress(c, &gradient, &self.known);
+            self.stresses.push(stress);
+            self.places.push(Place::Cell(c));
             self.shown_cells.push(c as u32);
         }
     }
@@ -399,25 +430,14 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         let solved = self.solved;
         let model = solved.model;
         let intact = Intact::of(solved);
-        // of force states that are not linear; the others follow from the displacements
-        let known: FxHashMap<u32, [[f64; 3]; 3]> = (solved.system)
-            .map(|system| system.stresses(solved.displacement))
-            .unwrap_or_default()
-            .into_iter()
-            .collect();
+        let known = &self.known;
         let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
             .into_par_iter()
             .filter(|&site| {
                 shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
             })
             .map(|site| {
-                let stress = match (known.get(&(site as u32)), model.point_of(site)) {
-                    (Some(rows), _) => Tensor::from_fn(|i, j| rows[i][j]),
-                    (None, Some((body, p))) => {
-                        body.partial_stress_of(p, solved.displacement, |j| intact.is_intact(p, j))
-                    }
-                    (None, None) => Tensor::zeros(),
-                };
+                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
                 (site, strain(&solved.point_gradient(site, &intact)), stress)
             })
             .collect();
@@ -438,6 +458,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                 .extend(material.flatten().map(|&m| i32::from(m)));
             self.strains.push(e);
             self.stresses.push(stress);
+            self.places.push(Place::Point(site));
         }
     }
 
@@ -497,6 +518,18 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             Field::tensor("strain", &self.strains),
             Field::tensor("stress", &self.stresses),
         ];
+        let derived: Vec<Vec<f64>> = match self.solved.has_derived() {
+            true => {
+                let each = self.stresses.par_iter().zip(&self.places);
+                each.map(|(s, place)| self.solved.derived(s, *place))
+                    .collect()
+            }
+            false => Vec::new(),
+        };
+        for (k, name) in self.solved.derived_names().into_iter().enumerate() {
+            let values = derived.iter().map(|d| d[k]).collect();
+            fields.push(Field::scalar(name, values));
+        }
         if !self.materials.is_empty() {
             fields.push(Field::integers("material", self.materials.clone()));
         }

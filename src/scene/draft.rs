@@ -10,6 +10,7 @@ use super::bounds_checks;
 use super::condition_list;
 use super::conditions::Condition;
 use super::error::{SceneError, SceneErrorKind};
+use super::failure::Breaking;
 use super::initial::Initial;
 use super::material_interfaces::MaterialInterface;
 use super::materials::{self, Material};
@@ -19,6 +20,7 @@ use super::solve::Solve;
 use super::spec::{
     BondsSpec, CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
 };
+use super::temperature::{self, Temperature};
 use super::unused::Parts;
 use super::user_material;
 use super::validated::{Scene, Solver};
@@ -46,6 +48,7 @@ pub(crate) struct Draft<'a, const D: usize> {
     pub cell_material: Vec<u16>,
     pub solve: Solve,
     pub conditions: Vec<Condition<D>>,
+    pub temperature: Option<Temperature>,
     pub initial: Vec<Initial<D>>,
     pub solver: Solver,
     /// Beginning of the names of its files.
@@ -91,6 +94,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         let clock = solve.clock();
         let conditions = condition_list::conditions(&spec.conditions, &mesh, clock)?;
         let initial = initial::initial(&spec.initial, &mesh, clock)?;
+        let temperature = temperature::temperature(spec.temperature.as_ref(), &mesh, clock)?;
         meshing::add_mesh(&mesh, &mut fingerprint);
         Ok(Self {
             spec,
@@ -100,6 +104,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             cell_material,
             solve,
             conditions,
+            temperature,
             initial,
             solver,
             name,
@@ -194,6 +199,19 @@ impl<'a, const D: usize> Draft<'a, D> {
         elements::elements(self.spec, coupling, (&self.materials, used), law, bonds)
     }
 
+    /// Refuses a temperature whose strain is not known, and numbers made of stresses that are not.
+    fn check_heat(
+        &self,
+        breaking: &Breaking<D>,
+        may_have_points: bool,
+        zones: &[Zone],
+    ) -> Result<(), SceneError> {
+        let (spec, materials) = (self.spec, &self.materials);
+        let has_points = may_have_points && zones.iter().any(|z| *z != Zone::Local);
+        temperature::agrees(spec, materials, breaking, &self.solve, has_points)?;
+        output::stresses_agree(spec, materials, self.kinematics)
+    }
+
     /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
     fn with_coupling(
         &self,
@@ -235,6 +253,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         self.check_laws(&joined.coupling, &used, &zones)?;
         let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
         let elements = self.elements(&joined.coupling, &used, law.as_ref(), breaking.bonds)?;
+        self.check_heat(&breaking, peridynamics.is_some(), &zones)?;
         let follow = adaptive_zone::follow(
             spec,
             &mut joined,
@@ -260,6 +279,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             placement: None,
             choices: choices.into_iter().chain(told).collect(),
             conditions: self.conditions.clone(),
+            temperature: self.temperature.clone(),
             voids,
             barriers,
             solve: self.solve.clone(),

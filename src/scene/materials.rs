@@ -55,6 +55,8 @@ pub struct Material<const D: usize> {
     pub density: f64,
     /// When its bonds break; never if there is none.
     pub fracture: Option<Fracture>,
+    /// Linear thermal expansion per degree; none if not given.
+    pub expansion: Option<f64>,
 }
 
 /// When a bond breaks.
@@ -112,6 +114,7 @@ pub(crate) fn materials<const D: usize>(
             lame,
             density,
             fracture: fracture(name, material)?,
+            expansion: material.thermal_expansion().map(|alpha| alpha.value),
         });
         match (cells, rest) {
             (Some(cells), _) => {

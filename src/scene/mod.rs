@@ -47,6 +47,7 @@ pub(crate) mod source;
 pub mod spec;
 mod surface_conditions;
 pub(crate) mod tagged_table;
+pub(crate) mod temperature;
 pub(crate) mod template;
 pub(crate) mod unused;
 pub(crate) mod user_material;

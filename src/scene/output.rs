@@ -3,11 +3,13 @@
 use super::bounds_checks;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
+use super::materials::Material;
 use super::region::{self, Region};
 use super::spec::{SceneSpec, TipSpec};
 use super::validated::{Output, Tip};
 use super::value::Text;
 use crate::fem::Locator;
+use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::ObserveError;
 use crate::observe::claim::{Claim, Files};
@@ -91,10 +93,36 @@ pub(crate) fn output<const D: usize>(
         name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
         vtu: o.vtu.unwrap_or(true),
         energy_density: o.energy_density.unwrap_or(false),
+        stresses: o.stresses.iter().map(|s| *s.get_ref()).collect(),
         lines,
         probes,
         tips,
     })
+}
+
+/// Refuses numbers made of a stress whose part out of the plane is not known.
+pub(super) fn stresses_agree<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    kinematics: Kinematics,
+) -> Result<(), SceneError> {
+    let Some(asked) = spec.output.stresses.first() else {
+        return Ok(());
+    };
+    let unknown = materials.iter().find(|m| !m.law.is_linear());
+    let Some(unknown) = unknown.filter(|_| kinematics == Kinematics::PlaneStrain) else {
+        return Ok(());
+    };
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!(
+            "`output.stresses` in plane strain, and the material `{}` is a {} law",
+            unknown.name,
+            unknown.law.name()
+        ),
+    )
+    .label(asked.span(), "its stress out of the plane is not written")
+    .help("use kinematics = \"solid\" with one layer of cells, or leave out `stresses`"))
 }
 
 impl<const D: usize> Output<D> {

@@ -53,6 +53,8 @@ pub struct Scene<const D: usize> {
     pub choices: Vec<Decision>,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
+    /// The temperature, if the scene has one.
+    pub temperature: Option<super::temperature::Temperature>,
     /// Empty regions: no point lies inside.
     pub voids: Vec<Shape<D>>,
     /// Voids and cracks that cut bonds.
@@ -114,6 +116,8 @@ pub struct Output<const D: usize> {
     pub vtu: bool,
     /// Whether it holds the energy density of points.
     pub energy_density: bool,
+    /// Numbers made of the stress that it holds too.
+    pub stresses: Vec<super::spec::StressSpec>,
     /// Lines of samples: name and positions.
     pub lines: Vec<(String, Vec<Vector<D>>)>,
     /// Probes: name and position.

@@ -7,6 +7,7 @@ use bondline::scene::Source;
 
 mod pressure;
 mod rotation;
+mod thermal;
 
 /// A finished run.
 struct Done {

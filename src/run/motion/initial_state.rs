@@ -106,7 +106,9 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let (mut moving, pace, growth) =
             paced(spec, &asked, self.moving, &held, known, self.choices)?;
         self.watch.lap(self.timings, "stable step");
-        let drive = driven(model, rest, &begin.u, &pace, spec)?;
+        let system = moving.system.as_ref();
+        let drive = driven(model, rest, &begin.u, &pace, spec)?
+            .heated(rest.stresses.thermal.as_ref(), system);
         if drive.evaluates_everywhere() {
             self.choices.push(Decision {
                 choice: "loads evaluated at every place and step".to_owned(),

@@ -81,7 +81,8 @@ fn load_steps<const D: usize>(
         Equilibrium::Relaxation => None,
     };
     let begin = start(model, &rest.initial);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
+        .heated(rest.stresses.thermal.as_ref(), system.as_ref());
     restore(system.as_mut(), saved.as_ref(), &file)?;
     let breaks = breaks(system.as_ref(), rest);
     let mut recorder = recorder(model, rest, spec, options, breaks, file, saved.as_ref())?;
@@ -100,7 +101,7 @@ fn load_steps<const D: usize>(
         pace,
         breaks,
         drive: &drive,
-        fields: FieldOutput::new(model, operator),
+        fields: FieldOutput::new(model, operator, &rest.stresses),
         recorder,
         rotations,
         state,

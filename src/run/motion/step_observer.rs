@@ -19,6 +19,7 @@ use crate::run::error::RunError;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
+use crate::run::stress_settings::StressSettings;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::solve::explicit::{Explicit, State};
@@ -61,15 +62,21 @@ pub(super) struct FieldOutput<'a, const D: usize> {
     model: &'a Model<D>,
     operator: &'a dyn Operator<D>,
     zone_of_site: Vec<crate::coupling::Zone>,
+    stresses: &'a StressSettings<D>,
 }
 
 impl<'a, const D: usize> FieldOutput<'a, D> {
     /// Of a model and the rows of its sites.
-    pub fn new(model: &'a Model<D>, operator: &'a dyn Operator<D>) -> Self {
+    pub fn new(
+        model: &'a Model<D>,
+        operator: &'a dyn Operator<D>,
+        stresses: &'a StressSettings<D>,
+    ) -> Self {
         Self {
             model,
             operator,
             zone_of_site: solution::zone_of_site(model),
+            stresses,
         }
     }
 
@@ -90,6 +97,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
             zone_of_site: &self.zone_of_site,
             system: Some(moment.system),
             broken: &moment.broken_bonds(),
+            stresses: self.stresses.at(moment.state.time),
         };
         recorder.output(moment, &solved)
     }
@@ -162,7 +170,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         };
         Ok(Self {
             segment,
-            fields: FieldOutput::new(model, segment.operator),
+            fields: FieldOutput::new(model, segment.operator, &segment.rest.stresses),
             monitor,
             guard,
             recorder,

@@ -5,8 +5,10 @@ use std::sync::{Mutex, PoisonError};
 use crate::coupling::Model;
 use crate::run::error::RunError;
 use crate::run::loads::{Loads, displacement, holders};
+use crate::run::thermal::Thermal;
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::solve::explicit::Drive;
+use crate::system::{BlockCsr, SemiDiscrete};
 use crate::tensor::Vector;
 
 /// The conditions of a scene on the sites of its model.
@@ -23,6 +25,8 @@ pub struct SceneDrive<'a, const D: usize> {
     by_time: Vec<TimedLoad>,
     /// Loads that depend on time and place.
     by_both: Vec<usize>,
+    /// Expansion by a temperature that changes, and the rows of all sites.
+    heat: Option<(&'a Thermal<D>, BlockCsr)>,
     prescribed: Vec<u32>,
     /// The condition that holds each prescribed dof.
     holder: Vec<u32>,
@@ -96,12 +100,31 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             steady,
             by_time,
             by_both,
+            heat: None,
             start: prescribed.iter().map(|&k| start[k as usize]).collect(),
             prescribed,
             holder,
             ways,
             step,
         })
+    }
+
+    /// With the forces of thermal expansion, by the rows of `system`.
+    #[must_use]
+    pub fn heated(mut self, thermal: Option<&'a Thermal<D>>, system: &dyn SemiDiscrete) -> Self {
+        let Some(thermal) = thermal else {
+            return self;
+        };
+        let sites: Vec<u32> = (0..self.model.sites.len() as u32).collect();
+        let rows = system.tangent_rows(&sites);
+        if thermal.temperature.value.depends_on_time() {
+            self.heat = Some((thermal, rows));
+        } else {
+            let forces = thermal.forces(self.model, &rows, 0.0);
+            let loads = self.steady.iter_mut().zip(forces);
+            loads.for_each(|(load, f)| *load += f);
+        }
+        self
     }
 
     /// Each prescribed dof with the condition that holds it.
@@ -254,10 +277,14 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
             let field = |x: &_, n: &_| self.conditions[number].force_density(x, n, time);
             self.loads.add(number, field, load);
         }
+        if let Some((thermal, rows)) = &self.heat {
+            let forces = thermal.forces(self.model, rows, time);
+            load.iter_mut().zip(forces).for_each(|(load, f)| *load += f);
+        }
     }
 
     fn is_steady(&self) -> bool {
-        self.by_time.is_empty() && self.by_both.is_empty()
+        self.by_time.is_empty() && self.by_both.is_empty() && self.heat.is_none()
     }
 
     fn prescribed(&self) -> &[u32] {

@@ -174,6 +174,7 @@ fn solved<const D: usize>(
             solver,
             time: t,
             ranks: None,
+            thermal: None,
         },
         None,
         timings,

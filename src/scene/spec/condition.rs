@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::scene::expression::Expression;
 use crate::scene::spec::region::ShapeSpec;
-use crate::scene::value::{Coordinates, Text};
+use crate::scene::value::{Coordinates, Number, Text};
 
 /// What is prescribed somewhere.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -141,6 +141,17 @@ pub struct BodyForceSpec {
     /// Force along z.
     #[serde(default)]
     pub z: Option<Expression>,
+}
+
+/// A temperature, by which bond-based and lps materials expand.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct TemperatureSpec {
+    /// Temperature in x, y, z and, in scenes in time, t.
+    pub value: Expression,
+    /// Temperature without thermal strain; 0 if left out.
+    #[serde(default)]
+    pub reference: Option<Number>,
 }
 
 /// An empty region.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
+use toml::Spanned;
 
 use super::motion::TipSpec;
 use crate::scene::value::{Coordinates, Count, Number, Text};
@@ -58,6 +59,10 @@ pub struct OutputSpec {
     /// Whether the VTU has the energy density of peridynamic points; false if left out.
     #[serde(default)]
     pub energy_density: Option<bool>,
+    /// Stresses that the VTU holds as fields beside the tensor; with any of them tables of static scenes along lines and at probes have columns of stress. None if left out.
+    #[serde(default)]
+    #[schemars(with = "Vec<StressSpec>")]
+    pub stresses: Vec<Spanned<StressSpec>>,
     /// Straight lines along which a CSV file samples the solution, by name.
     #[serde(default)]
     pub lines: BTreeMap<Text, LineSpec>,
@@ -67,6 +72,18 @@ pub struct OutputSpec {
     /// Tips of cracks to follow, by name, in a scene in which bonds break.
     #[serde(default)]
     pub tips: BTreeMap<Text, TipSpec>,
+}
+
+/// A number made of a stress, that out of the plane included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StressSpec {
+    /// Von Mises' equivalent stress.
+    VonMises,
+    /// The largest principal stress.
+    MaxPrincipal,
+    /// The smallest principal stress.
+    MinPrincipal,
 }
 
 /// A line of samples.

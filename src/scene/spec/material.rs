@@ -33,6 +33,17 @@ pub enum MaterialSpec {
     Named(NamedSpec),
 }
 
+impl MaterialSpec {
+    /// Thermal expansion, where it is typed.
+    pub fn thermal_expansion(&self) -> Option<&Number> {
+        match self {
+            Self::BondBased(m) => m.thermal_expansion.as_ref(),
+            Self::Lps(m) => m.thermal_expansion.as_ref(),
+            _ => None,
+        }
+    }
+}
+
 /// Keys of materials.
 static KEYS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
     let typed = ["bond-based", "lps", "correspondence", "umat"];
@@ -187,6 +198,9 @@ pub struct BondBasedSpec {
     /// Density.
     #[serde(default)]
     pub density: Option<Number>,
+    /// Linear thermal expansion α per degree, with `[temperature]`.
+    #[serde(default)]
+    pub thermal_expansion: Option<Number>,
     /// How the stiffness of a bond depends on its length.
     #[serde(default)]
     pub micromodulus: MicromodulusSpec,
@@ -212,6 +226,9 @@ pub struct StateBasedSpec {
     /// Density.
     #[serde(default)]
     pub density: Option<Number>,
+    /// Linear thermal expansion α per degree, with `[temperature]`.
+    #[serde(default)]
+    pub thermal_expansion: Option<Number>,
     /// Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.
     #[serde(default)]
     pub fracture_energy: Option<Number>,

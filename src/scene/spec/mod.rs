@@ -15,9 +15,9 @@ mod user_material;
 
 pub use condition::{
     BodyForceSpec, ConditionSpec, DisplacementSpec, PressureSpec, RotationSpec, SymmetrySpec,
-    TractionSpec, VelocitySpec, VoidSpec,
+    TemperatureSpec, TractionSpec, VelocitySpec, VoidSpec,
 };
-pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec, UnprovenSpec};
+pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec, StressSpec, UnprovenSpec};
 pub use coupling::{
     BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec, InterfaceSpec,
     LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
@@ -94,6 +94,9 @@ pub struct SceneSpec {
     /// Displacements, velocities, tractions and body forces by name.
     #[serde(default)]
     pub conditions: BTreeMap<Text, ConditionSpec>,
+    /// Temperature of the body; without it nothing expands.
+    #[serde(default)]
+    pub temperature: Option<TemperatureSpec>,
     /// Displacements and velocities at time zero by name; at rest where none says otherwise.
     #[serde(default)]
     pub initial: BTreeMap<Text, InitialSpec>,

@@ -1,0 +1,187 @@
+//! Thermal strain: what a temperature that differs from the one without stress does to the sites of a model.
+//!
+//! A body whose temperature is linear in space expands without stress by a displacement that is quadratic: with the rise τ and its gradient g at a place, `u = α (τ r + (g·r) r − ½ g |r|²)`, r from there. Its strain is `α (τ + g·r)` in
+//! all directions. Source: [BoleyWeiner1960], the strain being compatible where the temperature is linear.
+//!
+//! The thermal force of a site is what its own row makes of that displacement, with the rise of both ends of every pair: `α ξ (τ_i + τ_j)/2` along a bond, so that the extension of a bond less its thermal part is what
+//! stretches it. A finite element takes its own expansion, at its nodes. Every row, of a seam too, is then free of force where the body expands freely under a uniform or a linear temperature.
+
+use crate::coupling::{CellRole, Model, SiteKind};
+use crate::fem;
+use crate::scene::temperature::Temperature;
+use crate::system::BlockCsr;
+use crate::tensor::{Tensor, Vector, padded};
+
+/// The temperature of a body, and how its materials expand.
+#[derive(Clone, Debug)]
+pub struct Thermal<const D: usize> {
+    /// The temperature, and the one without stress.
+    pub temperature: Temperature,
+    /// Expansion per degree of each material within the dimensions of the scene: `(1 + ν) α` in plane strain.
+    pub expansion: Vec<f64>,
+    /// Half of the distance over which the temperature is differenced.
+    pub reach: f64,
+}
+
+/// Rise of the temperature at a place, and its gradient.
+#[derive(Clone, Copy, Debug)]
+struct Rise<const D: usize> {
+    value: f64,
+    slope: Vector<D>,
+}
+
+impl<const D: usize> Thermal<D> {
+    /// Temperature less that without stress.
+    pub fn rise_at(&self, x: &Vector<D>, t: f64) -> f64 {
+        self.temperature.value.eval_at(&padded(x), t) - self.temperature.reference
+    }
+
+    fn rise(&self, x: &Vector<D>, t: f64) -> Rise<D> {
+        let slope = |k: usize| {
+            let mut step = Vector::zeros();
+            step[k] = self.reach;
+            (self.rise_at(&(x + step), t) - self.rise_at(&(x - step), t)) / (2.0 * self.reach)
+        };
+        let varies = self.temperature.value.depends_on_position();
+        Rise {
+            value: self.rise_at(x, t),
+            slope: Vector::from_fn(|k, _| if varies { slope(k) } else { 0.0 }),
+        }
+    }
+
+    /// By how much each node of a cell is displaced where the cell expands freely about its centroid.
+    fn expanded_nodes(&self, model: &Model<D>, c: usize, t: f64) -> Vec<Vector<D>> {
+        let mesh = &model.mesh;
+        let alpha = self.expansion[model.material_of_cell(c) as usize];
+        let middle = mesh.centroid(c);
+        let here = self.rise(&middle, t);
+        let nodes = mesh.cell(c).iter().map(|&n| mesh.nodes[n as usize]);
+        nodes
+            .map(|x| parted(&here, &self.rise(&x, t), &(x - middle)) * alpha)
+            .collect()
+    }
+
+    /// The gradient at the centre of a cell of the displacement by which it expands freely.
+    pub fn cell_gradient(&self, model: &Model<D>, c: usize, t: f64) -> Tensor<D> {
+        let expanded = self.expanded_nodes(model, c, t);
+        let nodes = model.mesh.cell(c);
+        fem::displacement_gradient_at_centre(&model.mesh, c, |n| {
+            let place = nodes.iter().position(|&m| m as usize == n);
+            place.map_or(Vector::zeros(), |place| expanded[place])
+        })
+    }
+
+    /// What of each of the [`unit_expansions`] the free expansion around `x` is made of; rigid motions are left out.
+    pub fn parts(&self, material: u16, x: &Vector<D>, t: f64) -> Vec<f64> {
+        let alpha = self.expansion[usize::from(material)];
+        let rise = self.rise(x, t);
+        let at_origin = rise.value - rise.slope.dot(x);
+        let parts = std::iter::once(at_origin).chain(rise.slope.iter().copied());
+        parts.map(|part| alpha * part).collect()
+    }
+
+    /// Force \[N\] by dof that free expansion would take: `F = K u − f`; `rows` has the row of every site.
+    ///
+    /// All materials of a model with points expand alike.
+    pub fn forces(&self, model: &Model<D>, rows: &BlockCsr, t: f64) -> Vec<f64> {
+        let mut forces = vec![0.0; model.sites.len() * D];
+        let inner = inner_sites(model);
+        let alpha = self.expansion[model.peridynamic_material() as usize];
+        if inner.contains(&false) {
+            let rise: Vec<Rise<D>> = (model.sites.iter())
+                .map(|s| self.rise(&s.position, t))
+                .collect();
+            for site in (0..inner.len()).filter(|&s| !inner[s]) {
+                let x = &model.sites[site].position;
+                let (columns, blocks) = rows.row(site);
+                let mut sum = Vector::<D>::zeros();
+                for (&column, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+                    let other = column as usize;
+                    let xi = model.sites[other].position - x;
+                    sum += Tensor::from_row_slice(block) * parted(&rise[site], &rise[other], &xi);
+                }
+                for k in 0..D {
+                    forces[site * D + k] = alpha * sum[k];
+                }
+            }
+        }
+        self.add_elements(model, &inner, t, &mut forces);
+        forces
+    }
+
+    /// Adds what elements exert on the sites whose rows are theirs alone.
+    fn add_elements(&self, model: &Model<D>, inner: &[bool], t: f64, forces: &mut [f64]) {
+        let mesh = &model.mesh;
+        let scale = model.row_scale();
+        let mut site_of = vec![None; mesh.nodes.len()];
+        for (site, s) in model.sites.iter().enumerate() {
+            if let SiteKind::Node(n) = s.kind
+                && inner[site]
+            {
+                site_of[n as usize] = Some(site);
+            }
+        }
+        for c in (0..mesh.cell_count()).filter(|&c| model.roles[c] == CellRole::Element) {
+            let nodes = mesh.cell(c);
+            if nodes.iter().all(|&n| site_of[n as usize].is_none()) {
+                continue;
+            }
+            let expanded = self.expanded_nodes(model, c, t);
+            let tensor = model.tensor_of_cell(c);
+            fem::for_each_point(mesh, c, fem::Rule::Stiffness, |p| {
+                let stress = tensor.contract(&fem::displacement_gradient(p, |a| expanded[a]));
+                for (a, &n) in nodes.iter().enumerate() {
+                    if let Some(site) = site_of[n as usize] {
+                        let f = stress * p.gradient[a] * p.weight;
+                        let scale = scale.map_or(1.0, |scale| scale[site]);
+                        (0..D).for_each(|k| forces[site * D + k] += scale * f[k]);
+                    }
+                }
+            });
+        }
+    }
+}
+
+/// The displacements of all sites by which a body expands freely: x by a unit rise, `x_k x − ½ |x|² e_k` by a unit gradient along each axis.
+pub fn unit_expansions<const D: usize>(model: &Model<D>) -> Vec<Vec<f64>> {
+    let of = |field: &dyn Fn(&Vector<D>) -> Vector<D>| -> Vec<f64> {
+        let mut u = Vec::with_capacity(model.sites.len() * D);
+        for site in &model.sites {
+            u.extend(field(&site.position).iter());
+        }
+        u
+    };
+    let by_slope = |k: usize| {
+        of(&|x| {
+            let mut u = x * x[k];
+            u[k] -= 0.5 * x.norm_squared();
+            u
+        })
+    };
+    std::iter::once(of(&|x| *x))
+        .chain((0..D).map(by_slope))
+        .collect()
+}
+
+/// The displacement of one place seen from another, `xi` apart, where the body between them expands freely by one per degree.
+fn parted<const D: usize>(here: &Rise<D>, there: &Rise<D>, xi: &Vector<D>) -> Vector<D> {
+    let slope = (here.slope + there.slope) * 0.5;
+    let mean = 0.5 * (here.value + there.value);
+    xi * (mean + 0.5 * slope.dot(xi)) - slope * (0.5 * xi.norm_squared())
+}
+
+/// The sites whose rows are those of finite elements alone.
+fn inner_sites<const D: usize>(model: &Model<D>) -> Vec<bool> {
+    let mut whole = vec![true; model.mesh.nodes.len()];
+    for c in 0..model.mesh.cell_count() {
+        if model.roles[c] != CellRole::Element {
+            let nodes = model.mesh.cell(c).iter();
+            nodes.for_each(|&n| whole[n as usize] = false);
+        }
+    }
+    let is_inner = |kind: SiteKind| match kind {
+        SiteKind::Node(n) => whole[n as usize],
+        SiteKind::Point(_) => false,
+    };
+    model.sites.iter().map(|s| is_inner(s.kind)).collect()
+}

@@ -1,0 +1,120 @@
+//! The temperature of a body.
+
+use super::bounds_checks;
+use super::error::{SceneError, SceneErrorKind};
+use super::expression::Expression;
+use super::failure::Breaking;
+use super::materials::Material;
+use super::solve::{Clock, Solve};
+use super::spec::{BondsSpec, MaterialSpec, SceneSpec, TemperatureSpec};
+use crate::mesh::Mesh;
+use crate::tensor::padded;
+
+/// A temperature in space and time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Temperature {
+    /// The temperature.
+    pub value: Expression,
+    /// The temperature without thermal strain.
+    pub reference: f64,
+}
+
+/// The temperature of a scene, checked; none if it names none.
+pub(super) fn temperature<const D: usize>(
+    spec: Option<&TemperatureSpec>,
+    mesh: &Mesh<D>,
+    clock: Clock,
+) -> Result<Option<Temperature>, SceneError> {
+    let Some(spec) = spec else {
+        return Ok(None);
+    };
+    let place = "temperature.value";
+    bounds_checks::no_further_axes::<D>(place, &spec.value)?;
+    clock.admits(place, &spec.value)?;
+    for x in &mesh.nodes {
+        for &t in clock.instants(spec.value.depends_on_time()) {
+            let found = spec.value.eval_at(&padded(x), t);
+            if !found.is_finite() {
+                return Err(SceneError::new(
+                    SceneErrorKind::WrongValue,
+                    format!("`{place}` is {found} at {:?}, t = {t}", x.as_slice()),
+                )
+                .label(spec.value.span.clone(), "no finite number there")
+                .help("choose between branches with if(condition, a, b)"));
+            }
+        }
+    }
+    Ok(Some(Temperature {
+        value: spec.value.clone(),
+        reference: spec.reference.as_ref().map_or(0.0, |r| r.value),
+    }))
+}
+
+/// Refuses a temperature where its strain is not known to a law, a bond or a seam.
+pub(super) fn agrees<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    breaking: &Breaking<D>,
+    solve: &Solve,
+    has_points: bool,
+) -> Result<(), SceneError> {
+    let Some(temperature) = &spec.temperature else {
+        return unheated(spec);
+    };
+    let span = temperature.value.span.clone();
+    let refuse = |what: String, help: &str| {
+        let error = SceneError::new(SceneErrorKind::Conflict, what);
+        Err(error.label(span.clone(), "thermal strain").help(help))
+    };
+    if let Some(cold) = materials.iter().find(|m| m.expansion.is_none()) {
+        return refuse(
+            format!(
+                "`temperature`, and the material `{}` has no thermal-expansion",
+                cold.name
+            ),
+            "add thermal-expansion = ... to it, which bond-based and lps materials take; 0 is a number too",
+        );
+    }
+    let first = materials.first().and_then(|m| m.expansion);
+    if has_points && materials.iter().any(|m| m.expansion != first) {
+        return refuse(
+            "`temperature`, and materials that expand differently beside peridynamic points"
+                .to_owned(),
+            "give all materials the same thermal-expansion, or let coupling = \"local\"",
+        );
+    }
+    if breaking.breaks() || breaking.contact.is_some() {
+        return refuse(
+            "`temperature`, and bonds that break or touch: their thermal stretch is not known to the pass over exact bonds".to_owned(),
+            "leave out fracture-energy, critical-stretch and contact",
+        );
+    }
+    if breaking.bonds == BondsSpec::Exact && has_points {
+        return refuse(
+            "`temperature`, and bonds = \"exact\"".to_owned(),
+            "let bonds = \"linear\": thermal strain is that of small displacements",
+        );
+    }
+    let has_sub_steps = matches!(solve, Solve::Explicit(e) if e.sub_steps.is_some());
+    if has_sub_steps || spec.zones.auto.is_some() {
+        return refuse(
+            "`temperature`, and sub-steps or a zone that is placed by itself".to_owned(),
+            "leave out sub-steps, and draw zones.nonlocal",
+        );
+    }
+    Ok(())
+}
+
+/// Refuses expansion without a temperature: it would do nothing without a word.
+fn unheated(spec: &SceneSpec) -> Result<(), SceneError> {
+    let of = |m: &MaterialSpec| m.thermal_expansion().map(|n| n.span.clone());
+    let Some((name, span)) = spec.materials.iter().find_map(|(n, m)| Some((n, of(m)?))) else {
+        return Ok(());
+    };
+    Err(SceneError::new(
+        SceneErrorKind::Missing,
+        format!("the material `{name}` has a thermal-expansion, and the scene no temperature"),
+    )
+    .label(span, "expands by nothing")
+    .help("add [temperature] with value = \"...\", or remove the key"))
+}
