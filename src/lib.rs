@@ -96,6 +96,29 @@
 //!
 //! # From Rust
 //!
+//! A [`SceneBuilder`] makes the same scenes without a file, with every key of the format; its [`Solution`] has fields and tables by name. Numbers that vary are expressions, or a [`Function`].
+//!
+//! ```
+//! use bondline::{Condition, Function, Material, Region, SceneBuilder, Silent};
+//!
+//! let solution = SceneBuilder::bar("bar")
+//!     .line(0.0, 30.0, 30)
+//!     .material("steel", Material::bond_based(3.0))
+//!     .horizon(3.0)
+//!     .nonlocal(Region::cuboid([10.0], [20.0]))
+//!     .condition("left", Condition::displacement("left").x(0))
+//!     .condition("pull", Condition::traction("right").x(Function::of_position(|_| 0.03)))
+//!     .solve(&Silent)?;
+//! for (x, u) in solution.points().iter().zip(solution.displacement()?) {
+//!     assert!((u[0] - 0.01 * x[0]).abs() < 1e-12);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! `examples/cracked_plate.rs` is a plate with a crack.
+//!
+//! # The parts
+//!
 //! A [`Problem`] says what the model is, a [`Model`] lays out its sites and bonds, an [`Operator`] gives the rows of the stiffness, a [`StaticProblem`] is solved.
 //!
 //! ```
@@ -190,8 +213,9 @@ pub use peridynamics::{
     Micromodulus, PdBody,
 };
 pub use progress::{Progress, Silent};
-pub use run::{AnyScene, RunError};
-pub use scene::{Scene, SceneError};
+pub use run::{AnyScene, RunError, Solution};
+pub use scene::build::{self, Condition, Initial, Material, Region, SceneBuilder};
+pub use scene::{Function, Scene, SceneError};
 pub use shape::{Barrier, Shape};
 pub use solve::statics::{StaticError, StaticParams, StaticProblem, StaticSolution};
 pub use system::{BlockCsr, Symmetry};

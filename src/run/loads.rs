@@ -1,5 +1,7 @@
 //! Conditions of a scene on the sites of its model: which sites are held, and what force each takes.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use crate::coupling::tributary::{Detail, Parts};
@@ -9,7 +11,7 @@ use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::{Facet, facet_corners};
 use crate::observe::summary::Applied;
 use crate::run::error::RunError;
-use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::conditions::{Components, Condition, Prescribed, Support};
 use crate::scene::region::Region;
 use crate::tensor::Vector;
 
@@ -179,12 +181,41 @@ pub fn supports<const D: usize>(
     t: f64,
 ) -> Result<Held, RunError> {
     let holder = holders(model, conditions)?;
-    let prescribed = holder
-        .iter()
-        .enumerate()
-        .map(|(dof, holder)| holder.map(|h| displacement(model, &conditions[h], dof, t)))
-        .collect();
+    let mut prescribed: Vec<Option<f64>> = vec![None; holder.len()];
+    let mut by_function: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    for (dof, held) in holder.iter().enumerate() {
+        let Some(h) = *held else { continue };
+        match is_function(&conditions[h], dof % D) {
+            true => by_function.entry((h, dof % D)).or_default().push(dof),
+            false => prescribed[dof] = Some(displacement(model, &conditions[h], dof, t)),
+        }
+    }
+    for ((h, axis), dofs) in by_function {
+        let values = values_at_dofs(model, &conditions[h].components, axis, &dofs, t);
+        for (dof, value) in dofs.into_iter().zip(values) {
+            prescribed[dof] = Some(value);
+        }
+    }
     Ok((prescribed, holder))
+}
+
+/// Whether a component of a condition is a function of position: it is asked for many values at once.
+pub(crate) fn is_function<const D: usize>(condition: &Condition<D>, axis: usize) -> bool {
+    let component = condition.components.0[axis].as_ref();
+    component.is_some_and(|e| e.function().is_some() && e.depends_on_position())
+}
+
+/// The values of a component at the sites of some dofs.
+pub(crate) fn values_at_dofs<const D: usize>(
+    model: &Model<D>,
+    components: &Components<D>,
+    axis: usize,
+    dofs: &[usize],
+    t: f64,
+) -> Vec<f64> {
+    let places = dofs.iter().map(|dof| model.sites[dof / D].position);
+    let places: Vec<Vector<D>> = places.collect();
+    components.values(axis, &places, t).unwrap_or_default()
 }
 
 /// What a load acts on; the force of any field follows from it without another search.
@@ -301,6 +332,17 @@ impl<'a, const D: usize> Loads<'a, D> {
         sum
     }
 
+    /// Adds the force of a condition, by its number, at the time `t` to `load`; returns the sum of what it added.
+    pub fn add_condition(
+        &self,
+        condition: &Condition<D>,
+        number: usize,
+        t: f64,
+        load: &mut [f64],
+    ) -> Vector<D> {
+        condition.visit(t, |field| self.add(number, field, load))
+    }
+
     /// Hands each site's force to `add`.
     fn each(
         &self,
@@ -384,8 +426,7 @@ pub fn loads<const D: usize>(
     let mut applied = Vec::new();
     for number in loads.conditions() {
         let condition = &conditions[number];
-        let field = |x: &Vector<D>, n: &Vector<D>| condition.force_density(x, n, t);
-        let force = loads.add(number, field, &mut load);
+        let force = loads.add_condition(condition, number, t, &mut load);
         applied.push(Applied {
             condition: condition.name.clone(),
             force: force.iter().copied().collect(),

@@ -12,6 +12,7 @@
 //! | `proof/` | what is shown about a model before it is solved |
 //! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
 //! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
+//! | `results.rs` | a solution that a program keeps: fields and tables by name |
 //! | `samples.rs` | displacements of a static scene at places, for studies of convergence |
 //! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
 //! | `rotation.rs`, `warnings.rs` | how far elements rotate; what of a model makes its results doubtful |
@@ -34,6 +35,7 @@ pub mod motion;
 mod observed_tests;
 pub(crate) mod placed_scene;
 pub mod proof;
+mod results;
 mod rotation;
 mod samples;
 pub mod setup;
@@ -52,6 +54,7 @@ pub use budget::{Share, memory_budget, set_memory_budget};
 pub use error::RunError;
 pub use linear::{LinearModel, SceneModel};
 pub use motion::{RunOptions, StartFrom};
+pub use results::{BuildError, Frame, NoSuchField, Solution, Table};
 pub use samples::Samples;
 pub use solution::Solved;
 pub use statics::solve_with;

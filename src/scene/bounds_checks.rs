@@ -50,7 +50,9 @@ pub(crate) fn no_further_axes<const D: usize>(
     place: &str,
     expression: &Expression,
 ) -> Result<(), SceneError> {
-    match (D..3).find(|&k| expression.depends_on(k)) {
+    // a function takes all coordinates, of which the further ones are zero
+    let is_function = expression.function().is_some();
+    match (D..3).find(|&k| !is_function && expression.depends_on(k)) {
         None => Ok(()),
         Some(k) => Err(SceneError::new(
             SceneErrorKind::Dimension,

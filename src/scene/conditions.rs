@@ -1,5 +1,6 @@
 //! Conditions of a validated scene.
 
+use std::cell::{Cell, RefCell};
 use std::sync::Arc;
 
 use super::bounds_checks;
@@ -19,7 +20,7 @@ pub struct Components<const D: usize>(pub [Option<Expression>; D]);
 
 impl PartialEq for Expression {
     fn eq(&self, other: &Self) -> bool {
-        self.text == other.text
+        self.text == other.text && self.function() == other.function()
     }
 }
 
@@ -37,6 +38,43 @@ impl<const D: usize> Components<D> {
     /// The vector at `x` and time `t`, zero where nothing is given.
     pub fn vector(&self, x: &Vector<D>, t: f64) -> Vector<D> {
         Vector::from_fn(|k, _| self.at_time(k, x, t).unwrap_or(0.0))
+    }
+
+    /// The component along `axis` at some places and the time `t`, if it is given.
+    pub fn values(&self, axis: usize, places: &[Vector<D>], t: f64) -> Option<Vec<f64>> {
+        let places: Vec<[f64; 3]> = places.iter().map(padded).collect();
+        Some(self.0[axis].as_ref()?.values_at(&places, t))
+    }
+
+    /// Hands the field at the time `t` to `pass`, which asks for its values in the same order whenever it is called.
+    ///
+    /// Functions are asked for all of them at once: `pass` is then called twice, first with a field of zeros.
+    pub fn visit<T>(
+        &self,
+        t: f64,
+        mut pass: impl FnMut(&dyn Fn(&Vector<D>) -> Vector<D>) -> T,
+    ) -> T {
+        if !self.0.iter().flatten().any(|e| e.function().is_some()) {
+            return pass(&|x| self.vector(x, t));
+        }
+        let places = RefCell::new(Vec::new());
+        pass(&|x| {
+            places.borrow_mut().push(*x);
+            Vector::zeros()
+        });
+        let places = places.into_inner();
+        let values: [_; D] = std::array::from_fn(|k| self.values(k, &places, t));
+        let next = Cell::new(0..places.len());
+        pass(&|x| {
+            let mut rest = next.take();
+            let at = rest.next().filter(|&i| places[i] == *x);
+            next.set(rest);
+            Vector::from_fn(|k, _| match (&values[k], at) {
+                (Some(values), Some(i)) => values[i],
+                (Some(_), None) => self.at_time(k, x, t).unwrap_or(0.0),
+                (None, _) => 0.0,
+            })
+        })
     }
 
     /// Whether any component changes with time.
@@ -137,6 +175,19 @@ impl<const D: usize> Condition<D> {
             Prescribed::Pressure(_) => Vector::zeros(),
             _ => Vector::from_fn(|k, _| f64::from(u8::from(k == component))),
         }
+    }
+
+    /// Hands the force per area or volume at the time `t`, as [`Condition::force_density`] has it, to `pass`: as [`Components::visit`].
+    pub fn visit<T>(
+        &self,
+        t: f64,
+        mut pass: impl FnMut(&dyn Fn(&Vector<D>, &Vector<D>) -> Vector<D>) -> T,
+    ) -> T {
+        let components = &self.components;
+        components.visit(t, |field| match self.prescribed {
+            Prescribed::Pressure(_) => pass(&|x, n| n * -field(x)[0]),
+            _ => pass(&|x, _| field(x)),
+        })
     }
 
     /// Whether the force of a load differs from place to place.
@@ -315,34 +366,45 @@ pub(crate) fn finite<const D: usize>(
     positions: impl Iterator<Item = Vector<D>>,
 ) -> Result<(), SceneError> {
     let moving = components.depends_on_time();
-    for x in positions {
-        for &t in clock.instants(moving) {
-            for k in 0..D {
-                let Some(value) = components.at_time(k, &x, t).filter(|v| !v.is_finite()) else {
-                    continue;
-                };
-                let span = components.0[k]
-                    .as_ref()
-                    .map_or(name.span.clone(), |e| e.span.clone());
-                let when = if moving {
-                    format!(", t = {t}")
-                } else {
-                    String::new()
-                };
-                return Err(SceneError::new(
-                    SceneErrorKind::WrongValue,
-                    format!(
-                        "`{place}.{}` is {value} at {:?}{when}",
-                        ["x", "y", "z"][k],
-                        x.as_slice()
-                    ),
-                )
-                .label(span, "no finite number there")
-                .help(
-                    "choose between branches with if(condition, a, b), or restrict the condition",
-                ));
+    let instants = clock.instants(moving);
+    let all: Vec<Vector<D>> = positions.collect();
+    for positions in all.chunks(TOGETHER) {
+        let of_instant = |&t: &f64| -> [Option<Vec<f64>>; D] {
+            std::array::from_fn(|k| components.values(k, positions, t))
+        };
+        let values: Vec<_> = instants.iter().map(of_instant).collect();
+        for (i, x) in positions.iter().enumerate() {
+            for (t, values) in instants.iter().zip(&values) {
+                for k in 0..D {
+                    let value = values[k].as_ref().map_or(0.0, |v| v[i]);
+                    if value.is_finite() {
+                        continue;
+                    }
+                    let span = components.0[k]
+                        .as_ref()
+                        .map_or(name.span.clone(), |e| e.span.clone());
+                    let when = match moving {
+                        true => format!(", t = {t}"),
+                        false => String::new(),
+                    };
+                    return Err(SceneError::new(
+                        SceneErrorKind::WrongValue,
+                        format!(
+                            "`{place}.{}` is {value} at {:?}{when}",
+                            ["x", "y", "z"][k],
+                            x.as_slice()
+                        ),
+                    )
+                    .label(span, "no finite number there")
+                    .help(
+                        "choose between branches with if(condition, a, b), or restrict the condition",
+                    ));
+                }
             }
         }
     }
     Ok(())
 }
+
+/// Positions whose values are looked at together.
+const TOGETHER: usize = 4096;

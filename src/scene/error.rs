@@ -50,13 +50,13 @@ pub struct SceneError {
 /// A piece of a scene's text, with what is wrong in it.
 #[derive(Clone, Debug)]
 pub struct Excerpt {
-    /// The path of the scene, or `--set`.
+    /// The path of the scene, or `--set`; of a scene that a program made its name and the key at fault.
     pub name: String,
     /// The whole text.
     pub text: String,
     /// Bytes of `text` to underline, and a few words to write under each.
     pub labels: Vec<(Span, String)>,
-    /// The line of the first label, from 1; 0 if there is none.
+    /// The line of the first label, from 1; 0 if there is none, or if nobody has typed it.
     pub line: usize,
 }
 
@@ -93,11 +93,16 @@ impl SceneError {
             .zip(&self.labels)
             .filter_map(|(span, (_, words))| span.map(|s| (s, words.clone())))
             .collect();
+        let place = source.place_of(&spans);
+        let line = match (&place, spans.is_empty()) {
+            (None, false) => line,
+            _ => 0,
+        };
         self.shown = Some(Box::new(Excerpt {
-            name,
+            name: place.unwrap_or(name),
             text,
             labels,
-            line: if spans.is_empty() { 0 } else { line },
+            line,
         }));
         self
     }

@@ -15,6 +15,7 @@
 
 use std::fmt;
 
+use super::function::Function;
 use super::source::Span;
 
 /// The deepest nesting of brackets, signs and powers that is read; deeper input is refused before it exhausts the stack.
@@ -69,6 +70,8 @@ enum Term {
     /// Operators of one precedence, applied from left to right: as a list, so that a long sum nests no deeper than a short one.
     Chain(Box<Term>, Vec<(Binary, Term)>),
     If(Box<[Term; 3]>),
+    /// A function of a program; it stands alone.
+    Function(Function),
 }
 
 type Unary = fn(f64) -> f64;
@@ -148,6 +151,31 @@ impl Expression {
         }
     }
 
+    /// A function of a program, for which `text` stands in the scene.
+    pub(crate) fn of_function(text: &str, function: Function) -> Self {
+        Self {
+            text: text.to_owned(),
+            span: Span::default(),
+            root: Term::Function(function),
+        }
+    }
+
+    /// The function of a program that this is, if it is one.
+    pub fn function(&self) -> Option<&Function> {
+        match &self.root {
+            Term::Function(function) => Some(function),
+            _ => None,
+        }
+    }
+
+    /// The values at some positions (components beyond the dimension are zero) at the time `t`.
+    pub fn values_at(&self, places: &[[f64; 3]], t: f64) -> Vec<f64> {
+        match &self.root {
+            Term::Function(function) => function.values(places, t),
+            _ => places.iter().map(|x| self.eval_at(x, t)).collect(),
+        }
+    }
+
     /// The same expression, found at `span`.
     pub fn at(mut self, span: Span) -> Self {
         self.span = span;
@@ -201,6 +229,7 @@ impl Term {
                 let chosen = if parts[0].eval(x) != 0.0 { 1 } else { 2 };
                 parts[chosen].eval(x)
             }
+            Self::Function(function) => function.values(&[[x[0], x[1], x[2]]], x[TIME])[0],
         }
     }
 
@@ -214,6 +243,8 @@ impl Term {
                 first.depends_on(axis) || rest.iter().any(|(_, term)| term.depends_on(axis))
             }
             Self::If(parts) => parts.iter().any(|p| p.depends_on(axis)),
+            Self::Function(function) if axis == TIME => function.depends_on_time(),
+            Self::Function(function) => function.depends_on_position(),
         }
     }
 }

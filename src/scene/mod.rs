@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `source.rs` | the text and its overrides on one axis of positions |
 //! | `tagged_table.rs` | tables of exactly one key, and how overrides replace them |
-//! | `expression.rs`, `value.rs` | numbers, expressions, coordinates with their places |
+//! | `expression.rs`, `function.rs`, `value.rs` | numbers, expressions, functions of a program, coordinates with their places |
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
@@ -15,12 +15,14 @@
 //! | `elements.rs` | what finite elements follow |
 //! | `agreement.rs` | whether parts that are right alone agree |
 //! | `unused.rs` | parts of a scene that touch nothing |
+//! | `build/` | scenes that a program makes |
 //! | `template.rs` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy of what is typed |
 
 pub(crate) mod adaptive_zone;
 pub(crate) mod agreement;
 pub(crate) mod bounds_checks;
+pub mod build;
 mod condition_list;
 pub(crate) mod conditions;
 pub(crate) mod coupling_selection;
@@ -31,6 +33,7 @@ pub(crate) mod elements;
 pub(crate) mod error;
 pub(crate) mod expression;
 pub(crate) mod failure;
+pub(crate) mod function;
 pub(crate) mod initial;
 pub(crate) mod lattice_regions;
 pub(crate) mod material_interfaces;
@@ -61,6 +64,7 @@ pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use failure::{Breaking, Contact};
+pub use function::Function;
 pub use initial::{Initial, InitialKind};
 pub use materials::{Fracture, Material};
 pub use peridynamics::Peridynamics;

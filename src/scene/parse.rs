@@ -5,7 +5,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use super::error::{SceneError, SceneErrorKind};
-use super::source::{Source, Span};
+use super::function;
+use super::source::{Place, Source, find};
 use super::spec::{MeshSpec, SceneSpec};
 use super::tagged_table;
 
@@ -18,19 +19,14 @@ impl SceneSpec {
         let table = source.merged()?;
         let places = table.get_ref().clone();
         let root = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
-        let mut spec = Self::deserialize(ValueDeserializer::from(root))
+        let read = || Self::deserialize(ValueDeserializer::from(root));
+        let mut spec = function::with_functions(source.functions(), read)
             .map_err(|error| translate(&error, &places).shown_in(source))?;
         if let MeshSpec::File(file) = &mut spec.mesh {
             file.held = source.mesh().cloned();
         }
         Ok(spec)
     }
-}
-
-/// What stands at a span: its path, and whether the span is that of the key.
-struct Place {
-    path: Vec<String>,
-    is_key: bool,
 }
 
 impl Place {
@@ -183,53 +179,4 @@ fn ticked(message: &str) -> Vec<String> {
         .step_by(2)
         .map(str::to_owned)
         .collect()
-}
-
-/// The deepest key or value at `span`.
-fn find(table: &DeTable<'_>, span: &Span, path: &mut Vec<String>) -> Option<Place> {
-    let mut found = None;
-    for (key, value) in table.iter() {
-        path.push(key.get_ref().to_string());
-        if key.span() == *span {
-            found = Some(Place {
-                path: path.clone(),
-                is_key: true,
-            });
-        }
-        if value.span() == *span && found.is_none() {
-            found = Some(Place {
-                path: path.clone(),
-                is_key: false,
-            });
-        }
-        if let Some(deeper) = find_in_value(value, span, path) {
-            found = Some(deeper);
-        }
-        path.pop();
-        if found.is_some() {
-            break;
-        }
-    }
-    found
-}
-
-fn find_in_value(
-    value: &Spanned<DeValue<'_>>,
-    span: &Span,
-    path: &mut Vec<String>,
-) -> Option<Place> {
-    match value.get_ref() {
-        DeValue::Table(inner) => find(inner, span, path),
-        DeValue::Array(items) => items.iter().enumerate().find_map(|(i, item)| {
-            path.push((i + 1).to_string());
-            let here = (item.span() == *span).then(|| Place {
-                path: path.clone(),
-                is_key: false,
-            });
-            let found = find_in_value(item, span, path).or(here);
-            path.pop();
-            found
-        }),
-        _ => None,
-    }
 }

@@ -10,6 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, SceneErrorKind};
+use super::function::Function;
 use super::tagged_table;
 use crate::mesh::MeshParts;
 use crate::observe::checkpoint::Fingerprint;
@@ -23,6 +24,9 @@ pub type Span = std::ops::Range<usize>;
 pub struct Source {
     pieces: Vec<Piece>,
     mesh: Option<Arc<MeshParts>>,
+    functions: Vec<Function>,
+    /// Whether a program made the scene: places are its keys, for nobody has typed the lines.
+    is_built: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -45,7 +49,41 @@ impl Source {
                 toml: String::new(),
             }],
             mesh: None,
+            functions: Vec::new(),
+            is_built: false,
         }
+    }
+
+    /// A scene that a program made, from a table in which words stand for `functions`; messages give its keys as places instead of lines.
+    pub fn built(name: impl Into<String>, table: &toml::Table, functions: Vec<Function>) -> Self {
+        Self {
+            functions,
+            is_built: true,
+            ..Self::new(name, table.to_string())
+        }
+    }
+
+    /// The functions of the program that words of the scene stand for.
+    pub(crate) fn functions(&self) -> &[Function] {
+        &self.functions
+    }
+
+    /// What messages call a place: the file and the line of a scene that was typed; the keys of one that a program made.
+    pub(crate) fn place_of(&self, spans: &[Span]) -> Option<String> {
+        if !self.is_built {
+            return None;
+        }
+        // the text as it is: what is wrong may be how its parts merge
+        let table = DeTable::parse(&self.pieces[0].text).ok()?;
+        let found = spans
+            .iter()
+            .find_map(|s| find(table.get_ref(), s, &mut Vec::new()));
+        Some(match found {
+            Some(place) if !place.path.is_empty() => {
+                format!("{}, {}", self.name(), place.path.join("."))
+            }
+            _ => self.name().to_owned(),
+        })
     }
 
     /// The scene with a mesh in memory, instead of a `mesh` of its own.
@@ -265,6 +303,61 @@ fn plain(value: &DeValue<'_>) -> toml::Value {
             .map_or_else(|_| toml::Value::String(f.to_string()), toml::Value::Float),
         DeValue::Boolean(b) => toml::Value::Boolean(*b),
         DeValue::Datetime(d) => toml::Value::Datetime(*d),
+    }
+}
+
+/// What stands at a span: its path, and whether the span is that of the key.
+pub(super) struct Place {
+    pub path: Vec<String>,
+    pub is_key: bool,
+}
+
+/// The deepest key or value at `span`.
+pub(super) fn find(table: &DeTable<'_>, span: &Span, path: &mut Vec<String>) -> Option<Place> {
+    let mut found = None;
+    for (key, value) in table.iter() {
+        path.push(key.get_ref().to_string());
+        if key.span() == *span {
+            found = Some(Place {
+                path: path.clone(),
+                is_key: true,
+            });
+        }
+        if value.span() == *span && found.is_none() {
+            found = Some(Place {
+                path: path.clone(),
+                is_key: false,
+            });
+        }
+        if let Some(deeper) = find_in_value(value, span, path) {
+            found = Some(deeper);
+        }
+        path.pop();
+        if found.is_some() {
+            break;
+        }
+    }
+    found
+}
+
+fn find_in_value(
+    value: &Spanned<DeValue<'_>>,
+    span: &Span,
+    path: &mut Vec<String>,
+) -> Option<Place> {
+    match value.get_ref() {
+        DeValue::Table(inner) => find(inner, span, path),
+        DeValue::Array(items) => items.iter().enumerate().find_map(|(i, item)| {
+            path.push((i + 1).to_string());
+            let here = (item.span() == *span).then(|| Place {
+                path: path.clone(),
+                is_key: false,
+            });
+            let found = find_in_value(item, span, path).or(here);
+            path.pop();
+            found
+        }),
+        _ => None,
     }
 }
 

@@ -8,6 +8,7 @@ use serde::de::{self, Deserialize, Deserializer, SeqAccess, Visitor};
 use toml::Spanned;
 
 use super::expression::Expression;
+use super::function;
 use super::source::Span;
 use crate::observe::checkpoint::Pace;
 
@@ -162,7 +163,10 @@ impl Visitor<'_> for Scalars {
     }
 
     fn visit_str<E: de::Error>(self, v: &str) -> Result<Expression, E> {
-        self.check(Expression::parse(v).map_err(E::custom)?)
+        match function::in_scope(v) {
+            Some(function) => self.check(Expression::of_function(v, function)),
+            None => self.check(Expression::parse(v).map_err(E::custom)?),
+        }
     }
 }
 

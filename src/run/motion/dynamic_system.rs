@@ -20,6 +20,7 @@ use crate::scene::materials::Fracture;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
 use crate::system::{LinearMotion, Ranks, SemiDiscrete};
+use crate::tensor::Vector;
 
 /// What moves, and what it holds.
 pub struct DynamicSystem<'a> {
@@ -385,14 +386,14 @@ pub fn start<const D: usize>(model: &Model<D>, initial: &[Initial<D>]) -> State 
             InitialKind::Displacement => &mut state.u,
             InitialKind::Velocity => &mut state.v,
         };
-        for (site, s) in model.sites.iter().enumerate() {
-            if !field.region.contains(&s.position, 0.0) {
-                continue;
-            }
-            for k in 0..D {
-                if let Some(value) = field.components.at(k, &s.position) {
-                    values[site * D + k] = value;
-                }
+        let inside = |site: &usize| field.region.contains(&model.sites[*site].position, 0.0);
+        let sites: Vec<usize> = (0..model.sites.len()).filter(inside).collect();
+        let places = sites.iter().map(|&site| model.sites[site].position);
+        let places: Vec<Vector<D>> = places.collect();
+        for k in 0..D {
+            let found = field.components.values(k, &places, 0.0);
+            for (site, value) in sites.iter().zip(found.into_iter().flatten()) {
+                values[site * D + k] = value;
             }
         }
     }

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::coupling::Model;
 use crate::run::error::RunError;
-use crate::run::loads::{Loads, displacement, holders};
+use crate::run::loads::{Loads, displacement, holders, is_function, values_at_dofs};
 use crate::run::thermal::Thermal;
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::solve::explicit::Drive;
@@ -34,7 +34,47 @@ pub struct SceneDrive<'a, const D: usize> {
     start: Vec<f64>,
     /// The way of each prescribed velocity that changes with time, by condition and axis.
     ways: Vec<[Option<Way>; D]>,
+    /// What functions of position hold.
+    functions: Vec<FunctionTarget>,
     step: f64,
+}
+
+/// A function of position, with the prescribed dofs that it holds and their places in the list of all.
+struct FunctionTarget {
+    condition: usize,
+    axis: usize,
+    dofs: Vec<usize>,
+    places: Vec<usize>,
+}
+
+/// What functions hold.
+fn function_targets<const D: usize>(
+    conditions: &[Condition<D>],
+    prescribed: &[u32],
+    holder: &[u32],
+) -> Vec<FunctionTarget> {
+    let mut found: Vec<FunctionTarget> = Vec::new();
+    for (place, (&dof, &condition)) in prescribed.iter().zip(holder).enumerate() {
+        let (dof, condition) = (dof as usize, condition as usize);
+        let axis = dof % D;
+        if !is_function(&conditions[condition], axis) {
+            continue;
+        }
+        let of = |f: &&mut FunctionTarget| (f.condition, f.axis) == (condition, axis);
+        match found.iter_mut().find(of) {
+            Some(target) => {
+                target.dofs.push(dof);
+                target.places.push(place);
+            }
+            None => found.push(FunctionTarget {
+                condition,
+                axis,
+                dofs: vec![dof],
+                places: vec![place],
+            }),
+        }
+    }
+    found
 }
 
 /// One component of a load that depends on time alone.
@@ -64,8 +104,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         for number in loads.conditions() {
             let components = &conditions[number].components;
             if !components.depends_on_time() {
-                let field = |x: &_, n: &_| conditions[number].force_density(x, n, 0.0);
-                loads.add(number, field, &mut steady);
+                loads.add_condition(&conditions[number], number, 0.0, &mut steady);
             } else if components.depends_on_position() {
                 by_both.push(number);
             } else {
@@ -101,6 +140,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             by_time,
             by_both,
             heat: None,
+            functions: function_targets(conditions, &prescribed, &holder),
             start: prescribed.iter().map(|&k| start[k as usize]).collect(),
             prescribed,
             holder,
@@ -170,6 +210,26 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             let (dof, holder) = (self.prescribed[p] as usize, self.holder[p] as usize);
             *value = set(p, dof, &self.conditions[holder], uniform[holder][dof % D]);
         }
+    }
+
+    /// The values of functions of position at the prescribed dofs that they hold, all of one function at once.
+    fn of_functions(&self, time: f64) -> Vec<Option<f64>> {
+        let mut values = vec![
+            None;
+            if self.functions.is_empty() {
+                0
+            } else {
+                self.prescribed.len()
+            }
+        ];
+        for of in &self.functions {
+            let components = &self.conditions[of.condition].components;
+            let found = values_at_dofs(self.model, components, of.axis, &of.dofs, time);
+            for (&p, value) in of.places.iter().zip(found) {
+                values[p] = Some(value);
+            }
+        }
+        values
     }
 
     /// Displacement of a dof whose velocity is prescribed; `ways` are those that change with time.
@@ -274,8 +334,8 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
             }
         }
         for &number in &self.by_both {
-            let field = |x: &_, n: &_| self.conditions[number].force_density(x, n, time);
-            self.loads.add(number, field, load);
+            let condition = &self.conditions[number];
+            self.loads.add_condition(condition, number, time, load);
         }
         if let Some((thermal, rows)) = &self.heat {
             let forces = thermal.forces(self.model, rows, time);
@@ -295,11 +355,15 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
         let ways: Vec<[Option<f64>; D]> = (0..self.conditions.len())
             .map(|c| std::array::from_fn(|axis| self.way(c, axis, time)))
             .collect();
+        let of_functions = self.of_functions(time);
         self.each_prescribed(time, values, |p, dof, condition, uniform| {
             match (&condition.prescribed, uniform) {
                 (Prescribed::Velocity(_), _) => self.moved(p, dof, time, &ways),
                 (_, Some(value)) => value,
-                (_, None) => displacement(self.model, condition, dof, time),
+                (_, None) => match of_functions.get(p) {
+                    Some(Some(value)) => *value,
+                    _ => displacement(self.model, condition, dof, time),
+                },
             }
         });
     }

@@ -12,6 +12,7 @@ use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
 use crate::run::error::RunError;
 use crate::run::loads::{Loads, cells_of, may_bound_zone, nearest_points, site_of_node};
+use crate::scene::Expression;
 use crate::scene::conditions::{Condition, Prescribed, Support};
 use crate::system::Symmetry;
 use crate::tensor::Vector;
@@ -45,9 +46,9 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     let mut count = 0;
     for condition in loads.conditions() {
         let c = &conditions[condition];
-        let field = steady(c);
+        let at_once = steady(c);
         let mut load = vec![0.0; model.sites.len() * D];
-        loads.add(condition, &field, &mut load);
+        at_once.visit(0.0, |field| loads.add(condition, field, &mut load));
         let mut own = Moments::default();
         let centre = centre(model);
         for (site, f) in model.sites.iter().zip(load.chunks_exact(D)) {
@@ -57,7 +58,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         for (needed, f) in is_needed.iter_mut().zip(load.chunks_exact(D)) {
             *needed |= f.iter().any(|&f| f != 0.0);
         }
-        let exact = exact(model, c, &field);
+        let exact = at_once.visit(0.0, |field| exact(model, c, field));
         let figure = compare(model, &c.name, "load", &own, &exact, &mut part);
         worst = worst.max(figure);
         count += 1;
@@ -83,23 +84,15 @@ fn centre<const D: usize>(model: &Model<D>) -> Vector<D> {
     (low + high) / 2.0
 }
 
-/// A field as it is at some time: what depends on time is taken where it does not vanish, if there is such a time.
-fn steady<const D: usize>(
-    condition: &Condition<D>,
-) -> impl Fn(&Vector<D>, &Vector<D>) -> Vector<D> + '_ {
-    let components = &condition.components;
-    let in_space = components.depends_on_position();
-    move |x, n| {
-        let of_axis = |k: usize| match &components.0[k] {
-            // the force of a unit field is what loads are made of
-            Some(e) if e.depends_on_time() && !in_space => 1.0,
-            Some(_) => components.at_time(k, x, 0.0).unwrap_or(0.0),
-            None => 0.0,
-        };
-        (0..D)
-            .map(|k| condition.unit_density(k, n) * of_axis(k))
-            .sum()
-    }
+/// A condition as it is at time zero; components that depend on time alone are one, for the force of a unit field is what loads are made of.
+fn steady<const D: usize>(condition: &Condition<D>) -> Condition<D> {
+    let in_space = condition.components.depends_on_position();
+    let mut steady = condition.clone();
+    let of_time = steady.components.0.iter_mut().flatten();
+    of_time
+        .filter(|e| e.depends_on_time() && !in_space)
+        .for_each(|e| *e = Expression::constant(1.0));
+    steady
 }
 
 /// An integral with the sum of the sizes of what was summed, and what two rules differ by.
