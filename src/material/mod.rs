@@ -20,6 +20,8 @@ mod hardening;
 mod hyperelastic;
 mod j2;
 mod logarithmic_j2;
+#[cfg(test)]
+mod path_tests;
 mod reduction;
 #[cfg(feature = "umat")]
 mod umat;
