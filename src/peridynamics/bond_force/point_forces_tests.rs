@@ -386,7 +386,8 @@ fn a_resumed_drag_has_the_same_bits() {
     // at once: the drag of the step before
     let (a, b) = (step(&mut first, &here, 0.0), step(&mut second, &here, 0.0));
     assert_eq!(a, b);
-    (first.commit(), second.commit());
+    first.commit();
+    second.commit();
     let there = noise(n, 0.1 * H, 4);
     assert_eq!(
         step(&mut first, &there, STEP),
