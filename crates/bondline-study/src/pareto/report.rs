@@ -167,12 +167,11 @@ impl Trade {
         let unit = self.unit();
         let scaled = |(cost, error): (f64, f64)| (cost / unit, error);
         let dots = self.points().iter().map(|(_, p)| scaled(*p)).collect();
-        let line = self
+        let (line, names) = self
             .front()
             .iter()
-            .filter_map(|c| c.point(self.by))
-            .map(scaled)
-            .collect();
+            .filter_map(|c| Some((scaled(c.point(self.by)?), c.name())))
+            .unzip();
         let base = self.cases.first().and_then(|c| c.point(self.by));
         // where the scene lies means nothing to those who see the plot
         let name = self.scene.file_name().unwrap_or(self.scene.as_os_str());
@@ -184,7 +183,7 @@ impl Trade {
             y_scale: Scale::Log,
             series: vec![
                 Series::new("all cases", Stroke::Dots, dots),
-                Series::new("front", Stroke::LineAndDots, line),
+                Series::new("front", Stroke::LineAndDots, line).labelled(names),
                 Series::new(
                     "the scene as it is",
                     Stroke::Dots,
