@@ -22,6 +22,7 @@ use crate::{
 };
 use behaviour::NONE;
 pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, StretchOfMaterials, SystemError};
+pub use rows::scale_rows;
 
 pub(crate) mod behaviour;
 mod body;
@@ -247,18 +248,6 @@ fn reached<const D: usize>(body: &PdBody<D>, families: &Families, point: u32) ->
 pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) -> Vec<f64> {
     let own = model.peridynamic_material();
     model.tributary().masses(own, density)
-}
-
-/// Scales what each row gives, where the rows of a model are scaled.
-pub fn scale_rows<const D: usize>(model: &Model<D>, values: &mut [f64]) {
-    let Some(scale) = model.row_scale() else {
-        return;
-    };
-    for (values, &factor) in values.chunks_exact_mut(D).zip(scale) {
-        if factor != 1.0 {
-            values.iter_mut().for_each(|v| *v *= factor);
-        }
-    }
 }
 
 impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {

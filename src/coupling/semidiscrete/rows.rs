@@ -5,9 +5,22 @@ use rayon::prelude::*;
 use crate::coupling::semidiscrete::behaviour::{CHUNK, NONE};
 use crate::{
     assembly::{self, Row},
+    coupling::Model,
     system::{BlockCsr, ROW_CHUNK},
     tensor::{Tensor, Vector},
 };
+
+/// Scales what each row gives, where the rows of a model are scaled.
+pub fn scale_rows<const D: usize>(model: &Model<D>, values: &mut [f64]) {
+    let Some(scale) = model.row_scale() else {
+        return;
+    };
+    for (values, &factor) in values.chunks_exact_mut(D).zip(scale) {
+        if factor != 1.0 {
+            values.iter_mut().for_each(|v| *v *= factor);
+        }
+    }
+}
 
 /// The sites that have a row, and their rows: sites whose force comes from bonds alone cost nothing.
 pub(super) struct SiteRows {
