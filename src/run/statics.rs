@@ -127,10 +127,7 @@ fn solve_chosen<const D: usize>(
     let moving = system.as_mut().map(|s| s as &mut dyn SemiDiscrete);
     let computed;
     let (equilibrium, proof) = match cached {
-        Some(equilibrium) => (
-            equilibrium,
-            body.prove_cached(equilibrium, &mut timings, progress)?,
-        ),
+        Some(known) => (known, body.prove_cached(known, &mut timings, progress)?),
         None => {
             let (solved, proof) = body.solve(moving, &mut timings, progress)?;
             computed = solved;

@@ -236,12 +236,9 @@ impl<'a, const D: usize> Draft<'a, D> {
         let peridynamics = peridynamics
             .map(|p| lattice_regions::bodies(spec, joining, p, mesh, &mut zones))
             .transpose()?;
-        let PointMaterials {
-            used,
-            law,
-            interfaces,
-            told,
-        } = self.point_materials(&joined.coupling, peridynamics.as_ref(), &zones)?;
+        let points = self.point_materials(&joined.coupling, peridynamics.as_ref(), &zones)?;
+        let (used, law) = (points.used, points.law);
+        let (interfaces, told) = (points.interfaces, points.told);
         if let Some(p) = &peridynamics {
             agreement::horizon(spec, p, mesh, &zones)?;
         }

@@ -5,55 +5,11 @@
 
 use rayon::prelude::*;
 
-use super::{Kinematics, generic::Generic, point_forces::PointForces};
+use super::{Kinematics, generic::Generic, point_state::PointForces};
 use crate::{
     system::Interval,
     tensor::{Tensor, Vector, inverse},
 };
-
-/// What a drag remembers, and what it finds.
-pub(super) struct Drag<const D: usize> {
-    /// Displacement and velocity that were committed last.
-    before: Vec<f64>,
-    velocity: Vec<f64>,
-    /// Those of the last force.
-    present: Vec<f64>,
-    present_velocity: Vec<f64>,
-    /// The velocity gradient of each family, and its strength c, 0 where there is none.
-    rate: Vec<(Tensor<D>, f64)>,
-}
-
-impl<const D: usize> Drag<D> {
-    pub(super) fn new(points: usize) -> Self {
-        let nothing = vec![0.0; points * D];
-        Self {
-            before: nothing.clone(),
-            velocity: nothing.clone(),
-            present: nothing.clone(),
-            present_velocity: nothing,
-            rate: vec![(Tensor::zeros(), 0.0); points],
-        }
-    }
-
-    pub(super) fn commit(&mut self) {
-        self.before.clone_from(&self.present);
-        self.velocity.clone_from(&self.present_velocity);
-    }
-
-    /// What it keeps in checkpoints.
-    pub(super) fn kept(&self) -> impl Iterator<Item = &f64> {
-        self.before.iter().chain(&self.velocity)
-    }
-
-    /// The same, to be put back.
-    pub(super) fn kept_mut(&mut self) -> impl Iterator<Item = &mut f64> {
-        self.before.iter_mut().chain(&mut self.velocity)
-    }
-
-    pub(super) fn memory_bytes(&self) -> usize {
-        self.before.len() * 32 + self.rate.len() * std::mem::size_of::<(Tensor<D>, f64)>()
-    }
-}
 
 impl<const D: usize> Generic<D> {
     /// Adds the drag to the forces of points with rows, and what it dissipates to what they did.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::kinematics::Kinematics;
 use crate::{
     peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
     tensor::Vector,
@@ -11,26 +12,6 @@ use crate::{
 
 /// Largest difference of a number of a bond between its ends, in parts of it.
 pub(super) const ENDS: f64 = 1e-12;
-
-/// How bonds follow the motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kinematics {
-    /// Bonds rotate and stretch: any displacement.
-    #[default]
-    Exact,
-    /// Linear in the displacement, as the static operators are.
-    Linear,
-}
-
-impl Kinematics {
-    /// The value of `t` at the critical stretch `s`.
-    pub(crate) fn limit(self, s: f64) -> f64 {
-        match self {
-            Self::Exact => s * (2.0 + s),
-            Self::Linear => 2.0 * s,
-        }
-    }
-}
 
 /// Which pass to build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

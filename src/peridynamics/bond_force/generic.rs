@@ -10,7 +10,7 @@ use super::{
     BondPass, BondSetup, ForceStates, Kinematics,
     bond_failure::BondFailure,
     list::{extension, ratio, stretched},
-    point_forces::PointForces,
+    point_state::PointForces,
 };
 use crate::{
     peridynamics::{

@@ -6,7 +6,7 @@
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
-//! | `point_forces.rs`, `drag.rs` | the same of correspondence, by a stress per point; its drag |
+//! | `point_forces.rs`, `point_state.rs`, `drag.rs` | the same of correspondence, by a stress per point; what it keeps; its drag |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
 //! | `generic_states.rs` | what it tells of single points |
 //! | `generic_damage.rs` | damage that laws keep of their bonds |
@@ -38,6 +38,7 @@ mod generic_states;
 mod generic_tangent;
 #[cfg(test)]
 mod generic_tests;
+mod kinematics;
 mod lattice;
 mod lattice_setup;
 // vector instructions: the other modules of the crate have no unsafe code
@@ -49,6 +50,7 @@ mod own_points;
 mod point_forces;
 #[cfg(test)]
 mod point_forces_tests;
+mod point_state;
 #[cfg(test)]
 mod reference_force;
 #[allow(unsafe_code)]
@@ -59,9 +61,9 @@ pub(super) mod stretch;
 mod tests;
 
 pub use force_problem::{
-    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Kinematics, Layout,
-    Storage,
+    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Layout, Storage,
 };
+pub use kinematics::Kinematics;
 
 pub use stencil::BlockSetup;
 

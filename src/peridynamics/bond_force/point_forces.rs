@@ -9,13 +9,12 @@ use rayon::prelude::*;
 use super::{
     Kinematics,
     bond_failure::BondFailure,
-    drag::Drag,
     generic::{Generic, History, NONE, Outcome},
+    point_state::{Intact, PointForces, PointTensor},
 };
 use crate::{
     material::LocalResponse,
     peridynamics::{
-        ForceState,
         body::split_rows,
         force_state::PLASTIC_STRAIN,
         shape_tensor::spanned_inverse,
@@ -24,87 +23,6 @@ use crate::{
     },
     tensor::{Tensor, Vector},
 };
-
-/// What a family has whatever its deformation, by its intact bonds.
-#[derive(Clone, Copy)]
-struct Intact<const D: usize> {
-    /// `K⁻¹`; none if they do not span the space.
-    inverse: Option<Tensor<D>>,
-    /// `Σ ω ξ V` \[m^(D+1)\].
-    first: Vector<D>,
-    /// Share of the family's volume whose bonds are broken.
-    damage: f64,
-}
-
-/// What the bonds of a family take from their centre: `ω (B ξ + q η)`.
-#[derive(Clone, Copy)]
-struct PointTensor<const D: usize> {
-    through: Tensor<D>,
-    strength: f64,
-}
-
-impl<const D: usize> PointTensor<D> {
-    const NONE: Self = Self {
-        through: Tensor::<D>::from_array_storage(nalgebra::ArrayStorage([[0.0; D]; D])),
-        strength: 0.0,
-    };
-}
-
-/// What the pass keeps for it.
-pub(super) struct PointForces<const D: usize> {
-    pub(super) control: ZeroEnergyControl,
-    /// ω V of every bond, V of its far point; 0 of broken ones.
-    pub(super) weight: Vec<f64>,
-    /// The same with the ω that the far family gives to the bond, 0 if there is none; empty if all are equal.
-    pub(super) back: Vec<f64>,
-    intact: Vec<Intact<D>>,
-    /// Of the last force.
-    tensor: Vec<PointTensor<D>>,
-    /// `F̄ − I` of the last force.
-    gradient: Vec<Tensor<D>>,
-    /// The own part of the force per volume.
-    own: Vec<Vector<D>>,
-    pub(super) drag: Option<Drag<D>>,
-}
-
-impl<const D: usize> PointForces<D> {
-    /// For laws that have such points; the bonds as they stand are found by [`Generic::recall_intact`].
-    pub(super) fn new(states: &dyn ForceState<D>, points: usize) -> Option<Self> {
-        let control = states.correspondence(None)?.control;
-        Some(Self {
-            control,
-            weight: Vec::new(),
-            back: Vec::new(),
-            intact: Vec::new(),
-            tensor: vec![PointTensor::NONE; points],
-            gradient: vec![Tensor::zeros(); points],
-            own: vec![Vector::zeros(); points],
-            drag: (control == ZeroEnergyControl::Drag).then(|| Drag::new(points)),
-        })
-    }
-
-    /// ω V as the far ends of the bonds give it.
-    pub(super) fn back(&self) -> &[f64] {
-        match self.back.is_empty() {
-            true => &self.weight,
-            false => &self.back,
-        }
-    }
-
-    /// The strength of a control that the tensors of the points do not hold.
-    pub(super) fn strength(&self, i: usize) -> f64 {
-        self.tensor[i].strength
-    }
-
-    pub(super) fn memory_bytes(&self) -> usize {
-        (self.weight.len() + self.back.len()) * 8
-            + self.intact.len() * std::mem::size_of::<Intact<D>>()
-            + self.tensor.len() * std::mem::size_of::<PointTensor<D>>()
-            + self.gradient.len() * std::mem::size_of::<Tensor<D>>()
-            + self.own.len() * D * 8
-            + self.drag.as_ref().map_or(0, Drag::memory_bytes)
-    }
-}
 
 impl<const D: usize> Generic<D> {
     /// Goes back to a force state per bond, with which this is compared.

@@ -1,0 +1,21 @@
+//! How bonds follow a motion: exactly, or to first order.
+
+/// How bonds follow the motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kinematics {
+    /// Bonds rotate and stretch: any displacement.
+    #[default]
+    Exact,
+    /// Linear in the displacement, as the static operators are.
+    Linear,
+}
+
+impl Kinematics {
+    /// The value of `t` at the critical stretch `s`.
+    pub(crate) fn limit(self, s: f64) -> f64 {
+        match self {
+            Self::Exact => s * (2.0 + s),
+            Self::Linear => 2.0 * s,
+        }
+    }
+}
