@@ -85,6 +85,11 @@ impl Function {
         values
     }
 
+    /// What stands in a scene's keys for the function of this number among those of its source, see [`Source::with_functions`](super::Source::with_functions).
+    pub fn word(number: usize) -> String {
+        format!("function {number}")
+    }
+
     /// Whether values change in space.
     pub fn depends_on_position(&self) -> bool {
         self.varies[0]
@@ -116,11 +121,6 @@ pub(crate) fn with_functions<T>(functions: &[Function], read: impl FnOnce() -> T
     read()
 }
 
-/// What stands in a text for the function of a number.
-pub(crate) fn word(number: usize) -> String {
-    format!("function {number}")
-}
-
 /// The function that a text stands for, if it does.
 pub(crate) fn in_scope(text: &str) -> Option<Function> {
     let number: usize = text.strip_prefix("function ")?.parse().ok()?;
@@ -134,14 +134,14 @@ mod tests {
     #[test]
     fn words_stand_for_functions_within_their_source_only() {
         let double = Function::of_position(|x| 2.0 * x[0]);
-        assert!(in_scope(&word(0)).is_none());
+        assert!(in_scope(&Function::word(0)).is_none());
         with_functions(std::slice::from_ref(&double), || {
-            assert_eq!(in_scope(&word(0)).as_ref(), Some(&double));
-            assert!(in_scope(&word(1)).is_none() && in_scope("2*x").is_none());
-            with_functions(&[], || assert!(in_scope(&word(0)).is_none()));
-            assert!(in_scope(&word(0)).is_some());
+            assert_eq!(in_scope(&Function::word(0)).as_ref(), Some(&double));
+            assert!(in_scope(&Function::word(1)).is_none() && in_scope("2*x").is_none());
+            with_functions(&[], || assert!(in_scope(&Function::word(0)).is_none()));
+            assert!(in_scope(&Function::word(0)).is_some());
         });
-        assert!(in_scope(&word(0)).is_none());
+        assert!(in_scope(&Function::word(0)).is_none());
         assert_eq!(
             double.values(&[[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]], 0.0),
             [2.0, 6.0]

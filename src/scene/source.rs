@@ -63,6 +63,12 @@ impl Source {
         }
     }
 
+    /// The scene with functions of a program, for which [`Function::word`] stands in its text and its overrides.
+    pub fn with_functions(mut self, functions: Vec<Function>) -> Self {
+        self.functions = functions;
+        self
+    }
+
     /// The functions of the program that words of the scene stand for.
     pub(crate) fn functions(&self) -> &[Function] {
         &self.functions

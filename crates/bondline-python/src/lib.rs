@@ -16,6 +16,7 @@
 mod attend;
 mod errors;
 mod frame;
+mod function;
 mod mesh;
 mod program;
 mod scene;

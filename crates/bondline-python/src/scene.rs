@@ -10,6 +10,7 @@ use pyo3::types::PyDict;
 use crate::attend::{Ending, attend};
 use crate::errors::{check_error, defect, run_error, scene_error};
 use crate::frame::{columns, frame};
+use crate::function::{Functions, Raised};
 use crate::mesh::Mesh;
 use crate::value::{table, value_at};
 
@@ -20,26 +21,31 @@ pub struct Scene {
     directory: PathBuf,
     name: String,
     scene: AnyScene,
+    raised: Raised,
 }
 
-/// Keys with other values, as after `--set`.
-fn set(source: &mut Source, overrides: &Bound<'_, PyDict>) -> PyResult<()> {
+/// Keys with other values, as after `--set`, and the functions of the scene with those among them.
+fn set(
+    mut source: Source,
+    overrides: &Bound<'_, PyDict>,
+    mut functions: Functions,
+) -> PyResult<(Source, Raised)> {
     let py = overrides.py();
     for (key, value) in overrides {
         let key: String = key.extract()?;
-        let value = value_at(&value, &key, 0)?;
+        let value = value_at(&value, &key, 0, &mut functions)?;
         source
             .push_override(&format!("{key}={value}"))
             .map_err(|e| scene_error(py, e))?;
     }
-    Ok(())
+    Ok((source.with_functions(functions.list), functions.raised))
 }
 
 impl Scene {
     /// Validates a scene. What an `accuracy` or `zones = "auto"` leaves open takes runs of it, so the interpreter goes on meanwhile.
     fn validated(
         py: Python<'_>,
-        source: Source,
+        (source, raised): (Source, Raised),
         directory: PathBuf,
         name: String,
     ) -> PyResult<Self> {
@@ -55,7 +61,8 @@ impl Scene {
             source,
             directory,
             name,
-            scene: scene.map_err(|e| scene_error(py, e))?,
+            scene: raised.instead_of(scene.map_err(|e| scene_error(py, e)))?,
+            raised,
         })
     }
 }
@@ -65,8 +72,8 @@ impl Scene {
     /// From a file.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let (mut source, directory, name) = read(&path, &[]).map_err(|e| scene_error(py, e))?;
-        set(&mut source, overrides)?;
+        let (source, directory, name) = read(&path, &[]).map_err(|e| scene_error(py, e))?;
+        let source = set(source, overrides, Functions::default())?;
         Self::validated(py, source, directory.to_path_buf(), name)
     }
 
@@ -79,12 +86,13 @@ impl Scene {
         mesh: Option<&Mesh>,
         overrides: &Bound<'_, PyDict>,
     ) -> PyResult<Self> {
-        let text = table(keys, "", 0)?.to_string();
+        let mut functions = Functions::default();
+        let text = table(keys, "", 0, &mut functions)?.to_string();
         let mut source = Source::new(name.clone(), text);
         if let Some(mesh) = mesh {
             source = source.with_mesh(mesh.parts.clone());
         }
-        set(&mut source, overrides)?;
+        let source = set(source, overrides, functions)?;
         Self::validated(keys.py(), source, directory, name)
     }
 
@@ -124,7 +132,8 @@ impl Scene {
                 bondline_study::check_source(&source, &directory, &name, pilots, watched)
             },
         )?;
-        let prediction = found.map_err(|e| check_error(py, e))?;
+        let found = found.map_err(|e| check_error(py, e));
+        let prediction = self.raised.instead_of(found)?;
         serde_json::to_string(&prediction).map_err(|e| defect(py, &e.to_string()))
     }
 
@@ -169,7 +178,8 @@ impl Scene {
                 (summary, outlet.into_tables())
             },
         )?;
-        let summary = summary.map_err(|e| run_error(py, &e))?;
+        let summary = summary.map_err(|e| run_error(py, &e));
+        let summary = self.raised.instead_of(summary)?;
         let text = summary.json().map_err(|e| defect(py, &e.to_string()))?;
         let by_name = PyDict::new(py);
         for table in tables {

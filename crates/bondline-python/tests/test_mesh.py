@@ -147,7 +147,8 @@ def test_two_meshes_are_one_too_many() -> None:
     ("points", "cells", "words"),
     [
         (np.zeros((3, 4)), {"triangle": [[0, 1, 2]]}, "shape"),
-        ([[0, 0], [1, 0], [0, 1]], {"triangle6": [[0, 1, 2, 3, 4, 5]]}, "triangle6"),
+        ([[0, 0], [1, 0], [0, 1]], {"triangle6": [[0, 1, 2, 3, 4, 5]]}, "node 3"),
+        ([[0, 0], [1, 0], [0, 1]], {"triangle10": [list(range(10))]}, "triangle10"),
         ([[0, 0], [1, 0], [0, 1]], {"triangle": [[0, 1, -1]]}, "no numbers"),
         ([[0, 0], [1, 0], [0, 1]], {"triangle": [[0, 1, 7]]}, "node 7"),
         ([[0, 0], [1, 0], [0, float("nan")]], {"triangle": [[0, 1, 2]]}, "NaN"),

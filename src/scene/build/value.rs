@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::scene::function::{Function, word};
+use crate::scene::function::Function;
 
 /// What a key of a scene is set to.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ impl Entries {
             Value::Table(entries) => toml::Value::Table(entries.table(functions)),
             Value::Function(function) => {
                 functions.push(function.clone());
-                toml::Value::String(word(functions.len() - 1))
+                toml::Value::String(Function::word(functions.len() - 1))
             }
         };
         let entries = self.0.iter();

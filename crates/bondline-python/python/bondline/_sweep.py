@@ -63,6 +63,7 @@ def sweep(
     """Runs a scene once for each of ``values`` of the dotted ``key``; returns the results in the order of ``values``.
 
     scene: the keys of a scene, whose relative paths start in ``directory``; or a scene file.
+    Functions in it must be defined at the top level of a module, where other processes find them.
     processes: how many run at once, each with its share of the cores; one per core if left out.
 
     Results hold the last solution only. Raises what the first value raises that fails; the others are ended then.
@@ -76,9 +77,14 @@ def sweep(
     modules = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
     share = str(max(cores // at_once, 1))
     environment = dict(os.environ, PYTHONPATH=modules, RAYON_NUM_THREADS=share)
-    tasks = [
-        pickle.dumps((shared, str(directory), {**(overrides or {}), key: value})) for value in values
-    ]
+    try:
+        tasks = [
+            pickle.dumps((shared, str(directory), {**(overrides or {}), key: value})) for value in values
+        ]
+    except (AttributeError, TypeError, pickle.PicklingError) as error:
+        raise ValueError(
+            f"a sweep hands scenes to other processes, which is not possible here ({error}); define functions at the top level of a module"
+        ) from error
     started = _Processes()
     with ThreadPoolExecutor(at_once) as pool:
         try:
