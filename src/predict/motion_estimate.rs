@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::output_cost::{TrialFolder, file_seconds, made_up};
 use super::resource_estimate::{MotionPrediction, Prediction, holds, warnings};
-use super::solver_estimate::{OUTPUT_BYTES, Planned};
+use super::solver_estimate::{Planned, output_bytes};
 use crate::coupling::{Model, Operator, Sampler};
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::series::Series;
@@ -84,7 +84,7 @@ fn prediction<const D: usize>(
 ) -> Prediction {
     let sizes = sizes(laid_out.model, laid_out.operator);
     let output = match files {
-        Files::Some => OUTPUT_BYTES * (sizes.cells + sizes.points) as u64,
+        Files::Some => output_bytes(&sizes, &laid_out.rest.output),
         Files::None => 0,
     };
     let share = |name, bytes| Share { name, bytes };
@@ -220,7 +220,9 @@ impl OutputCost {
             };
             let mut series = Series::new(folder.path(), "trial");
             let more = [OverSites::Vector("velocity", &u)];
-            file_seconds(&solved, &more, count, |s| series.push(0.0, s).map(drop))?
+            file_seconds(&solved, &more, rest.output.points, count, |s| {
+                series.push(0.0, s).map(drop)
+            })?
         } else {
             0.0
         };

@@ -9,6 +9,7 @@ use crate::observe::vtu::{Compression, Snapshot, write_vtu};
 use crate::run::solution::Solved;
 use crate::run::write::{OverSites, Shown, snapshot, write};
 use crate::scene::Output;
+use crate::scene::spec::PointOutputSpec;
 
 /// Cells and points of the larger of two trial files, at least.
 const SHOWN: usize = 1500;
@@ -64,6 +65,7 @@ pub(crate) fn made_up(dofs: usize) -> Vec<f64> {
 pub(crate) fn file_seconds<const D: usize>(
     solved: &Solved<'_, D>,
     more: &[OverSites<'_>],
+    points: PointOutputSpec,
     files: f64,
     mut write: impl FnMut(Snapshot) -> Result<(), ObserveError>,
 ) -> Result<f64, ObserveError> {
@@ -71,7 +73,7 @@ pub(crate) fn file_seconds<const D: usize>(
     let mut trial = |wanted: f64| -> Result<(f64, f64), ObserveError> {
         let every = (all / wanted).floor().max(1.0);
         let begun = Instant::now();
-        write(snapshot(solved, more, Shown::Every(every as usize)))?;
+        write(snapshot(solved, more, points, Shown::Every(every as usize)))?;
         Ok((all / every, begun.elapsed().as_secs_f64()))
     };
     // the first of all makes the folder
@@ -102,7 +104,7 @@ pub(crate) fn output_seconds<const D: usize>(
     let mut seconds = 0.0;
     if output.vtu {
         let path = folder.path().join("trial.vtu");
-        seconds += file_seconds(solved, &[], 1.0, |s| {
+        seconds += file_seconds(solved, &[], output.points, 1.0, |s| {
             write_vtu(&path, &s, Compression::default())
         })?;
     }

@@ -154,7 +154,7 @@ pub(crate) fn predict<const D: usize>(
     ));
     choices.extend(weights_decisions(&model));
 
-    let (memory, peak) = plan.memory(laid_out, &sizes);
+    let (memory, peak) = plan.memory(laid_out, &sizes, &rest.output);
     plan.add_seconds(symmetry, nonzeros, &mut timings);
     timings.add(
         "output",

@@ -9,6 +9,8 @@ use crate::run::RunError;
 use crate::run::budget::Share;
 use crate::run::equilibrium;
 use crate::run::setup::RunSettings;
+use crate::scene::Output;
+use crate::scene::spec::PointOutputSpec;
 use crate::solve::FreeDofs;
 use crate::solve::direct::Analysis;
 use crate::solve::factor_time_estimate::{rehearse, seconds_per_scalar};
@@ -32,7 +34,19 @@ const SUBSTITUTIONS: f64 = 3.0;
 const PASSES: f64 = 1500.0;
 
 /// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
-pub(crate) const OUTPUT_BYTES: u64 = 900;
+const OUTPUT_BYTES: u64 = 900;
+
+/// Bytes per further corner of a point that is shown as a cell: its position and fields, their copy, its text.
+const CORNER_BYTES: u64 = 250;
+
+/// Bytes of the output while it is encoded.
+pub(crate) fn output_bytes<const D: usize>(sizes: &Sizes, output: &Output<D>) -> u64 {
+    let corners = match output.points {
+        PointOutputSpec::Vertices => 0,
+        PointOutputSpec::Cells => ((1 << D) - 1) * sizes.points as u64,
+    };
+    OUTPUT_BYTES * (sizes.cells + sizes.points) as u64 + CORNER_BYTES * corners
+}
 
 /// Bytes of a factorisation on two threads over those on one: two subtrees hold contribution blocks. Measured on the scenes
 /// of `tests/check.rs`: 1.23 to 1.36 for Cholesky, whose factors are the smaller part, 1.0 to 1.15 for LU.
@@ -101,9 +115,14 @@ impl Planned {
     }
 
     /// What holds memory beside the `laid_out` bytes of the model, and the most that is held at the same time.
-    pub fn memory(&self, laid_out: u64, sizes: &Sizes) -> (Vec<Share>, u64) {
+    pub fn memory<const D: usize>(
+        &self,
+        laid_out: u64,
+        sizes: &Sizes,
+        output: &Output<D>,
+    ) -> (Vec<Share>, u64) {
         let (stiffness, solver) = (self.stiffness, self.solver);
-        let output_bytes = OUTPUT_BYTES * (sizes.cells + sizes.points) as u64;
+        let output_bytes = output_bytes(sizes, output);
         let memory = vec![
             Share {
                 name: "model",

@@ -34,6 +34,7 @@ pub mod motion;
 #[cfg(test)]
 mod observed_tests;
 pub(crate) mod placed_scene;
+mod point_cells;
 pub mod proof;
 mod results;
 mod rotation;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::RunOptions;
+use super::point_cells::PointCells;
 use super::solution::Solved;
 use super::stresses::{KnownStresses, Place};
 use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
@@ -15,6 +16,7 @@ use crate::observe::ObserveError;
 use crate::observe::csv::{Entry, write_table};
 use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
 use crate::scene::output::PROBES;
+use crate::scene::spec::PointOutputSpec;
 use crate::scene::validated::Output;
 use crate::shape::Shape;
 use crate::tensor::{Tensor, Vector, padded, strain};
@@ -45,7 +47,7 @@ pub(super) fn write_for<const D: usize>(
         let more = energies
             .as_deref()
             .map(|e| OverSites::Scalar(ENERGY_DENSITY, e));
-        let shown = snapshot(solved, more.as_slice(), Shown::All);
+        let shown = snapshot(solved, more.as_slice(), output.points, Shown::All);
         if writes {
             files.push(path(".vtu"));
             write_vtu(&files[0], &shown, Compression::Zlib)?;
@@ -340,17 +342,18 @@ pub(super) fn energy_densities<const D: usize>(
 pub fn snapshot<const D: usize>(
     solved: &Solved<'_, D>,
     more: &[OverSites<'_>],
+    points: PointOutputSpec,
     shown: Shown,
 ) -> Snapshot {
     let mut rows = SnapshotRows::new(solved);
     rows.push_elements(shown);
-    rows.push_points(shown);
+    rows.push_points(points, shown);
     rows.snapshot.point_fields = rows.point_fields(more);
     rows.snapshot.cell_fields = rows.cell_fields();
     rows.snapshot
 }
 
-/// Points and cells of a file with their fields as they are collected: nodes that elements use and elements, then peridynamic points as both.
+/// Points and cells of a file with their fields as they are collected: nodes that elements use and elements, then peridynamic points, or the corners of their cells, and those cells.
 struct SnapshotRows<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
     snapshot: Snapshot,
@@ -358,7 +361,10 @@ struct SnapshotRows<'a, const D: usize> {
     site_of_point: Vec<Option<usize>>,
     node_of_point: Vec<Option<usize>>,
     displacement: Vec<Vector<D>>,
+    /// The spacing at each point of the file, zero at nodes of elements.
+    sizes: Vec<f64>,
     zones: Vec<u8>,
+    volumes: Vec<f64>,
     /// The material of each cell; empty if all are of one.
     materials: Vec<i32>,
     strains: Vec<Tensor<D>>,
@@ -376,7 +382,9 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             site_of_point: Vec::new(),
             node_of_point: Vec::new(),
             displacement: Vec::new(),
+            sizes: Vec::new(),
             zones: Vec::new(),
+            volumes: Vec::new(),
             materials: Vec::new(),
             strains: Vec::new(),
             stresses: Vec::new(),
@@ -405,6 +413,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                     *entry = self.snapshot.points.len() as u32;
                     self.snapshot.points.push(padded(&mesh.nodes[n as usize]));
                     self.displacement.push(solved.node(n as usize));
+                    self.sizes.push(0.0);
                     self.site_of_point.push(site_of_node[n as usize]);
                     self.node_of_point.push(Some(n as usize));
                 }
@@ -413,6 +422,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             self.snapshot
                 .push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
             self.zones.push(label(model.zones[c]));
+            self.volumes.push(fem::cell_volume(mesh, c));
             if model.several().is_some() {
                 self.materials.push(i32::from(model.material_of_cell(c)));
             }
@@ -426,9 +436,10 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
     }
 
     /// Peridynamic points with strain and stress of their families.
-    fn push_points(&mut self, shown: Shown) {
+    fn push_points(&mut self, form: PointOutputSpec, shown: Shown) {
         let solved = self.solved;
         let model = solved.model;
+        let cells = PointCells::of(model);
         let intact = Intact::of(solved);
         let known = &self.known;
         let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
@@ -442,27 +453,35 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             })
             .collect();
         for (site, e, stress) in on_points {
-            let number = self.snapshot.points.len() as u32;
-            self.snapshot
-                .points
-                .push(padded(&model.sites[site].position));
-            self.snapshot.push_cell(CellShape::Vertex, &[number]);
-            self.displacement.push(solved.site(site));
-            self.site_of_point.push(Some(site));
-            self.node_of_point.push(None);
+            let Some((body, p)) = model.point_of(site) else {
+                continue;
+            };
+            let x = &model.sites[site].position;
+            let (shape, corners) = match form {
+                PointOutputSpec::Vertices => (CellShape::Vertex, vec![padded(x)]),
+                PointOutputSpec::Cells => cells.cell(p, x),
+            };
+            let first = self.snapshot.points.len() as u32;
+            let numbers: Vec<u32> = (first..first + corners.len() as u32).collect();
+            self.snapshot.push_cell(shape, &numbers);
+            for corner in corners {
+                self.snapshot.points.push(corner);
+                self.displacement.push(solved.site(site));
+                self.sizes.push(cells.size(p));
+                self.site_of_point.push(Some(site));
+                self.node_of_point.push(None);
+            }
             self.zones.push(label(solved.zone_of_site[site]));
-            let material = model
-                .point_of(site)
-                .map(|(body, p)| body.cloud.material.get(p));
-            self.materials
-                .extend(material.flatten().map(|&m| i32::from(m)));
+            self.volumes.push(body.cloud.volume[p]);
+            let material = body.cloud.material.get(p);
+            self.materials.extend(material.map(|&m| i32::from(m)));
             self.strains.push(e);
             self.stresses.push(stress);
             self.places.push(Place::Point(site));
         }
     }
 
-    /// Displacement, blending, horizon and residual, and `more` fields over sites.
+    /// Displacement, blending, horizon, spacing and residual, and `more` fields over sites.
     fn point_fields(&self, more: &[OverSites<'_>]) -> Vec<Field> {
         let solved = self.solved;
         let model = solved.model;
@@ -483,6 +502,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             Field::vector("displacement", &self.displacement),
             Field::scalar("beta", of_site(&|s| solved.operator.beta(s))),
             Field::scalar("horizon", of_site(&horizon)),
+            Field::scalar("size", self.sizes.clone()),
         ];
         if !solved.residual.is_empty() {
             let residual: Vec<Vector<D>> = self
@@ -510,11 +530,12 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         fields
     }
 
-    /// Model, strain and stress, and what local laws remember.
+    /// Model, volume, strain and stress, and what local laws remember.
     fn cell_fields(&self) -> Vec<Field> {
         let shown = self.zones.len();
         let mut fields = vec![
             Field::labels("model", self.zones.clone()),
+            Field::scalar("volume", self.volumes.clone()),
             Field::tensor("strain", &self.strains),
             Field::tensor("stress", &self.stresses),
         ];

@@ -92,6 +92,7 @@ pub(crate) fn output<const D: usize>(
             .map_or("out".into(), |d| d.value.clone().into()),
         name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
         vtu: o.vtu.unwrap_or(true),
+        points: o.points,
         energy_density: o.energy_density.unwrap_or(false),
         stresses: o.stresses.iter().map(|s| *s.get_ref()).collect(),
         lines,

@@ -114,6 +114,8 @@ pub struct Output<const D: usize> {
     pub name: String,
     /// Whether a VTU is written.
     pub vtu: bool,
+    /// How it shows peridynamic points.
+    pub points: super::spec::PointOutputSpec,
     /// Whether it holds the energy density of points.
     pub energy_density: bool,
     /// Numbers made of the stress that it holds too.

@@ -426,7 +426,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if let Some(energies) = &energies {
             more.push(OverSites::Scalar(ENERGY_DENSITY, energies));
         }
-        let mut shown = snapshot(solved, &more, Shown::All);
+        let mut shown = snapshot(solved, &more, self.output.points, Shown::All);
         if writes {
             shown = self.series.push(moment.state.time, shown)?;
         }

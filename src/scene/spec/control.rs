@@ -56,6 +56,9 @@ pub struct OutputSpec {
     /// Whether a VTU file is written; true if left out.
     #[serde(default)]
     pub vtu: Option<bool>,
+    /// How the VTU shows peridynamic points; "vertices" if left out.
+    #[serde(default)]
+    pub points: PointOutputSpec,
     /// Whether the VTU has the energy density of peridynamic points; false if left out.
     #[serde(default)]
     pub energy_density: Option<bool>,
@@ -72,6 +75,17 @@ pub struct OutputSpec {
     /// Tips of cracks to follow, by name, in a scene in which bonds break.
     #[serde(default)]
     pub tips: BTreeMap<Text, TipSpec>,
+}
+
+/// How a VTU file shows peridynamic points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PointOutputSpec {
+    /// Each as a vertex, with its fields once.
+    #[default]
+    Vertices,
+    /// Each as the cell of its lattice, or of the mesh where points lie at centroids, so that viewers slice and shade them; corners have the values of the point.
+    Cells,
 }
 
 /// A number made of a stress, that out of the plane included.

@@ -17,7 +17,9 @@ pub use condition::{
     BodyForceSpec, ConditionSpec, DisplacementSpec, PressureSpec, RotationSpec, SymmetrySpec,
     TemperatureSpec, TractionSpec, VelocitySpec, VoidSpec,
 };
-pub use control::{LineSpec, OutputSpec, ProbeSpec, SolverSpec, StressSpec, UnprovenSpec};
+pub use control::{
+    LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SolverSpec, StressSpec, UnprovenSpec,
+};
 pub use coupling::{
     BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec, InterfaceSpec,
     LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,

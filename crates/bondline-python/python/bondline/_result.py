@@ -46,7 +46,7 @@ def _frozen(value: Any) -> Any:
 class Frame:
     """One solution: cells, points and fields, the same that a VTU file shows.
 
-    Nodes of elements come first, then peridynamic points; each of these is a cell of type ``vertex``. Arrays cannot be written to; ``.copy()`` gives one that can.
+    Nodes of elements come first, then peridynamic points; each of these is a cell of type ``vertex``, or with ``output.points = "cells"`` the cell around it with corners of its own. Arrays cannot be written to; ``.copy()`` gives one that can.
     Lengths and forces are in the units of the scene.
     """
 
