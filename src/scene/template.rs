@@ -15,11 +15,21 @@ pub enum Template {
     Plate,
     /// A plate on a mesh from a file.
     File,
+    /// A crack that runs and branches, in explicit dynamics.
+    Dynamics,
+    /// A crack that is opened in load steps.
+    LoadSteps,
 }
 
 impl Template {
     /// All templates.
-    pub const ALL: [Self; 3] = [Self::Bar, Self::Plate, Self::File];
+    pub const ALL: [Self; 5] = [
+        Self::Bar,
+        Self::Plate,
+        Self::File,
+        Self::Dynamics,
+        Self::LoadSteps,
+    ];
 
     /// Its text.
     pub fn text(self) -> &'static str {
@@ -27,6 +37,8 @@ impl Template {
             Self::Bar => include_str!("templates/bar.toml"),
             Self::Plate => include_str!("templates/plate.toml"),
             Self::File => include_str!("templates/file.toml"),
+            Self::Dynamics => include_str!("templates/dynamics.toml"),
+            Self::LoadSteps => include_str!("templates/load-steps.toml"),
         }
     }
 

@@ -55,7 +55,7 @@ Examples:
 
 /// Couples classical finite elements to meshfree peridynamics.
 #[derive(Parser)]
-#[command(version, after_help = EXAMPLES)]
+#[command(name = "bondline", version, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -261,6 +261,10 @@ enum TemplateName {
     Plate,
     /// A plate on a mesh from a file.
     File,
+    /// A crack that runs and branches, in explicit dynamics.
+    Dynamics,
+    /// A crack that is opened in load steps.
+    LoadSteps,
 }
 
 /// Does what the arguments say, and returns the exit status; the first one is the name of the program.
@@ -453,6 +457,8 @@ fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Resul
                 TemplateName::Bar => Template::Bar,
                 TemplateName::Plate => Template::Plate,
                 TemplateName::File => Template::File,
+                TemplateName::Dynamics => Template::Dynamics,
+                TemplateName::LoadSteps => Template::LoadSteps,
             };
             template.write(&path).map_err(report)?;
             print(format_args!(
