@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::classes::{RowClass, Unbalanced, limits, told};
+use super::classes::{Layout, RowClass, Skin, Unbalanced, limits, told};
 use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress};
 use super::patch::{Around, PatchField, StressError, stress_errors};
-use super::surface::{Boundary, FacetKind};
+use super::surface::{self, Boundary, FacetKind};
 use crate::assembly::Row;
 use crate::coupling::{Model, Operator, SiteKind, Zone};
 use crate::observe::proof::Part;
@@ -180,7 +180,14 @@ fn prove<const D: usize>(
         residual,
         total,
         &unbalanced,
-        (model.is_lattice(), model.faces_cut_bonds()),
+        Layout {
+            is_lattice: model.is_lattice(),
+            is_truncated: model.faces_cut_bonds(),
+            skin: match unbalanced.is_empty() {
+                true => Skin::Possible,
+                false => surface::skin(model),
+            },
+        },
     )
 }
 

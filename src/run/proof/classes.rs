@@ -69,13 +69,62 @@ pub(super) struct Unbalanced {
     pub stress_at: Vec<f64>,
 }
 
+/// Whether a layer of elements could cover the surfaces at which families lack points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Skin {
+    /// `zones.skin` would.
+    Possible,
+    /// A crack or void passes through the cells there, and elements carry neither.
+    Crossed,
+    /// There are no elements at all, so that zones are not looked at.
+    NoElements,
+}
+
+impl Skin {
+    /// What to do about surfaces, in words.
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Possible => "zones.skin = \"free-surfaces\" puts elements there",
+            Self::Crossed => {
+                "a crack or void passes through the cells there, which elements cannot carry: a smaller horizon makes the layer thinner"
+            }
+            Self::NoElements => {
+                "elements there (coupling = \"truncated\" and zones.skin = \"free-surfaces\") or a smaller horizon help"
+            }
+        }
+    }
+
+    /// As [`Skin::remedy`], where a seam meets the surface.
+    fn remedy_at_seam(self) -> &'static str {
+        match self {
+            Self::Possible | Self::NoElements => {
+                "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface"
+            }
+            Self::Crossed => {
+                "a crack or void passes through the cells there, so that the zone has to end in the surface: a smaller horizon makes the layer thinner"
+            }
+        }
+    }
+}
+
+/// What of a model decides which remedies there are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    /// Whether points lie on a lattice.
+    pub is_lattice: bool,
+    /// Whether bonds end on the faces of elements.
+    pub is_truncated: bool,
+    /// Whether elements could lie at surfaces.
+    pub skin: Skin,
+}
+
 /// What the proof has shown, as data.
 pub(super) fn told(
     fields: usize,
     residual: f64,
     rows: usize,
     unbalanced: &[Unbalanced],
-    (is_lattice, is_truncated): (bool, bool),
+    layout: Layout,
 ) -> Part {
     let figure = |name: String, value: f64| Figure { name, value };
     let mut figures = vec![
@@ -108,7 +157,7 @@ pub(super) fn told(
         figures,
         findings: unbalanced
             .iter()
-            .filter_map(|rows| verdict(rows, is_lattice, is_truncated))
+            .filter_map(|rows| verdict(rows, layout))
             .collect(),
     }
 }
@@ -131,11 +180,12 @@ impl RowClass {
 }
 
 /// Where rows of a class are, what to do about them, and from which error on they are warned of and refused; none of rows at a crack.
-fn described(
-    class: RowClass,
-    is_lattice: bool,
-    is_truncated: bool,
-) -> Option<(&'static str, &'static str, [f64; 2])> {
+fn described(class: RowClass, layout: Layout) -> Option<(&'static str, &'static str, [f64; 2])> {
+    let Layout {
+        is_lattice,
+        is_truncated,
+        skin,
+    } = layout;
     Some(match class {
         RowClass::Seam if is_lattice && is_truncated => (
             "at the seam",
@@ -169,7 +219,7 @@ fn described(
         ),
         RowClass::SeamAtSurface => (
             "where the seam meets the surface of the body",
-            "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface",
+            skin.remedy_at_seam(),
             [limits::WARN_SEAM_AT_SURFACE, limits::REFUSE_SURFACE],
         ),
         RowClass::Transition => (
@@ -179,12 +229,12 @@ fn described(
         ),
         RowClass::FreeSurface | RowClass::LoadedSurface => (
             "at a surface that crosses the peridynamic zone, where families lack points",
-            "zones.skin = \"free-surfaces\" puts elements there",
+            skin.remedy(),
             [limits::WARN_SURFACE, f64::INFINITY],
         ),
         RowClass::Support => (
             "at a symmetry plane or support that crosses the peridynamic zone, where families lack points",
-            "zones.skin = \"free-surfaces\" puts elements there",
+            skin.remedy(),
             [limits::WARN_SURFACE, f64::INFINITY],
         ),
         RowClass::Crack | RowClass::Border => return None,
@@ -192,12 +242,12 @@ fn described(
 }
 
 /// What is told of a class of rows.
-fn verdict(rows: &Unbalanced, is_lattice: bool, is_truncated: bool) -> Option<Finding> {
+fn verdict(rows: &Unbalanced, layout: Layout) -> Option<Finding> {
     let place = |x: &[f64]| {
         let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
         format!("({})", x.join(", "))
     };
-    let (what, remedy, [warn, refuse]) = described(rows.class, is_lattice, is_truncated)?;
+    let (what, remedy, [warn, refuse]) = described(rows.class, layout)?;
     let is_surface = !matches!(rows.class, RowClass::Seam | RowClass::Points);
     if rows.residual < limits::NEGLIGIBLE {
         return None;

@@ -2,10 +2,11 @@
 
 use rustc_hash::FxHashMap;
 
+use super::classes::Skin;
 use crate::coupling::Model;
 use crate::mesh::boundary::BoundaryFacet;
 use crate::scene::conditions::{Condition, Prescribed, Support};
-use crate::shape::Barriers;
+use crate::shape::{Barrier, Barriers};
 use crate::tensor::Vector;
 
 /// What the conditions of a scene make of a facet of the outer boundary.
@@ -17,6 +18,32 @@ pub(super) enum FacetKind {
     Held,
     /// It has a traction.
     Loaded,
+}
+
+/// Whether a layer of elements could cover the points at the surface of a body.
+pub(super) fn skin<const D: usize>(model: &Model<D>) -> Skin {
+    let mesh = &model.mesh;
+    let cells = 0..mesh.cell_count();
+    if !cells.clone().any(|c| model.is_element(c)) {
+        return Skin::NoElements;
+    }
+    let barriers = model.peridynamics.iter().flat_map(|p| &p.barriers);
+    let barriers: Vec<_> = barriers.collect();
+    if barriers.is_empty() {
+        return Skin::Possible;
+    }
+    let at_surface = mesh.cells_at_boundary();
+    // a crack along the face of a cell passes through it, too
+    let is_crossed = |c: usize| {
+        let (low, high) = mesh.bounds_of(mesh.cell(c));
+        let (centre, reach) = (mesh.centroid(c), 0.5 * (high - low).amax() * (1.0 + 1e-9));
+        let near = |b: &&Barrier<D>| b.shape().signed_distance(&centre) <= reach;
+        at_surface[c] && !model.is_element(c) && barriers.iter().any(near)
+    };
+    match { cells }.any(is_crossed) {
+        true => Skin::Crossed,
+        false => Skin::Possible,
+    }
 }
 
 /// The outer boundary of a body, sorted into bins.
