@@ -283,14 +283,51 @@ fn no_method() {
 }
 
 #[test]
-fn missing_horizon() {
-    let e = error("horizon = \"3/10\"\n", "");
+fn a_horizon_left_out_is_three_spacings_but_where_bonds_break() {
+    let text = RIGHT.replace("horizon = \"3/10\"\n", "");
+    let chosen = |overrides: &[&str]| {
+        let AnyScene::Plane(plane) = build(&text, overrides).unwrap() else {
+            panic!("a plate");
+        };
+        let told = plane.choices.iter();
+        let told = told.filter(|c| c.choice.starts_with("horizon ")).count();
+        assert_eq!(told, 1, "{:?}", plane.choices);
+        plane.horizon_at(&[1.0, 0.5].into())
+    };
+    assert!((chosen(&[]) - 0.3).abs() < 1e-12);
+    assert!((chosen(&["peridynamics.points.lattice.spacing=0.05"]) - 0.15).abs() < 1e-12);
+    // a lattice that is left out too is that of the cells; cells of 0.1 by 0.05 count by their shorter edge
+    let unplaced = text.replace("points.lattice = { spacing = 0.1 }\n", "");
+    let fine = unplaced.replace("y = { cells = 10 }", "y = { cells = 20 }");
+    for (text, horizon) in [(&unplaced, 0.3), (&fine, 0.15)] {
+        let AnyScene::Plane(plane) = build(text, &[]).unwrap() else {
+            panic!("a plate");
+        };
+        assert!((plane.horizon_at(&[1.0, 0.5].into()) - horizon).abs() < 1e-12);
+    }
+    // triangles are no grid: two of them per square have half its area
+    let triangles = unplaced.replace("[materials", "cell = \"tri3\"\n[materials");
+    let AnyScene::Plane(plane) = build(&triangles, &[]).unwrap() else {
+        panic!("a plate");
+    };
+    let wanted = 3.0 * (0.005f64).sqrt();
+    assert!((plane.horizon_at(&[1.0, 0.5].into()) - wanted).abs() < 1e-12);
+    // cracks depend on the horizon, at rest they do not grow
+    let breaking = [
+        "materials.plate.bond-based.fracture-energy=1",
+        "coupling=nonlocal",
+    ];
+    build(&text, &breaking).unwrap();
+    let moving = [&breaking[..], &["solve.quasi-static.steps=2"]].concat();
+    let e = build(&text, &moving).unwrap_err();
     assert_eq!(e.kind(), SceneErrorKind::Missing);
     assert!(
-        e.message().contains("`peridynamics` lacks `horizon`"),
+        e.message().contains("`peridynamics` lacks `horizon`") && e.message().contains("`plate`"),
         "{e}"
     );
-    assert!(e.remedy().unwrap().contains("spacing"), "{e}");
+    assert!(e.remedy().unwrap().contains("horizon = 0.3000"), "{e}");
+    // with accuracy it is chosen by trial runs, as before
+    build(RIGHT, &moving).unwrap();
 }
 
 #[test]

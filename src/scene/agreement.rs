@@ -240,7 +240,9 @@ pub(crate) fn horizon<const D: usize>(
             },
         )
         .label(
-            spec.peridynamics.as_ref().map_or(0..0, |p| p.horizon.span.clone()),
+            (spec.peridynamics.as_ref())
+                .and_then(|p| p.horizon.as_ref())
+                .map_or(0..0, |h| h.span.clone()),
             "no point would have a neighbour",
         )
         .help(if delta.is_finite() && delta > 0.0 {

@@ -160,7 +160,7 @@ fn obstacle<const D: usize>(
     if p.weights == WeightsSpec::Fitted {
         return certain("weights that are fitted family by family");
     }
-    if p.horizon.as_constant().is_none() {
+    if p.horizon_varies() {
         return certain("a horizon that varies");
     }
     let zones = zones::zones(spec, truncated, mesh, placed)?;

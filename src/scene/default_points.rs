@@ -85,7 +85,7 @@ fn of_horizon<const D: usize>(extents: &Vector<D>, horizon: f64) -> f64 {
 }
 
 /// Spacing and a corner of the grid that the cells are, if they are one whose edges are multiples of a spacing.
-fn of_cells<const D: usize>(
+pub(super) fn of_cells<const D: usize>(
     mesh: &Mesh<D>,
     cells: &[usize],
     horizon: f64,

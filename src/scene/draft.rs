@@ -26,8 +26,8 @@ use super::user_material;
 use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
-    adaptive_zone, agreement, coupling_selection, cracks_and_voids, elements, failure, initial,
-    lattice_regions, material_interfaces, output, solve, zones,
+    adaptive_zone, agreement, coupling_selection, cracks_and_voids, default_horizon, elements,
+    failure, initial, lattice_regions, material_interfaces, output, solve, zones,
 };
 use crate::coupling::Zone;
 use crate::material::Kinematics;
@@ -232,7 +232,10 @@ impl<'a, const D: usize> Draft<'a, D> {
         let peridynamics = (spec.peridynamics.as_ref())
             .map(|p| peridynamics::peridynamics(p, joining.lattice, mesh, &zones))
             .transpose()?;
-        let choices = peridynamics.as_ref().and_then(points_choice);
+        let choices: Vec<Decision> = (peridynamics.iter())
+            .flat_map(|p| [horizon_choice(p), points_choice(p)])
+            .flatten()
+            .collect();
         let peridynamics = peridynamics
             .map(|p| lattice_regions::bodies(spec, joining, p, mesh, &mut zones))
             .transpose()?;
@@ -240,6 +243,9 @@ impl<'a, const D: usize> Draft<'a, D> {
         let (used, law) = (points.used, points.law);
         let (interfaces, told) = (points.interfaces, points.told);
         if let Some(p) = &peridynamics {
+            let of_points = used.iter().map(|&m| &self.materials[usize::from(m)]);
+            let taken = (p.horizon_why.as_ref()).and(p.horizon.as_constant());
+            default_horizon::needed_where_bonds_break(spec, taken, &self.solve, of_points)?;
             agreement::horizon(spec, p, mesh, &zones)?;
         }
         let (voids, barriers) = cracks_and_voids::obstacles(spec, mesh, &zones)?;
@@ -302,6 +308,16 @@ struct PointMaterials<const D: usize> {
     interfaces: Vec<MaterialInterface>,
     /// Which they are, if there are several.
     told: Option<Decision>,
+}
+
+/// Says how large a horizon is that the scene does not type.
+fn horizon_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
+    let why = p.horizon_why.clone()?;
+    let horizon = p.horizon.as_constant()?;
+    Some(Decision {
+        choice: format!("horizon {}", number(horizon)),
+        why,
+    })
 }
 
 /// Says where points lie that the scene does not place.

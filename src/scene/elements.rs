@@ -110,7 +110,7 @@ fn families_that_differ(spec: &SceneSpec) -> Obstacle {
         ));
     }
     let p = spec.peridynamics.as_ref()?;
-    let why = if p.horizon.as_constant().is_none() {
+    let why = if p.horizon_varies() {
         "the horizon varies, so that there is no one family"
     } else if p.weights == WeightsSpec::Fitted {
         "weights that are fitted differ from family to family"

@@ -8,7 +8,7 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs` | its parts |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
@@ -27,6 +27,7 @@ mod condition_list;
 pub(crate) mod conditions;
 pub(crate) mod coupling_selection;
 pub(crate) mod cracks_and_voids;
+mod default_horizon;
 pub mod default_points;
 pub(crate) mod draft;
 pub(crate) mod elements;

@@ -140,9 +140,6 @@ fn missing(key: &str, at: &str) -> (String, String) {
         ("", "materials") => {
             "add a material, for example [materials.steel.lps] with youngs-modulus and poisson-ratio"
         }
-        ("peridynamics", "horizon") => {
-            "add horizon = 0.05, three to six times the spacing of the points"
-        }
         (_, "poisson-ratio") => {
             "add poisson-ratio = 0.25, or use a bond-based material, which has its own"
         }

@@ -1,6 +1,7 @@
 //! The peridynamic choices of a validated scene: horizon, points, weights, influence function, partial volumes.
 
 use super::bounds_checks;
+use super::default_horizon::horizon_of;
 use super::default_points::default_points;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
@@ -22,6 +23,8 @@ use crate::tensor::{Vector, padded};
 pub struct Peridynamics<const D: usize> {
     /// Horizon δ as a field.
     pub horizon: Expression,
+    /// Why it is so large, if the scene does not say how large.
+    pub horizon_why: Option<String>,
     /// Where the points are.
     pub points: Points<D>,
     /// Why they are there, if the scene does not say where.
@@ -67,20 +70,15 @@ pub(crate) fn peridynamics<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],
 ) -> Result<Peridynamics<D>, SceneError> {
-    bounds_checks::no_further_axes::<D>("peridynamics.horizon", &spec.horizon)?;
-    solve::still("peridynamics.horizon", &spec.horizon)?;
-    if let Some(value) = spec.horizon.as_constant() {
-        let number = Number {
-            value,
-            span: spec.horizon.span.clone(),
-        };
-        bounds_checks::positive("peridynamics.horizon", &number)?;
+    if let Some(typed) = &spec.horizon {
+        check_horizon::<D>(typed)?;
     }
+    let (horizon, horizon_why) = horizon_of(spec, mesh, zones);
     let mut points_why = None;
     let points = match &spec.points {
         None => {
-            let horizon = |c: usize| spec.horizon.eval(&padded(&mesh.centroid(c)));
-            let (points, why) = default_points(mesh, zones, start, horizon);
+            let of_cell = |c: usize| horizon.eval(&padded(&mesh.centroid(c)));
+            let (points, why) = default_points(mesh, zones, start, of_cell);
             points_why = Some(why);
             points
         }
@@ -112,13 +110,28 @@ pub(crate) fn peridynamics<const D: usize>(
         }
     };
     Ok(Peridynamics {
-        horizon: spec.horizon.clone(),
+        horizon,
+        horizon_why,
         points,
         points_why,
         weights: spec.weights,
         volumes: volumes(spec)?,
         surfaces: spec.surfaces,
     })
+}
+
+/// Refuses a horizon that varies in time or along axes that there are not, or a number that is not positive.
+fn check_horizon<const D: usize>(typed: &Expression) -> Result<(), SceneError> {
+    bounds_checks::no_further_axes::<D>("peridynamics.horizon", typed)?;
+    solve::still("peridynamics.horizon", typed)?;
+    if let Some(value) = typed.as_constant() {
+        let number = Number {
+            value,
+            span: typed.span.clone(),
+        };
+        bounds_checks::positive("peridynamics.horizon", &number)?;
+    }
+    Ok(())
 }
 
 /// The partial volumes typed; they need to know the cells of a lattice.

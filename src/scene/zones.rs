@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::bounds_checks;
 use super::conditions::extent;
+use super::default_horizon::horizon_of;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
 use super::source::Span;
@@ -105,8 +106,8 @@ fn mark_transition<const D: usize>(
         }
     } else if let (Some(_), ZonesNeeded::Transition { width, .. }) = (placed, joining.zones) {
         // the width that the method asks for, and half a cell, so that cells make it up
-        let horizon = spec.peridynamics.as_ref().map(|p| &p.horizon);
-        let reach = |x: &Vector<D>| horizon.map_or(0.0, |h| h.eval(&padded(x)));
+        let horizon = (spec.peridynamics.as_ref()).map(|p| horizon_of(p, mesh, zones).0);
+        let reach = |x: &Vector<D>| horizon.as_ref().map_or(0.0, |h| h.eval(&padded(x)));
         let largest = (0..count)
             .map(|c| reach(&mesh.centroid(c)))
             .fold(0.0, f64::max);

@@ -201,7 +201,14 @@ fn refined(
             "the scene has no [peridynamics], hence no horizon to refine with",
         ));
     };
-    let Some(horizon) = pd.horizon.as_constant() else {
+    let Some(typed) = &pd.horizon else {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            "the scene leaves `peridynamics.horizon` out; a study of convergence refines the one that is typed",
+        )
+        .help("type it: --set peridynamics.horizon=..., `bondline check` says which is taken"));
+    };
+    let Some(horizon) = typed.as_constant() else {
         return Err(SceneError::new(
             SceneErrorKind::WrongValue,
             "`peridynamics.horizon` varies in space; a study of convergence needs one number",

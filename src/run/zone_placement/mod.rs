@@ -116,7 +116,10 @@ pub(crate) fn placed<const D: usize>(scene: &Draft<'_, D>) -> Result<Option<Foun
                 mesh.centroid(c).as_slice()
             ),
         )
-        .label(p.horizon.span.clone(), "`zones.auto` looks everywhere")
+        .label(
+            p.horizon.as_ref().map_or(span, |h| h.span.clone()),
+            "`zones.auto` looks everywhere",
+        )
         .help("make it positive in the whole body, or draw the zone: [zones.nonlocal]"));
     }
     let marked = shapes::marked(scene)?;

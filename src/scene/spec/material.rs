@@ -340,8 +340,9 @@ impl JsonSchema for InfluenceSpec {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct PeridynamicsSpec {
-    /// Horizon δ: a number, or an expression in x, y, z.
-    pub horizon: Expression,
+    /// Horizon δ: a number, or an expression in x, y, z; three spacings of the points if left out, where no bond breaks.
+    #[serde(default)]
+    pub horizon: Option<Expression>,
     /// Bond weights.
     #[serde(default)]
     pub weights: WeightsSpec,
@@ -374,6 +375,14 @@ pub struct PeridynamicsSpec {
     /// Whether the mesh's own boundary (a hole, a notch) cuts bonds.
     #[serde(default)]
     pub surfaces: SurfacesSpec,
+}
+
+impl PeridynamicsSpec {
+    /// Whether a horizon is typed that is no number.
+    pub fn horizon_varies(&self) -> bool {
+        let typed = self.horizon.as_ref();
+        typed.is_some_and(|h| h.as_constant().is_none())
+    }
 }
 
 /// Weights of bonds.

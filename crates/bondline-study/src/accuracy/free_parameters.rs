@@ -145,7 +145,7 @@ impl AccuracyRequest {
                 false => spec
                     .peridynamics
                     .as_ref()
-                    .and_then(|p| p.horizon.as_constant()),
+                    .and_then(|p| p.horizon.as_ref()?.as_constant()),
             },
             lattice,
             idle,

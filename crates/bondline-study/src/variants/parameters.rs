@@ -89,6 +89,12 @@ enum Grown {
 impl Base {
     pub(crate) fn of(spec: &SceneSpec) -> Self {
         let pd = spec.peridynamics.as_ref();
+        let cell = || generated(&spec.mesh).as_ref().and_then(Generated::cell);
+        let horizon = pd.and_then(|p| match (&p.horizon, &p.points) {
+            (Some(typed), _) => typed.as_constant(),
+            (None, Some(PointsSpec::Lattice(l))) => Some(RATIO * l.spacing.value),
+            (None, _) => cell().map(|a| RATIO * a),
+        });
         let lattice = pd.and_then(|p| match &p.points {
             Some(PointsSpec::Lattice(l)) => {
                 Some((l.spacing.value, l.origin.as_ref().map(|o| o.values.clone())))
@@ -96,10 +102,9 @@ impl Base {
             Some(PointsSpec::Cells) => None,
             // where the lattice is that of the cells, the two are one
             None => {
-                let horizon = p.horizon.as_constant()?;
-                let cell = generated(&spec.mesh).as_ref().and_then(Generated::cell);
-                let spacing = cell.map_or(horizon / RATIO, |a| fraction_of_cells(a, horizon));
-                (Some(spacing) != cell).then_some((spacing, None))
+                let horizon = horizon?;
+                let spacing = cell().map_or(horizon / RATIO, |a| fraction_of_cells(a, horizon));
+                (Some(spacing) != cell()).then_some((spacing, None))
             }
         });
         let breaks = |m: &MaterialSpec| {
@@ -114,7 +119,7 @@ impl Base {
                 CouplingSpec::Truncated(TruncatedSpec::default()).joining(),
                 |c| c.get_ref().joining(),
             ),
-            horizon: pd.and_then(|p| p.horizon.as_constant()),
+            horizon,
             lattice,
             mesh: generated(&spec.mesh),
             nonlocal: spec

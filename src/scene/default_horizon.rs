@@ -1,0 +1,81 @@
+//! How large the horizon is if a scene does not say: three spacings of the points.
+//!
+//! Where no bond breaks the horizon is numerical: with it the solution tends to that of elasticity. Three points to a horizon are what most of the literature takes, and what a lattice
+//! takes here under a horizon that is typed. Where bonds break the horizon is a length of the material, and has to be typed.
+
+use super::default_points::{RATIO, of_cells};
+use super::error::{SceneError, SceneErrorKind};
+use super::expression::Expression;
+use super::materials::Material;
+use super::solve::Solve;
+use super::spec::{PeridynamicsSpec, PointsSpec, SceneSpec};
+use crate::coupling::Zone;
+use crate::mesh::Mesh;
+use crate::observe::report::number;
+
+/// The horizon \[m\], and why it is so large if it is not typed; a lattice that is not typed suits the cells that are not local, or all if there are none.
+pub(crate) fn horizon_of<const D: usize>(
+    spec: &PeridynamicsSpec,
+    mesh: &Mesh<D>,
+    zones: &[Zone],
+) -> (Expression, Option<String>) {
+    if let Some(typed) = &spec.horizon {
+        return (typed.clone(), None);
+    }
+    let everywhere = !zones.iter().any(|z| *z != Zone::Local);
+    let cells = (0..mesh.cell_count()).filter(|&c| everywhere || zones[c] != Zone::Local);
+    let cells: Vec<usize> = cells.collect();
+    let (spacing, of_what) = match &spec.points {
+        Some(PointsSpec::Lattice(lattice)) => (lattice.spacing.value, "spacings of the points"),
+        Some(PointsSpec::Cells) => (mean_size(mesh, &cells), "mean sizes of the cells"),
+        // as fine as the cells where they are a grid
+        None => match of_cells(mesh, &cells, f64::INFINITY) {
+            Some((edge, _)) => (edge, "edges of the zone's cells"),
+            None => (mean_size(mesh, &cells), "mean sizes of the zone's cells"),
+        },
+    };
+    let why = format!(
+        "the scene leaves `horizon` out: {RATIO} {of_what}, as most of the literature takes; no bond breaks, so that it is a matter of accuracy"
+    );
+    (Expression::constant(RATIO * spacing), Some(why))
+}
+
+/// The edge of a square or cube as large as the cells are in the mean.
+fn mean_size<const D: usize>(mesh: &Mesh<D>, cells: &[usize]) -> f64 {
+    let volume: f64 = cells.iter().map(|&c| mesh.cell_volume(c).abs()).sum();
+    (volume / cells.len().max(1) as f64).powf(1.0 / D as f64)
+}
+
+/// Refuses a horizon that was `taken` since none is typed where bonds of the points' materials may break.
+///
+/// # Errors
+/// [`SceneErrorKind::Missing`], with the horizon that would have been taken.
+pub(crate) fn needed_where_bonds_break<'a, const D: usize>(
+    spec: &SceneSpec,
+    taken: Option<f64>,
+    solve: &Solve,
+    mut of_points: impl Iterator<Item = &'a Material<D>>,
+) -> Result<(), SceneError> {
+    let (Some(taken), Some(material)) = (taken, of_points.find(|m| m.breaks())) else {
+        return Ok(());
+    };
+    if *solve == Solve::Static {
+        return Ok(());
+    }
+    let name = spec.materials.get_key_value(material.name.as_str());
+    Err(SceneError::new(
+        SceneErrorKind::Missing,
+        format!(
+            "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
+            material.name
+        ),
+    )
+    .label(
+        name.map_or(0..0, |(key, _)| key.span.clone()),
+        "its strength and its cracks depend on the horizon, which is a length of the material",
+    )
+    .help(format!(
+        "add horizon = {} to [peridynamics], three spacings of the points, or the length that its cracks have",
+        number(taken)
+    )))
+}
