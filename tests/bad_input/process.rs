@@ -49,6 +49,48 @@ fn full_terminals_change_no_exit_status() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_pipe_gets_plain_text() {
+    let wrong = edit(SCENE.to_owned(), &[("spacing = 0.05", "spacing = -1")]);
+    for (scene, status) in [(SCENE, 0), (wrong.as_str(), 1)] {
+        let folder = folder_with(scene);
+        for (name, value) in [("TERM", "xterm-256color"), ("TERM", ""), ("CI", "1")] {
+            let output = Command::new(env!("CARGO_BIN_EXE_bondline"))
+                .args(["run", "scene.toml"])
+                .current_dir(folder.path())
+                .env_remove("NO_COLOR")
+                .env_remove("TERM")
+                .env(name, value)
+                .output()
+                .unwrap();
+            assert_eq!(output.status.code(), Some(status), "{name}={value}");
+            for stream in [output.stdout, output.stderr] {
+                let said = String::from_utf8(stream).unwrap();
+                let control = |c: char| c.is_control() && c != '\n';
+                assert!(!said.contains(control), "{name}={value}: {said:?}");
+            }
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_reader_that_leaves_is_no_failure() {
+    let folder = folder_with(SCENE);
+    // the schema is longer than a pipe holds; a summary is not, and its reader may leave before it is written
+    for (command, reader) in [("schema", "head -1"), ("run scene.toml", "true")] {
+        let line = format!("{{ \"$0\" {command}; echo $? >&2; }} | {reader}");
+        let output = Command::new("sh")
+            .args(["-c", &line, env!("CARGO_BIN_EXE_bondline")])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(said, "0\n", "{command}");
+    }
+}
+
+#[test]
 fn more_threads_than_cores_can_use_are_asked_for_twice() {
     let folder = folder_with(SCENE);
     let (status, said) = by_shell(folder.path(), "", "--threads 100000");

@@ -3,12 +3,14 @@
 //! | file | what |
 //! |---|---|
 //! | `progress.rs` | a bar on standard error, if that is a terminal |
+//! | `progress_log.rs` | lines in its place, if it is a file or a pipe |
 //! | `report.rs` | a mistake in a scene, with the text underlined |
 //! | `streams.rs` | standard output and standard error, which may be full or closed |
 //! | `memory.rs` | the limit of memory, and the end of a run that exceeds it |
 
 pub mod memory;
 pub mod progress;
+mod progress_log;
 mod report;
 mod streams;
 

@@ -1,4 +1,4 @@
-//! A progress bar with the name of the stage and the time left, on standard error if that is a terminal.
+//! A progress bar with the name of the stage and the time left on standard error, or lines where that is no terminal.
 
 use std::io::{IsTerminal, Write as _};
 use std::sync::{PoisonError, RwLock};
@@ -8,10 +8,13 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use bondline::progress::Progress;
 
-/// Draws each stage as one line: a bar with the time left where the number of steps is known, else a spinner.
+use crate::progress_log::ProgressLog;
+
+/// Draws each stage as one line: a bar with the time left where the number of steps is known, else a spinner. Where standard error is a file or a pipe, a long run
+/// writes a plain line now and then.
 #[derive(Debug)]
 pub struct TerminalProgress {
-    /// The bar of the current stage; none when nobody watches.
+    /// The bar of the current stage; none where standard error is no terminal.
     bar: RwLock<Option<ProgressBar>>,
     target: Target,
 }
@@ -19,18 +22,18 @@ pub struct TerminalProgress {
 #[derive(Debug)]
 enum Target {
     StandardError,
-    Nowhere,
+    Log(ProgressLog<std::io::Stderr>),
     #[cfg(test)]
     Memory(tests::Screen),
 }
 
 impl TerminalProgress {
-    /// Draws on standard error if that is a terminal, else nowhere.
+    /// Draws on standard error if that is a terminal, else writes lines there.
     pub fn on_stderr() -> Self {
         Self::with(if std::io::stderr().is_terminal() {
             Target::StandardError
         } else {
-            Target::Nowhere
+            Target::Log(ProgressLog::on_stderr())
         })
     }
 
@@ -44,7 +47,7 @@ impl TerminalProgress {
     fn draw_target(&self) -> Option<ProgressDrawTarget> {
         match &self.target {
             Target::StandardError => Some(ProgressDrawTarget::stderr()),
-            Target::Nowhere => None,
+            Target::Log(_) => None,
             #[cfg(test)]
             Target::Memory(screen) => Some(ProgressDrawTarget::term_like(Box::new(screen.clone()))),
         }
@@ -68,7 +71,7 @@ impl TerminalProgress {
         match &self.target {
             // a terminal that has gone away is no reason to stop the computation
             Target::StandardError => drop(writeln!(std::io::stderr(), "{line}")),
-            Target::Nowhere => {}
+            Target::Log(log) => log.note(line),
             #[cfg(test)]
             Target::Memory(screen) => screen.put(line),
         }
@@ -108,6 +111,9 @@ fn style(total: Option<u64>) -> ProgressStyle {
 
 impl Progress for TerminalProgress {
     fn stage(&self, name: &str, total: Option<u64>) {
+        if let Target::Log(log) = &self.target {
+            log.stage(name, total);
+        }
         self.replace(|| {
             let target = self.draw_target()?;
             let bar = ProgressBar::with_draw_target(total, target)
@@ -123,6 +129,9 @@ impl Progress for TerminalProgress {
     }
 
     fn advance(&self, by: u64) {
+        if let Target::Log(log) = &self.target {
+            return log.advance(by);
+        }
         let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(bar) = &*bar {
             bar.inc(by);
@@ -130,6 +139,9 @@ impl Progress for TerminalProgress {
     }
 
     fn tell(&self, text: &str) {
+        if let Target::Log(log) = &self.target {
+            return log.tell(text);
+        }
         let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(bar) = &*bar {
             bar.set_message(text.to_owned());
@@ -140,8 +152,7 @@ impl Progress for TerminalProgress {
         let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
         match &*bar {
             Some(bar) => bar.suspend(|| self.write_line(line)),
-            // a log file wants it too; one that is full is no reason to stop
-            None => drop(writeln!(std::io::stderr(), "{line}")),
+            None => self.write_line(line),
         }
     }
 
@@ -236,8 +247,8 @@ mod tests {
     }
 
     #[test]
-    fn nobody_watching_costs_no_bar() {
-        let progress = TerminalProgress::with(Target::Nowhere);
+    fn a_log_has_no_bar() {
+        let progress = TerminalProgress::with(Target::Log(ProgressLog::on_stderr()));
         progress.stage("solve", Some(2));
         progress.advance(1);
         assert!(progress.bar.read().unwrap().is_none());
