@@ -267,6 +267,21 @@ pub enum ModelError {
     },
 }
 
+impl ModelError {
+    /// Where it goes wrong \[m\], if a single place is known.
+    pub fn position(&self) -> Option<&[f64]> {
+        match self {
+            Self::Horizon { position, .. }
+            | Self::Family { position, .. }
+            | Self::OtherMaterial { position }
+            | Self::Fit { position, .. }
+            | Self::CurvedSeam { position, .. }
+            | Self::Derivative { position, .. } => Some(position),
+            _ => None,
+        }
+    }
+}
+
 fn join(position: &[f64]) -> String {
     position
         .iter()

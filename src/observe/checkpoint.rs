@@ -150,6 +150,22 @@ pub enum CheckpointError {
     },
 }
 
+impl CheckpointError {
+    /// The file that it is about.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::None { path }
+            | Self::Unreadable { path, .. }
+            | Self::Foreign { path }
+            | Self::Version { path, .. }
+            | Self::Truncated { path, .. }
+            | Self::Damaged { path, .. }
+            | Self::OtherScene { path }
+            | Self::Content { path, .. } => path,
+        }
+    }
+}
+
 /// Which of two files a state was read from.
 #[derive(Debug)]
 pub enum Found {

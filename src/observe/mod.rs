@@ -34,7 +34,7 @@ pub mod vtu;
 
 pub use observer::Observer;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why something could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -151,6 +151,26 @@ pub enum ObserveError {
         /// Entries given.
         found: usize,
     },
+}
+
+impl ObserveError {
+    /// The file or folder that it is about.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Folder { path, .. }
+            | Self::Write { path, .. }
+            | Self::Claimed { path, .. }
+            | Self::OfAnother { path, .. }
+            | Self::Encode { path, .. }
+            | Self::FieldLength { path, .. }
+            | Self::FieldTwice { path, .. }
+            | Self::NotFinite { path, .. }
+            | Self::Cells { path, .. }
+            | Self::Empty { path, .. }
+            | Self::Shortened { path, .. }
+            | Self::RowLength { path, .. } => path,
+        }
+    }
 }
 
 /// What the user can do about an error of the operating system.

@@ -46,7 +46,7 @@ impl RunError {
         matches!(
             self,
             Self::Indefinite { .. }
-                | Self::Unproven(_)
+                | Self::Unproven { .. }
                 | Self::Model(
                     ModelError::Seam { .. }
                         | ModelError::SeamTooLarge { .. }

@@ -103,8 +103,13 @@ pub enum RunError {
     #[error(transparent)]
     Carry(#[from] CarryError),
     /// A check of the model failed, so that no result of it can be trusted.
-    #[error("{0}; or let it run with solver.unproven = \"warn\"")]
-    Unproven(String),
+    #[error("{message}; or let it run with solver.unproven = \"warn\"")]
+    Unproven {
+        /// What is wrong, by how much, and what to do.
+        message: String,
+        /// Where, one coordinate per dimension; empty where no single place is to blame.
+        place: Vec<f64>,
+    },
     /// Something that is planned and not there yet.
     #[error("{what}: {remedy}")]
     Later {
@@ -150,6 +155,33 @@ pub enum RunError {
         /// What to do.
         remedy: &'static str,
     },
+}
+
+impl RunError {
+    /// Where it went wrong, if that is known: a position, the key of a condition, or a file.
+    pub fn place(&self) -> Option<String> {
+        let at = |x: &[f64]| {
+            let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
+            (!x.is_empty()).then(|| format!("({})", x.join(", ")))
+        };
+        match self {
+            Self::Grows { place, .. } | Self::Unproven { place, .. } => at(place),
+            Self::Law { place, source, .. } => match place {
+                Some(place) => at(place),
+                None => source.place(),
+            },
+            Self::Model(error) => error.position().and_then(at),
+            Self::Solve(StaticError::Singular { positions, .. }) => {
+                positions.first().and_then(|x| at(x))
+            }
+            Self::Solve(StaticError::NotFinite { position, .. }) => at(position),
+            Self::Observe(error) => Some(error.path().display().to_string()),
+            Self::Checkpoint(error) => Some(error.path().display().to_string()),
+            Self::NoCoupling { error, .. } => error.place(),
+            Self::Idle { condition, .. } => Some(format!("conditions.{condition}")),
+            _ => None,
+        }
+    }
 }
 
 /// The error of a motion, or of a load step, with what a local law says that failed in it.

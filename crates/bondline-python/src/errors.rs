@@ -58,7 +58,7 @@ pub fn run_error(py: Python<'_>, error: &RunError) -> PyErr {
         Some((message, help)) => (message, Some(help)),
         None => (text.as_str(), None),
     };
-    exception(py, "RunError", &text, message, None, help)
+    exception(py, "RunError", &text, message, error.place(), help)
 }
 
 /// Why nothing can be predicted.

@@ -68,6 +68,8 @@ def test_a_scene_that_cannot_be_run(bar: dict[str, Any]) -> None:
     error = caught.value
     assert isinstance(error, bondline.BondlineError)
     assert error.help and error.message and error.help in str(error) and error.message in str(error)
+    # the first node that is free to move
+    assert error.place == "(0.0000e0, 0.0000e0, 0.0000e0)"
 
 
 def test_a_file_that_is_not_there() -> None:
@@ -77,8 +79,9 @@ def test_a_file_that_is_not_there() -> None:
 
 def test_a_folder_that_cannot_be_made(bar: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(bondline.RunError, match="file"):
+    with pytest.raises(bondline.RunError, match="file") as caught:
         bondline.run(bar, progress=False, output=tmp_path / "file" / "out")
+    assert caught.value.place is not None and caught.value.place.startswith(str(tmp_path / "file"))
 
 
 def test_threads_below_one(bar: dict[str, Any]) -> None:

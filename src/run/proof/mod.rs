@@ -82,8 +82,13 @@ pub fn prove<const D: usize>(
 /// # Errors
 /// [`RunError::Unproven`] with the first refusal.
 pub fn hold(proof: &Proof) -> Result<(), RunError> {
-    match proof.messages(Severity::Refusal).next() {
-        Some(message) => Err(RunError::Unproven(message.to_owned())),
+    let findings = proof.parts.iter().flat_map(|p| &p.findings);
+    let mut refusals = findings.filter(|f| f.severity == Severity::Refusal);
+    match refusals.next() {
+        Some(refusal) => Err(RunError::Unproven {
+            message: refusal.message.clone(),
+            place: refusal.place.clone(),
+        }),
         None => Ok(()),
     }
 }

@@ -8,8 +8,8 @@ from typing import Any
 class BondlineError(Exception):
     """Anything that bondline refuses.
 
-    ``str(error)`` is all of it. ``message`` says what is wrong, ``place`` where (the file and line of a scene, or a key), ``help`` what to do;
-    the last two are None where they are not known.
+    ``str(error)`` is all of it. ``message`` says what is wrong and by how much, ``place`` where (the file and line of a scene, a key, a position
+    in the body, or a file of results), ``help`` what to do; the last two are None where they are not known.
     """
 
     def __init__(
