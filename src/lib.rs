@@ -115,7 +115,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `examples/cracked_plate.rs` is a plate with a crack.
+//! `examples/cracked_plate.rs` is a plate with a crack, `examples/bar_wave.rs` a wave in time, `examples/ring_study.rs` a study of rings on meshes in memory.
 //!
 //! # The parts
 //!
