@@ -195,3 +195,237 @@ fn a_user_material_needs_its_feature() {
     assert!(parts.iter().all(|part| said.contains(part)), "{said}");
     assert_eq!(error.underlined(), ["\"none.so\""]);
 }
+
+/// A body of points alone and beside elements, in every dimension; `D` axes of 6 cells of the edge 0.5.
+const BODIES: [(&str, &str, usize); 3] = [
+    (
+        "bar",
+        "mesh.line = { min = 0, max = 3, x = { cells = 6 } }",
+        1,
+    ),
+    (
+        "plane-stress",
+        "mesh.rectangle = { min = [0, 0], max = [3, 3], x = { cells = 6 }, y = { cells = 6 } }",
+        2,
+    ),
+    (
+        "solid",
+        "mesh.box = { min = [0, 0, 0], max = [3, 3, 3], x = { cells = 6 }, y = { cells = 6 }, z = { cells = 6 } }",
+        3,
+    ),
+];
+
+/// The solution of a body that is pulled along x, with points shown in a form.
+fn shown(kinematics: &str, mesh: &str, more: &str, form: &str) -> bondline::run::Solution {
+    let text = format!(
+        "kinematics = \"{kinematics}\"\n{mesh}\n{more}\n[materials.m.bond-based]\nyoungs-modulus = 1\n[conditions.held.displacement]\non = \"left\"\nx = 0\n[conditions.pulled.displacement]\non = \"right\"\nx = 0.01\n{}{}[output]\npoints = \"{form}\"\n",
+        if kinematics == "bar" {
+            ""
+        } else {
+            "[conditions.low.displacement]\non = \"left\"\ny = 0\n"
+        },
+        if kinematics == "solid" {
+            "[conditions.back.displacement]\non = \"left\"\nz = 0\n"
+        } else {
+            ""
+        },
+    );
+    let source = Source::new("shown.toml", &text);
+    let scene = AnyScene::from_source(&source, std::path::Path::new(""), "shown").unwrap();
+    scene.solve(&Silent).unwrap()
+}
+
+#[test]
+fn cells_of_points_fill_the_body_and_have_the_values_of_their_points() {
+    for (kinematics, mesh, dimension) in BODIES {
+        // points halfway between the nodes of a mesh of the same spacing: their cells are those of the mesh, beside elements too
+        let zone = match dimension {
+            1 => "box = { min = 0, max = 1.5 }",
+            2 => "box = { min = [0, 0], max = [1.5, 3] }",
+            _ => "box = { min = [0, 0, 0], max = [1.5, 3, 3] }",
+        };
+        let origin = vec!["0.25"; dimension].join(", ");
+        for coupling in ["nonlocal", "truncated"] {
+            let more = format!(
+                "coupling = \"{coupling}\"\nperidynamics = {{ horizon = 1, points.lattice = {{ spacing = 0.5, origin = [{origin}] }} }}\nzones.nonlocal = {{ {zone} }}"
+            );
+            let cells = shown(kinematics, mesh, &more, "cells");
+            let points = shown(kinematics, mesh, &more, "vertices");
+            // both have one cell per element and point with the same fields
+            let (cells, points) = (cells.snapshot(), points.snapshot());
+            assert_eq!(cells.cell_fields, points.cell_fields);
+            assert_eq!(cells.shapes.len(), 6usize.pow(dimension as u32));
+            // read back as a mesh by the reader of meshes: no cell is folded, and together they are the body
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("shown.vtu");
+            bondline::observe::vtu::write_vtu(&path, cells, Default::default()).unwrap();
+            let volumes = match dimension {
+                1 => volumes_of::<1>(&path),
+                2 => volumes_of::<2>(&path),
+                _ => volumes_of::<3>(&path),
+            };
+            let whole = 0.5f64.powi(dimension as i32);
+            assert_eq!(volumes.len(), cells.shapes.len());
+            assert!(volumes.iter().all(|v| (v / whole - 1.0).abs() < 1e-12));
+            let told = cells.cell_fields.iter().find(|f| f.name == "volume");
+            let bondline::observe::vtu::Values::Real(told) = &told.unwrap().values else {
+                panic!("volumes are numbers");
+            };
+            assert!(told.iter().all(|v| (v / whole - 1.0).abs() < 1e-12));
+            corners_agree(cells, points);
+        }
+    }
+}
+
+/// Volumes of the cells of a file, all above zero or it is not read.
+fn volumes_of<const D: usize>(path: &std::path::Path) -> Vec<f64> {
+    let mesh = bondline::mesh::read::<D>(path).unwrap();
+    let cells = 0..mesh.cell_count();
+    cells
+        .map(|c| bondline::fem::cell_volume(&mesh, c))
+        .collect()
+}
+
+/// Cell by cell, the mean of the corners is the point, and each corner has the point's values.
+fn corners_agree(
+    cells: &bondline::observe::vtu::Snapshot,
+    points: &bondline::observe::vtu::Snapshot,
+) {
+    use bondline::mesh::CellShape;
+    use bondline::observe::vtu::Values;
+    let (mut at, mut of) = (0, 0);
+    let mut compared = 0;
+    for (shape, other) in cells.shapes.iter().zip(&points.shapes) {
+        let corners = &cells.connectivity[at..at + shape.node_count()];
+        let nodes = &points.connectivity[of..of + other.node_count()];
+        at += shape.node_count();
+        of += other.node_count();
+        if *other != CellShape::Vertex {
+            assert_eq!(corners, nodes, "elements stay");
+            continue;
+        }
+        let point = nodes[0] as usize;
+        for axis in 0..3 {
+            let sum: f64 = corners
+                .iter()
+                .map(|&n| cells.points[n as usize][axis])
+                .sum();
+            let mean = sum / corners.len() as f64;
+            assert!((mean - points.points[point][axis]).abs() < 1e-12);
+        }
+        for (field, one) in cells.point_fields.iter().zip(&points.point_fields) {
+            let (Values::Real(field), Values::Real(values), n) =
+                (&field.values, &one.values, one.components)
+            else {
+                continue;
+            };
+            for &corner in corners {
+                assert_eq!(
+                    field[corner as usize * n..][..n],
+                    values[point * n..][..n],
+                    "{}",
+                    one.name
+                );
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 0);
+}
+
+#[test]
+fn points_at_centroids_are_shown_as_the_cells_of_the_mesh() {
+    let mesh = "mesh.rectangle = { min = [0, 0], max = [3, 3], x = { cells = 6 }, y = { cells = 5 }, cell = \"tri3\" }";
+    let more = "coupling = \"nonlocal\"\nperidynamics = { horizon = 1.6, points = \"cells\" }";
+    let solution = shown("plane-stress", mesh, more, "cells");
+    let snapshot = solution.snapshot();
+    assert!(
+        snapshot
+            .shapes
+            .iter()
+            .all(|s| *s == bondline::mesh::CellShape::Tri3)
+    );
+    let folder = tempfile::tempdir().unwrap();
+    solution.write_vtu(folder.path().join("c.vtu")).unwrap();
+    let volumes = volumes_of::<2>(&folder.path().join("c.vtu"));
+    assert_eq!(volumes.len(), 60);
+    assert!((volumes.iter().sum::<f64>() - 9.0).abs() < 1e-12);
+    let told = solution.cell_field("volume").unwrap();
+    assert!(volumes.iter().zip(told).all(|(a, b)| (a - b).abs() < 1e-12));
+}
+
+#[test]
+fn what_helps_at_a_surface_is_what_the_scene_can_have() {
+    let warnings = |overrides: &[&str]| -> Result<String, bondline::SceneError> {
+        let text = r#"
+kinematics = "plane-stress"
+coupling = "truncated"
+[mesh.rectangle]
+min = [0, 0]
+max = [1, 0.5]
+x = { cells = 40 }
+y = { cells = 20 }
+[materials.plate.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = 0.075
+points.lattice = { spacing = 0.025, origin = [0.0125, 0.0125] }
+[zones.nonlocal]
+box = { min = [0, 0.1], max = [1, 0.4] }
+[conditions.held.displacement]
+on = "bottom"
+x = 0
+y = 0
+[conditions.pulled.traction]
+on = "top"
+y = 1e-3
+"#;
+        let mut source = Source::new("plate.toml", text);
+        for o in overrides {
+            source.push_override(o)?;
+        }
+        let scene = AnyScene::from_source(&source, std::path::Path::new(""), "plate")?;
+        Ok(scene.solve(&Silent).unwrap().summary().warnings.join("\n"))
+    };
+    let skin = "zones.skin=free-surfaces";
+    let inside = "cracks.c.segment={from=[0.3,0.25],to=[0.5,0.25]}";
+    let told = warnings(&[inside]).unwrap();
+    assert!(told.contains("zones.skin = \"free-surfaces\""), "{told}");
+    let helped = warnings(&[inside, skin]).unwrap();
+    assert!(!helped.contains("at a surface"), "{helped}");
+    // a crack that comes in through the surface: elements there are refused, so they are not advised
+    let edge = "cracks.c.segment={from=[-0.1,0.25],to=[0.3,0.25]}";
+    let told = warnings(&[edge]).unwrap();
+    assert!(
+        told.contains("at a surface") && told.contains("a smaller horizon"),
+        "{told}"
+    );
+    assert!(!told.contains("zones.skin"), "{told}");
+    assert!(warnings(&[edge, skin]).is_err());
+}
+
+#[test]
+fn an_error_of_a_run_knows_its_place() {
+    // two cracks cut the bar into three, and only the left end is held
+    let text = r#"
+kinematics = "bar"
+coupling = "splice"
+mesh.line = { min = 0, max = 1, x = { cells = 50 } }
+materials.bar.bond-based.youngs-modulus = 2
+peridynamics = { horizon = 0.06, points.lattice = { spacing = 0.02 } }
+zones.nonlocal.box = { min = 0.4, max = 0.6 }
+cracks.a.point = 0.49
+cracks.b.point = 0.51
+conditions.left.displacement = { on = "left", x = 0 }
+conditions.right.traction = { on = "right", x = 1e-3 }
+"#;
+    let source = Source::new("bar.toml", text);
+    let scene = AnyScene::from_source(&source, std::path::Path::new(""), "bar").unwrap();
+    let error = scene.solve(&Silent).unwrap_err();
+    // the first site of the two pieces, in the order of sites: the node where the elements on the right begin
+    assert_eq!(
+        error.place().as_deref(),
+        Some("(6.0000e-1, 0.0000e0, 0.0000e0)"),
+        "{error}"
+    );
+}
