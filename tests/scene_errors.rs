@@ -458,6 +458,8 @@ fn the_right_scene_is_validated() {
 fn templates_are_right_and_never_overwritten() {
     build(Template::Plate.text(), &[]).unwrap();
     build(Template::Bar.text(), &[]).unwrap();
+    build(Template::Dynamics.text(), &[]).unwrap();
+    build(Template::LoadSteps.text(), &[]).unwrap();
     parse(Template::File.text(), &[]).unwrap();
     // the one that names a mesh says so where there is none
     let e = build(Template::File.text(), &[]).unwrap_err();

@@ -279,7 +279,7 @@ fn cells_of_points_fill_the_body_and_have_the_values_of_their_points() {
 
 /// Volumes of the cells of a file, all above zero or it is not read.
 fn volumes_of<const D: usize>(path: &std::path::Path) -> Vec<f64> {
-    let mesh = bondline::mesh::read::<D>(path).unwrap();
+    let mesh = bondline::mesh::read::read::<D>(path).unwrap();
     let cells = 0..mesh.cell_count();
     cells
         .map(|c| bondline::fem::cell_volume(&mesh, c))

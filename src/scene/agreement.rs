@@ -3,6 +3,7 @@
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
+use super::solve::Solve;
 use super::spec::{
     BondsSpec, CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded,
 };
@@ -204,6 +205,40 @@ pub(crate) fn drag<const D: usize>(
     )
     .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
     .help("use zero-energy-control = \"bond-force\" or \"length\", or [solve.explicit] without `sub-steps`"))
+}
+
+/// Refuses a horizon that was `taken` since none is typed where bonds of the points' materials may break.
+///
+/// # Errors
+/// [`SceneErrorKind::Missing`], with the horizon that would have been taken.
+pub(crate) fn horizon_where_bonds_break<'a, const D: usize>(
+    spec: &SceneSpec,
+    taken: Option<f64>,
+    solve: &Solve,
+    mut of_points: impl Iterator<Item = &'a Material<D>>,
+) -> Result<(), SceneError> {
+    let (Some(taken), Some(material)) = (taken, of_points.find(|m| m.breaks())) else {
+        return Ok(());
+    };
+    if *solve == Solve::Static {
+        return Ok(());
+    }
+    let name = spec.materials.get_key_value(material.name.as_str());
+    Err(SceneError::new(
+        SceneErrorKind::Missing,
+        format!(
+            "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
+            material.name
+        ),
+    )
+    .label(
+        name.map_or(0..0, |(key, _)| key.span.clone()),
+        "its strength and its cracks depend on the horizon, which is a length of the material",
+    )
+    .help(format!(
+        "add horizon = {} to [peridynamics], three spacings of the points, or the length that its cracks have",
+        number(taken)
+    )))
 }
 
 /// Refuses a horizon below the spacing of the points.

@@ -4,14 +4,10 @@
 //! takes here under a horizon that is typed. Where bonds break the horizon is a length of the material, and has to be typed.
 
 use super::default_points::{RATIO, of_cells};
-use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
-use super::materials::Material;
-use super::solve::Solve;
-use super::spec::{PeridynamicsSpec, PointsSpec, SceneSpec};
+use super::spec::{PeridynamicsSpec, PointsSpec};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
-use crate::observe::report::number;
 
 /// The horizon \[m\], and why it is so large if it is not typed; a lattice that is not typed suits the cells that are not local, or all if there are none.
 pub(crate) fn horizon_of<const D: usize>(
@@ -44,38 +40,4 @@ pub(crate) fn horizon_of<const D: usize>(
 fn mean_size<const D: usize>(mesh: &Mesh<D>, cells: &[usize]) -> f64 {
     let volume: f64 = cells.iter().map(|&c| mesh.cell_volume(c).abs()).sum();
     (volume / cells.len().max(1) as f64).powf(1.0 / D as f64)
-}
-
-/// Refuses a horizon that was `taken` since none is typed where bonds of the points' materials may break.
-///
-/// # Errors
-/// [`SceneErrorKind::Missing`], with the horizon that would have been taken.
-pub(crate) fn needed_where_bonds_break<'a, const D: usize>(
-    spec: &SceneSpec,
-    taken: Option<f64>,
-    solve: &Solve,
-    mut of_points: impl Iterator<Item = &'a Material<D>>,
-) -> Result<(), SceneError> {
-    let (Some(taken), Some(material)) = (taken, of_points.find(|m| m.breaks())) else {
-        return Ok(());
-    };
-    if *solve == Solve::Static {
-        return Ok(());
-    }
-    let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!(
-            "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
-            material.name
-        ),
-    )
-    .label(
-        name.map_or(0..0, |(key, _)| key.span.clone()),
-        "its strength and its cracks depend on the horizon, which is a length of the material",
-    )
-    .help(format!(
-        "add horizon = {} to [peridynamics], three spacings of the points, or the length that its cracks have",
-        number(taken)
-    )))
 }

@@ -26,8 +26,8 @@ use super::user_material;
 use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
-    adaptive_zone, agreement, coupling_selection, cracks_and_voids, default_horizon, elements,
-    failure, initial, lattice_regions, material_interfaces, output, solve, zones,
+    adaptive_zone, agreement, coupling_selection, cracks_and_voids, elements, failure, initial,
+    lattice_regions, material_interfaces, output, solve, zones,
 };
 use crate::coupling::Zone;
 use crate::material::Kinematics;
@@ -170,6 +170,22 @@ impl<'a, const D: usize> Draft<'a, D> {
         })
     }
 
+    /// Refuses a horizon that is missing where bonds break, or below the spacing.
+    fn check_horizon(
+        &self,
+        p: Option<&Peridynamics<D>>,
+        used: &[u16],
+        zones: &[Zone],
+    ) -> Result<(), SceneError> {
+        let Some(p) = p else {
+            return Ok(());
+        };
+        let taken = (p.horizon_why.as_ref()).and(p.horizon.as_constant());
+        let of_points = used.iter().map(|&m| &self.materials[usize::from(m)]);
+        agreement::horizon_where_bonds_break(self.spec, taken, &self.solve, of_points)?;
+        agreement::horizon(self.spec, p, &self.mesh, zones)
+    }
+
     /// Refuses laws that do not agree with the coupling, the elements, or the want of time.
     fn check_laws(
         &self,
@@ -232,22 +248,14 @@ impl<'a, const D: usize> Draft<'a, D> {
         let peridynamics = (spec.peridynamics.as_ref())
             .map(|p| peridynamics::peridynamics(p, joining.lattice, mesh, &zones))
             .transpose()?;
-        let choices: Vec<Decision> = (peridynamics.iter())
-            .flat_map(|p| [horizon_choice(p), points_choice(p)])
-            .flatten()
-            .collect();
+        let choices: Vec<Decision> = peridynamics.iter().flat_map(lattice_choices).collect();
         let peridynamics = peridynamics
             .map(|p| lattice_regions::bodies(spec, joining, p, mesh, &mut zones))
             .transpose()?;
         let points = self.point_materials(&joined.coupling, peridynamics.as_ref(), &zones)?;
         let (used, law) = (points.used, points.law);
         let (interfaces, told) = (points.interfaces, points.told);
-        if let Some(p) = &peridynamics {
-            let of_points = used.iter().map(|&m| &self.materials[usize::from(m)]);
-            let taken = (p.horizon_why.as_ref()).and(p.horizon.as_constant());
-            default_horizon::needed_where_bonds_break(spec, taken, &self.solve, of_points)?;
-            agreement::horizon(spec, p, mesh, &zones)?;
-        }
+        self.check_horizon(peridynamics.as_ref(), &used, &zones)?;
         let (voids, barriers) = cracks_and_voids::obstacles(spec, mesh, &zones)?;
         if matches!(self.solve, Solve::Explicit(_)) {
             densities(spec, &self.materials)?;
@@ -308,6 +316,12 @@ struct PointMaterials<const D: usize> {
     interfaces: Vec<MaterialInterface>,
     /// Which they are, if there are several.
     told: Option<Decision>,
+}
+
+/// Says what horizon and points are, as far as the scene leaves them out.
+fn lattice_choices<const D: usize>(p: &Peridynamics<D>) -> Vec<Decision> {
+    let both = [horizon_choice(p), points_choice(p)];
+    both.into_iter().flatten().collect()
 }
 
 /// Says how large a horizon is that the scene does not type.

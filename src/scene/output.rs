@@ -81,10 +81,8 @@ pub(crate) fn output<const D: usize>(
         }
         probes.push((key.value.clone(), at));
     }
-    let mut tips = Vec::with_capacity(o.tips.len());
-    for (key, tip) in &o.tips {
-        tips.push(self::tip(key, tip, mesh)?);
-    }
+    let tips = o.tips.iter().map(|(key, spec)| tip(key, spec, mesh));
+    let tips = tips.collect::<Result<_, _>>()?;
     Ok(Output {
         directory: o
             .directory

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::line_plot::{LinePlot, Scale, Series, Stroke};
 use bondline::run::{RunError, Samples};
-use bondline::scene::spec::{AxisSpec, MeshSpec, PointsSpec};
+use bondline::scene::spec::{AxisSpec, MeshSpec, PeridynamicsSpec, PointsSpec};
 use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source};
 use bondline::{
     observe::{
@@ -187,6 +187,23 @@ pub fn converge(
     compare(params.refinement, &solved)
 }
 
+/// The horizon that a study refines.
+fn typed_horizon(pd: &PeridynamicsSpec) -> Result<f64, SceneError> {
+    let Some(typed) = &pd.horizon else {
+        return Err(SceneError::new(
+            SceneErrorKind::Missing,
+            "the scene leaves `peridynamics.horizon` out; a study of convergence refines the one that is typed",
+        )
+        .help("type it: --set peridynamics.horizon=..., `bondline check` says which is taken"));
+    };
+    typed.as_constant().ok_or_else(|| {
+        SceneError::new(
+            SceneErrorKind::WrongValue,
+            "`peridynamics.horizon` varies in space; a study of convergence needs one number",
+        )
+    })
+}
+
 /// The overrides that make a level of the scene.
 fn refined(
     spec: &SceneSpec,
@@ -201,19 +218,7 @@ fn refined(
             "the scene has no [peridynamics], hence no horizon to refine with",
         ));
     };
-    let Some(typed) = &pd.horizon else {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            "the scene leaves `peridynamics.horizon` out; a study of convergence refines the one that is typed",
-        )
-        .help("type it: --set peridynamics.horizon=..., `bondline check` says which is taken"));
-    };
-    let Some(horizon) = typed.as_constant() else {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            "`peridynamics.horizon` varies in space; a study of convergence needs one number",
-        ));
-    };
+    let horizon = typed_horizon(pd)?;
     overrides.push(format!("peridynamics.horizon={:e}", horizon * delta));
     let (shape, axes) = match &spec.mesh {
         MeshSpec::Line(m) => ("line", vec![("x", m.x.get_ref())]),
