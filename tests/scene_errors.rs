@@ -305,12 +305,12 @@ fn a_horizon_left_out_is_three_spacings_but_where_bonds_break() {
         };
         assert!((plane.horizon_at(&[1.0, 0.5].into()) - horizon).abs() < 1e-12);
     }
-    // triangles are no grid: two of them per square have half its area
-    let triangles = unplaced.replace("[materials", "cell = \"tri3\"\n[materials");
-    let AnyScene::Plane(plane) = build(&triangles, &[]).unwrap() else {
+    // no lattice has cells of 0.1 by 1/15: the edge of a square as large as they are
+    let oblong = unplaced.replace("y = { cells = 10 }", "y = { cells = 15 }");
+    let AnyScene::Plane(plane) = build(&oblong, &[]).unwrap() else {
         panic!("a plate");
     };
-    let wanted = 3.0 * (0.005f64).sqrt();
+    let wanted = 3.0 * (0.1f64 / 15.0).sqrt();
     assert!((plane.horizon_at(&[1.0, 0.5].into()) - wanted).abs() < 1e-12);
     // cracks depend on the horizon, at rest they do not grow
     let breaking = [
@@ -326,7 +326,6 @@ fn a_horizon_left_out_is_three_spacings_but_where_bonds_break() {
         "{e}"
     );
     assert!(e.remedy().unwrap().contains("horizon = 0.3000"), "{e}");
-    // with accuracy it is chosen by trial runs, as before
     build(RIGHT, &moving).unwrap();
 }
 
@@ -353,7 +352,10 @@ fn overrides() {
         ],
     )
     .unwrap();
-    assert_eq!(spec.peridynamics.unwrap().horizon.as_constant(), Some(0.4));
+    assert_eq!(
+        spec.peridynamics.unwrap().horizon.unwrap().as_constant(),
+        Some(0.4)
+    );
     assert_eq!(spec.title.as_deref(), Some("My plate"));
     assert!(
         matches!(spec.coupling.unwrap().into_inner(), CouplingSpec::Blending(b) if b.beta == BetaSpec::Smooth)
