@@ -8,10 +8,12 @@ use rayon::prelude::*;
 pub mod ranks;
 mod shared_blocks;
 mod spmv;
+mod springs;
 
 pub use ranks::{Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
 pub use spmv::ROW_CHUNK;
+pub use springs::{SpringRows, Sprung};
 
 /// Whether the tangent of a system is symmetric; solvers choose by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]

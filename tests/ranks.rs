@@ -272,6 +272,7 @@ y = 4e6
 
 [output]
 tips.front = { direction = [1, 0] }
+sections.cut = { point = [0.02, 0.01], normal = [1, 0] }
 "#;
 
 /// A plate whose crack runs, with its material and coupling.

@@ -168,6 +168,24 @@ pub struct Applied {
     pub force: Vec<f64>,
 }
 
+/// The force that the part of the body beyond a section exerts on the rest.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SectionForce {
+    /// The section, as the scene names it.
+    pub section: String,
+    /// Force, one component per dimension. Units: N (per thickness in 2D, per section in 1D).
+    pub force: Vec<f64>,
+    /// Moment: none in 1D, about z in 2D, about x, y and z in 3D. Units: N m (per thickness in 2D).
+    pub moment: Vec<f64>,
+}
+
+impl SectionForce {
+    /// Force, then moment.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        self.force.iter().chain(&self.moment).copied()
+    }
+}
+
 /// What one run did, for `run --json` and for people.
 ///
 /// Units: those of the scene; with SI units forces are in N and energies in J (per metre of thickness in 2D, per square
@@ -204,6 +222,9 @@ pub struct RunSummary {
     pub applied: Vec<Applied>,
     /// Forces of the displacement conditions; of a run in time or in load steps those of the last row of its history.
     pub reactions: Vec<Reaction>,
+    /// Forces in the sections that the scene asks for, at the end of the run.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sections: Vec<SectionForce>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
     pub energy: Option<f64>,
     /// What was shown about the model before it was solved.
@@ -332,6 +353,18 @@ impl fmt::Display for RunSummary {
                 r.condition,
                 components(&r.force)
             )?;
+        }
+        for s in &self.sections {
+            write!(
+                f,
+                "section                {}: force {}",
+                s.section,
+                components(&s.force)
+            )?;
+            match s.moment.is_empty() {
+                true => writeln!(f)?,
+                false => writeln!(f, ", moment {}", components(&s.moment))?,
+            }
         }
         write!(f, "{}", self.proof)?;
         for warning in &self.warnings {

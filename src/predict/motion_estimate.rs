@@ -198,12 +198,13 @@ impl OutputCost {
         recorder.begin(shown);
         let place = |site: usize| model.sites[site].position;
         let energies = recorder.energies(shown);
-        recorder.row(shown, energies, place)?;
+        let probed = recorder.unprobed();
+        recorder.row(shown, energies, &probed, place)?;
         let opened = begun.elapsed().as_secs_f64();
         let begun = Instant::now();
         for _ in 0..ROWS {
             let energies = recorder.energies(shown);
-            recorder.row(shown, energies, place)?;
+            recorder.row(shown, energies, &probed, place)?;
         }
         let per_row = begun.elapsed().as_secs_f64() / f64::from(ROWS);
         let per_file = if let Some(count) = count {
@@ -216,6 +217,7 @@ impl OutputCost {
                 zone_of_site: &solution::zone_of_site(model),
                 system: None,
                 broken: &[],
+                sections: &[],
                 stresses: None,
             };
             let mut series = Series::new(folder.path(), "trial");

@@ -251,6 +251,7 @@ fn seconds_of_output<const D: usize>(
         zone_of_site: &zones,
         system: None,
         broken: &[],
+        sections: &[],
         stresses: rest.stresses.at(0.0),
     };
     Ok(output_seconds(&rest.output, &made_up)?)

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::budget;
 use super::loads::{loads, supports};
+use super::springs::Springs;
 use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::summary::{Applied, Decision, Stopwatch, Timings};
 use crate::progress::Progress;
@@ -19,7 +20,7 @@ use crate::solve::statics::{
     self, Method, MethodUsed, SpreadProblem, SpreadRows, StaticError, StaticInfo, StaticParams,
     StaticProblem, StaticSolution,
 };
-use crate::system::{BlockCsr, Partition, Ranks, SemiDiscrete, Spread, Symmetry};
+use crate::system::{BlockCsr, Partition, Ranks, SemiDiscrete, Spread, Sprung, Symmetry};
 use crate::tensor::padded;
 
 /// A model at rest under its conditions, about to be solved.
@@ -58,7 +59,9 @@ pub(crate) struct Equilibrium {
     pub solution: StaticSolution,
     /// Internal force \[N\] at the solution.
     pub internal: Vec<f64>,
-    /// Energy stored there \[J\]; none of a matrix that is not symmetric.
+    /// What springs hold the body.
+    pub springs: Springs,
+    /// Energy stored there and in springs \[J\]; none of a matrix that is not symmetric.
     pub energy: Option<f64>,
     /// What the symmetry of the matrix decided.
     pub choices: Vec<Decision>,
@@ -90,7 +93,8 @@ pub(crate) fn equilibrium<const D: usize>(
     }
     let mut watch = Stopwatch::start();
     let model = at.model;
-    let stiffness = model.assemble(at.operator, progress);
+    let springs = Springs::new(model, at.conditions)?;
+    let mut stiffness = model.assemble(at.operator, progress);
     watch.lap(&mut timings, "assembly");
     let (mut load, applied) = loads(model, at.conditions, at.time)?;
     let expands = (at.thermal).map(|thermal| thermal.forces(model, &stiffness, at.time));
@@ -103,6 +107,7 @@ pub(crate) fn equilibrium<const D: usize>(
     let symmetry = symmetry(at.coupling, || stiffness.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");
     timings.add("proof", prove(&Assembled::Whole(&stiffness))?);
+    springs.all.add_to(&mut stiffness);
     let static_problem = StaticProblem {
         stiffness: &stiffness,
         symmetry,
@@ -120,8 +125,13 @@ pub(crate) fn equilibrium<const D: usize>(
                 .then(|| 0.5 * u.iter().zip(&internal).map(|(u, f)| u * f).sum::<f64>());
             (solution, internal, energy)
         }
-        Some(system) => nonlinear(system, &static_problem, &params, model, progress)?,
+        Some(system) => {
+            let mut sprung = Sprung::new(system, &springs.all);
+            nonlinear(&mut sprung, &static_problem, &params, model, progress)?
+        }
     };
+    // what springs take is no force within the body
+    springs.take_from(&mut internal, &solution.displacement);
     if let Some(expands) = expands {
         // what expansion takes belongs to the forces within the body
         for ((f, load), own) in internal.iter_mut().zip(&mut load).zip(&expands) {
@@ -143,6 +153,7 @@ pub(crate) fn equilibrium<const D: usize>(
         solution,
         internal,
         energy,
+        springs,
         choices,
         timings,
     })
@@ -156,6 +167,12 @@ fn spread<const D: usize>(
     prove: impl FnOnce(&Assembled<'_>) -> Result<f64, RunError>,
     progress: &dyn Progress,
 ) -> Result<Equilibrium, RunError> {
+    if !Springs::new(at.model, at.conditions)?.is_empty() {
+        return Err(RunError::Later {
+            what: "springs in a static scene of several processes",
+            remedy: "run it in one process, or in load steps: solve.quasi-static.steps = 1",
+        });
+    }
     let mut watch = Stopwatch::start();
     let model = at.model;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
@@ -203,6 +220,7 @@ fn spread<const D: usize>(
         solution,
         internal,
         energy,
+        springs: Springs::default(),
         choices,
         timings,
     })

@@ -147,6 +147,18 @@ pub enum RunError {
         /// What to do.
         remedy: String,
     },
+    /// A section with all sites of the model on one side.
+    #[error(
+        "the section `{section}` has {} sites of the model beyond it; {}",
+        match sites { 0 => "no", _ => "all" },
+        match sites { 0 => "move its point, or turn its normal to the part whose force is to be told, or enlarge `inside`", _ => "move its point into the body" }
+    )]
+    EmptySection {
+        /// Its name.
+        section: String,
+        /// How many lie beyond.
+        sites: usize,
+    },
     /// A condition meets no site.
     #[error("the condition `{condition}` meets no site of the model; {remedy}")]
     Idle {
@@ -179,6 +191,7 @@ impl RunError {
             Self::Checkpoint(error) => Some(error.path().display().to_string()),
             Self::NoCoupling { error, .. } => error.place(),
             Self::Idle { condition, .. } => Some(format!("conditions.{condition}")),
+            Self::EmptySection { section, .. } => Some(format!("output.sections.{section}")),
             _ => None,
         }
     }

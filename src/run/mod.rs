@@ -15,6 +15,9 @@
 //! | `results.rs` | a solution that a program keeps: fields and tables by name |
 //! | `samples.rs` | displacements of a static scene at places, for studies of convergence |
 //! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
+//! | `stresses.rs`, `stress_settings.rs`, `stress_probes.rs` | stress as outputs show it, and with each row of a history |
+//! | `springs.rs` | springs between the body and the ground, on the sites of a model |
+//! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
 //! | `rotation.rs`, `warnings.rs` | how far elements rotate; what of a model makes its results doubtful |
 //! | `write.rs` | the files of a run |
 //! | `error.rs` | what cannot be run, with place and remedy |
@@ -39,9 +42,12 @@ pub mod proof;
 mod results;
 mod rotation;
 mod samples;
+mod sections;
 pub mod setup;
 pub mod solution;
+mod springs;
 mod statics;
+mod stress_probes;
 mod stress_settings;
 mod stresses;
 mod thermal;

@@ -1,6 +1,7 @@
 //! A solved scene, and where its sites lie.
 
 use crate::coupling::{Model, Operator, SiteKind, Zone};
+use crate::observe::summary::SectionForce;
 use crate::run::stress_settings::StressSettings;
 use crate::system::SemiDiscrete;
 
@@ -20,6 +21,8 @@ pub struct Solved<'a, const D: usize> {
     pub system: Option<&'a dyn SemiDiscrete>,
     /// Bonds that broke in motion, by the sites of their ends, each once for each direction.
     pub broken: &'a [(u32, u32)],
+    /// Forces in the sections that the scene asks for.
+    pub sections: &'a [SectionForce],
     /// What of the stress is thermal and what is made of it, at a time; none where neither is.
     pub stresses: Option<(&'a StressSettings<D>, f64)>,
 }

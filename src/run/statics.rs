@@ -5,6 +5,7 @@ use super::equilibrium::{Assembled, Equilibrium, StaticInput, equilibrium};
 use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
+use super::sections::Sections;
 use super::setup::{RunSettings, border_choice, model, problem, volumes_choice};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
@@ -15,7 +16,8 @@ use crate::coupling::{Coupling, Model, Operator, SiteKind};
 use crate::observe::ObserveError;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
-    Decision, Reaction, Rotation, RunSummary, Sizes, Stopwatch, Timings, peak_memory_bytes,
+    Decision, Reaction, Rotation, RunSummary, SectionForce, Sizes, Stopwatch, Timings,
+    peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::run::definiteness;
@@ -73,7 +75,9 @@ fn solve_over<const D: usize>(
         // what placed the zone knows of linear elements only
         let kept = kept
             .take()
-            .filter(|_| scene.elements == ElementsSpec::Linear);
+            .filter(|_| scene.elements == ElementsSpec::Linear)
+            // whose stiffness has the springs in it, and is not that of the body
+            .filter(|k| k.equilibrium.springs.is_empty());
         solve_chosen(scene, kept, ranks, progress, |output, solved| {
             match visit.take() {
                 Some(visit) => visit(output, solved),
@@ -95,7 +99,7 @@ fn solve_chosen<const D: usize>(
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
     let (name, joining) = (scene.title.clone(), scene.coupling.joining());
-    let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
+    let counts = [scene.mesh.nodes.len(), scene.mesh.cell_count()];
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
     }
@@ -138,6 +142,7 @@ fn solve_chosen<const D: usize>(
     choices.extend(body.decisions(equilibrium));
     let zone_of_site = zone_of_site(model);
     let residual = equilibrium.residual();
+    let sections = body.section_forces(&residual)?;
     let solved = Solved {
         model,
         operator: operator.as_ref(),
@@ -146,20 +151,21 @@ fn solve_chosen<const D: usize>(
         zone_of_site: &zone_of_site,
         system: system.as_ref().map(|s| s as &dyn SemiDiscrete),
         broken: &[],
+        sections: &sections,
         stresses: rest.stresses.at(0.0),
     };
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
-    let sizes = body.sizes([nodes, cells], &equilibrium.solution.info);
     Ok(RunSummary {
         scene: name,
-        sizes,
+        sizes: body.sizes(counts, &equilibrium.solution.info),
         choices,
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
         files,
+        sections,
         ..body.summary(equilibrium, is_linear, joining, proof)
     })
 }
@@ -314,6 +320,18 @@ impl<const D: usize> StaticBody<'_, D> {
         }
     }
 
+    /// Forces in the sections that the scene asks for.
+    ///
+    /// # Errors
+    /// [`RunError::EmptySection`].
+    fn section_forces(&self, residual: &[f64]) -> Result<Vec<SectionForce>, RunError> {
+        let RunSettings {
+            output, conditions, ..
+        } = self.rest;
+        let sections = Sections::new(self.model, &output.sections, conditions)?;
+        Ok(sections.forces(residual, 0.0))
+    }
+
     /// Sizes of a model with so many nodes and cells.
     fn sizes(&self, [nodes, cells]: [usize; 2], info: &StaticInfo) -> Sizes {
         let model = self.model;
@@ -349,6 +367,11 @@ impl<const D: usize> StaticBody<'_, D> {
                 condition: c.name.clone(),
                 force: r.iter().copied().collect(),
             })
+            .chain(
+                equilibrium
+                    .springs
+                    .reactions::<D>(&equilibrium.solution.displacement),
+            )
             .collect()
     }
 }

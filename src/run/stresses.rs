@@ -9,6 +9,27 @@ use crate::material::Kinematics;
 use crate::scene::spec::StressSpec;
 use crate::tensor::{Tensor, Vector};
 
+/// The names of the columns of a stress: its components, then the numbers that are `asked` for.
+pub(super) fn names<const D: usize>(asked: &[StressSpec]) -> Vec<String> {
+    let mut names = Vec::new();
+    for (i, first) in AXES[..D].iter().enumerate() {
+        names.extend(AXES[i..D].iter().map(|second| format!("s{first}{second}")));
+    }
+    names.extend(asked.iter().map(|s| name(s).replace('-', "_")));
+    names
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The name of a number made of a stress.
+fn name(asked: &StressSpec) -> &'static str {
+    match asked {
+        StressSpec::VonMises => "von-mises",
+        StressSpec::MaxPrincipal => "max-principal",
+        StressSpec::MinPrincipal => "min-principal",
+    }
+}
+
 /// What a stress belongs to.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Place {
@@ -62,20 +83,19 @@ impl<const D: usize> Solved<'_, D> {
         settings.thermal.as_ref().map(|thermal| (thermal, t))
     }
 
+    /// The numbers made of the stress that are asked for.
+    pub(super) fn asked(&self) -> &[StressSpec] {
+        self.stresses.map_or(&[][..], |(s, _)| &s.asked)
+    }
+
     /// Whether numbers made of the stress are asked for.
     pub(super) fn has_derived(&self) -> bool {
-        self.stresses.is_some_and(|(s, _)| !s.asked.is_empty())
+        !self.asked().is_empty()
     }
 
     /// The names of their fields.
     pub(super) fn derived_names(&self) -> Vec<&'static str> {
-        let asked = self.stresses.map_or(&[][..], |(s, _)| &s.asked);
-        let name = |s: &StressSpec| match s {
-            StressSpec::VonMises => "von-mises",
-            StressSpec::MaxPrincipal => "max-principal",
-            StressSpec::MinPrincipal => "min-principal",
-        };
-        asked.iter().map(name).collect()
+        self.asked().iter().map(name).collect()
     }
 
     /// Stress of an element at its centre, where the displacement has the gradient `gradient`.

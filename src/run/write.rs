@@ -7,15 +7,17 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::RunOptions;
 use super::point_cells::PointCells;
+use super::sections;
 use super::solution::Solved;
-use super::stresses::{KnownStresses, Place};
+use super::stresses::{KnownStresses, Place, names};
 use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
 use crate::fem::{self, Locator};
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
 use crate::observe::csv::{Entry, write_table};
+use crate::observe::summary::SectionForce;
 use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
-use crate::scene::output::PROBES;
+use crate::scene::output::{PROBES, SECTIONS};
 use crate::scene::spec::PointOutputSpec;
 use crate::scene::validated::Output;
 use crate::shape::Shape;
@@ -64,8 +66,16 @@ pub(super) fn write_for<const D: usize>(
         let positions = output.probes.iter().map(|(_, x)| *x).collect();
         tables.push((PROBES, positions));
     }
-    for (name, positions) in tables {
+    let sampled = tables.into_iter().map(|(name, positions)| {
         let (header, rows) = table(&positions, &solution);
+        (name, header, rows)
+    });
+    let forces = solved.sections.iter().flat_map(SectionForce::numbers);
+    let sections = (!solved.sections.is_empty()).then(|| {
+        let header = sections::header(&output.sections);
+        (SECTIONS, header, vec![forces.collect()])
+    });
+    for (name, header, rows) in sampled.chain(sections) {
         if let Some(observer) = options.observer {
             for row in &rows {
                 let row: Vec<Entry> = row.iter().map(|&x| Entry::Real(x)).collect();
@@ -94,11 +104,7 @@ fn table<const D: usize>(
         header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
     }
     if solution.solved.has_derived() {
-        for (i, first) in AXES[..D].iter().enumerate() {
-            header.extend(AXES[i..D].iter().map(|second| format!("s{first}{second}")));
-        }
-        let derived = solution.solved.derived_names();
-        header.extend(derived.into_iter().map(|name| name.replace('-', "_")));
+        header.extend(names::<D>(solution.solved.asked()));
     }
     header.push("model".to_owned());
     let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| solution.at(x)).collect();
@@ -187,25 +193,17 @@ impl<'a, const D: usize> Solution<'a, D> {
             return None;
         }
         let displacement = self.sampler.displacement(x, self.solved.displacement)?;
-        let (solved, wanted) = (self.solved, self.solved.has_derived());
-        let (gradient, zone, stress) = match self.sampler.carrier(x)? {
-            Carrier::Element(c) => {
-                let gradient = solved.element_gradient(c);
-                let stress = wanted.then(|| {
-                    let stress = solved.cell_stress(c, &gradient, &self.known);
-                    (stress, solved.derived(&stress, Place::Cell(c)))
-                });
-                (gradient, solved.model.zones[c], stress)
-            }
-            Carrier::Point(site) => {
-                let stress = wanted.then(|| {
-                    let intact = |p, j| self.intact.is_intact(p, j);
-                    let stress = solved.point_stress(site, intact, &self.known);
-                    (stress, solved.derived(&stress, Place::Point(site)))
-                });
-                let gradient = solved.point_gradient(site, &self.intact);
-                (gradient, solved.zone_of_site[site], stress)
-            }
+        let solved = self.solved;
+        let carrier = self.sampler.carrier(x)?;
+        let stress = solved
+            .has_derived()
+            .then(|| solved.carried_stress(carrier, &self.known, &self.intact));
+        let (gradient, zone) = match carrier {
+            Carrier::Element(c) => (solved.element_gradient(c), solved.model.zones[c]),
+            Carrier::Point(site) => (
+                solved.point_gradient(site, &self.intact),
+                solved.zone_of_site[site],
+            ),
         };
         Some(Sample {
             displacement,
@@ -217,10 +215,10 @@ impl<'a, const D: usize> Solution<'a, D> {
 }
 
 /// Which bonds between points stand.
-struct Intact(FxHashSet<(u32, u32)>);
+pub(super) struct Intact(FxHashSet<(u32, u32)>);
 
 impl Intact {
-    fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
+    pub fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
         let sites = &solved.model.sites;
         let point = |site: u32| match sites[site as usize].kind {
             SiteKind::Point(p) => Some(p),
@@ -251,6 +249,27 @@ impl<const D: usize> Solved<'_, D> {
 
     fn element_gradient(&self, c: usize) -> Tensor<D> {
         fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
+    }
+
+    /// Stress of what carries a position, and the numbers made of it.
+    pub(super) fn carried_stress(
+        &self,
+        carrier: Carrier,
+        known: &KnownStresses,
+        intact: &Intact,
+    ) -> (Tensor<D>, Vec<f64>) {
+        let (stress, place) = match carrier {
+            Carrier::Element(c) => {
+                let gradient = self.element_gradient(c);
+                (self.cell_stress(c, &gradient, known), Place::Cell(c))
+            }
+            Carrier::Point(site) => {
+                let stands = |p, j| intact.is_intact(p, j);
+                let stress = self.point_stress(site, stands, known);
+                (stress, Place::Point(site))
+            }
+        };
+        (stress, self.derived(&stress, place))
     }
 
     /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.

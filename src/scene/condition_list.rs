@@ -26,7 +26,12 @@ pub(crate) fn conditions<const D: usize>(
     for (name, condition) in spec {
         found.push(one(name, condition, mesh, clock)?);
     }
-    let holds = |c: &Condition<D>| matches!(c.prescribed, Prescribed::Displacement(_));
+    let holds = |c: &Condition<D>| {
+        matches!(
+            c.prescribed,
+            Prescribed::Displacement(_) | Prescribed::Spring(_)
+        )
+    };
     if clock.pacing != Pacing::Moving && !found.iter().any(holds) {
         return Err(SceneError::new(
             SceneErrorKind::Missing,
@@ -129,6 +134,7 @@ fn one<const D: usize>(
             Ok(typed.condition(Prescribed::BodyForce(region), components))
         }
         ConditionSpec::Pressure(c) => surface_conditions::pressure(name, c, mesh, clock),
+        ConditionSpec::Spring(c) => surface_conditions::spring(name, c, mesh),
         ConditionSpec::Symmetry(c) => surface_conditions::symmetry(name, c, mesh),
         ConditionSpec::Rotation(c) => surface_conditions::rotation(name, c, mesh, clock),
     }

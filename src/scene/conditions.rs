@@ -149,6 +149,34 @@ pub enum Prescribed<const D: usize> {
     Pressure(Vec<BoundaryFacet>),
     /// Force per volume inside a region.
     BodyForce(Region<D>),
+    /// Springs to the ground; the components of the condition are not used.
+    Spring(Bedding<D>),
+}
+
+/// What springs hold, and how stiff they are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Bedding<const D: usize> {
+    /// Facets.
+    Axes {
+        /// The facets.
+        facets: Vec<Facet>,
+        /// Force per area and displacement along each axis \[N/m³\].
+        stiffness: Vector<D>,
+    },
+    /// Facets at the boundary of the mesh, along their normals.
+    Normal {
+        /// The facets.
+        facets: Vec<BoundaryFacet>,
+        /// Force per area and displacement \[N/m³\].
+        stiffness: f64,
+    },
+    /// Cells whose centroid lies in a region.
+    Inside {
+        /// The region.
+        region: Region<D>,
+        /// Force per volume and displacement along each axis \[N/m⁴\].
+        stiffness: Vector<D>,
+    },
 }
 
 impl<const D: usize> Condition<D> {

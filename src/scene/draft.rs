@@ -20,6 +20,7 @@ use super::solve::Solve;
 use super::spec::{
     BondsSpec, CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
 };
+use super::table_rows;
 use super::temperature::{self, Temperature};
 use super::unused::Parts;
 use super::user_material;
@@ -69,6 +70,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         mut fingerprint: Fingerprint,
     ) -> Result<Self, SceneError> {
         let solver = solver(spec)?;
+        table_rows::read_files(&spec.tables, directory, &mut fingerprint)?;
         let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
         let influence = match spec
             .peridynamics

@@ -17,6 +17,7 @@ use std::fmt;
 
 use super::function::Function;
 use super::source::Span;
+use super::table::{self, Table};
 
 /// The deepest nesting of brackets, signs and powers that is read; deeper input is refused before it exhausts the stack.
 const DEEPEST: usize = 64;
@@ -35,6 +36,8 @@ pub struct Expression {
     /// Where it stands in the scene.
     pub span: Span,
     root: Term,
+    /// The tables that it may name.
+    tables: Vec<Table>,
 }
 
 impl fmt::Debug for Expression {
@@ -70,6 +73,8 @@ enum Term {
     /// Operators of one precedence, applied from left to right: as a list, so that a long sum nests no deeper than a short one.
     Chain(Box<Term>, Vec<(Binary, Term)>),
     If(Box<[Term; 3]>),
+    /// A table at an argument.
+    Table(Table, Box<Term>),
     /// A function of a program; it stands alone.
     Function(Function),
 }
@@ -107,16 +112,28 @@ const BINARY: &[(&str, Binary)] = &[
     ("min", f64::min),
 ];
 
+/// Whether a name is that of a variable, a constant or a function.
+pub(crate) fn knows(name: &str) -> bool {
+    let is_variable = matches!(name, "x" | "y" | "z" | "t" | "pi" | "if");
+    is_variable || UNARY.iter().any(|(n, _)| *n == name) || BINARY.iter().any(|(n, _)| *n == name)
+}
+
 impl Expression {
-    /// Reads an expression in `x`, `y`, `z` and `t`.
+    /// Reads an expression in `x`, `y`, `z` and `t`, and in the tables of the scene that is read at present.
     ///
     /// # Errors
     /// [`ExpressionError`] with the character where the text stops making sense.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
+        Self::parse_with(text, &table::in_scope())
+    }
+
+    /// As [`Expression::parse`], with these tables.
+    pub(crate) fn parse_with(text: &str, tables: &[Table]) -> Result<Self, ExpressionError> {
         let mut parser = Parser {
             text,
             at: 0,
             depth: 0,
+            tables,
         };
         if text.len() > LONGEST {
             return Err(ExpressionError {
@@ -139,6 +156,7 @@ impl Expression {
             text: text.to_owned(),
             span: Span::default(),
             root,
+            tables: tables.to_vec(),
         })
     }
 
@@ -148,6 +166,7 @@ impl Expression {
             text: value.to_string(),
             span: Span::default(),
             root: Term::Constant(value),
+            tables: Vec::new(),
         }
     }
 
@@ -157,6 +176,7 @@ impl Expression {
             text: text.to_owned(),
             span: Span::default(),
             root: Term::Function(function),
+            tables: Vec::new(),
         }
     }
 
@@ -166,6 +186,11 @@ impl Expression {
             Term::Function(function) => Some(function),
             _ => None,
         }
+    }
+
+    /// The tables that it may name.
+    pub(crate) fn tables(&self) -> &[Table] {
+        &self.tables
     }
 
     /// The values at some positions (components beyond the dimension are zero) at the time `t`.
@@ -192,10 +217,9 @@ impl Expression {
         self.root.eval(&[x[0], x[1], x[2], t])
     }
 
-    /// The value, if the expression has no variable.
+    /// The value, if the expression has no variable and no table.
     pub fn as_constant(&self) -> Option<f64> {
-        (0..=TIME)
-            .all(|variable| !self.depends_on(variable))
+        (!self.root.has_table() && (0..=TIME).all(|variable| !self.depends_on(variable)))
             .then(|| self.eval(&[0.0; 3]))
     }
 
@@ -229,7 +253,21 @@ impl Term {
                 let chosen = if parts[0].eval(x) != 0.0 { 1 } else { 2 };
                 parts[chosen].eval(x)
             }
+            Self::Table(table, argument) => table.at(argument.eval(x)),
             Self::Function(function) => function.values(&[[x[0], x[1], x[2]]], x[TIME])[0],
+        }
+    }
+
+    fn has_table(&self) -> bool {
+        match self {
+            Self::Table(..) => true,
+            Self::Constant(_) | Self::Variable(_) | Self::Function(_) => false,
+            Self::Unary(_, a) => a.has_table(),
+            Self::Binary(_, a, b) => a.has_table() || b.has_table(),
+            Self::Chain(first, rest) => {
+                first.has_table() || rest.iter().any(|(_, term)| term.has_table())
+            }
+            Self::If(parts) => parts.iter().any(Self::has_table),
         }
     }
 
@@ -237,7 +275,7 @@ impl Term {
         match self {
             Self::Constant(_) => false,
             Self::Variable(a) => *a == axis,
-            Self::Unary(_, a) => a.depends_on(axis),
+            Self::Unary(_, a) | Self::Table(_, a) => a.depends_on(axis),
             Self::Binary(_, a, b) => a.depends_on(axis) || b.depends_on(axis),
             Self::Chain(first, rest) => {
                 first.depends_on(axis) || rest.iter().any(|(_, term)| term.depends_on(axis))
@@ -253,6 +291,7 @@ struct Parser<'a> {
     text: &'a str,
     at: usize,
     depth: usize,
+    tables: &'a [Table],
 }
 
 impl Parser<'_> {
@@ -418,6 +457,13 @@ impl Parser<'_> {
             "t" => return Ok(self.advance(length, Term::Variable(TIME))),
             _ => {}
         }
+        if let Some(table) = self.tables.iter().find(|t| t.name() == name) {
+            self.at += length;
+            self.expect("(")?;
+            let argument = self.comparison()?;
+            self.expect(")")?;
+            return Ok(Term::Table(table.clone(), Box::new(argument)));
+        }
         let unary = UNARY.iter().find(|(n, _)| *n == name);
         let two = BINARY.iter().find(|(n, _)| *n == name);
         if unary.is_none() && two.is_none() && name != "if" {
@@ -427,8 +473,13 @@ impl Parser<'_> {
                 .chain(BINARY.iter().map(|(n, _)| *n))
                 .collect::<Vec<_>>()
                 .join(", ");
+            let tables: Vec<&str> = self.tables.iter().map(Table::name).collect();
+            let tables = match tables.is_empty() {
+                true => String::new(),
+                false => format!("; the tables are {}", tables.join(", ")),
+            };
             return Err(self.error(format!(
-                "`{name}` is unknown; the variables are x, y, z, t, the constant is pi, the functions are {known} and if"
+                "`{name}` is unknown; the variables are x, y, z, t, the constant is pi, the functions are {known} and if{tables}"
             )));
         }
         self.at += length;
@@ -473,86 +524,5 @@ fn chain(first: Term, mut rest: Vec<(Binary, Term)>) -> Term {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::Expression;
-
-    fn value(text: &str) -> f64 {
-        Expression::parse(text).unwrap().eval(&[2.0, 3.0, 5.0])
-    }
-
-    #[test]
-    fn precedence_is_that_of_written_mathematics() {
-        assert_eq!(value("-x^2"), -4.0);
-        assert_eq!(value("2^3^2"), 512.0);
-        assert_eq!(value("2^-x"), 0.25);
-        assert_eq!(value("1 - 2 - 3"), -4.0);
-        assert_eq!(value("12 / 2 / 3"), 2.0);
-        assert_eq!(value("2 * -x^2"), -8.0);
-        assert_eq!(value("1 + x * y ** 2"), 19.0);
-        assert_eq!(value("1.5e-1*z"), 0.75);
-        assert_eq!(value("(-x)^3"), -8.0);
-        assert_eq!(value("1/120"), 1.0 / 120.0);
-    }
-
-    #[test]
-    fn functions_and_choices() {
-        assert_eq!(value("if(x < y, 10, 20)"), 10.0);
-        assert_eq!(value("if(x >= y, 10, 20)"), 20.0);
-        assert_eq!(value("max(x, min(y, z)) + abs(-1)"), 4.0);
-        assert!((value("sin(pi / 2)") - 1.0).abs() < 1e-15);
-        assert_eq!(value("hypot(3, 4)"), 5.0);
-    }
-
-    #[test]
-    fn dependence_is_known() {
-        let e = Expression::parse("1 + y").unwrap();
-        assert!(e.depends_on(1) && !e.depends_on(0));
-        assert_eq!(e.as_constant(), None);
-        assert_eq!(Expression::parse("1/4").unwrap().as_constant(), Some(0.25));
-        let e = Expression::parse("if(t < 2, x * t, -1)").unwrap();
-        assert!(e.depends_on_time() && e.depends_on_position() && !e.depends_on(1));
-        assert_eq!(e.as_constant(), None);
-        assert_eq!(e.eval_at(&[4.0, 0.0, 0.0], 1.5), 6.0);
-        assert_eq!(e.eval_at(&[4.0, 0.0, 0.0], 2.0), -1.0);
-        assert!(!Expression::parse("2*t").unwrap().depends_on_position());
-    }
-
-    #[test]
-    fn wrong_text_is_located() {
-        for (text, at, what) in [
-            ("1 +", 4, "ends where"),
-            ("2 x", 3, "operator"),
-            ("sin x", 5, "expected `(`"),
-            ("(1", 3, "expected `)`"),
-            ("1 + foo", 5, "`foo` is unknown"),
-            ("tt", 1, "`tt` is unknown"),
-            ("1..2", 1, "no number"),
-            ("1 # 2", 3, "operator"),
-            ("", 1, "ends where"),
-            ("min(1)", 6, "expected `,`"),
-        ] {
-            let error = Expression::parse(text).unwrap_err();
-            assert_eq!(error.at, at, "{text}: {error}");
-            assert!(error.to_string().contains(what), "{text}: {error}");
-        }
-        assert!(Expression::parse(&"(".repeat(100_000)).is_err());
-        assert!(Expression::parse(&"-".repeat(100_000)).is_err());
-    }
-
-    #[test]
-    fn long_sums_and_products_are_read_and_longer_text_is_refused_by_name() {
-        let sum = Expression::parse(&["0.5*x"; 50_000].join(" + ")).unwrap();
-        assert_eq!(sum.clone().eval(&[2.0, 0.0, 0.0]), 50_000.0);
-        assert!(sum.depends_on(0) && !sum.depends_on(1));
-        let product = format!("y{}", "*2/2".repeat(50_000));
-        assert_eq!(value(&product), 3.0);
-        // from left to right: 1 - 2 - 3 … and not 1 - (2 - 3 …)
-        assert_eq!(value(&format!("100{}", " - x".repeat(50))), 0.0);
-        let error = Expression::parse(&"1+".repeat(600_000)).unwrap_err();
-        assert!(error.to_string().len() < 400, "{error}");
-        assert!(error.what.contains("1200000 bytes"), "{error}");
-        let deep = format!("{}x{}", "(".repeat(65), ")".repeat(65));
-        let error = Expression::parse(&deep).unwrap_err();
-        assert!(error.what.contains("more than 64 deep"), "{error}");
-    }
-}
+#[path = "expression_tests.rs"]
+mod tests;

@@ -4,11 +4,12 @@
 //! |---|---|
 //! | `source.rs` | the text and its overrides on one axis of positions |
 //! | `tagged_table.rs` | tables of exactly one key, and how overrides replace them |
-//! | `expression.rs`, `function.rs`, `value.rs` | numbers, expressions, functions of a program, coordinates with their places |
+//! | `expression.rs`, `function.rs`, `table.rs`, `value.rs` | numbers, expressions, functions of a program, tables, coordinates with their places |
+//! | `table_rows.rs` | the rows of tables, typed or from files |
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs` | its parts |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
@@ -45,11 +46,14 @@ pub(crate) mod parse;
 pub(crate) mod peridynamics;
 pub(crate) mod points;
 pub(crate) mod region;
+pub(crate) mod section;
 pub(crate) mod selected_coupling;
 pub(crate) mod solve;
 pub(crate) mod source;
 pub mod spec;
 mod surface_conditions;
+pub(crate) mod table;
+mod table_rows;
 pub(crate) mod tagged_table;
 pub(crate) mod temperature;
 pub(crate) mod template;
@@ -70,6 +74,7 @@ pub use initial::{Initial, InitialKind};
 pub use materials::{Fracture, Material};
 pub use peridynamics::Peridynamics;
 pub use region::Region;
+pub use section::Section;
 pub use solve::{Explicit, QuasiStatic, Solve};
 pub use source::{Source, Span, read};
 pub use spec::SceneSpec;

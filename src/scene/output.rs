@@ -5,7 +5,8 @@ use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::region::{self, Region};
-use super::spec::{SceneSpec, TipSpec};
+use super::section;
+use super::spec::{OutputSpec, SceneSpec, TipSpec};
 use super::validated::{Output, Tip};
 use super::value::Text;
 use crate::fem::Locator;
@@ -17,6 +18,9 @@ use crate::shape::Shape;
 
 /// The table of all probes; lines have tables by their own names beside it.
 pub(crate) const PROBES: &str = "probes";
+
+/// The table of all sections of a static scene.
+pub(crate) const SECTIONS: &str = "sections";
 
 /// The outputs of a scene whose files are named `name` by default.
 pub(crate) fn output<const D: usize>(
@@ -47,14 +51,7 @@ pub(crate) fn output<const D: usize>(
         let positions = (0..n)
             .map(|i| from.lerp(&to, i as f64 / (n - 1) as f64))
             .collect();
-        if key.value == PROBES && !o.probes.is_empty() {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("the line `{place}` has the name of the table of all probes"),
-            )
-            .label(key.span.clone(), "both would be one file")
-            .help("give the line another name"));
-        }
+        has_own_table(&place, key, o)?;
         lines.push((key.value.clone(), positions));
     }
     let locator = Locator::new(mesh, 0..mesh.cell_count());
@@ -83,6 +80,7 @@ pub(crate) fn output<const D: usize>(
     }
     let tips = o.tips.iter().map(|(key, spec)| tip(key, spec, mesh));
     let tips = tips.collect::<Result<_, _>>()?;
+    let sections = section::sections(&o.sections, mesh)?;
     Ok(Output {
         directory: o
             .directory
@@ -95,6 +93,7 @@ pub(crate) fn output<const D: usize>(
         stresses: o.stresses.iter().map(|s| *s.get_ref()).collect(),
         lines,
         probes,
+        sections,
         tips,
     })
 }
@@ -160,12 +159,32 @@ impl<const D: usize> Output<D> {
             if !self.probes.is_empty() {
                 ends.push(format!("_{PROBES}.csv"));
             }
+            if !self.sections.is_empty() {
+                ends.push(format!("_{SECTIONS}.csv"));
+            }
         }
         Files {
             name: name.clone(),
             files: ends.into_iter().map(|end| format!("{name}{end}")).collect(),
             series: moves,
         }
+    }
+}
+
+/// Refuses a line whose table would be that of all probes or all sections.
+fn has_own_table(place: &str, key: &Text, o: &OutputSpec) -> Result<(), SceneError> {
+    let taken = [
+        (PROBES, o.probes.is_empty()),
+        (SECTIONS, o.sections.is_empty()),
+    ];
+    match taken.iter().find(|(t, none)| key.value == *t && !none) {
+        None => Ok(()),
+        Some((table, _)) => Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("the line `{place}` has the name of the table of all {table}"),
+        )
+        .label(key.span.clone(), "both would be one file")
+        .help("give the line another name")),
     }
 }
 

@@ -8,6 +8,8 @@ use super::error::{SceneError, SceneErrorKind};
 use super::function;
 use super::source::{Place, Source, find};
 use super::spec::{MeshSpec, SceneSpec};
+use super::table::{self, Table};
+use super::table_rows;
 use super::tagged_table;
 
 impl SceneSpec {
@@ -19,13 +21,28 @@ impl SceneSpec {
         let table = source.merged()?;
         let places = table.get_ref().clone();
         let root = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
+        let tables = tables_of(&places);
         let read = || Self::deserialize(ValueDeserializer::from(root));
-        let mut spec = function::with_functions(source.functions(), read)
-            .map_err(|error| translate(&error, &places).shown_in(source))?;
+        let mut spec = table::with_tables(&tables, || {
+            function::with_functions(source.functions(), read)
+        })
+        .map_err(|error| translate(&error, &places).shown_in(source))?;
+        table_rows::take_in(&mut spec.tables, &tables).map_err(|error| error.shown_in(source))?;
         if let MeshSpec::File(file) = &mut spec.mesh {
             file.held = source.mesh().cloned();
         }
         Ok(spec)
+    }
+}
+
+/// The tables of a scene by their names, which its expressions may use; their rows come later.
+fn tables_of(scene: &DeTable<'_>) -> Vec<Table> {
+    match scene.get("tables").map(Spanned::get_ref) {
+        Some(DeValue::Table(tables)) => tables
+            .keys()
+            .map(|name| Table::named(name.get_ref()))
+            .collect(),
+        _ => Vec::new(),
     }
 }
 

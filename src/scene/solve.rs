@@ -8,7 +8,7 @@ use super::expression::Expression;
 use super::spec::{
     BeyondLimitSpec, ExplicitSpec, GrowingModesSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec,
 };
-use super::value::{Count, Every, Number};
+use super::value::{Count, Every, Number, StepTimes};
 use crate::observe::checkpoint::Pace;
 use crate::solve::sub_cycling;
 
@@ -56,6 +56,8 @@ pub struct Explicit {
 pub struct QuasiStatic {
     /// Number of load steps.
     pub steps: usize,
+    /// The time of each; empty where they are of equal length.
+    pub times: Vec<f64>,
     /// What t reaches at the last step.
     pub duration: f64,
     /// How each step is solved.
@@ -107,6 +109,16 @@ impl Clock {
         )
         .label(expression.span.clone(), "t means nothing here")
         .help("add [solve.explicit] with duration = ..., or [solve.quasi-static] with steps = ...; or use x, y, z only"))
+    }
+}
+
+impl QuasiStatic {
+    /// The time of a load step, that of the state before the first being zero.
+    pub fn time_of(&self, step: u64) -> f64 {
+        match step.checked_sub(1).and_then(|k| self.times.get(k as usize)) {
+            Some(time) => *time,
+            None => step as f64 * (self.duration / self.steps as f64),
+        }
     }
 }
 
@@ -297,6 +309,41 @@ fn sub_steps(count: Option<&Count>) -> Result<Option<u32>, SceneError> {
 /// The most VTU files of a run: beyond it a typing error is likelier than a wish.
 const MOST_FILES: f64 = 1e5;
 
+/// The times of load steps that are listed.
+fn listed(spec: &QuasiStaticSpec, times: &[f64]) -> Result<Vec<f64>, SceneError> {
+    let refuse = |what: String, label: &str, help: &str| {
+        Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`solve.quasi-static.steps` {what}"),
+        )
+        .label(spec.steps.span.clone(), label)
+        .help(help))
+    };
+    let order = "list the times of the load steps, larger than 0 and increasing: [0.5, 0.8, 1]; the state at t = 0 comes before them";
+    if times.is_empty() {
+        return refuse("is empty".to_owned(), "nothing is computed", order);
+    }
+    let mut before = 0.0;
+    for time in times {
+        if *time <= before {
+            return refuse(
+                format!("lists {time} after {before}"),
+                "not increasing",
+                order,
+            );
+        }
+        before = *time;
+    }
+    if spec.duration.is_some() {
+        return refuse(
+            "lists times beside `duration`".to_owned(),
+            "the last time is the duration",
+            "leave `duration` out",
+        );
+    }
+    Ok(times.to_vec())
+}
+
 fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
     let place = |key: &str| format!("solve.quasi-static.{key}");
     let count = |key: &str, number: &Count| {
@@ -309,10 +356,22 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
                 .help("ask for at least 1"),
         )
     };
-    let steps = count("steps", &spec.steps)?;
+    let (steps, times) = match &spec.steps.choice {
+        StepTimes::Equal(number) => {
+            let number = Count {
+                value: *number,
+                span: spec.steps.span.clone(),
+            };
+            (count("steps", &number)?, Vec::new())
+        }
+        StepTimes::Listed(times) => {
+            let listed = listed(spec, times)?;
+            (listed.len(), listed)
+        }
+    };
     let duration = match &spec.duration {
         Some(d) => bounds_checks::positive(&place("duration"), d)?,
-        None => 1.0,
+        None => times.last().copied().unwrap_or(1.0),
     };
     let tolerance = match &spec.tolerance {
         Some(t) => bounds_checks::within(
@@ -330,6 +389,7 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
     };
     Ok(QuasiStatic {
         steps,
+        times,
         duration,
         method: spec.method,
         tolerance,

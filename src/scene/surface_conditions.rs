@@ -3,12 +3,14 @@
 use rustc_hash::FxHashSet;
 
 use super::bounds_checks;
-use super::conditions::{Components, Condition, Prescribed, facet_set, finite, support};
+use super::conditions::{
+    Bedding, Components, Condition, Prescribed, facet_set, finite, inside, support,
+};
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::region::position;
 use super::solve::Clock;
-use super::spec::{PressureSpec, RotationSpec, SymmetrySpec};
+use super::spec::{PressureSpec, RotationSpec, SpringSpec, SymmetrySpec};
 use super::value::Text;
 use crate::mesh::Mesh;
 use crate::mesh::boundary::BoundaryFacet;
@@ -73,6 +75,79 @@ pub(super) fn outer_facets<const D: usize>(
     })
 }
 
+/// Springs to the ground on facets, or in cells.
+pub(super) fn spring<const D: usize>(
+    name: &Text,
+    spec: &SpringSpec,
+    mesh: &Mesh<D>,
+) -> Result<Condition<D>, SceneError> {
+    let place = format!("conditions.{name}.spring");
+    let given = [&spec.x, &spec.y, &spec.z];
+    let choice = |what: &str, help: &str| {
+        Err(
+            SceneError::new(SceneErrorKind::Choice, format!("`{place}` has {what}"))
+                .label(name.span.clone(), "springs")
+                .help(help),
+        )
+    };
+    let mut stiffness = Vector::<D>::zeros();
+    for (k, number) in given.iter().enumerate() {
+        let Some(number) = number else { continue };
+        let at = format!("{place}.{}", AXES[k]);
+        let value = bounds_checks::positive(&at, number)?;
+        if k >= D {
+            return Err(SceneError::new(
+                SceneErrorKind::Dimension,
+                format!("`{at}` in a scene of dimension {D}"),
+            )
+            .label(number.span.clone(), "no such axis")
+            .help(format!("remove `{}`", AXES[k])));
+        }
+        stiffness[k] = value;
+    }
+    let has_components = given.iter().any(|g| g.is_some());
+    let bedding = match (&spec.on, &spec.inside, &spec.normal) {
+        (None, None, _) | (Some(_), Some(_), _) => {
+            return choice(
+                match spec.on {
+                    Some(_) => "both `on` and `inside`",
+                    None => "neither `on` nor `inside`",
+                },
+                "keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`",
+            );
+        }
+        (_, _, Some(_)) if has_components => {
+            return choice("`normal` and components", "keep one of the two");
+        }
+        (None, Some(_), Some(_)) => {
+            return choice(
+                "`inside` and `normal`",
+                "cells have no normal: give components, or name a set of facets by `on`",
+            );
+        }
+        (_, _, None) if !has_components => {
+            return choice("no stiffness", "add x = ..., or normal = ...");
+        }
+        (Some(on), None, Some(normal)) => Bedding::Normal {
+            facets: outer_facets(&place, on, mesh)?,
+            stiffness: bounds_checks::positive(&format!("{place}.normal"), normal)?,
+        },
+        (Some(on), None, None) => Bedding::Axes {
+            facets: facet_set(&place, on, mesh)?.to_vec(),
+            stiffness,
+        },
+        (None, Some(shape), None) => Bedding::Inside {
+            region: inside(&place, name, shape, mesh)?,
+            stiffness,
+        },
+    };
+    Ok(Condition {
+        name: name.value.clone(),
+        prescribed: Prescribed::Spring(bedding),
+        components: Components(std::array::from_fn(|_| None)),
+    })
+}
+
 /// A vector field with one component.
 fn only<const D: usize>(axis: usize, value: Expression) -> Components<D> {
     Components(std::array::from_fn(|k| (k == axis).then(|| value.clone())))
@@ -111,7 +186,7 @@ pub(super) fn symmetry<const D: usize>(
                 from.as_slice(),
                 to.as_slice()
             ),
-            "turn the mesh so that its planes of symmetry lie along the axes, or hold the set by stiff [conditions.NAME.springs] with normal = ...",
+            "turn the mesh so that its planes of symmetry lie along the axes, or hold the set by stiff [conditions.NAME.spring] with normal = ...",
         ),
         _ => refuse(
             format!(
@@ -237,7 +312,8 @@ fn rotated<const D: usize>(
             row(&square, i)
         );
         // made of an expression that has been read
-        let read = Expression::parse(&text).unwrap_or_else(|_| Expression::constant(f64::NAN));
+        let read = Expression::parse_with(&text, angle.tables())
+            .unwrap_or_else(|_| Expression::constant(f64::NAN));
         read.at(angle.span.clone())
     };
     Components(std::array::from_fn(|i| Some(component(i))))

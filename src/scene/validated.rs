@@ -10,6 +10,7 @@ use super::initial::Initial;
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::region::Region;
+use super::section::Section;
 use super::solve::Solve;
 use super::spec::{CouplingSpec, ElementsSpec, UnprovenSpec};
 use crate::coupling::Zone;
@@ -124,6 +125,8 @@ pub struct Output<const D: usize> {
     pub lines: Vec<(String, Vec<Vector<D>>)>,
     /// Probes: name and position.
     pub probes: Vec<(String, Vector<D>)>,
+    /// Sections through the body.
+    pub sections: Vec<Section<D>>,
     /// Tips of cracks to follow.
     pub tips: Vec<Tip<D>>,
 }

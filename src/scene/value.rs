@@ -48,6 +48,24 @@ pub struct Every {
     pub span: Span,
 }
 
+/// A number of load steps, or the times of all of them.
+#[derive(Clone, Debug)]
+pub struct Steps {
+    /// What is typed.
+    pub choice: StepTimes,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Load steps of equal length, or at the times that are listed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StepTimes {
+    /// So many of equal length.
+    Equal(usize),
+    /// At these times.
+    Listed(Vec<f64>),
+}
+
 /// A piece of text: a path, the name of a set, or a key that the user chose.
 #[derive(Clone, Debug, Default)]
 pub struct Text {
@@ -116,7 +134,7 @@ impl Scalars {
         }
         match expression.as_constant() {
             None => Err(E::custom(format!(
-                "`{expression}` has a variable where a constant is expected"
+                "`{expression}` has a variable or a table where a constant is expected"
             ))),
             Some(v) if !v.is_finite() => Err(E::custom(format!(
                 "`{expression}` is {v}, not a finite number"
@@ -254,6 +272,51 @@ impl<'de> Deserialize<'de> for Whole {
     }
 }
 
+/// Load steps, typed as a number or as a list of times.
+impl<'de> Deserialize<'de> for StepTimes {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Choices;
+        let count = |e: &Expression| StepTimes::Equal(e.eval(&[0.0; 3]) as usize);
+        impl<'de> Visitor<'de> for Choices {
+            type Value = Result<Expression, Vec<f64>>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a whole number, or a list of times such as [0.5, 0.8, 1]")
+            }
+
+            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Self::Value, E> {
+                Scalars::Whole.visit_i64(v).map(Ok)
+            }
+
+            fn visit_f64<E: de::Error>(self, v: f64) -> Result<Self::Value, E> {
+                Scalars::Whole.visit_f64(v).map(Ok)
+            }
+
+            fn visit_str<E: de::Error>(self, v: &str) -> Result<Self::Value, E> {
+                Scalars::Whole.visit_str(v).map(Ok)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+                Lists.visit_seq(seq).map(Err)
+            }
+        }
+        Ok(match deserializer.deserialize_any(Choices)? {
+            Ok(number) => count(&number),
+            Err(times) => Self::Listed(times),
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Steps {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<StepTimes>::deserialize(deserializer)?;
+        Ok(Self {
+            span: spanned.span(),
+            choice: spanned.into_inner(),
+        })
+    }
+}
+
 impl<'de> Deserialize<'de> for Expression {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let spanned = Spanned::<Scalar>::deserialize(deserializer)?;
@@ -315,41 +378,44 @@ impl<'de> Deserialize<'de> for Text {
 /// One number or a list of them.
 struct List(Vec<f64>);
 
+/// Reads numbers into a list.
+struct Lists;
+
+impl<'de> Visitor<'de> for Lists {
+    type Value = Vec<f64>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("coordinates such as [0.1, 0.2]")
+    }
+
+    fn visit_i64<E: de::Error>(self, v: i64) -> Result<Vec<f64>, E> {
+        Ok(vec![v as f64])
+    }
+
+    fn visit_f64<E: de::Error>(self, v: f64) -> Result<Vec<f64>, E> {
+        if v.is_finite() {
+            Ok(vec![v])
+        } else {
+            Err(E::custom(format!("{v} is not a finite number")))
+        }
+    }
+
+    fn visit_str<E: de::Error>(self, v: &str) -> Result<Vec<f64>, E> {
+        let constant = Scalars::Constant.visit_str::<E>(v)?;
+        Ok(vec![constant.eval(&[0.0; 3])])
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Vec<f64>, A::Error> {
+        let mut values = Vec::new();
+        while let Some(v) = seq.next_element::<Constant>()? {
+            values.push(v.0);
+        }
+        Ok(values)
+    }
+}
+
 impl<'de> Deserialize<'de> for List {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Lists;
-        impl<'de> Visitor<'de> for Lists {
-            type Value = Vec<f64>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("coordinates such as [0.1, 0.2]")
-            }
-
-            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Vec<f64>, E> {
-                Ok(vec![v as f64])
-            }
-
-            fn visit_f64<E: de::Error>(self, v: f64) -> Result<Vec<f64>, E> {
-                if v.is_finite() {
-                    Ok(vec![v])
-                } else {
-                    Err(E::custom(format!("{v} is not a finite number")))
-                }
-            }
-
-            fn visit_str<E: de::Error>(self, v: &str) -> Result<Vec<f64>, E> {
-                let constant = Scalars::Constant.visit_str::<E>(v)?;
-                Ok(vec![constant.eval(&[0.0; 3])])
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Vec<f64>, A::Error> {
-                let mut values = Vec::new();
-                while let Some(v) = seq.next_element::<Constant>()? {
-                    values.push(v.0);
-                }
-                Ok(values)
-            }
-        }
         deserializer.deserialize_any(Lists).map(List)
     }
 }
@@ -386,6 +452,11 @@ schema!(Count, "Count", {
     "description": "A whole number, or a constant expression in quotes.",
     "type": ["integer", "string"],
     "minimum": 0
+});
+schema!(Steps, "Steps", {
+    "description": "A number of load steps of equal length, or the list of their times.",
+    "type": ["integer", "string", "array"],
+    "items": { "type": ["number", "string"] }
 });
 schema!(Automatic, "Automatic", {
     "description": "A number, or \"auto\".",

@@ -7,6 +7,10 @@ use bondline::scene::Source;
 
 mod pressure;
 mod rotation;
+mod sections;
+mod springs;
+mod stresses;
+mod tables;
 mod thermal;
 
 /// A finished run.

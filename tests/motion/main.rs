@@ -18,6 +18,7 @@ mod keys;
 mod laws;
 mod load_steps;
 mod neighbours;
+mod parts;
 mod plasticity;
 mod position_aware;
 mod restarts;
@@ -59,6 +60,7 @@ on = "right"
 x = "0.004 * min(1, t / 8)"
 [output]
 probes.middle = { at = [6, 2] }
+sections.cut = { point = [6, 3], normal = [1, 0] }
 tips.notch = { direction = [0, -1], threshold = 0.2 }
 "#;
 

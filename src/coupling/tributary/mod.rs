@@ -7,6 +7,7 @@
 //! | `around.rs` | places beside points at centroids |
 //! | `marks.rs` | the cells of a lattice that the edge of a region cuts |
 //! | `found.rs` | volumes and moments of parts that were found |
+//! | `half_space.rs` | what of cells and facets lies beyond a plane |
 //! | `parts.rs` | a region of the zone, or of its surface, in parts that follow sites |
 //!
 //! The principle of virtual work gives all of it. The displacement of a finite element is `Σ N_a u_a`; a cell of the lattice that lies in the zone as a whole has that of its point; one that the seam, a surface or a void cuts has
@@ -21,11 +22,13 @@
 mod around;
 pub(crate) mod found;
 mod grid;
+mod half_space;
 mod marks;
 mod parts;
 mod simplex;
 
 pub use crate::coupling::tributary::found::{Detail, Moments};
+pub use half_space::HalfSpace;
 pub use parts::Parts;
 
 use crate::{

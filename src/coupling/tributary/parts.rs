@@ -226,6 +226,25 @@ impl<const D: usize> Parts<D> {
         }
     }
 
+    /// Hands each point of the quadratures to `visit`: its place, its weight, the outward unit normal (zero but on a surface), and the sites that it follows with their weights.
+    ///
+    /// Parts have to be laid out with [`Detail::Quadrature`].
+    pub fn each_point(&self, mut visit: impl FnMut(&Vector<D>, f64, &Vector<D>, &[(u32, f64)])) {
+        let none = Vector::zeros();
+        for k in 0..self.size.len() {
+            let follows = &self.follows[self.offsets[k]..self.offsets[k + 1]];
+            for q in self.quadrature_offsets[k]..self.quadrature_offsets[k + 1] {
+                let (x, weight) = &self.quadrature[q];
+                let arm = x - self.centre[k];
+                let sites = follows.iter();
+                let sites: Vec<(u32, f64)> = sites
+                    .map(|(site, w, gradient)| (*site, w + gradient.dot(&arm)))
+                    .collect();
+                visit(x, *weight, self.normals.get(q).unwrap_or(&none), &sites);
+            }
+        }
+    }
+
     /// Adds to each site what it has of the size of the parts.
     pub fn add_sizes(&self, sizes: &mut [f64]) {
         for k in 0..self.size.len() {

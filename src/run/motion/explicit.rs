@@ -198,6 +198,7 @@ fn take_segment<'r, const D: usize>(
         rest,
         spec,
         moving: laid_out.moving,
+        springs: laid_out.springs,
         remedy: record.remedy,
         proved,
         choices: &mut record.choices,
@@ -315,6 +316,7 @@ impl SegmentRecord {
         told.extend(rotation.as_ref().map(Rotation::warning));
         let files = observer.recorder.files();
         let reactions = observer.recorder.reactions();
+        let sections = observer.recorder.section_forces();
         let motion = motion_summary(observer, motion, ended, energy_gain, self.taken)?;
         Ok(RunSummary {
             scene: self.title,
@@ -329,6 +331,7 @@ impl SegmentRecord {
             proof: self.proof,
             applied,
             reactions,
+            sections,
             rotation,
             motion: Some(motion),
             files,

@@ -1,5 +1,7 @@
 //! What the steps with one layout of the zones begin with: at time zero, at a checkpoint, or where the zones have changed.
 
+use std::sync::Arc;
+
 use super::RunOptions;
 use super::breaks::breaks;
 use super::dynamic_system::{DynamicSystem, start};
@@ -16,6 +18,7 @@ use crate::run::error::RunError;
 use crate::run::motion::seen::Seen;
 use crate::run::proof::growth::GrowthQuestion;
 use crate::run::setup::RunSettings;
+use crate::run::springs::Springs;
 use crate::scene::solve::Explicit as Spec;
 use crate::solve::explicit::State;
 use crate::system::Dissipation;
@@ -69,6 +72,8 @@ pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
     pub rest: &'r RunSettings<D>,
     pub spec: &'a Spec,
     pub moving: DynamicSystem<'m>,
+    /// What springs hold the body.
+    pub springs: Arc<Springs>,
     /// What to do about modes that grow.
     pub remedy: &'static str,
     /// What shows that none does, if anything does.
@@ -131,6 +136,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             saved.as_ref().map(|s| &s.written),
         )?;
         recorder.hold(drive.holders());
+        recorder.cut(model, &rest.conditions, self.springs)?;
         let resumed = saved.is_some();
         let edge = saved.as_ref().and_then(|s| s.edge);
         let (state, zone, seen) = match saved {
@@ -191,6 +197,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let (state, switch) = leaving.arrive(model, system, &drive)?;
         recorder.move_to(&Sampler::new(model));
         recorder.hold(drive.holders());
+        recorder.cut(model, &rest.conditions, self.springs)?;
         recorder.energy_at_start += switch.left();
         self.watch.lap(self.timings, "state carried over");
         let own = std::mem::replace(self.timings, before);

@@ -15,6 +15,8 @@
 //! | `zone_monitor.rs`, `bounding_boxes.rs` | where a zone that follows the crack is wanted |
 //! | `rezoning.rs` | what a change of the zone carries over, and what it costs |
 //! | `supports.rs` | what holds the body: forces and displacements of conditions |
+//! | `probe_rows.rs`, `section_rows.rs` | what the history tells of probes, and of sections through the body |
+//! | `tips.rs` | where the tip of a crack is |
 //! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
 
 pub(crate) mod bounding_boxes;
@@ -24,14 +26,17 @@ pub mod explicit;
 pub(crate) mod guard;
 pub(crate) mod initial_state;
 mod material_stretches;
+mod probe_rows;
 pub mod quasi_static;
 pub(crate) mod rezoning;
+mod section_rows;
 pub(crate) mod seen;
 pub mod setup;
 pub(crate) mod step_observer;
 mod supports;
 pub mod time_dependent_loads;
 pub mod time_step;
+mod tips;
 pub mod writer;
 pub(crate) mod zone_monitor;
 

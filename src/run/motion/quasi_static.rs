@@ -1,6 +1,7 @@
 //! A scene under a load that grows: one equilibrium after another, each broken through until no bond breaks.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -26,6 +27,7 @@ use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
+use crate::run::springs::Springs;
 use crate::run::warnings::{locking, warnings, without_response};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
@@ -73,8 +75,8 @@ fn load_steps<const D: usize>(
     let params = equilibrium_params(spec, &mut choices);
     let near = match params.equilibrium {
         Equilibrium::Newton => {
-            let symmetry = system.symmetry();
-            let near = factors(model, operator, symmetry, rest, &mut choices, progress)?;
+            let body = (model, operator, laid_out.springs.as_ref());
+            let near = factors(body, system.symmetry(), rest, &mut choices, progress)?;
             watch.lap(&mut timings, "factorisation");
             near
         }
@@ -87,6 +89,7 @@ fn load_steps<const D: usize>(
     let breaks = breaks(system.as_ref(), rest);
     let mut recorder = recorder(model, rest, spec, options, breaks, file, saved.as_ref())?;
     recorder.hold(drive.holders());
+    recorder.cut(model, &rest.conditions, Arc::clone(&laid_out.springs))?;
     let edge = saved.as_ref().and_then(|s| s.edge);
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
@@ -101,7 +104,7 @@ fn load_steps<const D: usize>(
         pace,
         breaks,
         drive: &drive,
-        fields: FieldOutput::new(model, operator, &rest.stresses),
+        fields: FieldOutput::new(model, operator, &rest.stresses, &rest.output),
         recorder,
         rotations,
         state,
@@ -249,7 +252,8 @@ impl<const D: usize> LoadStepObserver<'_, D> {
     ) -> Result<(QuasiStaticInfo, f64), RunError> {
         let written = self.recorder.seconds;
         let (progress, pace, drive) = (self.progress, self.pace, self.drive);
-        let times = |k: u64| (k <= pace.steps).then_some(k as f64 * pace.step);
+        let spec = self.spec;
+        let times = |k: u64| (k <= pace.steps).then(|| spec.time_of(k));
         progress.stage("load steps", Some(pace.steps));
         progress.advance(self.state.step);
         let clock = Instant::now();
@@ -346,7 +350,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             .collect();
         let last = self.is_last();
         let (state, recorder) = (&self.state, &mut self.recorder);
-        let moment = Moment::at_rest(state, seen.system, (seen.force, &loads));
+        let moment = Moment::at_rest(state, seen.system, (seen.force, &loads), seen.load);
         let shown = begins
             || last
             || matches!(self.ended, Ended::DamageAtEdge | Ended::ElementsRotated)
@@ -357,7 +361,8 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         }
         let energies = recorder.energies(&moment);
         let place = |site: usize| self.model.sites[site].position;
-        recorder.row(&moment, energies, place)?;
+        let probed = self.fields.probed(&moment);
+        recorder.row(&moment, energies, &probed, place)?;
         if shown {
             self.fields.write(recorder, &moment)?;
         }
@@ -413,6 +418,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             dimension: D,
             applied,
             reactions: self.recorder.reactions(),
+            sections: self.recorder.section_forces(),
             iterations,
             motion: Some(motion),
             files: self.recorder.files(),
@@ -457,8 +463,7 @@ const RAISED: f64 = 1e-10;
 
 /// Factors of the stiffness before bonds break, which lead Newton's method; none where `[solver]` asks for an iteration, or `"auto"` finds factors dear.
 fn factors<const D: usize>(
-    model: &Model<D>,
-    operator: &dyn Operator<D>,
+    (model, operator, springs): (&Model<D>, &dyn Operator<D>, &Springs),
     symmetry: Symmetry,
     rest: &RunSettings<D>,
     choices: &mut Vec<Decision>,
@@ -471,6 +476,7 @@ fn factors<const D: usize>(
     let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
     let mut stiffness = model.assemble(operator, progress);
+    springs.all.add_to(&mut stiffness);
     stiffness.raise_diagonal(RAISED);
     let problem = StaticProblem {
         stiffness: &stiffness,

@@ -3,6 +3,8 @@
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
 use super::writer::Saved;
 use super::{RunOptions, StartFrom};
+use std::sync::Arc;
+
 use crate::coupling::{Model, Operator, Problem};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
 use crate::observe::proof::Proof;
@@ -11,9 +13,10 @@ use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::proof::{self, Subject, growth};
 use crate::run::setup::{self, RunSettings};
+use crate::run::springs::Springs;
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
-use crate::system::{Ranks, SemiDiscrete};
+use crate::system::{Ranks, SemiDiscrete, Sprung};
 
 /// A scene with all that it computes before its first step.
 pub struct ModelSetup<'a, const D: usize> {
@@ -33,6 +36,8 @@ pub struct ModelSetup<'a, const D: usize> {
     pub rest: &'a RunSettings<D>,
     /// The system that solvers see.
     pub moving: DynamicSystem<'a>,
+    /// What springs hold the body; the system has them.
+    pub(crate) springs: Arc<Springs>,
     /// What the program chose where the scene leaves it open.
     pub choices: Vec<Decision>,
     /// What was shown about the model.
@@ -100,7 +105,8 @@ pub(crate) fn lay_out<const D: usize, T>(
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;
-    let moving = dynamic(
+    let springs = Arc::new(springs_of(&model, rest)?);
+    let mut moving = dynamic(
         &model,
         coupling.as_ref(),
         operator.as_ref(),
@@ -126,6 +132,9 @@ pub(crate) fn lay_out<const D: usize, T>(
     )?;
     proof::hold(&proof)?;
     watch.lap(&mut timings, "proof");
+    if !springs.is_empty() {
+        moving.system = Box::new(Sprung::new(moving.system, &springs.all));
+    }
     let done = then(ModelSetup {
         title,
         joining,
@@ -135,6 +144,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         operator: operator.as_ref(),
         rest,
         moving,
+        springs: Arc::clone(&springs),
         choices,
         proof,
         bytes,
@@ -143,6 +153,24 @@ pub(crate) fn lay_out<const D: usize, T>(
     })?;
     drop(operator);
     Ok((done, model.into_problem(coupling)))
+}
+
+/// The springs of a scene in time or load steps.
+///
+/// # Errors
+/// [`RunError::Idle`], and [`RunError::Later`] beside a temperature.
+fn springs_of<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+) -> Result<Springs, RunError> {
+    let springs = Springs::new(model, &rest.conditions)?;
+    if !springs.is_empty() && rest.stresses.thermal.is_some() {
+        return Err(RunError::Later {
+            what: "springs beside a temperature in time or load steps",
+            remedy: "solve a static scene for each temperature, or leave one of the two out",
+        });
+    }
+    Ok(springs)
 }
 
 /// Lays a scene out and hands it on; `first` has a say before anything is computed.

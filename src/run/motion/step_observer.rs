@@ -19,9 +19,11 @@ use crate::run::error::RunError;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
+use crate::run::stress_probes::StressProbes;
 use crate::run::stress_settings::StressSettings;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
+use crate::scene::validated::Output;
 use crate::solve::explicit::{Explicit, State};
 
 /// How often whoever watches is told.
@@ -63,6 +65,7 @@ pub(super) struct FieldOutput<'a, const D: usize> {
     operator: &'a dyn Operator<D>,
     zone_of_site: Vec<crate::coupling::Zone>,
     stresses: &'a StressSettings<D>,
+    probes: StressProbes,
 }
 
 impl<'a, const D: usize> FieldOutput<'a, D> {
@@ -71,8 +74,10 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
         model: &'a Model<D>,
         operator: &'a dyn Operator<D>,
         stresses: &'a StressSettings<D>,
+        output: &Output<D>,
     ) -> Self {
         Self {
+            probes: StressProbes::new(model, stresses, &output.probes),
             model,
             operator,
             zone_of_site: solution::zone_of_site(model),
@@ -89,17 +94,32 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
         recorder: &mut Recorder<'_, D>,
         moment: &Moment<'_>,
     ) -> Result<(), ObserveError> {
-        let solved = Solved {
+        recorder.output(moment, &self.solved(moment, &moment.broken_bonds()))
+    }
+
+    /// A moment as it is shown.
+    fn solved<'m>(&'m self, moment: &'m Moment<'_>, broken: &'m [(u32, u32)]) -> Solved<'m, D> {
+        Solved {
             model: self.model,
             operator: self.operator,
             displacement: &moment.state.u,
             residual: &[],
             zone_of_site: &self.zone_of_site,
             system: Some(moment.system),
-            broken: &moment.broken_bonds(),
+            broken,
+            sections: &[],
             stresses: self.stresses.at(moment.state.time),
-        };
-        recorder.output(moment, &solved)
+        }
+    }
+
+    /// Stresses at the probes, as far as they are asked for.
+    pub fn probed(&self, moment: &Moment<'_>) -> Vec<f64> {
+        match self.probes.is_empty() {
+            true => Vec::new(),
+            false => self
+                .probes
+                .row(&self.solved(moment, &moment.broken_bonds())),
+        }
     }
 }
 
@@ -170,7 +190,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         };
         Ok(Self {
             segment,
-            fields: FieldOutput::new(model, segment.operator, &segment.rest.stresses),
+            fields: FieldOutput::new(model, segment.operator, &rest.stresses, &rest.output),
             monitor,
             guard,
             recorder,
@@ -401,8 +421,9 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     /// Writes a row of the history and of the tables of tips.
     fn write_row(&mut self, moment: &Moment<'_>, energies: Row) -> Result<(), ObserveError> {
         let sites = &self.segment.model.sites;
+        let probed = self.fields.probed(moment);
         self.recorder
-            .row(moment, energies, |site| sites[site].position)
+            .row(moment, energies, &probed, |site| sites[site].position)
     }
 
     /// Writes all that the run needs to go on from here.
@@ -456,6 +477,7 @@ pub fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
         kinetic: energies.kinetic,
         discrete: is_linear.then_some(energies.discrete),
         supports: (motion.external_force(), motion.applied()),
+        forces: (motion.internal_force(), motion.external_force()),
     }
 }
 

@@ -1,6 +1,9 @@
 //! What holds the body: the force of each condition that prescribes how sites move, and by how much it has moved them.
 
+use std::sync::Arc;
+
 use crate::observe::summary::Reaction;
+use crate::run::springs::Springs;
 use crate::scene::conditions::{Condition, Prescribed};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -10,6 +13,12 @@ pub(super) struct Supports<const D: usize> {
     conditions: Vec<Support<D>>,
     /// Prescribed dofs with the condition that holds each, by its number among all conditions.
     holders: Vec<(u32, u32)>,
+    /// The conditions that are springs, by their names.
+    spring_names: Vec<String>,
+    /// What they hold; none before the model is known.
+    springs: Option<Arc<Springs>>,
+    /// Forces of the springs at the last row.
+    last_of_springs: Vec<Reaction>,
     /// Forces of the last row, `D` of each condition; empty before the first.
     last: Vec<f64>,
 }
@@ -33,7 +42,12 @@ impl<const D: usize> Supports<D> {
                 _ => c.components.0[k].is_some(),
             }),
         };
+        let springs = conditions.iter();
+        let springs = springs.filter(|c| matches!(c.prescribed, Prescribed::Spring(_)));
         Self {
+            spring_names: springs.map(|c| c.name.clone()).collect(),
+            springs: None,
+            last_of_springs: Vec::new(),
             conditions: all.map(support).collect(),
             holders: Vec::new(),
             last: Vec::new(),
@@ -45,7 +59,22 @@ impl<const D: usize> Supports<D> {
         self.holders = holders.collect();
     }
 
-    /// The columns of a row: all reactions, then the displacements of what is prescribed.
+    /// The prescribed dofs.
+    pub fn dofs(&self) -> impl Iterator<Item = u32> {
+        self.holders.iter().map(|(dof, _)| *dof)
+    }
+
+    /// Takes what springs hold the body.
+    pub fn spring(&mut self, springs: Arc<Springs>) {
+        self.springs = Some(springs);
+    }
+
+    /// What springs hold the body, if that is known.
+    pub fn springs(&self) -> Option<&Springs> {
+        self.springs.as_deref()
+    }
+
+    /// The columns of a row: all reactions, then the displacements of what is prescribed, then the forces of springs.
     pub fn header(&self) -> Vec<String> {
         let of_all = self.conditions.iter();
         let mut header: Vec<String> = of_all
@@ -54,6 +83,11 @@ impl<const D: usize> Supports<D> {
         header.extend(self.prescribed().map(|(c, k)| {
             let name = &self.conditions[c].name;
             format!("{name}_displacement_{}", AXES[k])
+        }));
+        let springs = self.spring_names.iter();
+        header.extend(springs.flat_map(|name| {
+            let axes = AXES[..D].iter();
+            axes.map(move |a| format!("{name}_reaction_{a}"))
         }));
         header
     }
@@ -68,7 +102,7 @@ impl<const D: usize> Supports<D> {
         })
     }
 
-    /// Forces of all conditions by components, then the means of the displacements that each prescribes.
+    /// Forces of all conditions by components, then the means of the displacements that each prescribes, then the forces of springs.
     ///
     /// `forces` are those of supports and loads together by dof, `loads` those of loads alone on each prescribed dof, `u` displacements by dof.
     /// A condition all of whose dofs are held by others has force and displacement zero.
@@ -91,6 +125,12 @@ impl<const D: usize> Supports<D> {
             let (sum, count) = sums[c * D + k];
             if count > 0.0 { sum / count } else { 0.0 }
         }));
+        match &self.springs {
+            Some(springs) => self.last_of_springs = springs.reactions::<D>(u),
+            None => reactions.extend(vec![0.0; self.spring_names.len() * D]),
+        }
+        let springs = self.last_of_springs.iter();
+        reactions.extend(springs.flat_map(|r| r.force.iter().copied()));
         reactions
     }
 
@@ -102,6 +142,7 @@ impl<const D: usize> Supports<D> {
             condition: support.name.clone(),
             force: force.to_vec(),
         })
+        .chain(self.last_of_springs.iter().cloned())
         .collect()
     }
 }

@@ -1,14 +1,18 @@
 //! What a run writes while it goes on: history, VTU files, tips of cracks, checkpoints.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
 use super::RunOptions;
 use super::breaks::Breaks;
+use super::probe_rows::ProbeRows;
 use super::rezoning::{nonlocal, share};
+use super::section_rows::SectionRows;
 use super::supports::Supports;
+use super::tips::farthest;
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
@@ -16,12 +20,15 @@ use crate::observe::csv::Entry;
 use crate::observe::history::History;
 use crate::observe::rezoning_event::Switch;
 use crate::observe::series::Series;
-use crate::observe::summary::Reaction;
+use crate::observe::summary::{Reaction, SectionForce};
+use crate::run::error::RunError;
 use crate::run::motion::seen::Seen;
 use crate::run::solution::Solved;
+use crate::run::springs::Springs;
+use crate::run::stress_probes;
 use crate::run::write::{ENERGY_DENSITY, OverSites, Shown, energy_densities, snapshot};
 use crate::scene::conditions::Condition;
-use crate::scene::validated::{Output, Tip};
+use crate::scene::validated::Output;
 use crate::solve::explicit::State;
 use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
@@ -154,6 +161,8 @@ pub struct Moment<'a> {
     pub discrete: Option<f64>,
     /// Forces of supports and loads together by dof, and of loads alone on each prescribed dof.
     pub supports: (&'a [f64], &'a [f64]),
+    /// Internal and external forces by dof; the external ones of prescribed dofs stand in `supports`.
+    pub forces: (&'a [f64], &'a [f64]),
 }
 
 impl<'a> Moment<'a> {
@@ -162,12 +171,14 @@ impl<'a> Moment<'a> {
         state: &'a State,
         system: &'a dyn SemiDiscrete,
         supports: (&'a [f64], &'a [f64]),
+        load: &'a [f64],
     ) -> Self {
         Self {
             state,
             system,
             kinetic: 0.0,
             discrete: None,
+            forces: (supports.0, load),
             supports,
         }
     }
@@ -201,9 +212,9 @@ pub struct Row {
 /// What a run writes.
 pub struct Recorder<'a, const D: usize> {
     output: &'a Output<D>,
-    /// Sites and weights of each probe.
-    probes: Vec<Vec<(u32, f64)>>,
+    probes: ProbeRows<'a, D>,
     supports: Supports<D>,
+    sections: SectionRows<'a, D>,
     breaks: Breaks,
     history: History,
     tips: Vec<History>,
@@ -235,7 +246,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         options: RunOptions<'a>,
         written: Option<&Written>,
     ) -> Result<Self, ObserveError> {
-        let probes = probes(output, sampler);
+        let probes = ProbeRows::new(&output.probes, sampler);
         let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
         let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
         let table = |name: &str, header, file| match options.writes() {
@@ -243,7 +254,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
             false => Ok(History::unwritten(header)),
         };
         let supports = Supports::new(conditions);
-        let header = history_header(output, &supports, breaks, is_linear);
+        let sections = SectionRows::new(&output.sections);
+        let mut header = history_header(&probes, &supports, breaks, is_linear);
+        header.extend(sections.header());
+        header.extend(stress_probes::header(output));
         let history = table("history", header, 0)?;
         let tips = output
             .tips
@@ -270,6 +284,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             output,
             probes,
             supports,
+            sections,
             breaks,
             history,
             tips,
@@ -285,7 +300,22 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// Finds the probes in another layout of the same body.
     pub fn move_to(&mut self, sampler: &Sampler<'_, D>) {
-        self.probes = probes(self.output, sampler);
+        self.probes.find(sampler);
+    }
+
+    /// Finds what of a model lies beyond each section, and takes what springs hold it.
+    ///
+    /// # Errors
+    /// [`RunError::EmptySection`].
+    pub(crate) fn cut(
+        &mut self,
+        model: &Model<D>,
+        conditions: &'a [Condition<D>],
+        springs: Arc<Springs>,
+    ) -> Result<(), RunError> {
+        self.sections.find(model, conditions)?;
+        self.supports.spring(springs);
+        Ok(())
     }
 
     /// Learns which condition holds each prescribed dof.
@@ -298,9 +328,19 @@ impl<'a, const D: usize> Recorder<'a, D> {
         self.supports.reactions()
     }
 
+    /// Forces in the sections, at the last row.
+    pub fn section_forces(&self) -> Vec<SectionForce> {
+        self.sections.last()
+    }
+
     /// Begins the account of energy.
     pub fn begin(&mut self, moment: &Moment<'_>) {
         self.energy_at_start = moment.kinetic + moment.system.stored_energy(&moment.state.u);
+    }
+
+    /// As many zeros as there are columns of stresses at probes: for trials of the output.
+    pub fn unprobed(&self) -> Vec<f64> {
+        vec![0.0; stress_probes::header(self.output).len()]
     }
 
     /// The energies of a state.
@@ -321,7 +361,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
     }
 
-    /// Appends to the history and to the tables of tips.
+    /// Appends to the history and to the tables of tips; `probed` are the stresses at the probes.
     ///
     /// # Errors
     /// [`ObserveError`] if a row cannot be written.
@@ -329,6 +369,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         &mut self,
         moment: &Moment<'_>,
         energies: Row,
+        probed: &[f64],
         positions: impl Fn(usize) -> Vector<D>,
     ) -> Result<(), ObserveError> {
         let begun = Instant::now();
@@ -355,16 +396,15 @@ impl<'a, const D: usize> Recorder<'a, D> {
             momentum.iter_mut().zip(v).for_each(|(p, v)| *p += m * v);
         }
         row.extend(momentum.map(Entry::from));
-        for probe in &self.probes {
-            for field in [&state.u, &state.v] {
-                row.extend((0..D).map(|k| -> Entry {
-                    let of_site = |&(s, w): &(u32, f64)| w * field[s as usize * D + k];
-                    probe.iter().map(of_site).sum::<f64>().into()
-                }));
-            }
-        }
+        let probes = self.probes.row(&state.u, &state.v);
+        row.extend(probes.into_iter().map(Entry::from));
         let supports = self.supports.row(moment.supports, &state.u);
         row.extend(supports.into_iter().map(Entry::from));
+        let held = self.supports.dofs().zip(moment.supports.1);
+        let springs = self.supports.springs().map(|s| (s, &state.u[..]));
+        let sections = self.sections.row(moment.forces, springs, held, state.time);
+        row.extend(sections.into_iter().map(Entry::from));
+        row.extend(probed.iter().map(|&s| Entry::from(s)));
         self.options.keep("history", &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
         if may_be_damaged && !self.tips.is_empty() {
@@ -513,16 +553,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
     }
 }
 
-/// Sites and weights of each probe.
-fn probes<const D: usize>(output: &Output<D>, sampler: &Sampler<'_, D>) -> Vec<Vec<(u32, f64)>> {
-    let probes = output.probes.iter();
-    probes
-        .map(|(_, x)| sampler.weights(x).unwrap_or_default())
-        .collect()
-}
-
 fn history_header<const D: usize>(
-    output: &Output<D>,
+    probes: &ProbeRows<'_, D>,
     supports: &Supports<D>,
     breaks: Breaks,
     is_linear: bool,
@@ -545,32 +577,7 @@ fn history_header<const D: usize>(
     }
     let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();
     header.extend(AXES[..D].iter().map(|a| format!("momentum_{a}")));
-    for (name, _) in &output.probes {
-        for field in ["u", "v"] {
-            header.extend(AXES[..D].iter().map(|a| format!("{name}_{field}{a}")));
-        }
-    }
+    header.extend(probes.header());
     header.extend(supports.header());
     header
-}
-
-/// The damaged site that lies farthest along the direction of a tip; of several, the first.
-fn farthest<const D: usize>(
-    tip: &Tip<D>,
-    damage: &[f64],
-    positions: impl Fn(usize) -> Vector<D>,
-) -> Option<usize> {
-    let mut best: Option<(f64, usize)> = None;
-    for (site, _) in damage
-        .iter()
-        .enumerate()
-        .filter(|(_, d)| **d >= tip.threshold)
-    {
-        let x = positions(site);
-        let reach = tip.direction.dot(&x);
-        if best.is_none_or(|(b, _)| reach > b) && tip.inside.contains(&x, 0.0) {
-            best = Some((reach, site));
-        }
-    }
-    best.map(|(_, site)| site)
 }

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 use super::classes::Skin;
 use crate::coupling::Model;
 use crate::mesh::boundary::BoundaryFacet;
-use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::conditions::{Bedding, Condition, Prescribed, Support};
 use crate::shape::{Barrier, Barriers};
 use crate::tensor::Vector;
 
@@ -202,6 +202,12 @@ fn kinds<const D: usize>(
         let loaded: Vec<&[u32]> = match &condition.prescribed {
             Prescribed::Traction(loaded) => loaded.iter().map(AsRef::as_ref).collect(),
             Prescribed::Pressure(loaded) => loaded.iter().map(|f| f.nodes.as_ref()).collect(),
+            Prescribed::Spring(Bedding::Axes { facets, .. }) => {
+                facets.iter().map(AsRef::as_ref).collect()
+            }
+            Prescribed::Spring(Bedding::Normal { facets, .. }) => {
+                facets.iter().map(|f| f.nodes.as_ref()).collect()
+            }
             _ => Vec::new(),
         };
         for nodes in loaded {

@@ -21,6 +21,8 @@ pub enum ConditionSpec {
     Pressure(PressureSpec),
     /// Force per volume.
     BodyForce(BodyForceSpec),
+    /// Springs to the ground, an elastic foundation: a force per area against the displacement.
+    Spring(SpringSpec),
     /// A plane of symmetry: no displacement along its normal.
     Symmetry(SymmetrySpec),
     /// Rigid rotation about a centre, as an axis or a grip imposes it.
@@ -96,6 +98,30 @@ pub struct PressureSpec {
     pub on: Text,
     /// Pressure, positive where it presses on the body; may depend on place and time.
     pub value: Expression,
+}
+
+/// Springs to the ground: exactly one of `on` and `inside`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SpringSpec {
+    /// A named set of facets of the mesh; stiffnesses are forces per area and displacement.
+    #[serde(default)]
+    pub on: Option<Text>,
+    /// The cells of the mesh with their centroid in a shape; stiffnesses are forces per volume and displacement.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// Stiffness along x.
+    #[serde(default)]
+    pub x: Option<Number>,
+    /// Stiffness along y.
+    #[serde(default)]
+    pub y: Option<Number>,
+    /// Stiffness along z.
+    #[serde(default)]
+    pub z: Option<Number>,
+    /// Stiffness along the normal of the set, instead of components.
+    #[serde(default)]
+    pub normal: Option<Number>,
 }
 
 /// A plane of symmetry along the axes.

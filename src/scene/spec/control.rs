@@ -7,6 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::motion::TipSpec;
+use super::region::ShapeSpec;
 use crate::scene::value::{Coordinates, Count, Number, Text};
 use crate::solve::ordering::Ordering;
 use crate::solve::statics::Method;
@@ -62,7 +63,7 @@ pub struct OutputSpec {
     /// Whether the VTU has the energy density of peridynamic points; false if left out.
     #[serde(default)]
     pub energy_density: Option<bool>,
-    /// Stresses that the VTU holds as fields beside the tensor; with any of them tables of static scenes along lines and at probes have columns of stress. None if left out.
+    /// Stresses that the VTU holds as fields beside the tensor; with any of them tables of static scenes along lines and at probes, and histories for probes, have columns of stress. None if left out.
     #[serde(default)]
     #[schemars(with = "Vec<StressSpec>")]
     pub stresses: Vec<Spanned<StressSpec>>,
@@ -72,6 +73,9 @@ pub struct OutputSpec {
     /// Points at which a CSV file gives the solution, by name; in a scene that moves, columns of the history.
     #[serde(default)]
     pub probes: BTreeMap<Text, ProbeSpec>,
+    /// Sections through the body by name: force and moment that the part beyond a plane exerts on the rest, as columns of the history; of a static scene a CSV file. The summary has them too.
+    #[serde(default)]
+    pub sections: BTreeMap<Text, SectionSpec>,
     /// Tips of cracks to follow, by name, in a scene in which bonds break.
     #[serde(default)]
     pub tips: BTreeMap<Text, TipSpec>,
@@ -118,4 +122,20 @@ pub struct LineSpec {
 pub struct ProbeSpec {
     /// Its position.
     pub at: Coordinates,
+}
+
+/// A section through the body: a plane, and the part of the body beyond it.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SectionSpec {
+    /// A point of the plane.
+    pub point: Coordinates,
+    /// Normal of the plane, of any length; it points to the part whose force on the rest is told.
+    pub normal: Coordinates,
+    /// A shape that holds that part beyond the plane; all beyond the plane if left out.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// The point about which the moment is taken; `point` if left out.
+    #[serde(default)]
+    pub about: Option<Coordinates>,
 }

@@ -11,14 +11,16 @@ mod mesh;
 mod motion;
 pub(super) mod named_law;
 mod region;
+mod table;
 mod user_material;
 
 pub use condition::{
-    BodyForceSpec, ConditionSpec, DisplacementSpec, PressureSpec, RotationSpec, SymmetrySpec,
-    TemperatureSpec, TractionSpec, VelocitySpec, VoidSpec,
+    BodyForceSpec, ConditionSpec, DisplacementSpec, PressureSpec, RotationSpec, SpringSpec,
+    SymmetrySpec, TemperatureSpec, TractionSpec, VelocitySpec, VoidSpec,
 };
 pub use control::{
-    LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SolverSpec, StressSpec, UnprovenSpec,
+    LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SectionSpec, SolverSpec, StressSpec,
+    UnprovenSpec,
 };
 pub use coupling::{
     BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec, InterfaceSpec,
@@ -44,6 +46,7 @@ pub use region::{
     AutoSpec, BallSpec, BodySpec, BoxSpec, CellsSpec, EdgeSpec, FollowSpec, NearSpec, SegmentSpec,
     ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
+pub use table::TableSpec;
 pub use user_material::{EnergiesSpec, StrainsSpec, UmatSpec};
 
 use std::collections::BTreeMap;
@@ -96,6 +99,9 @@ pub struct SceneSpec {
     /// Displacements, velocities, tractions and body forces by name.
     #[serde(default)]
     pub conditions: BTreeMap<Text, ConditionSpec>,
+    /// Tables by name, which expressions call: load(t).
+    #[serde(default)]
+    pub tables: BTreeMap<Text, TableSpec>,
     /// Temperature of the body; without it nothing expands.
     #[serde(default)]
     pub temperature: Option<TemperatureSpec>,

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::coupling::NoOptionsSpec;
 use super::region::ShapeSpec;
 use crate::scene::expression::Expression;
-use crate::scene::value::{Automatic, Coordinates, Count, Every, Number};
+use crate::scene::value::{Automatic, Coordinates, Count, Every, Number, Steps};
 
 /// What is computed.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -87,8 +87,8 @@ pub enum GrowingModesSpec {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct QuasiStaticSpec {
-    /// Number of load steps.
-    pub steps: Count,
+    /// Number of load steps of equal length, or the list of their times, the last of which takes the place of `duration`.
+    pub steps: Steps,
     /// What t reaches at the last step; 1 if left out.
     #[serde(default)]
     pub duration: Option<Number>,

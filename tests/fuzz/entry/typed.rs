@@ -111,9 +111,15 @@ fn solution(frame: &Frame, rest: &mut String) {
     }
 }
 
-/// Lines of a static scene, a probe of one that moves.
+/// A section; lines of a static scene, a probe of one that moves.
 fn outputs(frame: &Frame, rest: &mut String) {
     line!(rest, "[output]\nvtu = false");
+    let along: Vec<f64> = (0..frame.d).map(|k| f64::from(u8::from(k == 0))).collect();
+    line!(
+        rest,
+        "sections.half = {{ point = {}, normal = {along:?} }}",
+        frame.place([0.5; 3])
+    );
     if frame.kind == Kind::Static {
         let (from, to) = ([0.0, 0.37, 0.43], [1.0, 0.37, 0.43]);
         line!(

@@ -1,0 +1,302 @@
+//! Sections through the body: force and moment that the part beyond a plane exerts on the rest.
+//!
+//! A free body is cut: `S = Σ (F_i − f_i) + L` over the sites beyond the plane, with the internal forces `F`, the nodal forces `f` of the loads, and the
+//! integral `L` of the loads over what of the mesh lies beyond the plane. Therefore `S = R + L − Σ m a` with the reactions R of what is held
+//! beyond. It knows of no coupling: bonds, elements and seams are all in `F`. Nodal forces of a cell that the plane cuts belong to
+//! both sides; `L − Σ f_i` puts that right, so that the weight of what stands on a section is exact wherever the plane lies. Sites that a
+//! set holds count where the set lies, for the same reason.
+
+use crate::coupling::Model;
+use crate::observe::summary::SectionForce;
+use crate::run::error::RunError;
+use crate::run::loads::{cells_of, holders};
+use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::section::Section;
+use crate::tensor::{Vector, padded};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Axes along which there is a moment: none in 1D, z in 2D.
+const fn moment_axes<const D: usize>() -> &'static [usize] {
+    match D {
+        1 => &[],
+        2 => &[2],
+        _ => &[0, 1, 2],
+    }
+}
+
+/// Force and moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Resultant<const D: usize> {
+    force: Vector<D>,
+    moment: [f64; 3],
+}
+
+impl<const D: usize> Resultant<D> {
+    fn none() -> Self {
+        Self {
+            force: Vector::zeros(),
+            moment: [0.0; 3],
+        }
+    }
+
+    /// Adds a force at the place `arm` from where moments are taken about.
+    fn add(&mut self, force: &Vector<D>, arm: &Vector<D>) {
+        self.force += force;
+        let (f, r) = (padded(force), padded(arm));
+        for (k, moment) in self.moment.iter_mut().enumerate() {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            *moment += r[i] * f[j] - r[j] * f[i];
+        }
+    }
+
+    fn add_times(&mut self, other: &Self, factor: f64) {
+        self.force += other.force * factor;
+        for (own, other) in self.moment.iter_mut().zip(other.moment) {
+            *own += other * factor;
+        }
+    }
+}
+
+/// What lies beyond a section of a model.
+struct Cut<const D: usize> {
+    about: Vector<D>,
+    sites: Vec<(u32, Vector<D>)>,
+    /// Dofs that count on the other side than their site, with the sign of what they change.
+    moved: Vec<(usize, Vector<D>, f64)>,
+    loads: Vec<LoadBeyond<D>>,
+}
+
+/// A load as far as it acts beyond a section.
+struct LoadBeyond<const D: usize> {
+    condition: usize,
+    share: Share<D>,
+}
+
+enum Share<const D: usize> {
+    /// It does not change.
+    Steady(Resultant<D>),
+    /// It depends on time alone: the resultants of unit components.
+    ByTime([Resultant<D>; D]),
+    /// It depends on time and place: place, weight and outward normal of each point of a quadrature.
+    Everywhere(Vec<(Vector<D>, f64, Vector<D>)>),
+}
+
+/// The sections of a scene, and what of its model lies beyond each.
+pub(crate) struct Sections<'a, const D: usize> {
+    sections: &'a [Section<D>],
+    conditions: &'a [Condition<D>],
+    cuts: Vec<Cut<D>>,
+}
+
+/// The columns of all sections: force, then moment of each.
+pub(crate) fn header<const D: usize>(sections: &[Section<D>]) -> Vec<String> {
+    let of_one = |s: &Section<D>| {
+        let force = AXES[..D].iter().map(|a| format!("{}_force_{a}", s.name));
+        let moment = moment_axes::<D>().iter();
+        let moment = moment.map(|&k| format!("{}_moment_{}", s.name, AXES[k]));
+        force.chain(moment).collect::<Vec<_>>()
+    };
+    sections.iter().flat_map(of_one).collect()
+}
+
+impl<'a, const D: usize> Sections<'a, D> {
+    /// Finds what of a model lies beyond each section.
+    ///
+    /// # Errors
+    /// [`RunError::EmptySection`] for one beyond which no site lies.
+    pub fn new(
+        model: &Model<D>,
+        sections: &'a [Section<D>],
+        conditions: &'a [Condition<D>],
+    ) -> Result<Self, RunError> {
+        let cut = |section: &Section<D>| -> Result<Cut<D>, RunError> {
+            let sites = model.sites.iter().enumerate();
+            let beyond = sites.filter(|(_, s)| section.holds(&s.position));
+            let sites: Vec<(u32, Vector<D>)> = beyond
+                .map(|(site, s)| (site as u32, s.position - section.about))
+                .collect();
+            if sites.is_empty() || sites.len() == model.sites.len() {
+                return Err(RunError::EmptySection {
+                    section: section.name.clone(),
+                    sites: sites.len(),
+                });
+            }
+            let loads = conditions.iter().enumerate();
+            Ok(Cut {
+                about: section.about,
+                sites,
+                moved: moved(model, section, conditions)?,
+                loads: loads
+                    .filter_map(|(number, c)| load_beyond(model, section, number, c))
+                    .collect(),
+            })
+        };
+        Ok(Self {
+            sections,
+            conditions,
+            cuts: sections.iter().map(cut).collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Force and moment of each section at the time `t`; `excess` are internal less external forces \[N\] by dof, the forces of supports and the inertia.
+    pub fn forces(&self, excess: &[f64], t: f64) -> Vec<SectionForce> {
+        let told = self.sections.iter().zip(&self.cuts).map(|(section, cut)| {
+            let sum = self.resultant(cut, excess, t);
+            SectionForce {
+                section: section.name.clone(),
+                force: sum.force.iter().copied().collect(),
+                moment: moment_axes::<D>().iter().map(|&k| sum.moment[k]).collect(),
+            }
+        });
+        told.collect()
+    }
+
+    fn resultant(&self, cut: &Cut<D>, excess: &[f64], t: f64) -> Resultant<D> {
+        let mut sum = Resultant::none();
+        for (site, arm) in &cut.sites {
+            let own = &excess[*site as usize * D..][..D];
+            sum.add(&Vector::from_column_slice(own), arm);
+        }
+        for (dof, arm, sign) in &cut.moved {
+            let force = Vector::from_fn(|k, _| {
+                if k == dof % D {
+                    sign * excess[*dof]
+                } else {
+                    0.0
+                }
+            });
+            sum.add(&force, arm);
+        }
+        for load in &cut.loads {
+            let condition = &self.conditions[load.condition];
+            match &load.share {
+                Share::Steady(own) => sum.add_times(own, 1.0),
+                Share::ByTime(units) => {
+                    let components = &condition.components;
+                    for (axis, unit) in units.iter().enumerate() {
+                        let value = components.at_time(axis, &Vector::zeros(), t);
+                        sum.add_times(unit, value.unwrap_or(0.0));
+                    }
+                }
+                Share::Everywhere(points) => {
+                    for (x, weight, normal) in points {
+                        let force = condition.force_density(x, normal, t) * *weight;
+                        sum.add(&force, &(x - cut.about));
+                    }
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// What a set holds lies where the set does: points that a support holds from beside it may lie on the other side of a plane than the support.
+///
+/// # Errors
+/// As [`holders`].
+fn moved<const D: usize>(
+    model: &Model<D>,
+    section: &Section<D>,
+    conditions: &[Condition<D>],
+) -> Result<Vec<(usize, Vector<D>, f64)>, RunError> {
+    // of each set that lies on one side, whether that is beyond
+    let side = |c: &Condition<D>| match c.support() {
+        Some(Support::Set { nodes, .. }) => {
+            let beyond = |n: &u32| section.holds(&model.mesh.nodes[*n as usize]);
+            let first = nodes.first().map(beyond)?;
+            nodes.iter().all(|n| beyond(n) == first).then_some(first)
+        }
+        _ => None,
+    };
+    let sides: Vec<Option<bool>> = conditions.iter().map(side).collect();
+    let mut moved = Vec::new();
+    for (dof, holder) in holders(model, conditions)?.into_iter().enumerate() {
+        let x = &model.sites[dof / D].position;
+        if let Some(set) = holder.and_then(|h| sides[h])
+            && set != section.holds(x)
+        {
+            moved.push((dof, x - section.about, if set { 1.0 } else { -1.0 }));
+        }
+    }
+    Ok(moved)
+}
+
+/// A load as far as it acts beyond a section; none of a condition that does not load, or not there.
+fn load_beyond<const D: usize>(
+    model: &Model<D>,
+    section: &Section<D>,
+    number: usize,
+    condition: &Condition<D>,
+) -> Option<LoadBeyond<D>> {
+    let points = points_beyond(model, section, condition);
+    if points.is_empty() {
+        return None;
+    }
+    let integral = |density: &dyn Fn(&Vector<D>, &Vector<D>) -> Vector<D>| {
+        let mut sum = Resultant::none();
+        for (x, weight, normal) in &points {
+            sum.add(&(density(x, normal) * *weight), &(x - section.about));
+        }
+        sum
+    };
+    let components = &condition.components;
+    let share = match (
+        components.depends_on_time(),
+        components.depends_on_position(),
+    ) {
+        (false, _) => Share::Steady(integral(&|x, n| condition.force_density(x, n, 0.0))),
+        (true, false) => Share::ByTime(std::array::from_fn(|axis| {
+            integral(&|_, n| condition.unit_density(axis, n))
+        })),
+        (true, true) => Share::Everywhere(points),
+    };
+    Some(LoadBeyond {
+        condition: number,
+        share,
+    })
+}
+
+/// Place, weight and outward normal of each point of a quadrature over what a load acts on beyond a section.
+fn points_beyond<const D: usize>(
+    model: &Model<D>,
+    section: &Section<D>,
+    condition: &Condition<D>,
+) -> Vec<(Vector<D>, f64, Vector<D>)> {
+    let (mesh, beyond) = (&model.mesh, &section.beyond);
+    let mut points = Vec::new();
+    let mut add = |x: &Vector<D>, weight: f64, normal: &Vector<D>| {
+        if section.inside.contains(x, beyond.tolerance) {
+            points.push((*x, weight, *normal));
+        }
+    };
+    let none = Vector::zeros();
+    match &condition.prescribed {
+        Prescribed::Traction(facets) => {
+            for facet in mesh.present_facets(facets.clone()) {
+                beyond.facet_points(mesh, &facet, |x, w| add(x, w, &none));
+            }
+        }
+        Prescribed::Pressure(facets) => {
+            for facet in facets {
+                let facet = mesh.facet((facet.cell, facet.local));
+                beyond.outward_points(mesh, &facet, |x, w, n| add(x, w, n));
+            }
+        }
+        Prescribed::BodyForce(region) => {
+            let inside = cells_of(model, region);
+            let voids = model.peridynamics.as_ref().map_or(&[][..], |p| &p.voids);
+            for c in (0..inside.len()).filter(|&c| inside[c]) {
+                beyond.cell_points(mesh, c, |x, w| {
+                    // a void in the zone has no weight
+                    let is_void = voids.iter().any(|v| v.signed_distance(x) < 0.0);
+                    if model.is_element(c) || !is_void {
+                        add(x, w, &none);
+                    }
+                });
+            }
+        }
+        _ => {}
+    }
+    points
+}

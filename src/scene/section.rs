@@ -1,0 +1,100 @@
+//! Sections through the body: a plane, and the part of the body beyond it.
+
+use std::collections::BTreeMap;
+
+use super::conditions::{extent, inside};
+use super::error::{SceneError, SceneErrorKind};
+use super::region::{Region, position};
+use super::spec::SectionSpec;
+use super::value::Text;
+use crate::coupling::tributary::HalfSpace;
+use crate::mesh::Mesh;
+use crate::tensor::Vector;
+
+/// A section through the body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section<const D: usize> {
+    /// Its name.
+    pub name: String,
+    /// What lies beyond the plane.
+    pub beyond: HalfSpace<D>,
+    /// The part of it whose force is told.
+    pub inside: Region<D>,
+    /// The point about which the moment is taken \[m\].
+    pub about: Vector<D>,
+}
+
+impl<const D: usize> Section<D> {
+    /// Whether a place lies in the part whose force is told.
+    pub fn holds(&self, x: &Vector<D>) -> bool {
+        self.beyond.holds(x) && self.inside.contains(x, self.beyond.tolerance)
+    }
+}
+
+/// The sections of a scene.
+pub(super) fn sections<const D: usize>(
+    spec: &BTreeMap<Text, SectionSpec>,
+    mesh: &Mesh<D>,
+) -> Result<Vec<Section<D>>, SceneError> {
+    spec.iter()
+        .map(|(name, typed)| section(name, typed, mesh))
+        .collect()
+}
+
+fn section<const D: usize>(
+    name: &Text,
+    spec: &SectionSpec,
+    mesh: &Mesh<D>,
+) -> Result<Section<D>, SceneError> {
+    let place = format!("output.sections.{name}");
+    let point = position::<D>(&format!("{place}.point"), &spec.point)?;
+    let normal = position::<D>(&format!("{place}.normal"), &spec.normal)?;
+    let normal = normal.try_normalize(1e-300);
+    let Some(normal) = normal.filter(|n| n.iter().all(|n| n.is_finite())) else {
+        return Err(SceneError::new(
+            SceneErrorKind::WrongValue,
+            format!("`{place}.normal` has no direction"),
+        )
+        .label(spec.normal.span.clone(), "zero")
+        .help(format!(
+            "write a direction such as {}",
+            ["[1]", "[1, 0]", "[1, 0, 0]"][D - 1]
+        )));
+    };
+    let (low, high) = mesh.bounds();
+    let section = Section {
+        name: name.value.clone(),
+        beyond: HalfSpace {
+            point,
+            normal,
+            tolerance: 1e-9 * (high - low).norm(),
+        },
+        inside: match &spec.inside {
+            Some(shape) => inside(&place, name, shape, mesh)?,
+            None => Region::everywhere(),
+        },
+        about: match &spec.about {
+            Some(about) => position(&format!("{place}.about"), about)?,
+            None => point,
+        },
+    };
+    let beyond = mesh.nodes.iter().filter(|x| section.holds(x)).count();
+    if beyond > 0 && beyond < mesh.nodes.len() {
+        return Ok(section);
+    }
+    let (what, remedy) = match beyond {
+        0 => (
+            "has nothing of the body beyond it",
+            "move its point, or turn its normal to the part whose force is to be told",
+        ),
+        _ => (
+            "has all of the body beyond it",
+            "move its point into the body",
+        ),
+    };
+    Err(
+        SceneError::new(SceneErrorKind::Empty, format!("`{place}` {what}"))
+            .label(spec.point.span.clone(), "cuts nothing")
+            .help(format!("{remedy}; {}", extent(mesh))),
+    )
+}

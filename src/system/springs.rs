@@ -1,0 +1,387 @@
+//! Springs between sites and the ground: rows that are added to a stiffness, and a system that has them.
+
+use std::collections::BTreeMap;
+use std::ops::DerefMut;
+
+use super::{
+    BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, SharedRows, Symmetry,
+};
+
+/// The stiffness `S` of springs between sites and the ground \[N/m\]: symmetric, and no displacement has a negative energy.
+///
+/// Shapes: row `k` of `rows` is that of site `sites[k]`; sites ascend.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SpringRows {
+    sites: Vec<u32>,
+    rows: BlockCsr,
+}
+
+impl SpringRows {
+    /// From the blocks of pairs of sites, row-major.
+    pub fn from_blocks(block: usize, blocks: &BTreeMap<(u32, u32), Vec<f64>>) -> Self {
+        let mut own = Self {
+            sites: Vec::new(),
+            rows: BlockCsr {
+                block,
+                row_offsets: vec![0],
+                ..BlockCsr::default()
+            },
+        };
+        for (&(row, column), values) in blocks {
+            if own.sites.last() != Some(&row) {
+                own.sites.push(row);
+                own.rows.row_offsets.push(own.rows.columns.len());
+            }
+            own.rows.columns.push(column);
+            own.rows.values.extend(values);
+            if let Some(end) = own.rows.row_offsets.last_mut() {
+                *end = own.rows.columns.len();
+            }
+        }
+        own
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.sites.is_empty()
+    }
+
+    /// Hands each row to `visit`: its site, its columns, its blocks.
+    fn each<'s>(&'s self, mut visit: impl FnMut(u32, &'s [u32], &'s [f64])) {
+        for (k, &site) in self.sites.iter().enumerate() {
+            let (columns, blocks) = self.rows.row(k);
+            visit(site, columns, blocks);
+        }
+    }
+
+    /// `y += S x`.
+    pub fn add_product(&self, x: &[f64], y: &mut [f64]) {
+        let d = self.rows.block;
+        self.each(|site, columns, blocks| {
+            let y = &mut y[site as usize * d..][..d];
+            for (&column, block) in columns.iter().zip(blocks.chunks_exact(d * d)) {
+                let x = &x[column as usize * d..][..d];
+                for (y, row) in y.iter_mut().zip(block.chunks_exact(d)) {
+                    *y += row.iter().zip(x).map(|(s, x)| s * x).sum::<f64>();
+                }
+            }
+        });
+    }
+
+    /// `½ uᵀ S u` \[J\].
+    pub fn energy(&self, u: &[f64]) -> f64 {
+        let mut force = vec![0.0; if self.is_empty() { 0 } else { u.len() }];
+        self.add_product(u, &mut force);
+        0.5 * u.iter().zip(&force).map(|(u, f)| u * f).sum::<f64>()
+    }
+
+    /// Adds the rows to a matrix with a row for each site; rows that share their blocks with others get their own.
+    pub fn add_to(&self, matrix: &mut BlockCsr) {
+        if self.is_empty() {
+            return;
+        }
+        let own: Vec<u32> = (0..matrix.rows() as u32).collect();
+        *matrix = self.added(matrix, &own);
+    }
+
+    /// The rows of a matrix, row `k` that of site `sites[k]`, with those of the springs added.
+    fn added(&self, matrix: &BlockCsr, sites: &[u32]) -> BlockCsr {
+        let size = matrix.block * matrix.block;
+        let mut sum = BlockCsr {
+            block: matrix.block,
+            row_offsets: vec![0],
+            // shared blocks stay where they are, rows of their own follow
+            values: matrix
+                .shared
+                .as_ref()
+                .map_or(Vec::new(), |_| matrix.values.clone()),
+            shared: matrix.shared.as_ref().map(|_| SharedRows::default()),
+            ..BlockCsr::default()
+        };
+        for (k, site) in sites.iter().enumerate() {
+            let (columns, blocks) = matrix.row(k);
+            let added = self.sites.binary_search(site).ok();
+            let first = sum.values.len() / size;
+            match added.map(|place| self.rows.row(place)) {
+                Some(springs) => merge((columns, blocks), springs, size, &mut sum),
+                None => {
+                    sum.columns.extend(columns);
+                    if matrix.shared.is_none() {
+                        sum.values.extend(blocks);
+                    }
+                }
+            }
+            if let (Some(shared), Some(before)) = (&mut sum.shared, &matrix.shared) {
+                shared.starts.push(match added {
+                    Some(_) => first,
+                    None => before.starts[k],
+                });
+                let is_after_own = k > 0 && self.sites.binary_search(&sites[k - 1]).is_ok();
+                shared
+                    .follows
+                    .push(before.follows[k] && added.is_none() && !is_after_own);
+            }
+            sum.row_offsets.push(sum.columns.len());
+        }
+        sum
+    }
+
+    /// Adds `Σ_b |S_ab|` to every scalar row's sum.
+    fn add_row_sums(&self, sums: &mut [f64]) {
+        let d = self.rows.block;
+        self.each(|site, _, blocks| {
+            for block in blocks.chunks_exact(d * d) {
+                let own = sums[site as usize * d..].iter_mut();
+                for (sum, row) in own.zip(block.chunks_exact(d)) {
+                    *sum += row.iter().map(|s| s.abs()).sum::<f64>();
+                }
+            }
+        });
+    }
+}
+
+/// Appends the sum of two rows, columns ascending in each.
+fn merge(a: (&[u32], &[f64]), b: (&[u32], &[f64]), size: usize, sum: &mut BlockCsr) {
+    let (mut i, mut j) = (0, 0);
+    while i < a.0.len() || j < b.0.len() {
+        let column = match (a.0.get(i), b.0.get(j)) {
+            (Some(&p), Some(&q)) => p.min(q),
+            (Some(&p), None) => p,
+            (None, Some(&q)) => q,
+            (None, None) => return,
+        };
+        let first = sum.values.len();
+        sum.columns.push(column);
+        sum.values.resize(first + size, 0.0);
+        for ((columns, blocks), place) in [(a, &mut i), (b, &mut j)] {
+            if columns.get(*place) == Some(&column) {
+                let own = &blocks[*place * size..][..size];
+                let to = sum.values[first..].iter_mut();
+                to.zip(own).for_each(|(to, own)| *to += own);
+                *place += 1;
+            }
+        }
+    }
+}
+
+/// A system with springs to the ground: `F(u) + S u`.
+#[derive(Debug)]
+pub struct Sprung<'s, S> {
+    system: S,
+    springs: &'s SpringRows,
+}
+
+impl<'s, S> Sprung<'s, S> {
+    /// A system, and what is added to it.
+    pub fn new(system: S, springs: &'s SpringRows) -> Self {
+        Self { system, springs }
+    }
+}
+
+impl<S> SemiDiscrete for Sprung<'_, S>
+where
+    S: DerefMut + Send + Sync,
+    S::Target: SemiDiscrete,
+{
+    fn internal_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        breakage: FailureUpdate,
+    ) -> u64 {
+        let broken = self
+            .system
+            .internal_force_into(u, force, interval, breakage);
+        self.springs.add_product(u, force);
+        broken
+    }
+
+    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
+        self.system.tangent_into(x, y);
+        self.springs.add_product(x, y);
+    }
+
+    fn row_sums(&self) -> Vec<f64> {
+        let mut sums = self.system.row_sums();
+        self.springs.add_row_sums(&mut sums);
+        sums
+    }
+
+    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
+        self.springs.added(&self.system.tangent_rows(sites), sites)
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        self.system.stored_energy(u) + self.springs.energy(u)
+    }
+
+    fn block(&self) -> usize {
+        self.system.block()
+    }
+
+    fn mass(&self) -> &[f64] {
+        self.system.mass()
+    }
+
+    fn commit(&mut self) {
+        self.system.commit();
+    }
+
+    fn difference_length(&self) -> Option<f64> {
+        self.system.difference_length()
+    }
+
+    fn contact_frequency_bound(&self) -> f64 {
+        self.system.contact_frequency_bound()
+    }
+
+    fn drag_rate_bound(&self) -> f64 {
+        self.system.drag_rate_bound()
+    }
+
+    fn tangent_is_constant(&self) -> Vec<bool> {
+        self.system.tangent_is_constant()
+    }
+
+    fn seam_sites(&self) -> Vec<u32> {
+        self.system.seam_sites()
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        self.system.symmetry()
+    }
+
+    fn dissipation(&self) -> Option<Dissipation> {
+        self.system.dissipation()
+    }
+
+    fn set_dissipation(&mut self, dissipation: Dissipation) {
+        self.system.set_dissipation(dissipation);
+    }
+
+    fn account_for_breaks(&mut self, at: &Halfway<'_>) {
+        self.system.account_for_breaks(at);
+    }
+
+    fn dissipated_energy(&self) -> Option<f64> {
+        self.system.dissipated_energy()
+    }
+
+    fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        self.system.stresses(u)
+    }
+
+    fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
+        self.system.energy_densities(u)
+    }
+
+    fn points_without_response(&self, u: &[f64]) -> usize {
+        self.system.points_without_response(u)
+    }
+
+    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+        self.system.remembered()
+    }
+
+    fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+        self.system.cell_stresses(u)
+    }
+
+    fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
+        self.system.remembered_by_cells()
+    }
+
+    fn damage(&self) -> Option<Vec<f64>> {
+        self.system.damage()
+    }
+
+    fn damage_at_edge(&self) -> Option<usize> {
+        self.system.damage_at_edge()
+    }
+
+    fn damaged_sites(&self) -> Vec<u32> {
+        self.system.damaged_sites()
+    }
+
+    fn broken_bonds(&self) -> Vec<(u32, u32)> {
+        self.system.broken_bonds()
+    }
+
+    fn damage_state(&self) -> Vec<u64> {
+        self.system.damage_state()
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        self.system.restore_damage(state)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Springs of two sites, the second of which stands twice in the pattern.
+    fn springs() -> SpringRows {
+        let blocks = [
+            ((1, 1), vec![2.0, 1.0, 1.0, 3.0]),
+            ((1, 3), vec![0.5, 0.0, 0.0, 0.25]),
+            ((3, 1), vec![0.5, 0.0, 0.0, 0.25]),
+            ((3, 3), vec![4.0, 0.0, 0.0, 5.0]),
+        ];
+        SpringRows::from_blocks(2, &blocks.into_iter().collect())
+    }
+
+    fn matrix(shared: Option<SharedRows>) -> BlockCsr {
+        // diagonal, with one entry beside it in the second row
+        BlockCsr {
+            block: 2,
+            row_offsets: vec![0, 1, 3, 4, 5],
+            columns: vec![0, 1, 2, 2, 3],
+            values: match shared {
+                None => [
+                    [1.0, 0.0, 0.0, 1.0],
+                    [7.0, 0.0, 0.0, 7.0],
+                    [1.0, 2.0, 3.0, 4.0],
+                    [1.0, 0.0, 0.0, 1.0],
+                    [1.0, 0.0, 0.0, 1.0],
+                ]
+                .concat(),
+                Some(_) => [
+                    [1.0, 0.0, 0.0, 1.0],
+                    [7.0, 0.0, 0.0, 7.0],
+                    [1.0, 2.0, 3.0, 4.0],
+                ]
+                .concat(),
+            },
+            shared,
+        }
+    }
+
+    #[test]
+    fn a_matrix_with_springs_has_the_products_of_both() {
+        let shared = SharedRows {
+            starts: vec![0, 1, 0, 0],
+            follows: vec![false, false, false, true],
+        };
+        let x: Vec<f64> = (0..8).map(|k| f64::from(k) - 2.5).collect();
+        for of in [None, Some(shared)] {
+            let plain = matrix(of);
+            let mut wanted = plain.multiply(&x);
+            springs().add_product(&x, &mut wanted);
+            let mut sum = plain.clone();
+            springs().add_to(&mut sum);
+            assert_eq!(sum.multiply(&x), wanted);
+            assert_eq!(sum.row(1).0, [1, 2, 3]);
+            // bounds of the rows hold for the sum
+            let mut sums = plain.row_sums();
+            springs().add_row_sums(&mut sums);
+            assert!(sum.row_sums().iter().zip(&sums).all(|(a, b)| a <= b));
+        }
+        let energy = springs().energy(&x);
+        let mut force = vec![0.0; 8];
+        springs().add_product(&x, &mut force);
+        let work: f64 = x.iter().zip(&force).map(|(u, f)| u * f).sum();
+        assert_eq!(energy, 0.5 * work);
+    }
+}

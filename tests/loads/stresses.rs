@@ -1,0 +1,100 @@
+//! Stresses at probes with each row of a history.
+
+use super::{Done, run};
+
+/// A plate between rollers that load steps pull, with a probe in elements and one at points.
+const PLATE: &str = r#"
+kinematics = "plane-strain"
+coupling = "truncated"
+mesh.rectangle = { min = [0, 0], max = [4, 1], x = { cells = 24 }, y = { cells = 6 } }
+materials.m.lps = { youngs-modulus = 100, poisson-ratio = 0.3, density = 1 }
+peridynamics = { horizon = 0.4, points = { lattice = { spacing = 0.13 } } }
+zones.nonlocal.box = { min = [1.4, 0], max = [2.6, 1] }
+conditions.left.displacement = { on = "left", x = 0 }
+conditions.base.displacement = { on = "bottom", y = 0 }
+conditions.right.traction = { on = "right", x = "2 * t" }
+solve.quasi-static.steps = 2
+[output]
+vtu = false
+stresses = ["von-mises", "max-principal"]
+probes.element.at = [0.4, 0.55]
+probes.point.at = [2, 0.5]
+"#;
+
+const COLUMNS: [&str; 5] = ["sxx", "sxy", "syy", "von_mises", "max_principal"];
+
+fn probed(done: &Done, probe: &str) -> Vec<Vec<f64>> {
+    let columns = COLUMNS.map(|c| done.column("scene_history.csv", &format!("{probe}_{c}")));
+    let rows = columns[0].len();
+    (0..rows)
+        .map(|r| columns.iter().map(|c| c[r]).collect())
+        .collect()
+}
+
+#[test]
+fn a_plate_that_is_pulled_tells_its_stress_step_by_step() {
+    let done = run(PLATE, &[]);
+    // the same at rest, under the load of the last step
+    let at_rest = PLATE
+        .replace("solve.quasi-static.steps = 2\n", "")
+        .replace("\"2 * t\"", "2");
+    let at_rest = run(&at_rest, &[]);
+    for (k, probe) in ["element", "point"].into_iter().enumerate() {
+        let rows = probed(&done, probe);
+        assert_eq!(rows.len(), 3);
+        assert!(rows[0].iter().all(|s| *s == 0.0), "{:?}", rows[0]);
+        for (column, last) in COLUMNS.iter().zip(&rows[2]) {
+            let still = at_rest.column("scene_probes.csv", column)[k];
+            assert!(
+                (last - still).abs() < 1e-6,
+                "{probe} {column}: {last} {still}"
+            );
+        }
+        for (half, whole) in rows[1].iter().zip(&rows[2]) {
+            assert!((2.0 * half - whole).abs() < 1e-6, "{rows:?}");
+        }
+    }
+    // uniaxial in the plane, ν σ across it
+    let element = &probed(&done, "element")[2];
+    let mises = 2.0 * (1.0f64 - 0.3 + 0.09).sqrt();
+    for (found, exact) in element.iter().zip([2.0, 0.0, 0.0, mises, 2.0]) {
+        assert!((found - exact).abs() < 0.02, "{element:?}");
+    }
+}
+
+/// In time: behind its front a wave has the stress of its load.
+#[test]
+fn a_wave_has_its_stress_at_a_probe() {
+    let bar = r#"
+kinematics = "bar"
+coupling = "local"
+mesh.line = { min = 0, max = 2, x = { cells = 200 } }
+materials.m.lps = { youngs-modulus = 4, poisson-ratio = 0, density = 1 }
+conditions.left.displacement = { on = "left", x = 0 }
+conditions.right.traction = { on = "right", x = "0.01 * min(1, t / 0.1)" }
+solve.explicit = { duration = 0.8, outputs = 0, history-interval = 0.01 }
+[output]
+vtu = false
+stresses = ["von-mises"]
+probes.middle.at = 1.002
+"#;
+    let done = run(bar, &[]);
+    let (time, stress) = (
+        done.column("scene_history.csv", "time"),
+        done.column("scene_history.csv", "middle_sxx"),
+    );
+    for (t, s) in time.iter().zip(&stress) {
+        match t {
+            t if *t < 0.45 => assert!(s.abs() < 1e-5, "{t}: {s}"),
+            t if *t > 0.7 => assert!((s - 0.01).abs() < 5e-4, "{t}: {s}"),
+            _ => {}
+        }
+    }
+    let mises = done.column("scene_history.csv", "middle_von_mises");
+    assert!(
+        mises
+            .iter()
+            .zip(stress)
+            .all(|(m, s)| (m - s.abs()).abs() < 1e-15)
+    );
+}
