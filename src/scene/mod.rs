@@ -90,7 +90,6 @@ pub fn schema() -> schemars::Schema {
         ("LineMeshSpec", &["x", "y", "z"]),
         ("RectangleMeshSpec", &["x", "y", "z"]),
         ("BoxMeshSpec", &["x", "y", "z"]),
-        ("PeridynamicsSpec", &["horizon", "points", ""]),
     ] {
         if let Some(serde_json::Value::Array(required)) =
             schema.pointer_mut(&format!("/$defs/{table}/required"))
