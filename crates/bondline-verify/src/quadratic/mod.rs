@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `order.rs` | errors of a manufactured solution in L2 and their orders, elements alone |
+//! | `order.rs` | errors of a manufactured solution in L2 and their orders, elements alone and beside points |
 //! | `problems.rs` | Kirsch's hole, a cantilever, Cook's membrane |
 //!
 //! The affine fields are those of [`meshes`](super::meshes), on the same families of meshes raised to second order.
@@ -25,14 +25,17 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     vec![
         affine::of_second_order(effort, progress),
         order::table(effort, progress),
+        order::beside_points(effort, progress),
         problems::table(effort, progress),
     ]
 }
 
-/// A solved scene of elements alone: its mesh, and the displacement of each node \[m\].
+/// A solved scene: its mesh, and the displacement of each node \[m\], which is zero where no equation uses a node.
 struct Solution<const D: usize> {
     mesh: Mesh<D>,
     displacement: Vec<Vector<D>>,
+    /// Position \[m\], volume \[m^D\] and displacement \[m\] of each node and point that has an equation.
+    sites: Vec<(Vector<D>, f64, Vector<D>)>,
 }
 
 impl<const D: usize> Solution<D> {
@@ -48,9 +51,14 @@ impl<const D: usize> Solution<D> {
         solve_with(scene, &Silent, |_, solved: &Solved<'_, D>| {
             let model = solved.model;
             let of_node = |n: usize| model.node_transfer.displacement(n, solved.displacement);
+            let of_site = |i: usize| Vector::from_fn(|k, _| solved.displacement[D * i + k]);
+            let sites = model.sites.iter().enumerate();
             found = Some(Self {
                 mesh: model.mesh.clone(),
                 displacement: (0..model.mesh.nodes.len()).map(of_node).collect(),
+                sites: sites
+                    .map(|(i, s)| (s.position, s.volume, of_site(i)))
+                    .collect(),
             });
             Ok(Vec::new())
         })

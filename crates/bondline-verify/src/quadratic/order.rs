@@ -1,10 +1,11 @@
-//! Order of convergence of elements alone, with a manufactured solution.
+//! Order of convergence of elements alone and beside points, with a manufactured solution.
 //!
 //! ```text
 //!   u_i = a sin(k_i · x + φ_i)     b = −(λ + μ) ∇(∇ · u) − μ ∇² u
 //! ```
 //!
 //! The body force stands in the scene, the displacement is prescribed on the whole boundary, and the error is integrated over the cells with the rule of the masses: the norm decides the order, and this one is that of the theory.
+//! Beside points the horizon shrinks with the cells. The solution is that of the local theory, which points meet to second order in the horizon, and cells at the seam are linear: order 2.
 
 use bondline::fem::{Rule, for_each_point};
 use bondline::observe::report::{Columns, Row, Table};
@@ -97,6 +98,20 @@ fn generated(dimension: usize, cell: &str, n: usize) -> String {
     scene(dimension, &mesh, &[&boundary])
 }
 
+/// A generated square whose middle half is peridynamic, two spacings a cell and m = 3.
+fn coupled(cell: &str, coupling: &str, n: usize) -> String {
+    let local = generated(2, cell, n);
+    let spacing = 0.5 / n as f64;
+    let zone = format!(
+        "[peridynamics]\nhorizon = {}\npoints.lattice.spacing = {spacing}\n[zones.nonlocal.box]\nmin = [0.25, 0.25]\nmax = [0.75, 0.75]\n",
+        3.0 * spacing
+    );
+    local.replace(
+        "coupling = \"local\"",
+        &format!("coupling = \"{coupling}\""),
+    ) + &zone
+}
+
 /// Relative L2 error of a scene.
 fn error<const D: usize>(text: &str, files: &[(&str, &str)]) -> Result<f64, String> {
     let found = Solution::<D>::of(text, &[], files)?;
@@ -111,6 +126,17 @@ fn error<const D: usize>(text: &str, files: &[(&str, &str)]) -> Result<f64, Stri
             wrong += p.weight * (u - exact).norm_squared();
             whole += p.weight * exact.norm_squared();
         });
+    }
+    Ok((wrong / whole).sqrt())
+}
+
+/// Relative error of a coupled scene in L2, lumped: over nodes and points, with their volumes.
+fn error_of_sites(text: &str) -> Result<f64, String> {
+    let found = Solution::<2>::of(text, &[], &[])?;
+    let (mut wrong, mut whole) = (0.0, 0.0);
+    for (x, volume, u) in &found.sites {
+        wrong += volume * (u - exact(x)).norm_squared();
+        whole += volume * exact(x).norm_squared();
     }
     Ok((wrong / whole).sqrt())
 }
@@ -165,6 +191,41 @@ fn rows(table: &mut Table, name: &str, counts: &[usize], errors: &[Result<f64, S
             Err(why) => table.push(Row::refused(&case, "relative L2 error of u", why)),
         }
     }
+}
+
+/// The table of orders beside points. A splice beside triangles is out of balance by more than beside a grid, and ends at order 1: its bound is below that.
+pub fn beside_points(effort: Effort, progress: &dyn Progress) -> Table {
+    let mut table = Table::new(
+        "Elements beside LPS points in the middle of a square, two spacings a cell and m = 3, manufactured solution of the local theory: lumped error of the displacement in L2 and its order",
+        Columns::ByQuantity,
+    );
+    let counts: &[usize] = match effort {
+        Effort::Quick => &[8, 16],
+        Effort::Full => &[8, 16, 32, 64],
+    };
+    progress.stage("orders beside points", None);
+    for cell in ["tri3", "quad4", "tri6", "quad8"] {
+        for coupling in ["splice", "truncated"] {
+            let mut last: Option<f64> = None;
+            for n in counts {
+                let case = format!("{cell}, {coupling}, {n} cells a side");
+                match error_of_sites(&coupled(cell, coupling, *n)) {
+                    Ok(error) => {
+                        table.push(Row::info(&case, "relative L2 error of u", error));
+                        if let Some(before) = last {
+                            let order = (before / error).log2();
+                            let is_slow = coupling == "splice" && cell.starts_with("tri");
+                            let limit = if is_slow { 0.8 } else { 1.8 };
+                            table.push(Row::at_least(&case, "order", order, limit));
+                        }
+                        last = Some(error);
+                    }
+                    Err(why) => table.push(Row::refused(&case, "relative L2 error of u", why)),
+                }
+            }
+        }
+    }
+    table
 }
 
 /// The table of orders.
