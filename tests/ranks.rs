@@ -448,6 +448,7 @@ x = 200e6
 
 [output]
 lines.axis = {{ from = -0.5, to = 0.5, samples = 41 }}
+sections.middle = {{ point = 0.003, normal = 1 }}
 "#
     )
 }
@@ -475,8 +476,27 @@ fn bars_at_rest_are_straight_on_any_number_of_processes() {
                 let off = (row[1] - 1e-3 * row[0]).abs();
                 assert!(off < 1e-9 * 5e-4, "{coupling} on {ranks}: {row:?}");
             }
+            let force = rows(folder.path(), "scene_sections.csv")[0][0];
+            assert!(
+                (force / 200e6 - 1.0).abs() < 1e-9,
+                "{coupling} on {ranks}: {force}"
+            );
         }
     }
+}
+
+#[test]
+fn springs_swing_alike_and_are_refused_at_rest() {
+    let spring = "[conditions.bed.spring]\ninside.box = { min = 40, max = 75 }\nx = 0.01\n";
+    assert_same(&format!("{WAVE}\n{spring}"), &[3]);
+    let still = format!("{}\n{spring}", bar("[coupling.splice]"));
+    let still = still.replace("min = 40, max = 75", "min = 0, max = 0.5");
+    let how = How { ranks: 2, ..ALONE };
+    let told = run(&still, folder().path(), how).expect_err("refused");
+    assert!(
+        told.contains("springs in a static scene of several processes"),
+        "{told}"
+    );
 }
 
 #[test]
