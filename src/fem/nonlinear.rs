@@ -4,8 +4,9 @@
 //!   f_a = Σ_b K_ab u_b + ∫ (P(∇u, history) − C : ∇u) · ∂N_a/∂X dV
 //! ```
 //!
-//! Where a law flows at constant volume, cells with several quadrature points take the mean of their dilatation, `∇u + (θ̄ − θ)/D I`, in stress and virtual work alike (the B̄ method, \[Hughes1987\] section 4.5):
+//! Where a law flows at constant volume, cells of first order with several quadrature points take the mean of their dilatation, `∇u + (θ̄ − θ)/D I`, in stress and virtual work alike (the B̄ method, \[Hughes1987\] section 4.5):
 //! with the dilatation of each point they would resist the flow. Under affine fields the two are the same.
+//! Cells of second order keep the dilatation of each point: with its mean they would not resist `u = 2 (a·x) x − |x|² a` at all, whose strain is a dilatation alone.
 //!
 //! All integrals are over the undeformed body (total Lagrangian); P is the first Piola–Kirchhoff stress, which for small strains is σ. The first term is that of the rows, as if all elements were linear; the integral is a sum over the quadrature points of the stiffness, each with what its law remembers. Elements that are linear do not appear here.
 
@@ -323,7 +324,8 @@ fn excess<const D: usize>(
     // means of the gradients of the shape functions
     let mut mean = [Vector::<D>::zeros(); MAX_NODES];
     let is_objective = law.is_objective();
-    let has_mean_dilatation = law.flows_at_constant_volume();
+    let shape = mesh.shapes[element.cell as usize];
+    let has_mean_dilatation = law.flows_at_constant_volume() && !shape.is_quadratic();
     if has_mean_dilatation {
         let mut volume = 0.0;
         for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
