@@ -114,7 +114,10 @@ impl<'a> Explicit<'a> {
         if broken > 0 {
             system.account_for_breaks(&Halfway::at(&state.u));
         }
-        system.commit();
+        if starts {
+            // what a resumed system remembers is committed: to respond to it once more changes it by rounding
+            system.commit();
+        }
         state.broken += broken;
         let inverse_mass: Vec<f64> = system.mass().iter().map(|m| 1.0 / m).collect();
         let mut motion = Explicit {

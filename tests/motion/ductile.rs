@@ -100,6 +100,95 @@ fn a_bar_that_tears_goes_on_from_its_checkpoint() {
     crate::resumes_with_the_same_bytes(&typed);
 }
 
+#[test]
+fn a_drag_needs_velocities_of_one_time_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = |control: &str| law(5.0, 5.0, &format!("zero-energy-control = \"{control}\""));
+    let refused = |typed: &str, part: &str| refused(folder.path(), typed, part);
+    refused(
+        &scene("nonlocal", &with("drag"), STEPS),
+        "this scene is at rest in every step",
+    );
+    refused(
+        &scene("nonlocal", &with("drug"), STEPS),
+        "\"length\", \"drag\"",
+    );
+    let typed = torn("zero-energy-control = \"drag\"");
+    refused(
+        &typed.replace("outputs = 6", "outputs = 6\nsub-steps = 2"),
+        "sub-steps have several",
+    );
+}
+
+#[test]
+fn a_dragged_bar_that_tears_goes_on_from_its_checkpoint() {
+    let typed =
+        torn("tearing-parameter = 0.12\nzero-energy-control = \"drag\"\nstabilisation = 0.02");
+    let whole = crate::resumes_with_the_same_bytes(&typed);
+    let path = whole.path().join("out/bar_history.csv");
+    assert!(*column(&path, "broken_bonds").last().unwrap() > 0.0);
+    accounts_for_its_energy(&path, 0.02);
+}
+
+#[test]
+fn a_dragged_plate_that_tears_leaves_the_same_bytes_on_any_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let dragged = "critical-stretch = 0.1\nzero-energy-control = \"drag\"\nstabilisation = 0.2";
+    write(
+        folder.path(),
+        "plate.toml",
+        &PLATE.replace("critical-stretch = 0.1", dragged),
+    );
+    for (threads, output) in [("1", "one"), ("2", "two")] {
+        let to = ["plate.toml", "--output", output, "--threads", threads];
+        run(folder.path(), &to);
+    }
+    let path = folder.path().join("one/plate_history.csv");
+    assert!(*column(&path, "broken_bonds").last().unwrap() > 100.0);
+    accounts_for_its_energy(&path, 0.02);
+    crate::same(&folder.path().join("one"), &folder.path().join("two"));
+}
+
+/// Kinetic, stored and dissipated energy of a bar whose points move by turns to the left and to the right, at times up to 0.1.
+fn alternating(control: &str, step_fraction: f64) -> [Vec<f64>; 3] {
+    let folder = tempfile::tempdir().unwrap();
+    let rest = format!(
+        "[initial.u.velocity]\nx = \"0.01*cos(10*pi*(x - 0.05))\"\n[solve.explicit]\nduration = 0.1\nhistory-interval = 1e-3\nstep-fraction = {step_fraction}\n"
+    );
+    let typed = scene("nonlocal", &law(5.0, 5.0, control), &rest)
+        .replace("0.1*t", "0")
+        .replace("spacing = 0.1", "spacing = 0.1, origin = 0.05");
+    write(folder.path(), "bar.toml", &typed);
+    run(folder.path(), &["bar.toml"]);
+    let path = folder.path().join("out/bar_history.csv");
+    ["kinetic_energy", "stored_energy", "dissipated_energy"].map(|name| column(&path, name))
+}
+
+#[test]
+fn a_drag_takes_the_energy_of_an_alternating_motion_and_a_bond_force_keeps_it() {
+    let dragged = |step_fraction: f64| {
+        let control = "zero-energy-control = \"drag\"\nstabilisation = 0.02";
+        let [kinetic, stored, dissipated] = alternating(control, step_fraction);
+        let last = *kinetic.last().unwrap();
+        assert!(last < 0.01 * kinetic[0], "{last} {}", kinetic[0]);
+        assert!(dissipated.is_sorted(), "{dissipated:?}");
+        let off = (0..kinetic.len())
+            .map(|k| (kinetic[k] + stored[k] + dissipated[k] - kinetic[0]).abs() / kinetic[0]);
+        off.fold(0.0, f64::max)
+    };
+    // the drag has the velocities of the step before: its energy is exact to first order in the step
+    let (coarse, fine) = (dragged(0.25), dragged(0.125));
+    assert!(coarse < 0.1 && fine < 0.55 * coarse, "{coarse} {fine}");
+    let [kinetic, stored, dissipated] = alternating("", 0.125);
+    assert_eq!(dissipated.last(), Some(&0.0));
+    let kept = kinetic.last().unwrap() + stored.last().unwrap();
+    assert!(
+        (kept / kinetic[0] - 1.0).abs() < 0.05,
+        "{kept} {}",
+        kinetic[0]
+    );
+}
+
 /// A plate of Neo-Hooke that is pulled in two by its ends.
 const PLATE: &str = r#"
 kinematics = "plane-strain"
