@@ -5,7 +5,8 @@ use bondline::{
     progress::Silent,
 };
 use bondline_verify::{
-    Effort, balance, extremes, layers, partial_volumes, quadratic, surface_layer, tangents, weights,
+    Effort, balance, extremes, layers, partial_volumes, plasticity, quadratic, surface_layer,
+    tangents, weights,
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -71,6 +72,15 @@ fn extremes_pass_or_are_refused() {
     assert_eq!(count(&tables, "left over", Verdict::Pass), 6);
     assert_eq!(count(&tables, "same in 1D", Verdict::Pass), 6);
     assert_eq!(count(&tables, "one that rests", Verdict::Pass), 5);
+}
+
+#[test]
+fn plastic_elements_are_near_calculix_and_hill() {
+    let tables = plasticity::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    // two meshes of either kind of cell, two ratios of Poisson with either
+    assert_eq!(count(&tables, "tip", Verdict::Pass), 2 * 4);
+    assert_eq!(count(&tables, "largest", Verdict::Pass), 2 * 4);
 }
 
 #[test]

@@ -9,6 +9,8 @@
 //! | `skin` | bars with free sides, with a skin of elements and without |
 //! | `softening` | softening bonds: a notched strip pulled to separation, a notched beam in three-point bending |
 //! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
+//! | `ductile` | the notched bar of [SAND2015-7998] section 6.3.1 beside CalculiX, until it tears |
+//! | `plasticity` | J2 plasticity in elements: Cook's membrane beside CalculiX, a thick cylinder beside Hill's solution |
 //! | `layers` | two lattices of different horizons with a layer of elements between |
 //! | `large-deformation` | stretches and rotations of any size at seams whose elements follow the bonds |
 //! | `interfaces` | two materials: energy of an interface, a crack that meets one |
@@ -39,6 +41,7 @@ pub mod bar;
 pub mod bobaru;
 pub mod continuum_damage;
 pub mod convergence;
+pub mod ductile;
 pub mod emmrich_weckner;
 pub mod enclosed;
 pub mod estimates;
@@ -52,6 +55,7 @@ pub mod meshes;
 mod observed;
 pub mod partial_volumes;
 pub mod patch;
+pub mod plasticity;
 pub mod position_aware;
 pub mod quadratic;
 pub mod reflection;
@@ -131,6 +135,11 @@ pub const SUITES: &[Suite] = &[
         name: "damage",
         about: "SAND2015-7998 section 6.2: continuum damage of a bar, and of the plate with a hole (6.2.5) beside bonds that break by their stretch",
         run: continuum_damage::run,
+    },
+    Suite {
+        name: "plasticity",
+        about: "J2 plasticity in finite elements: Cook's membrane beside CalculiX, a thick cylinder up to 0.95 of its limit pressure beside Hill's solution",
+        run: plasticity::run,
     },
     Suite {
         name: "layers",
@@ -240,6 +249,11 @@ pub const LONG_SUITES: &[Suite] = &[
         name: "convergence-3d",
         about: "all of SAND2015-7998 figure 5.8, N = 75 to 150: about 20 minutes on two cores, only if named",
         run: convergence::run_solid,
+    },
+    Suite {
+        name: "ductile",
+        about: "SAND2015-7998 section 6.3.1: a notched bar beside CalculiX until it tears; minutes, only if named",
+        run: ductile::run,
     },
     Suite {
         name: "seams",

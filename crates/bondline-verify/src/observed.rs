@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
+use crate::meshes::scene::Folder;
 use bondline::{
     observe::{Observer, csv::Entry, vtu::Snapshot},
     progress::Silent,
@@ -63,11 +64,32 @@ impl Seen {
 /// # Errors
 /// What the scene or its run says.
 pub(crate) fn run_scene(text: &str) -> Result<Seen, String> {
+    run_scene_in(text, &[], Path::new(""))
+}
+
+/// Runs a scene with keys that are set otherwise, `key=value`, beside the files (name, text) that it names; nothing else is written.
+///
+/// # Errors
+/// What the scene or its run says.
+pub(crate) fn run_scene_with(
+    text: &str,
+    overrides: &[String],
+    files: &[(&str, &str)],
+) -> Result<Seen, String> {
+    let folder = Folder::with(files)?;
+    run_scene_in(text, overrides, folder.path())
+}
+
+fn run_scene_in(text: &str, overrides: &[String], directory: &Path) -> Result<Seen, String> {
     let rows = Rows::default();
     let start = Instant::now();
-    let source = Source::new("scene.toml", text.to_owned());
-    let scene =
-        AnyScene::from_source(&source, Path::new(""), "scene").map_err(|e| e.to_string())?;
+    let mut source = Source::new("scene.toml", text.to_owned());
+    for set in overrides {
+        source
+            .push_override(set)
+            .map_err(|e| e.message().to_owned())?;
+    }
+    let scene = AnyScene::from_source(&source, directory, "scene").map_err(|e| e.to_string())?;
     let options = RunOptions {
         observer: Some(&rows),
         ..RunOptions::default()
