@@ -136,7 +136,9 @@ mod tests {
     use crate::fem::sample::boxes;
 
     fn cut_by<const D: usize>() {
-        for mesh in boxes::<D>(3, 0.2) {
+        // simplices have the volume of a cell with warped faces, and another first moment
+        let jitter = if D == 3 { 0.0 } else { 0.2 };
+        for mesh in boxes::<D>(3, jitter) {
             let (low, high) = mesh.bounds();
             let normal = Vector::<D>::from_fn(|k, _| 1.0 - 0.4 * k as f64).normalize();
             let half = |normal: Vector<D>| HalfSpace {
