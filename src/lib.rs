@@ -214,7 +214,7 @@ pub use peridynamics::{
 };
 pub use progress::{Progress, Silent};
 pub use run::{AnyScene, RunError, Solution};
-pub use scene::build::{self, Condition, Initial, Material, Region, SceneBuilder};
+pub use scene::build::{self, Condition, Impactor, Initial, Material, Region, SceneBuilder};
 pub use scene::{Function, Scene, SceneError};
 pub use shape::{Barrier, Shape};
 pub use solve::statics::{StaticError, StaticParams, StaticProblem, StaticSolution};

@@ -307,6 +307,22 @@ fn so_do_those_of_a_solid_and_of_listed_bonds() {
     assert_same(&listed, &[4]);
 }
 
+/// A ball strikes the upper edge, across sites of several processes.
+#[test]
+fn an_impactor_pushes_sites_of_all_processes_alike() {
+    let ball = "[impactors.ball]\nsphere = { center = [0.019, 0.0221], radius = 0.002 }\nmass = 0.03\nvelocity = { y = -40 }\n";
+    let text = plate("bond-based", "[coupling.truncated]", "") + ball;
+    let cut = "sections.cut = { point = [0.02, 0.01], normal = [1, 0] }\n";
+    assert!(text.contains(cut));
+    let text = text.replace(cut, "");
+    assert_same(&text, &[2, 3]);
+    let one = folder();
+    run(&text, one.path(), ALONE).unwrap();
+    let table = String::from_utf8(files(one.path())["scene_history.csv"].clone()).unwrap();
+    let force = |row: &str| -> f64 { row.rsplit(',').next().unwrap().parse().unwrap() };
+    assert!(table.lines().skip(1).any(|row| force(row) < 0.0), "{table}");
+}
+
 /// A pulse through a bar.
 const WAVE: &str = r#"
 kinematics = "bar"

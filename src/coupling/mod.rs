@@ -17,6 +17,7 @@
 //! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
 //! | `semidiscrete.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
+//! | `impact.rs`, `impact/` | rigid impactors that push the sites of a model that moves | |
 //! | `state_transfer.rs` | a motion handed from one layout of zones to another | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
@@ -31,6 +32,7 @@ mod bond_cutting;
 mod cauchy_born;
 pub mod error_indicator;
 pub mod field_evaluation;
+pub mod impact;
 mod interface_interpolation;
 mod lattice_axes;
 mod lattice_box;
@@ -56,6 +58,7 @@ pub mod zone_distance;
 pub use balanced::Balanced;
 pub use blending::{Blending, BlendingFunction};
 pub use field_evaluation::{Carrier, Sampler};
+pub use impact::{Impact, ImpactedSystem, ImpactorShape, RigidImpactor};
 pub use interface_interpolation::Bins;
 pub use least_squares_gradient::FitDegree;
 pub use model::{Model, Site, SiteKind};

@@ -49,7 +49,7 @@ impl EnergyGain {
         let (step, time) = self.first_told?;
         let cause = match self.by_law {
             true => {
-                "the material has stiffened with its strain, and the step is too large for it; results from there on are not to be trusted: take a smaller solve.explicit.step-fraction"
+                "the material has stiffened with its strain, or more of the body lies against an impactor than the step allows for, and the step is too large for it; results from there on are not to be trusted: take a smaller solve.explicit.step-fraction"
             }
             false => {
                 "the stiffness is not symmetric, and the seam feeds its modes; results from there on are not to be trusted: make the run shorter, or use coupling.truncated"
@@ -112,6 +112,42 @@ impl Rotation {
     }
 }
 
+/// What a rigid impactor did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ImpactorSummary {
+    /// Its name.
+    pub name: String,
+    /// Where it is at the end \[m\].
+    pub position: Vec<f64>,
+    /// Its velocity at the end \[m/s\].
+    pub velocity: Vec<f64>,
+    /// Its momentum at the end \[kg m/s\]; none of one whose motion is prescribed.
+    pub momentum: Option<Vec<f64>>,
+    /// The largest force between it and the body \[N\]; zero if they never touched.
+    pub peak_force: f64,
+    /// When that was \[s\].
+    pub peak_time: f64,
+}
+
+impl ImpactorSummary {
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = format!("impactor {}", self.name);
+        match self.peak_force > 0.0 {
+            true => write!(
+                f,
+                "{name:<22} peak force {} at t = {}",
+                number(self.peak_force),
+                number(self.peak_time)
+            )?,
+            false => write!(f, "{name:<22} has not touched the body")?,
+        }
+        match &self.momentum {
+            Some(momentum) => writeln!(f, ", momentum ({})", components(momentum)),
+            None => writeln!(f),
+        }
+    }
+}
+
 /// What became of a scene in time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MotionSummary {
@@ -142,6 +178,9 @@ pub struct MotionSummary {
     pub cracks: Option<CrackSummary>,
     /// Energy that a law with memory dissipated \[J\].
     pub inelastic_energy: Option<f64>,
+    /// What each rigid impactor did.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub impactors: Vec<ImpactorSummary>,
     /// Bonds broken, each once for each direction.
     pub broken_bonds: u64,
     /// When damage reached the edge of the nonlocal zone, and where.
@@ -196,6 +235,7 @@ impl MotionSummary {
         let dissipated =
             self.cracks.map_or(0.0, |c| c.dissipated_energy) + self.inelastic_energy.unwrap_or(0.0);
         writeln!(f, "{rest:<22} {}", number(self.missing_energy - dissipated))?;
+        self.impactors.iter().try_for_each(|i| i.write(f))?;
         if self.broken_bonds > 0 {
             writeln!(
                 f,

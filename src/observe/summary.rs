@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-pub use super::motion_summary::{Ended, EnergyGain, MotionSummary, Rotation};
+pub use super::motion_summary::{Ended, EnergyGain, ImpactorSummary, MotionSummary, Rotation};
 use super::proof::Proof;
 pub use super::report::grouped;
 use super::report::{aligned, components, number};

@@ -1,11 +1,13 @@
 //! What a run in time will need: its stable step, number of steps, memory and time, from a few steps taken.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::output_cost::{TrialFolder, file_seconds, made_up};
 use super::resource_estimate::{MotionPrediction, Prediction, holds, warnings};
 use super::solver_estimate::{Planned, output_bytes};
-use crate::coupling::{Model, Operator, Sampler};
+use crate::coupling::impact::RESOLVED;
+use crate::coupling::{Impact, Model, Operator, Sampler};
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::series::Series;
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
@@ -14,8 +16,11 @@ use crate::run::budget::Share;
 use crate::run::equilibrium::may_factorise;
 use crate::run::motion::STILL;
 use crate::run::motion::breaks::{Breaks, breaks};
+use crate::run::motion::driven_impactors;
 use crate::run::motion::dynamic_system::start;
 use crate::run::motion::explicit::sizes;
+use crate::run::motion::impact::impacted;
+use crate::run::motion::impact_record::ImpactRecord;
 use crate::run::motion::setup::{ModelSetup, laid_out};
 use crate::run::motion::step_observer::moment;
 use crate::run::motion::time_dependent_loads::SceneDrive;
@@ -170,10 +175,12 @@ impl OutputCost {
     ///
     /// # Errors
     /// [`RunError`] if they cannot be written.
+    #[expect(clippy::too_many_arguments, reason = "each is another part of the run")]
     fn of<const D: usize>(
         model: &Model<D>,
         operator: &dyn Operator<D>,
         rest: &RunSettings<D>,
+        impact: Option<Arc<Impact<D>>>,
         breaks: Breaks,
         is_linear: bool,
         shown: &Moment<'_>,
@@ -189,6 +196,7 @@ impl OutputCost {
             &output,
             &rest.conditions,
             &Sampler::new(model),
+            impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, None)),
             breaks,
             is_linear,
             CheckpointFile::new(folder.path().join("trial.checkpoint"), 0),
@@ -256,22 +264,23 @@ fn steps<const D: usize>(
         policy: spec.growing_modes,
         place: &|site| model.sites[site].position.iter().copied().collect(),
     };
-    let (moving, pace, growth) = paced(
-        spec,
-        &asked,
-        laid_out.moving,
-        &held,
-        None,
-        &mut laid_out.choices,
-    )?;
+    let begin = start(model, rest);
+    let choices = &mut laid_out.choices;
+    let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, RESOLVED, choices)?;
+    let mut prescribed = held.clone();
+    prescribed.extend(driven_impactors::prescribed(
+        &rest.impactors,
+        model.sites.len(),
+    ));
+    let (moving, pace, growth) = paced(spec, &asked, moving, &prescribed, None, choices)?;
     laid_out.proof.parts.extend(growth);
     laid_out.moving = moving;
     laid_out.watch.lap(&mut laid_out.timings, "stable step");
 
     let is_linear = laid_out.moving.is_linear;
     let breaks = breaks(laid_out.moving.system.as_ref(), rest);
-    let begin = start(model, &rest.initial);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?;
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
+        .with_impactors(&rest.impactors, pace.steps);
     let state_bytes = 12 * 8 * begin.u.len() as u64;
     let mut motion = Explicit::new(
         laid_out.moving.system.as_mut(),
@@ -287,6 +296,7 @@ fn steps<const D: usize>(
         model,
         operator,
         rest,
+        impact,
         breaks,
         is_linear,
         &shown,
@@ -299,13 +309,10 @@ fn steps<const D: usize>(
         Some(count) => (Files::Some, count),
         None => (Files::None, 0.0),
     };
-    let rows = (spec.duration / spec.history_interval)
-        .ceil()
-        .min(pace.steps as f64)
-        + 1.0;
     let timings = &mut laid_out.timings;
     timings.add("start", cost.opened + cost.per_file);
     timings.add("steps", pace.steps as f64 * seconds_per_step);
+    let rows = rows_of(spec, &pace);
     timings.add(
         "output",
         (written - 1.0).max(0.0) * cost.per_file + rows * cost.per_row,
@@ -317,6 +324,12 @@ fn steps<const D: usize>(
     prediction.warnings = warnings(model, laid_out.joining, &prediction);
     holds(&prediction)?;
     Ok(prediction)
+}
+
+/// Rows of the history that a run writes.
+fn rows_of(spec: &Spec, pace: &StepChoice) -> f64 {
+    let rows = (spec.duration / spec.history_interval).ceil();
+    rows.min(pace.steps as f64) + 1.0
 }
 
 /// The steps of a run.
@@ -349,8 +362,19 @@ pub(crate) fn load_steps<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
     let nothing = |_: &_, _: &mut Vec<Decision>| Ok(());
-    laid_out(scene, None, progress, nothing, |laid_out, ()| {
+    laid_out(scene, None, progress, nothing, |mut laid_out, ()| {
         let held = held(laid_out.model, &laid_out.rest.conditions)?;
+        let (model, rest) = (laid_out.model, laid_out.rest);
+        let begin = start(model, rest);
+        let (moving, _) = impacted(
+            model,
+            rest,
+            laid_out.moving,
+            &begin,
+            1.0,
+            &mut laid_out.choices,
+        )?;
+        laid_out.moving = moving;
         progress.finish();
         let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);
         factors(&laid_out, spec, &held, &mut prediction, progress)?;

@@ -159,6 +159,18 @@ pub enum RunError {
         /// How many lie beyond.
         sites: usize,
     },
+    /// An impactor lies over the body at time zero.
+    #[error(
+        "the impactor `{impactor}` lies over the body at time zero, by {depth:.4e} at ({}): move it back by as much", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+    )]
+    Overlap {
+        /// Its name.
+        impactor: String,
+        /// How deep the body lies inside \[m\].
+        depth: f64,
+        /// Where it lies deepest.
+        place: Vec<f64>,
+    },
     /// A condition meets no site.
     #[error("the condition `{condition}` meets no site of the model; {remedy}")]
     Idle {

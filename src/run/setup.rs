@@ -14,6 +14,7 @@ use crate::run::stress_settings::StressSettings;
 use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
 use crate::scene::failure::Breaking;
+use crate::scene::impactors::Impactor;
 use crate::scene::initial::Initial;
 use crate::scene::materials::{Material, Ratio};
 use crate::scene::points::Points;
@@ -31,6 +32,8 @@ pub struct RunSettings<const D: usize> {
     pub output: Output<D>,
     /// Displacements and velocities at the start.
     pub initial: Vec<Initial<D>>,
+    /// Rigid bodies that strike or press.
+    pub impactors: Vec<Impactor<D>>,
     /// What breaks bonds.
     pub breaking: Breaking<D>,
     /// Poisson's ratio of the points.
@@ -183,6 +186,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             solver: scene.solver,
             output: scene.output,
             initial: scene.initial,
+            impactors: scene.impactors,
             breaking: scene.breaking,
             ratio,
             follow: scene.follow,

@@ -11,6 +11,7 @@ use super::condition_list;
 use super::conditions::Condition;
 use super::error::{SceneError, SceneErrorKind};
 use super::failure::Breaking;
+use super::impactors::{self, Impactor};
 use super::initial::Initial;
 use super::material_interfaces::MaterialInterface;
 use super::materials::{self, Material};
@@ -51,6 +52,7 @@ pub(crate) struct Draft<'a, const D: usize> {
     pub conditions: Vec<Condition<D>>,
     pub temperature: Option<Temperature>,
     pub initial: Vec<Initial<D>>,
+    pub impactors: Vec<Impactor<D>>,
     pub solver: Solver,
     /// Beginning of the names of its files.
     pub name: &'a str,
@@ -96,6 +98,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         let clock = solve.clock();
         let conditions = condition_list::conditions(&spec.conditions, &mesh, clock)?;
         let initial = initial::initial(&spec.initial, &mesh, clock)?;
+        let impactors = impactors::impactors(spec, &solve)?;
         let temperature = temperature::temperature(spec.temperature.as_ref(), &mesh, clock)?;
         meshing::add_mesh(&mesh, &mut fingerprint);
         Ok(Self {
@@ -108,6 +111,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             conditions,
             temperature,
             initial,
+            impactors,
             solver,
             name,
             fingerprint,
@@ -297,6 +301,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             barriers,
             solve: self.solve.clone(),
             initial: self.initial.clone(),
+            impactors: self.impactors.clone(),
             breaking,
             elements,
             follow,

@@ -11,6 +11,7 @@
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `impactors.rs` | rigid bodies that strike or press |
 //! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
 //! | `elements.rs` | what finite elements follow |
@@ -36,6 +37,7 @@ pub(crate) mod error;
 pub(crate) mod expression;
 pub(crate) mod failure;
 pub(crate) mod function;
+pub(crate) mod impactors;
 pub(crate) mod initial;
 pub(crate) mod lattice_regions;
 pub(crate) mod material_interfaces;
@@ -70,6 +72,7 @@ pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use failure::{Breaking, Contact};
 pub use function::Function;
+pub use impactors::{Impactor, ImpactorMotion};
 pub use initial::{Initial, InitialKind};
 pub use materials::{Fracture, Material};
 pub use peridynamics::Peridynamics;

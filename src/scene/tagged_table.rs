@@ -30,6 +30,7 @@ const TOP: &[&str] = &[
     "cracks",
     "no-fail",
     "contact",
+    "impactors",
     "solver",
     "output",
 ];

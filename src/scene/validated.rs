@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::adaptive_zone::Follow;
 use super::conditions::Condition;
 use super::failure::Breaking;
+use super::impactors::Impactor;
 use super::initial::Initial;
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
@@ -64,6 +65,8 @@ pub struct Scene<const D: usize> {
     pub solve: Solve,
     /// Displacements and velocities at time zero.
     pub initial: Vec<Initial<D>>,
+    /// Rigid bodies that strike or press.
+    pub impactors: Vec<Impactor<D>>,
     /// How bonds deform and break.
     pub breaking: Breaking<D>,
     /// What elements of the points' materials follow.

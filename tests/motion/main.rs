@@ -13,6 +13,7 @@ mod faults;
 mod follow;
 mod growth;
 mod hyperelastic;
+mod impact;
 mod indefinite;
 mod keys;
 mod laws;

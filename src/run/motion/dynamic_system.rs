@@ -12,10 +12,11 @@ use crate::progress::Progress;
 use crate::run::definiteness;
 use crate::run::equilibrium;
 use crate::run::error::RunError;
+use crate::run::motion::driven_impactors::extend_start;
 use crate::run::motion::material_stretches::{self, stretches_of_materials};
 use crate::run::setup::RunSettings;
 use crate::scene::failure::Breaking;
-use crate::scene::initial::{Initial, InitialKind};
+use crate::scene::initial::InitialKind;
 use crate::scene::materials::Fracture;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
@@ -378,10 +379,10 @@ pub(crate) struct PlaneEnergy {
     pub typed: Option<f64>,
 }
 
-/// Displacement and velocity at time zero.
-pub fn start<const D: usize>(model: &Model<D>, initial: &[Initial<D>]) -> State {
+/// Displacement and velocity at time zero, those of impactors last.
+pub fn start<const D: usize>(model: &Model<D>, rest: &RunSettings<D>) -> State {
     let mut state = State::at_rest(model.sites.len() * D);
-    for field in initial {
+    for field in &rest.initial {
         let values = match field.kind {
             InitialKind::Displacement => &mut state.u,
             InitialKind::Velocity => &mut state.v,
@@ -397,5 +398,6 @@ pub fn start<const D: usize>(model: &Model<D>, initial: &[Initial<D>]) -> State 
             }
         }
     }
+    extend_start(&mut state, &rest.impactors);
     state
 }

@@ -162,7 +162,8 @@ fn run_segment<'r, const D: usize>(
 /// Whether the balance of energy is watched: what is proved of the undeformed body need not hold of one whose law changes with its strain.
 fn balance_of<const D: usize>(model: &Model<D>, rest: &RunSettings<D>, is_proved: bool) -> Balance {
     let points = model.peridynamics.as_ref();
-    let follows_law = rest.has_nonlinear_elements(model)
+    let follows_law = !rest.impactors.is_empty()
+        || rest.has_nonlinear_elements(model)
         || points.is_some_and(|p| !p.law.is_linear() && p.law.accelerator().is_none());
     match is_proved {
         true if follows_law => Balance::WatchedForLaw,
@@ -375,6 +376,7 @@ fn motion_summary<const D: usize>(
         energy_gain,
         cracks: cracks(moment.system, observer.segment.breaks, plane),
         inelastic_energy: inelastic_energy(moment.system),
+        impactors: (observer.recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
         broken_bonds: state.broken,
         edge_reached: observer.edge.map(|e| {
             let x = model.sites[e.site as usize].position;

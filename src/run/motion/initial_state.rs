@@ -4,12 +4,16 @@ use std::sync::Arc;
 
 use super::RunOptions;
 use super::breaks::breaks;
+use super::driven_impactors::prescribed;
 use super::dynamic_system::{DynamicSystem, start};
+use super::impact::impacted;
+use super::impact_record::ImpactRecord;
 use super::rezoning::Leaving;
 use super::setup::restore;
 use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::{EdgeReached, Recorder, Saved, StepChoice, Zone};
+use crate::coupling::impact::RESOLVED;
 use crate::coupling::{BrokenBonds, Model, Sampler};
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
@@ -95,10 +99,12 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         saved: Option<Saved>,
     ) -> Result<StepState<'r, 'm, D>, RunError> {
         let (model, rest, spec) = (self.model, self.rest, self.spec);
-        let held = held(model, &rest.conditions)?;
-        let begin = start(model, &rest.initial);
+        let mut held = held(model, &rest.conditions)?;
+        held.extend(prescribed(&rest.impactors, model.sites.len()));
+        let begin = start(model, rest);
+        let (moving, impact) = impacted(model, rest, self.moving, &begin, RESOLVED, self.choices)?;
         self.choices.push(Decision {
-            choice: format!("{} in rows and bonds", bytes_text(self.moving.bytes as u64)),
+            choice: format!("{} in rows and bonds", bytes_text(moving.bytes as u64)),
             why: "read once per step".to_owned(),
         });
         let known = saved.as_ref().map(|saved| saved.pace);
@@ -108,8 +114,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             policy: spec.growing_modes,
             place: &|site| model.sites[site].position.iter().copied().collect(),
         };
-        let (mut moving, pace, growth) =
-            paced(spec, &asked, self.moving, &held, known, self.choices)?;
+        let (mut moving, pace, growth) = paced(spec, &asked, moving, &held, known, self.choices)?;
         self.watch.lap(self.timings, "stable step");
         let system = moving.system.as_ref();
         let drive = driven(model, rest, &begin.u, &pace, spec)?
@@ -122,10 +127,13 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             });
         }
         restore(moving.system.as_mut(), saved.as_ref(), &file)?;
+        let written = saved.as_ref().map(|s| &s.written);
+        let peaks = written.map(|w| &w.peaks[..]);
         let mut recorder = Recorder::new(
             &rest.output,
             &rest.conditions,
             &Sampler::new(model),
+            impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks)),
             breaks(moving.system.as_ref(), rest),
             moving.is_linear,
             file,
@@ -133,7 +141,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
                 checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
                 ..options
             },
-            saved.as_ref().map(|s| &s.written),
+            written,
         )?;
         recorder.hold(drive.holders());
         recorder.cut(model, &rest.conditions, self.springs)?;
@@ -192,7 +200,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let system = self.moving.system.as_ref();
         let pace = repaced(spec, system, &held, pace, leaving.state())?;
         self.watch.lap(self.timings, "stable step");
-        let begin = start(model, &rest.initial);
+        let begin = start(model, rest);
         let drive = driven(model, rest, &begin.u, &pace, spec)?;
         let (state, switch) = leaving.arrive(model, system, &drive)?;
         recorder.move_to(&Sampler::new(model));
@@ -235,5 +243,6 @@ fn driven<'m, const D: usize>(
         (0, _) => pace.steps,
         _ => (spec.duration / pace.step).ceil() as u64,
     };
-    SceneDrive::new(model, &rest.conditions, start, pace.step, steps)
+    let drive = SceneDrive::new(model, &rest.conditions, start, pace.step, steps)?;
+    Ok(drive.with_impactors(&rest.impactors, steps))
 }

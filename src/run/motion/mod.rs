@@ -11,6 +11,8 @@
 //! | `step_observer.rs` | what follows each step: what is watched, what is written |
 //! | `quasi_static.rs` | the run under a load that grows |
 //! | `time_step.rs` | the time step, with sub-cycling |
+//! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, what is told of them |
+//! | `way.rs` | the way of a prescribed velocity |
 //! | `guard.rs`, `seen.rs` | what is watched meanwhile: energy, rotation of elements |
 //! | `zone_monitor.rs`, `bounding_boxes.rs` | where a zone that follows the crack is wanted |
 //! | `rezoning.rs` | what a change of the zone carries over, and what it costs |
@@ -21,9 +23,12 @@
 
 pub(crate) mod bounding_boxes;
 pub mod breaks;
+pub(crate) mod driven_impactors;
 pub mod dynamic_system;
 pub mod explicit;
 pub(crate) mod guard;
+pub(crate) mod impact;
+pub(crate) mod impact_record;
 pub(crate) mod initial_state;
 mod material_stretches;
 mod probe_rows;
@@ -37,6 +42,7 @@ mod supports;
 pub mod time_dependent_loads;
 pub mod time_step;
 mod tips;
+mod way;
 pub mod writer;
 pub(crate) mod zone_monitor;
 

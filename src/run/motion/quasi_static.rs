@@ -9,11 +9,13 @@ use super::RunOptions;
 use super::breaks::{Breaks, breaks};
 use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
+use super::impact::{BodyOnly, impacted};
+use super::impact_record::ImpactRecord;
 use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{EdgeReached, Moment, Recorder, Saved, StepChoice};
-use crate::coupling::{Model, Operator, Sampler};
+use crate::coupling::{Impact, Model, Operator, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
@@ -68,33 +70,32 @@ fn load_steps<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
     let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
-    let mut system = laid_out.moving.system;
-    let (mut timings, mut watch) = (laid_out.timings, laid_out.watch);
-    let mut choices = laid_out.choices;
+    let (mut timings, mut watch, mut choices) =
+        (laid_out.timings, laid_out.watch, laid_out.choices);
+    let begin = start(model, rest);
+    let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
+    let (is_linear, mut system) = (moving.is_linear, moving.system);
     let pace = step_choice(spec);
     let params = equilibrium_params(spec, &mut choices);
-    let near = match params.equilibrium {
-        Equilibrium::Newton => {
-            let body = (model, operator, laid_out.springs.as_ref());
-            let near = factors(body, system.symmetry(), rest, &mut choices, progress)?;
-            watch.lap(&mut timings, "factorisation");
-            near
-        }
-        Equilibrium::Relaxation => None,
-    };
-    let begin = start(model, &rest.initial);
+    let mut near = None;
+    if params.equilibrium == Equilibrium::Newton {
+        let body = (model, operator, laid_out.springs.as_ref());
+        near = factors(body, system.symmetry(), rest, &mut choices, progress)?;
+        watch.lap(&mut timings, "factorisation");
+    }
     let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
+        .with_impactors(&rest.impactors, pace.steps)
         .heated(rest.stresses.thermal.as_ref(), system.as_ref());
-    restore(system.as_mut(), saved.as_ref(), &file)?;
+    let at = saved.as_ref();
+    restore(system.as_mut(), at, &file)?;
     let breaks = breaks(system.as_ref(), rest);
-    let mut recorder = recorder(model, rest, spec, options, breaks, file, saved.as_ref())?;
+    let mut recorder = recorder((model, rest), spec, options, (impact, breaks), file, at)?;
     recorder.hold(drive.holders());
     recorder.cut(model, &rest.conditions, Arc::clone(&laid_out.springs))?;
     let edge = saved.as_ref().and_then(|s| s.edge);
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
-    let failing = failing_stretch(model, rest)?;
-    let rotations = Rotations::new(model, rest, laid_out.moving.is_linear, failing);
+    let rotations = Rotations::new(model, rest, is_linear, failing_stretch(model, rest)?);
     let mut observer = LoadStepObserver {
         model,
         rest,
@@ -114,9 +115,10 @@ fn load_steps<const D: usize>(
         failed: None,
     };
     watch.lap(&mut timings, "start");
+    let near = near.as_ref().map(|f| BodyOnly::new(f, model));
     let near = near.as_ref().map(|f| f as &dyn LinearMap);
-    let (info, seconds) =
-        observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings)?;
+    let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
+    let (info, seconds) = taken?;
     choices.push(Decision {
         choice: format!("{} products or passes", info.iterations),
         why: "of all load steps of this run".to_owned(),
@@ -145,18 +147,20 @@ fn load_steps<const D: usize>(
 /// # Errors
 /// [`ObserveError`] for files that cannot be made or cut.
 fn recorder<'a, const D: usize>(
-    model: &Model<D>,
-    rest: &'a RunSettings<D>,
+    (model, rest): (&Model<D>, &'a RunSettings<D>),
     spec: &Spec,
     options: &RunOptions<'a>,
-    breaks: Breaks,
+    (impact, breaks): (Option<Arc<Impact<D>>>, Breaks),
     file: CheckpointFile,
     saved: Option<&Saved>,
 ) -> Result<Recorder<'a, D>, ObserveError> {
+    let peaks = saved.map(|s| &s.written.peaks[..]);
+    let impact = impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks));
     Recorder::new(
         &rest.output,
         &rest.conditions,
         &Sampler::new(model),
+        impact,
         breaks,
         false,
         file,
@@ -351,6 +355,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let last = self.is_last();
         let (state, recorder) = (&self.state, &mut self.recorder);
         let moment = Moment::at_rest(state, seen.system, (seen.force, &loads), seen.load);
+        if let Some(impact) = &mut recorder.impact {
+            impact.watch(moment.state, moment.supports.0);
+        }
         let shown = begins
             || last
             || matches!(self.ended, Ended::DamageAtEdge | Ended::ElementsRotated)
@@ -401,6 +408,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             energy_gain: None,
             cracks: cracks(system, self.breaks, plane),
             inelastic_energy: inelastic_energy(system),
+            impactors: (self.recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
             broken_bonds: state.broken,
             edge_reached: self.edge.map(|e| {
                 let x = model.sites[e.site as usize].position;

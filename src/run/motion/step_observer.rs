@@ -288,6 +288,9 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     /// Watches and writes a step; says whether the next is taken.
     fn observe(&mut self, motion: &Explicit<'_>) -> ControlFlow<()> {
         let moment = moment(motion, self.segment.is_linear);
+        if let Some(impact) = &mut self.recorder.impact {
+            impact.watch(moment.state, moment.supports.0);
+        }
         let pace = self.segment.pace;
         let step = moment.state.step;
         let last = step == pace.steps;

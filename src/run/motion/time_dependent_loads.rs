@@ -1,12 +1,13 @@
 //! What drives a scene: its loads and prescribed motion as functions of time.
 
-use std::sync::{Mutex, PoisonError};
-
+use super::driven_impactors::{DrivenImpactors, prescribed};
+use super::way::Way;
 use crate::coupling::Model;
 use crate::run::error::RunError;
 use crate::run::loads::{Loads, displacement, holders, is_function, values_at_dofs};
 use crate::run::thermal::Thermal;
 use crate::scene::conditions::{Condition, Prescribed};
+use crate::scene::impactors::Impactor;
 use crate::solve::explicit::Drive;
 use crate::system::{BlockCsr, SemiDiscrete};
 use crate::tensor::Vector;
@@ -36,6 +37,8 @@ pub struct SceneDrive<'a, const D: usize> {
     ways: Vec<[Option<Way>; D]>,
     /// What functions of position hold.
     functions: Vec<FunctionTarget>,
+    /// Impactors whose motion is prescribed; their dofs are the last.
+    impactors: Option<DrivenImpactors<'a, D>>,
     step: f64,
 }
 
@@ -130,7 +133,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             .unzip();
         let ways = conditions
             .iter()
-            .map(|c| std::array::from_fn(|axis| Way::of(c, axis, step, steps)))
+            .map(|c| std::array::from_fn(|axis| way_of(c, axis, step, steps)))
             .collect();
         Ok(Self {
             model,
@@ -140,6 +143,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             by_time,
             by_both,
             heat: None,
+            impactors: None,
             functions: function_targets(conditions, &prescribed, &holder),
             start: prescribed.iter().map(|&k| start[k as usize]).collect(),
             prescribed,
@@ -167,7 +171,18 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         self
     }
 
-    /// Each prescribed dof with the condition that holds it.
+    /// With the motion of the impactors that have no mass, over `steps` steps.
+    #[must_use]
+    pub fn with_impactors(mut self, impactors: &'a [Impactor<D>], steps: u64) -> Self {
+        if !impactors.is_empty() {
+            let sites = self.model.sites.len();
+            self.prescribed.extend(prescribed(impactors, sites));
+            self.impactors = Some(DrivenImpactors::new(impactors, self.step, steps));
+        }
+        self
+    }
+
+    /// Each prescribed dof with the condition that holds it; without those of impactors.
     pub fn holders(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         self.prescribed
             .iter()
@@ -242,91 +257,27 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
 
     /// The way of a condition along an axis from time zero to `time`, if its velocity changes with time.
     fn way(&self, condition: usize, axis: usize, time: f64) -> Option<f64> {
-        let way = self.ways[condition][axis].as_ref()?;
-        let condition = &self.conditions[condition];
-        let index = (time / self.step + 1e-6).floor().max(0.0);
-        let known = way.after(index as u64, condition, axis);
-        // steps that have changed their size in between do not end where those of the way do
-        let rest = time - index * self.step;
-        Some(if rest > 1e-5 * self.step {
-            known + simpson(condition, axis, index * self.step, rest)
-        } else {
-            known
-        })
+        Some(self.ways[condition][axis].as_ref()?.at(time))
     }
 }
 
-/// The integral of a prescribed velocity that depends on time alone, step by step by Simpson's rule, as far as it has been asked for.
-struct Way {
+/// The way of a condition along an axis, if that is a velocity that changes with time.
+fn way_of<const D: usize>(
+    condition: &Condition<D>,
+    axis: usize,
     step: f64,
-    /// Two beyond the last step: nothing moves on from there.
     steps: u64,
-    known: Mutex<Known>,
-}
-
-/// What is known of a way: the sum after so many steps, and after every [`MARK`]-th step before.
-struct Known {
-    after: u64,
-    sum: f64,
-    marks: Vec<f64>,
-}
-
-/// Steps between sums that are kept: a run of any length keeps few of them, and none is far from the next.
-const MARK: u64 = 1024;
-
-impl Way {
-    fn of<const D: usize>(
-        condition: &Condition<D>,
-        axis: usize,
-        step: f64,
-        steps: u64,
-    ) -> Option<Self> {
-        let expression = condition.components.0[axis].as_ref()?;
-        let is_velocity = matches!(condition.prescribed, Prescribed::Velocity(_));
-        (is_velocity && expression.depends_on_time()).then(|| Self {
-            step,
-            steps: steps.saturating_add(2),
-            known: Mutex::new(Known {
-                after: 0,
-                sum: 0.0,
-                marks: vec![0.0],
-            }),
-        })
-    }
-
-    /// The way after `step` steps: the same sum in the same order whatever was asked for before.
-    fn after<const D: usize>(&self, step: u64, condition: &Condition<D>, axis: usize) -> f64 {
-        let step = step.min(self.steps);
-        // sums are whole whoever panicked while holding them
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if step < known.after {
-            let mark = (step / MARK) as usize;
-            (known.after, known.sum) = (mark as u64 * MARK, known.marks[mark]);
-        }
-        while known.after < step {
-            known.sum += simpson(condition, axis, known.after as f64 * self.step, self.step);
-            known.after += 1;
-            if known.after == known.marks.len() as u64 * MARK {
-                let sum = known.sum;
-                known.marks.push(sum);
-            }
-        }
-        known.sum
-    }
-}
-
-/// The integral of a prescribed velocity over `step` from `t` on, by Simpson's rule.
-fn simpson<const D: usize>(condition: &Condition<D>, axis: usize, t: f64, step: f64) -> f64 {
-    let v = |t: f64| {
-        let e = condition.components.0[axis].as_ref();
-        e.map_or(0.0, |e| e.eval_at(&[0.0; 3], t))
-    };
-    step / 6.0 * (v(t) + 4.0 * v(t + 0.5 * step) + v(t + step))
+) -> Option<Way> {
+    let expression = condition.components.0[axis].as_ref()?;
+    let is_velocity = matches!(condition.prescribed, Prescribed::Velocity(_));
+    (is_velocity && expression.depends_on_time()).then(|| Way::of(expression.clone(), step, steps))
 }
 
 impl<const D: usize> Drive for SceneDrive<'_, D> {
     fn load_into(&self, time: f64, load: &mut [f64]) {
-        load.copy_from_slice(&self.steady);
+        let (of_sites, of_impactors) = load.split_at_mut(self.steady.len());
+        of_sites.copy_from_slice(&self.steady);
+        of_impactors.fill(0.0);
         for timed in &self.by_time {
             let value = self.uniform(timed.condition, timed.axis, time);
             for (dof, f) in &timed.forces {
@@ -352,6 +303,10 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
     }
 
     fn displacement_into(&self, time: f64, values: &mut [f64]) {
+        let (values, of_impactors) = values.split_at_mut(self.holder.len());
+        if let Some(impactors) = &self.impactors {
+            impactors.displacement_into(time, of_impactors);
+        }
         let ways: Vec<[Option<f64>; D]> = (0..self.conditions.len())
             .map(|c| std::array::from_fn(|axis| self.way(c, axis, time)))
             .collect();
@@ -369,6 +324,10 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
     }
 
     fn velocity_into(&self, time: f64, values: &mut [f64]) {
+        let (values, of_impactors) = values.split_at_mut(self.holder.len());
+        if let Some(impactors) = &self.impactors {
+            impactors.velocity_into(time, of_impactors);
+        }
         let h = self.step;
         self.each_prescribed(time, values, |_, dof, condition, uniform| {
             let at = |t: f64| displacement(self.model, condition, dof, t);

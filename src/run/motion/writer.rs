@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::RunOptions;
 use super::breaks::Breaks;
+use super::impact_record::{ImpactRecord, Peak};
 use super::probe_rows::ProbeRows;
 use super::rezoning::{nonlocal, share};
 use super::section_rows::SectionRows;
@@ -147,6 +148,8 @@ pub struct Written {
     pub times: Vec<f64>,
     /// Kinetic and stored energy at the start.
     pub energy_at_start: f64,
+    /// The largest forces of impactors so far.
+    pub peaks: Vec<Peak>,
 }
 
 /// A state to tell of.
@@ -215,6 +218,8 @@ pub struct Recorder<'a, const D: usize> {
     probes: ProbeRows<'a, D>,
     supports: Supports<D>,
     sections: SectionRows<'a, D>,
+    /// What is told of impactors, if there are any.
+    pub impact: Option<ImpactRecord<D>>,
     breaks: Breaks,
     history: History,
     tips: Vec<History>,
@@ -240,6 +245,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         output: &'a Output<D>,
         conditions: &[Condition<D>],
         sampler: &Sampler<'_, D>,
+        impact: Option<ImpactRecord<D>>,
         breaks: Breaks,
         is_linear: bool,
         checkpoint: CheckpointFile,
@@ -258,6 +264,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let mut header = history_header(&probes, &supports, breaks, is_linear);
         header.extend(sections.header());
         header.extend(stress_probes::header(output));
+        header.extend(impact.iter().flat_map(ImpactRecord::header));
         let history = table("history", header, 0)?;
         let tips = output
             .tips
@@ -285,6 +292,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             probes,
             supports,
             sections,
+            impact,
             breaks,
             history,
             tips,
@@ -405,6 +413,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let sections = self.sections.row(moment.forces, springs, held, state.time);
         row.extend(sections.into_iter().map(Entry::from));
         row.extend(probed.iter().map(|&s| Entry::from(s)));
+        let impact = self
+            .impact
+            .iter()
+            .flat_map(|impact| impact.row(state, moment.supports.0));
+        row.extend(impact.map(Entry::from));
         self.options.keep("history", &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
         if may_be_damaged && !self.tips.is_empty() {
@@ -523,6 +536,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 bytes,
                 times: self.series.times().to_vec(),
                 energy_at_start: self.energy_at_start,
+                peaks: self.impact.as_ref().map_or(Vec::new(), |i| i.peaks.clone()),
             },
             edge,
             zone,

@@ -7,12 +7,12 @@
 //! | file | what |
 //! |---|---|
 //! | `value.rs` | values and tables of them |
-//! | `parts.rs` | materials, regions, conditions, fields at time zero |
+//! | `parts.rs` | materials, regions, conditions, fields at time zero, impactors |
 
 mod parts;
 mod value;
 
-pub use parts::{Condition, Initial, Material, Region};
+pub use parts::{Condition, Impactor, Initial, Material, Region};
 pub use value::{Entries, Value};
 
 use std::path::{Path, PathBuf};
@@ -177,6 +177,12 @@ impl SceneBuilder {
     /// A displacement or a velocity at time zero.
     pub fn initial(mut self, name: &str, initial: Initial) -> Self {
         self.keys.insert("initial", name, initial.entries);
+        self
+    }
+
+    /// A rigid body that strikes or presses.
+    pub fn impactor(mut self, name: &str, impactor: Impactor) -> Self {
+        self.keys.insert("impactors", name, impactor.entries);
         self
     }
 

@@ -1,4 +1,4 @@
-//! The named parts of a scene: materials, regions, conditions, fields at time zero.
+//! The named parts of a scene: materials, regions, conditions, fields at time zero, impactors.
 
 use super::value::{Entries, Value, list};
 
@@ -157,6 +157,60 @@ macro_rules! components {
 }
 
 components!(Condition, Initial);
+
+/// A rigid body that strikes or presses. Its motion is set by keys: `.set("velocity.y", -10.0)`, `.set("displacement.y", "-0.1 * t")`.
+#[derive(Clone, Debug)]
+pub struct Impactor {
+    pub(super) entries: Entries,
+}
+
+impl Impactor {
+    fn of(shape: Entries, kind: &str) -> Self {
+        let mut entries = Entries::default();
+        entries.set(kind, shape);
+        Self { entries }
+    }
+
+    /// A sphere; a disc in two dimensions.
+    pub fn sphere(center: impl Into<Value>, radius: impl Into<Value>) -> Self {
+        let mut shape = Entries::default();
+        shape.set("center", center);
+        shape.set("radius", radius);
+        Self::of(shape, "sphere")
+    }
+
+    /// A cylinder without ends about an axis, in three dimensions.
+    pub fn cylinder(
+        point: impl Into<Value>,
+        direction: impl Into<Value>,
+        radius: impl Into<Value>,
+    ) -> Self {
+        let mut shape = Entries::default();
+        shape.set("point", point);
+        shape.set("direction", direction);
+        shape.set("radius", radius);
+        Self::of(shape, "cylinder")
+    }
+
+    /// The half space behind a plane, whose normal points to the body.
+    pub fn plane(point: impl Into<Value>, normal: impl Into<Value>) -> Self {
+        let mut shape = Entries::default();
+        shape.set("point", point);
+        shape.set("normal", normal);
+        Self::of(shape, "plane")
+    }
+
+    /// Lets it move freely, with this mass.
+    pub fn mass(self, mass: impl Into<Value>) -> Self {
+        self.set("mass", mass)
+    }
+
+    /// Sets any of its keys.
+    pub fn set(mut self, key: &str, value: impl Into<Value>) -> Self {
+        self.entries.set(key, value);
+        self
+    }
+}
 
 /// A part of space, or a set of the mesh.
 #[derive(Clone, Debug)]

@@ -5,6 +5,7 @@
 mod condition;
 mod control;
 mod coupling;
+mod impactor;
 mod material;
 mod material_interface;
 mod mesh;
@@ -26,6 +27,7 @@ pub use coupling::{
     BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec, InterfaceSpec,
     LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
 };
+pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use material::{
     BondBasedSpec, CorrespondenceSpec, InfluenceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec,
     PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec, VolumesSpec,
@@ -120,6 +122,9 @@ pub struct SceneSpec {
     /// Short-range contact; none if left out.
     #[serde(default)]
     pub contact: Option<ContactSpec>,
+    /// Rigid bodies that strike or press, by name; scenes in time and load steps.
+    #[serde(default)]
+    pub impactors: BTreeMap<Text, ImpactorSpec>,
     /// The linear solver.
     #[serde(default)]
     pub solver: SolverSpec,

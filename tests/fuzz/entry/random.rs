@@ -107,6 +107,10 @@ pub fn scene(u: &mut Unstructured<'_>) -> Result<String> {
     conditions(u, &frame, &mut text)?;
     run(u, &frame, &mut text)?;
     outputs(u, &frame, &mut text)?;
+    // last, so that what was found before is read as it was
+    if frame.kind != Kind::Static && u.ratio(1, 5)? {
+        impactor(u, &frame, &mut text)?;
+    }
     Ok(text)
 }
 
@@ -546,6 +550,29 @@ fn run(u: &mut Unstructured<'_>, frame: &Frame, text: &mut String) -> Result<()>
     }
     if frame.breaks && u.ratio(1, 5)? {
         line!(text, "[no-fail.grip]\n{}", frame.shape(u, 0.0, 0.2)?);
+    }
+    Ok(())
+}
+
+/// A plane before or within the body, or a sphere, that is free or driven.
+fn impactor(u: &mut Unstructured<'_>, frame: &Frame, text: &mut String) -> Result<()> {
+    let normal = frame.list(|k| -f64::from(u8::from(k == 0)));
+    let at = frame.corner(f64::from(u.int_in_range(9u8..=12)?) / 10.0);
+    line!(text, "[impactors.one]");
+    match u.ratio(1, 2)? {
+        true => line!(text, "plane = {{ point = {at}, normal = {normal} }}"),
+        false => line!(text, "sphere = {{ center = {at}, radius = {:e} }}", frame.h),
+    }
+    let speed = (frame.modulus / frame.density).sqrt();
+    match (frame.kind == Kind::Explicit, u.ratio(1, 2)?) {
+        (true, true) => line!(
+            text,
+            "mass = {:e}\nvelocity = {{ x = {:e} }}",
+            frame.density * frame.h,
+            -1e-2 * speed
+        ),
+        (true, false) => line!(text, "velocity = {{ x = '{:e} * t' }}", -speed),
+        _ => line!(text, "displacement = {{ x = '{:e} * t' }}", -1e-2 * frame.h),
     }
     Ok(())
 }

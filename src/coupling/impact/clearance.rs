@@ -1,0 +1,106 @@
+//! Sizes of sites, and how far their points lie below the surface.
+
+use rustc_hash::FxHashMap;
+
+use crate::coupling::{Bins, Model, PointSource};
+use crate::mesh::facet_corners;
+use crate::shape::{Shape, distance_to_segment};
+use crate::tensor::Vector;
+
+/// The size of every site \[m\]: the edge of a point's whole cell, or the shortest edge of the cells around a node, half of it where they have nodes in the middle.
+pub(super) fn sizes<const D: usize>(model: &Model<D>) -> Vec<f64> {
+    let whole = whole_cells(model);
+    let of_site = |site: usize| match model.point_of(site) {
+        Some((body, p)) => {
+            let of_lattice = whole.get(&body.cloud.horizon[p].to_bits());
+            let volume = of_lattice.unwrap_or(&body.cloud.volume[p]);
+            volume.powf(1.0 / D as f64)
+        }
+        None => shortest_edge(model, site),
+    };
+    (0..model.sites.len()).map(of_site).collect()
+}
+
+/// The largest volume of a point of each horizon, where points lie on lattices: surfaces cut the cells of some.
+fn whole_cells<const D: usize>(model: &Model<D>) -> FxHashMap<u64, f64> {
+    let mut whole = FxHashMap::default();
+    let is_lattice = (model.peridynamics.as_ref()).is_some_and(|p| p.points != PointSource::Cells);
+    if let (Some(body), true) = (model.body(), is_lattice) {
+        for (horizon, volume) in body.cloud.horizon.iter().zip(&body.cloud.volume) {
+            let largest = whole.entry(horizon.to_bits()).or_insert(0.0);
+            *largest = volume.max(*largest);
+        }
+    }
+    whole
+}
+
+fn shortest_edge<const D: usize>(model: &Model<D>, site: usize) -> f64 {
+    let mesh = &model.mesh;
+    let mut shortest = f64::INFINITY;
+    for (cell, _) in model.cells_of_site(site) {
+        let corners = mesh.corners(cell);
+        let part = match mesh.shapes[cell].is_quadratic() {
+            true => 0.5,
+            false => 1.0,
+        };
+        for (k, &a) in corners.iter().enumerate() {
+            for &b in &corners[k + 1..] {
+                let edge = (mesh.nodes[a as usize] - mesh.nodes[b as usize]).norm();
+                if edge > 0.0 {
+                    shortest = shortest.min(part * edge);
+                }
+            }
+        }
+    }
+    shortest
+}
+
+/// Nearer to the surface than this part of its size, a point is one of the first layer.
+const FIRST_LAYER: f64 = 1.0 - 1e-6;
+
+/// How far the body reaches beyond every site \[m\]: nothing at a node. A point of the first layer reaches to the surface of the mesh, any other half of its size.
+pub(super) fn clearances<const D: usize>(model: &Model<D>, sizes: &[f64]) -> Vec<f64> {
+    let points: Vec<usize> = (0..model.sites.len())
+        .filter(|&s| model.point_of(s).is_some())
+        .collect();
+    let mut clearance = vec![0.0; model.sites.len()];
+    if points.is_empty() {
+        return clearance;
+    }
+    let positions: Vec<Vector<D>> = points.iter().map(|&s| model.sites[s].position).collect();
+    let largest = points.iter().map(|&s| sizes[s]).fold(0.0, f64::max);
+    let mut depth = vec![f64::INFINITY; points.len()];
+    let bins = Bins::new(&positions, largest);
+    for facet in model.mesh.outer_facets() {
+        let corners: Vec<Vector<D>> = facet_corners::<D>(&facet.nodes)
+            .iter()
+            .map(|&n| model.mesh.nodes[n as usize])
+            .collect();
+        let middle = corners.iter().sum::<Vector<D>>() / corners.len() as f64;
+        let radius = corners.iter().map(|x| (x - middle).norm());
+        let radius = radius.fold(0.0, f64::max) + largest;
+        for k in bins.around(&middle, radius) {
+            depth[k] = depth[k].min(distance(&corners, &positions[k]));
+        }
+    }
+    for (&site, depth) in points.iter().zip(depth) {
+        clearance[site] = match depth < FIRST_LAYER * sizes[site] {
+            true => depth,
+            false => 0.5 * sizes[site],
+        };
+    }
+    clearance
+}
+
+/// The distance of a place from a facet, triangle by triangle.
+fn distance<const D: usize>(corners: &[Vector<D>], x: &Vector<D>) -> f64 {
+    match corners {
+        [a] => (x - a).norm(),
+        [a, b] => distance_to_segment(x, a, b),
+        [a, rest @ ..] => rest
+            .windows(2)
+            .map(|w| Shape::Polygon(vec![*a, w[0], w[1]]).signed_distance(x))
+            .fold(f64::INFINITY, f64::min),
+        [] => f64::INFINITY,
+    }
+}
