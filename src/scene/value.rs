@@ -57,6 +57,16 @@ pub struct Steps {
     pub span: Span,
 }
 
+impl Steps {
+    /// How many load steps there are.
+    pub fn count(&self) -> usize {
+        match &self.choice {
+            StepTimes::Equal(number) => *number,
+            StepTimes::Listed(times) => times.len(),
+        }
+    }
+}
+
 /// Load steps of equal length, or at the times that are listed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepTimes {

@@ -24,7 +24,7 @@ pub fn is_small(spec: &SceneSpec) -> bool {
     let samples = spec.output.lines.values().map(|l| l.samples.value);
     let samples = samples.fold(0usize, usize::saturating_add);
     let steps = match spec.solve.as_ref().map(Spanned::get_ref) {
-        Some(SolveSpec::QuasiStatic(q)) => q.steps.value,
+        Some(SolveSpec::QuasiStatic(q)) => q.steps.count(),
         _ => 0,
     };
     cells_and_points_are_few(spec) && samples <= MOST_SAMPLES && steps <= MOST_LOAD_STEPS
