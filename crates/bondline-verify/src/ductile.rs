@@ -28,7 +28,7 @@ pub const AXIS_LIMIT: f64 = 0.5 * NECK;
 /// Largest share of the work that is not accounted for before the first bond breaks.
 pub const BALANCE_LIMIT: f64 = 1e-3;
 
-/// The mean load of the torn bar beyond the nominal strain [`TORN`], over the largest one, at most.
+/// The mean load of the torn bar beyond the nominal strain `TORN`, over the largest one, at most.
 pub const LEFT_LIMIT: f64 = 0.6;
 
 /// See [`LEFT_LIMIT`].
