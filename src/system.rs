@@ -9,6 +9,7 @@ pub mod ranks;
 mod shared_blocks;
 mod spmv;
 mod springs;
+pub(crate) mod wrapped;
 
 pub use ranks::{Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};

@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::ops::DerefMut;
 
-use super::{
-    BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, SharedRows, Symmetry,
-};
+use super::wrapped::{fields_of, state_of};
+use super::{BlockCsr, FailureUpdate, Interval, SemiDiscrete, SharedRows};
 
 /// The stiffness `S` of springs between sites and the ground \[N/m\]: symmetric, and no displacement has a negative energy.
 ///
@@ -183,6 +182,9 @@ where
     S: DerefMut + Send + Sync,
     S::Target: SemiDiscrete,
 {
+    state_of!(system);
+    fields_of!(system);
+
     fn internal_force_into(
         &mut self,
         u: &[f64],
@@ -224,10 +226,6 @@ where
         self.system.mass()
     }
 
-    fn commit(&mut self) {
-        self.system.commit();
-    }
-
     fn difference_length(&self) -> Option<f64> {
         self.system.difference_length()
     }
@@ -236,84 +234,12 @@ where
         self.system.contact_frequency_bound()
     }
 
-    fn drag_rate_bound(&self) -> f64 {
-        self.system.drag_rate_bound()
-    }
-
     fn tangent_is_constant(&self) -> Vec<bool> {
         self.system.tangent_is_constant()
     }
 
     fn seam_sites(&self) -> Vec<u32> {
         self.system.seam_sites()
-    }
-
-    fn symmetry(&self) -> Symmetry {
-        self.system.symmetry()
-    }
-
-    fn dissipation(&self) -> Option<Dissipation> {
-        self.system.dissipation()
-    }
-
-    fn set_dissipation(&mut self, dissipation: Dissipation) {
-        self.system.set_dissipation(dissipation);
-    }
-
-    fn account_for_breaks(&mut self, at: &Halfway<'_>) {
-        self.system.account_for_breaks(at);
-    }
-
-    fn dissipated_energy(&self) -> Option<f64> {
-        self.system.dissipated_energy()
-    }
-
-    fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        self.system.stresses(u)
-    }
-
-    fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
-        self.system.energy_densities(u)
-    }
-
-    fn points_without_response(&self, u: &[f64]) -> usize {
-        self.system.points_without_response(u)
-    }
-
-    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
-        self.system.remembered()
-    }
-
-    fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        self.system.cell_stresses(u)
-    }
-
-    fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
-        self.system.remembered_by_cells()
-    }
-
-    fn damage(&self) -> Option<Vec<f64>> {
-        self.system.damage()
-    }
-
-    fn damage_at_edge(&self) -> Option<usize> {
-        self.system.damage_at_edge()
-    }
-
-    fn damaged_sites(&self) -> Vec<u32> {
-        self.system.damaged_sites()
-    }
-
-    fn broken_bonds(&self) -> Vec<(u32, u32)> {
-        self.system.broken_bonds()
-    }
-
-    fn damage_state(&self) -> Vec<u64> {
-        self.system.damage_state()
-    }
-
-    fn restore_damage(&mut self, state: &[u64]) -> bool {
-        self.system.restore_damage(state)
     }
 }
 

@@ -54,3 +54,49 @@ fn a_seam_without_an_energy_is_not_sub_cycled() {
     assert!(said.contains("symmetric stiffness"), "{said}");
     assert!(said.contains("coupling.truncated"), "{said}");
 }
+
+/// A plate of perfect plasticity, pulled to ten times its strain at yield.
+const YIELDING: &str = r#"
+kinematics = "plane-stress"
+coupling = "nonlocal"
+[mesh.rectangle]
+min = [0, 0]
+max = [1, 1]
+x = { cells = 10 }
+y = { cells = 10 }
+[materials.plate.plastic-correspondence]
+youngs-modulus = 1
+poisson-ratio = 0.3
+density = 1
+yield-stress = 1e-4
+[peridynamics]
+horizon = 0.3
+points.lattice = { spacing = 0.1 }
+[solve.explicit]
+duration = 1
+outputs = 1
+[conditions.bottom.displacement]
+on = "bottom"
+x = 0
+y = 0
+[conditions.top.displacement]
+on = "top"
+y = "0.001 * t"
+[output]
+stresses = ["von-mises"]
+probes.middle = { at = [0.5, 0.5] }
+"#;
+
+#[test]
+fn results_of_laws_with_memory_are_theirs_with_sub_steps_too() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "plate.toml", YIELDING);
+    run(folder.path(), &[&["plate.toml"][..], &TWO].concat());
+    let history = folder.path().join("out/plate_history.csv");
+    let stress = column(&history, "middle_von_mises");
+    // the elastic stress of that strain is ten times the yield stress, which the law never exceeds
+    let last = *stress.last().unwrap();
+    assert!((0.5e-4..=1.000001e-4).contains(&last), "{last}");
+    let vtu = std::fs::read(folder.path().join("out/plate_0001.vtu")).unwrap();
+    assert!(String::from_utf8_lossy(&vtu).contains("equivalent plastic strain"));
+}

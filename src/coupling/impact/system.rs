@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use super::Impact;
-use crate::system::{
-    BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry,
-};
+use crate::system::wrapped::state_of;
+use crate::system::{BlockCsr, FailureUpdate, Halfway, Interval, SemiDiscrete};
 
 /// A system whose sites rigid impactors push: the sites of the body first, one for each impactor after them.
 ///
@@ -43,6 +42,8 @@ impl<'a, const D: usize> ImpactedSystem<'a, D> {
 }
 
 impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
+    state_of!(body);
+
     fn block(&self) -> usize {
         D
     }
@@ -66,10 +67,6 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         broken
     }
 
-    fn commit(&mut self) {
-        self.body.commit();
-    }
-
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         let (own, rest) = y.split_at_mut(self.dofs());
         rest.fill(0.0);
@@ -91,10 +88,6 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         self.body.contact_frequency_bound() + self.impact.frequency_bound(self.body.mass())
     }
 
-    fn drag_rate_bound(&self) -> f64 {
-        self.body.drag_rate_bound()
-    }
-
     fn tangent_is_constant(&self) -> Vec<bool> {
         self.extended(self.body.tangent_is_constant(), false)
     }
@@ -107,20 +100,8 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         self.body.seam_sites()
     }
 
-    fn symmetry(&self) -> Symmetry {
-        self.body.symmetry()
-    }
-
     fn stored_energy(&self, u: &[f64]) -> f64 {
         self.body.stored_energy(self.own(u)) + self.impact.energy(u)
-    }
-
-    fn dissipation(&self) -> Option<Dissipation> {
-        self.body.dissipation()
-    }
-
-    fn set_dissipation(&mut self, dissipation: Dissipation) {
-        self.body.set_dissipation(dissipation);
     }
 
     fn account_for_breaks(&mut self, at: &Halfway<'_>) {
@@ -144,39 +125,7 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         self.body.points_without_response(self.own(u))
     }
 
-    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
-        self.body.remembered()
-    }
-
     fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
         self.body.cell_stresses(self.own(u))
-    }
-
-    fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
-        self.body.remembered_by_cells()
-    }
-
-    fn damage(&self) -> Option<Vec<f64>> {
-        self.body.damage()
-    }
-
-    fn damage_at_edge(&self) -> Option<usize> {
-        self.body.damage_at_edge()
-    }
-
-    fn damaged_sites(&self) -> Vec<u32> {
-        self.body.damaged_sites()
-    }
-
-    fn broken_bonds(&self) -> Vec<(u32, u32)> {
-        self.body.broken_bonds()
-    }
-
-    fn damage_state(&self) -> Vec<u64> {
-        self.body.damage_state()
-    }
-
-    fn restore_damage(&mut self, state: &[u64]) -> bool {
-        self.body.restore_damage(state)
     }
 }

@@ -1,0 +1,88 @@
+//! What a system that wraps another one takes from it unchanged.
+//!
+//! Most methods of [`SemiDiscrete`](super::SemiDiscrete) have a default, for bodies in which nothing breaks and no law remembers. A wrapper that left one out would have the
+//! default in place of the answer of the body, so those that no wrapper changes stand here, once for all of them.
+
+/// Methods of what a body remembers and of what has broken, handed on to the field `$system`.
+macro_rules! state_of {
+    ($system:ident) => {
+        fn commit(&mut self) {
+            self.$system.commit();
+        }
+
+        fn drag_rate_bound(&self) -> f64 {
+            self.$system.drag_rate_bound()
+        }
+
+        fn symmetry(&self) -> $crate::system::Symmetry {
+            self.$system.symmetry()
+        }
+
+        fn dissipation(&self) -> Option<$crate::system::Dissipation> {
+            self.$system.dissipation()
+        }
+
+        fn set_dissipation(&mut self, dissipation: $crate::system::Dissipation) {
+            self.$system.set_dissipation(dissipation);
+        }
+
+        fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
+            self.$system.remembered()
+        }
+
+        fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
+            self.$system.remembered_by_cells()
+        }
+
+        fn damage(&self) -> Option<Vec<f64>> {
+            self.$system.damage()
+        }
+
+        fn damage_at_edge(&self) -> Option<usize> {
+            self.$system.damage_at_edge()
+        }
+
+        fn damaged_sites(&self) -> Vec<u32> {
+            self.$system.damaged_sites()
+        }
+
+        fn broken_bonds(&self) -> Vec<(u32, u32)> {
+            self.$system.broken_bonds()
+        }
+
+        fn damage_state(&self) -> Vec<u64> {
+            self.$system.damage_state()
+        }
+
+        fn restore_damage(&mut self, state: &[u64]) -> bool {
+            self.$system.restore_damage(state)
+        }
+    };
+}
+
+/// Methods that take a displacement, handed on to the field `$system`, which has the same unknowns.
+macro_rules! fields_of {
+    ($system:ident) => {
+        fn account_for_breaks(&mut self, at: &$crate::system::Halfway<'_>) {
+            self.$system.account_for_breaks(at);
+        }
+
+        fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+            self.$system.stresses(u)
+        }
+
+        fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
+            self.$system.energy_densities(u)
+        }
+
+        fn points_without_response(&self, u: &[f64]) -> usize {
+            self.$system.points_without_response(u)
+        }
+
+        fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+            self.$system.cell_stresses(u)
+        }
+    };
+}
+
+pub(crate) use {fields_of, state_of};
