@@ -66,6 +66,18 @@ fn read(text: &str, overrides: &[&str]) -> Result<AnyScene, String> {
     AnyScene::from_source(&source, here, "scene").map_err(|e| e.to_string())
 }
 
+/// A scene is refused with a message that has each of `parts`.
+fn refused(text: &str, overrides: &[&str], parts: &[&str]) {
+    let error = read(text, overrides).unwrap_err();
+    let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in parts {
+        assert!(
+            error.contains(part),
+            "{overrides:?}: {part} is not in {error}"
+        );
+    }
+}
+
 /// Runs a scene with overrides.
 fn run(text: &str, overrides: &[&str]) -> Done {
     let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
 //! Springs to the ground: a bar, a body that is nearly rigid, a beam on an elastic foundation, a mass that swings.
 
-use super::{read, run};
+use super::{read, refused, run};
 
 const BAR: &str = r#"
 kinematics = "bar"
@@ -291,23 +291,17 @@ fn wrong_springs_are_refused() {
             ["spring.inside", "no part of the mesh", "reaches from"],
         ),
     ] {
-        let error = read(
+        refused(
             BAR,
             &[
                 "coupling=local",
                 "conditions.right.traction.x=1",
                 &format!("conditions.left.spring={typed}"),
             ],
-        )
-        .unwrap_err();
-        let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
-        for part in parts {
-            assert!(error.contains(part), "{typed}: {part} is not in {error}");
-        }
+            &parts,
+        );
     }
     // springs along y alone leave a plate free along x
-    let scene = read(PLATE, &["coupling=local", "conditions.wall.spring.x=1"]).unwrap();
-    drop(scene);
     let free = PLATE.replace(
         "inside.box = { min = [2, 0], max = [3, 1] }, x = 6",
         "on = \"top\", y = 6",

@@ -1,6 +1,6 @@
 //! Thermal strain: free where it may expand, `−E α ΔT` where it may not.
 
-use super::{Done, read, run};
+use super::{Done, run};
 
 /// A square with irregular triangles, peridynamics in the middle, held at a node so that it may expand as it likes.
 const PLATE: &str = r#"
@@ -209,10 +209,7 @@ fn plane_strain_is_held_along_its_normal() {
 #[test]
 fn what_has_no_thermal_strain_is_refused() {
     let text = scene("plane-stress", LPS, 1e-5, [1.0, 0.0, 0.0]);
-    let refused = |set: &[&str], words: &str| {
-        let error = read(&text, set).err().unwrap();
-        assert!(error.contains(words), "{words}: {error}");
-    };
+    let refused = |set: &[&str], words: &str| super::refused(&text, set, &[words]);
     refused(
         &[
             "materials.steel.lps.thermal-expansion=0",
