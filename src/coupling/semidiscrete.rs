@@ -92,18 +92,17 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         let body = MovingBody::new(model, operator, behaviour, seam.as_ref())?;
         if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
             let cloud = &body.cloud;
-            let critical = behaviour.critical_stretch.as_ref();
-            let critical = critical.map(|c| {
-                |[i, j]: [u32; 2]| match c {
+            seam.follow_motion(behaviour.kinematics);
+            if let Some(critical) = &behaviour.critical_stretch {
+                let critical = |[i, j]: [u32; 2]| match critical {
                     Critical::ByMaterials(stretch) => {
                         stretch.at(cloud.material[i as usize], cloud.material[j as usize])
                     }
-                    _ => c.at(cloud.horizon[i as usize]),
-                }
-            });
-            seam.behave(behaviour.kinematics, critical, |p| {
-                (behaviour.no_fail)(&cloud.position[p as usize])
-            });
+                    of_horizon => of_horizon.at(cloud.horizon[i as usize]),
+                };
+                let never = |p: u32| (behaviour.no_fail)(&cloud.position[p as usize]);
+                seam.let_break(model, body, critical, never);
+            }
         }
         let linear = SiteRows::assemble(
             sites,

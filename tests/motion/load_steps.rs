@@ -1,5 +1,7 @@
 //! Loads that grow step by step.
 
+use std::path::Path;
+
 use crate::{BREAKING, bondline, column, run, same, table, write};
 
 /// The scene that breaks, at rest and whole: the loads are a tenth of those in time.
@@ -195,4 +197,63 @@ fn load_steps_break_bonds_and_resume_to_the_same_bytes() {
         .concat(),
     );
     same(&folder.path().join("whole"), &folder.path().join("again"));
+}
+
+/// A quarter of a ring from Gmsh, sheared at one end; the seam fits nothing and meets both arcs.
+const RING: &str = r#"
+kinematics = "plane-stress"
+
+[mesh.file]
+path = "quarter_ring.msh"
+
+[materials.m.lps]
+youngs-modulus = 1
+poisson-ratio = 0.3
+critical-stretch = 4e-5
+
+[peridynamics]
+horizon = 0.09
+points.lattice = { spacing = 0.03 }
+
+[zones.nonlocal]
+box = { min = [0.5, 0.2], max = [2.1, 0.7] }
+
+[conditions.bottom.displacement]
+on = "bottom"
+x = 0
+y = 0
+
+[conditions.left.displacement]
+on = "left"
+x = 1e-4
+y = 0
+
+[solve.quasi-static]
+steps = 1
+"#;
+
+#[test]
+fn bonds_of_a_seam_that_fits_nothing_break_by_their_whole_stretch() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "ring.toml", RING);
+    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../meshes");
+    std::fs::copy(
+        meshes.join("quarter_ring.msh"),
+        folder.path().join("quarter_ring.msh"),
+    )
+    .unwrap();
+    let broken = |coupling: &str, stretch: &str| {
+        let coupling = format!("coupling={coupling}");
+        let stretch = format!("materials.m.lps.critical-stretch={stretch}");
+        let sets = ["--set", &coupling, "--set", &stretch];
+        let warn = ["--set", "zones.damage-at-edge=warn"];
+        run(folder.path(), &[&["ring.toml"][..], &sets, &warn].concat());
+        let column = column(&folder.path().join("out/ring_history.csv"), "broken_bonds");
+        column[column.len() - 1]
+    };
+    // the splice, which cuts no bonds, tells how far any is stretched; pieces of half a spacing are by more
+    for coupling in ["splice", "truncated"] {
+        assert_eq!(broken(coupling, "4e-5"), 0.0, "{coupling}");
+        assert!(broken(coupling, "2e-5") > 1000.0, "{coupling}");
+    }
 }

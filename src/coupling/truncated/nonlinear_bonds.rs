@@ -1,14 +1,17 @@
 //! Bonds at a seam that turn, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
 //!
-//! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, D/s)`: it is stretched by `|ξ + D/s|/|ξ| − 1`, like the whole bond would be. The pieces of a bond break together, when one of them passes the critical
-//! stretch, and take `s w` each. The elements behind the face keep their classical energy: a crack cannot go on into them.
+//! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, D/s)`: it is stretched by `|ξ + D/s|/|ξ| − 1`, like the whole bond would be. The pieces of a bond break together, and take `s w` each, when the whole bond
+//! passes the critical stretch: its ends move with their points, or with the elements that they lie in (`breaking.rs`). The elements behind the face keep their classical energy: a crack cannot go on into them.
 //!
 //! Of an LPS a piece also hands its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
 //! whole bonds break there, and are told here.
 
+mod breaking;
 mod construction;
 
 use rayon::prelude::*;
+
+use breaking::Breaking;
 
 use super::{
     bond_kinematics::Part,
@@ -48,7 +51,7 @@ pub struct NonlinearSeam<const D: usize> {
     intact: Vec<u8>,
     /// Bonds that the last pass broke.
     last: Vec<u32>,
-    breaks: Option<Breaking>,
+    breaks: Option<Breaking<D>>,
     kinematics: Kinematics,
     /// Sites at which parts end, and for each the parts with their weights.
     sites: Vec<u32>,
@@ -64,34 +67,12 @@ pub struct NonlinearSeam<const D: usize> {
     elongation: Vec<f64>,
     /// Of each of `sites`, kept between passes.
     sums: Vec<[f64; D]>,
-    over: Vec<bool>,
-}
-
-/// When bonds break.
-struct Breaking {
-    /// The value of t at the critical stretch of each bond.
-    limit: Vec<f64>,
-    never: Vec<bool>,
 }
 
 impl<const D: usize> NonlinearSeam<D> {
-    /// How bonds follow the motion, and by the numbers of its points at which stretch a bond breaks, if any does, and of a point whether its bonds never do.
-    pub(in crate::coupling) fn behave(
-        &mut self,
-        kinematics: Kinematics,
-        critical: Option<impl Fn([u32; 2]) -> f64>,
-        never: impl Fn(u32) -> bool,
-    ) {
+    /// How bonds follow the motion.
+    pub(in crate::coupling) fn follow_motion(&mut self, kinematics: Kinematics) {
         self.kinematics = kinematics;
-        let critical = critical.map(|of| self.bonds.iter().map(|b| of(*b)).collect::<Vec<_>>());
-        self.breaks = critical.map(|critical| Breaking {
-            limit: critical.iter().map(|&s| kinematics.limit(s)).collect(),
-            never: self
-                .bonds
-                .iter()
-                .map(|b| b.iter().any(|&p| never(p)))
-                .collect(),
-        });
     }
 
     /// The families over which the body's own pass runs.
@@ -124,33 +105,25 @@ impl<const D: usize> NonlinearSeam<D> {
         self.intact[bond as usize / 8] >> (bond % 8) & 1 == 1
     }
 
-    /// Directions in `pulls`, elongations, and which parts that may break here are over the limit; zero for those that do not stand.
+    /// Directions in `pulls`, and elongations; zero for parts that do not stand.
     fn stretch<const EXACT: bool>(
         &self,
         u: &[f64],
         pulls: &mut [[f64; D]],
         elongation: &mut [f64],
-        over: &mut [bool],
     ) {
-        let limit = |bond: usize| match &self.breaks {
-            Some(breaks) if bond < self.own => breaks.limit[bond],
-            _ => f64::INFINITY,
-        };
         pulls
             .par_chunks_mut(CHUNK)
             .zip(elongation.par_chunks_mut(CHUNK))
-            .zip(over.par_chunks_mut(CHUNK))
             .enumerate()
-            .for_each(|(chunk, ((pulls, elongation), over))| {
-                let parts = pulls.iter_mut().zip(elongation).zip(over);
-                for (k, ((pull, elongation), over)) in parts.enumerate() {
+            .for_each(|(chunk, (pulls, elongation))| {
+                for (k, (pull, elongation)) in pulls.iter_mut().zip(elongation).enumerate() {
                     let p = chunk * CHUNK + k;
                     let part = &self.parts[p];
-                    (*pull, *elongation, *over) = ([0.0; D], 0.0, false);
+                    (*pull, *elongation) = ([0.0; D], 0.0);
                     if self.stands(part.bond) {
                         let s = part.strained::<EXACT>(&self.difference.displacement(p, u));
                         (*pull, *elongation) = (s.direction, s.elongation);
-                        *over = s.excess > limit(part.bond as usize) * s.square;
                     }
                 }
             });
@@ -210,49 +183,24 @@ impl<const D: usize> NonlinearSeam<D> {
         force: &mut [f64],
         breakage: FailureUpdate,
     ) -> u64 {
-        let (mut pulls, mut elongation, mut over, mut sums) = (
+        let (mut pulls, mut elongation, mut sums) = (
             std::mem::take(&mut self.pulls),
             std::mem::take(&mut self.elongation),
-            std::mem::take(&mut self.over),
             std::mem::take(&mut self.sums),
         );
-        match self.kinematics {
-            Kinematics::Exact => self.stretch::<true>(u, &mut pulls, &mut elongation, &mut over),
-            Kinematics::Linear => self.stretch::<false>(u, &mut pulls, &mut elongation, &mut over),
-        }
         let broken = match breakage {
-            FailureUpdate::Update => self.break_bonds(&over, &mut pulls, &mut elongation),
+            FailureUpdate::Update => self.break_bonds(u),
             FailureUpdate::Frozen => 0,
         };
+        match self.kinematics {
+            Kinematics::Exact => self.stretch::<true>(u, &mut pulls, &mut elongation),
+            Kinematics::Linear => self.stretch::<false>(u, &mut pulls, &mut elongation),
+        }
         let own = self.own_parts(u, self.kinematics);
         let pressures = self.pull(own.as_ref(), &elongation, &mut pulls);
         self.add_forces(&pulls, (own.as_ref(), &pressures), u, &mut sums, force);
         drop(own);
-        (self.pulls, self.elongation, self.over, self.sums) = (pulls, elongation, over, sums);
-        broken
-    }
-
-    fn break_bonds(
-        &mut self,
-        over: &[bool],
-        pulls: &mut [[f64; D]],
-        elongation: &mut [f64],
-    ) -> u64 {
-        let Some(breaks) = &self.breaks else { return 0 };
-        if !over.contains(&true) {
-            return 0;
-        }
-        let mut broken = 0;
-        for bond in 0..self.own {
-            let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
-            if over[parts.clone()].contains(&true) && !breaks.never[bond] {
-                self.intact[bond / 8] &= !(1 << (bond % 8));
-                self.last.push(bond as u32);
-                pulls[parts.clone()].fill([0.0; D]);
-                elongation[parts].fill(0.0);
-                broken += 2;
-            }
-        }
+        (self.pulls, self.elongation, self.sums) = (pulls, elongation, sums);
         broken
     }
 
@@ -280,7 +228,7 @@ impl<const D: usize> NonlinearSeam<D> {
     pub(in crate::coupling) fn add_tangent(&self, x: &[f64], y: &mut [f64]) {
         let parts = self.parts.len();
         let (mut pulls, mut elongation) = (vec![[0.0; D]; parts], vec![0.0; parts]);
-        self.stretch::<false>(x, &mut pulls, &mut elongation, &mut vec![false; parts]);
+        self.stretch::<false>(x, &mut pulls, &mut elongation);
         let own = self.own_parts(x, Kinematics::Linear);
         let pressures = self.pull(own.as_ref(), &elongation, &mut pulls);
         let parts = (own.as_ref(), &pressures[..]);

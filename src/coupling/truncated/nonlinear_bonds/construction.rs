@@ -53,7 +53,6 @@ impl<const D: usize> NonlinearSeam<D> {
         seam.intact = vec![0xff; seam.bonds.len().div_ceil(8)];
         seam.pulls = vec![[0.0; D]; seam.parts.len()];
         seam.elongation = vec![0.0; seam.parts.len()];
-        seam.over = vec![false; seam.parts.len()];
         seam
     }
 
@@ -81,7 +80,6 @@ impl<const D: usize> NonlinearSeam<D> {
             pulls: Vec::new(),
             elongation: Vec::new(),
             sums: Vec::new(),
-            over: Vec::new(),
         }
     }
 
