@@ -503,7 +503,7 @@ pub fn grouped(value: usize) -> String {
 }
 
 /// The components of a force in words.
-pub(super) fn components(force: &[f64]) -> String {
+pub(crate) fn components(force: &[f64]) -> String {
     let words: Vec<String> = force.iter().map(|&v| number(v)).collect();
     words.join(", ")
 }

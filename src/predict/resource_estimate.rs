@@ -227,7 +227,7 @@ fn weights_decisions<const D: usize>(model: &Model<D>) -> Vec<Decision> {
                 BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
             },
         });
-        choices.extend(setup::volumes_choice(model));
+        choices.extend(setup::model_choices(model));
     }
     choices
 }

@@ -218,8 +218,46 @@ pub(crate) fn model<const D: usize>(
     Ok((model, coupling))
 }
 
+/// What is worth knowing of a model before it is solved: partial volumes, points on a border of materials, sizes of elements beside the points.
+pub fn model_choices<const D: usize>(model: &Model<D>) -> Vec<Decision> {
+    let all = [
+        volumes_choice(model),
+        border_choice(model),
+        elements_choice(model),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// Says how large the elements beside the points are, where there are both.
+fn elements_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
+    model.body()?;
+    let mesh = &model.mesh;
+    let mut is_beside = vec![false; mesh.nodes.len()];
+    for c in (0..mesh.cell_count()).filter(|&c| !model.is_element(c)) {
+        mesh.cell(c)
+            .iter()
+            .for_each(|&n| is_beside[n as usize] = true);
+    }
+    let beside = (0..mesh.cell_count())
+        .filter(|&c| model.is_element(c) && mesh.corners(c).iter().any(|&n| is_beside[n as usize]));
+    let sizes = beside.map(|c| {
+        let (low, high) = mesh.bounds_of(mesh.corners(c));
+        (high - low).amax() / model.spacing()
+    });
+    let (least, most) = sizes.fold((f64::INFINITY, 0.0f64), |(least, most), size| {
+        (least.min(size), most.max(size))
+    });
+    (most > 0.0).then(|| Decision {
+        choice: match most - least < 0.05 {
+            true => format!("elements of {most:.1} spacings beside the points"),
+            false => format!("elements of {least:.1} to {most:.1} spacings beside the points"),
+        },
+        why: "as the mesh has them; one to four are usual".to_owned(),
+    })
+}
+
 /// Says how many points lie on a border of two materials, if any do.
-pub fn border_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
+fn border_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
     let points = model.points_on_border();
     (points > 0).then(|| Decision {
         choice: format!("{points} points on a border of two materials"),
@@ -228,7 +266,7 @@ pub fn border_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
 }
 
 /// Says which partial volumes are in use, if not full ones.
-pub fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
+fn volumes_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
     let volumes = model.peridynamics.as_ref()?.volumes;
     let why = match volumes {
         PartialVolume::Full => return None,

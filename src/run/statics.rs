@@ -6,7 +6,7 @@ use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::sections::Sections;
-use super::setup::{RunSettings, border_choice, model, problem, volumes_choice};
+use super::setup::{RunSettings, model, model_choices, problem};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
@@ -277,8 +277,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 info.free_dofs
             ),
         });
-        choices.extend(volumes_choice(self.model));
-        choices.extend(border_choice(self.model));
+        choices.extend(model_choices(self.model));
         choices
     }
 

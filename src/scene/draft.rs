@@ -35,7 +35,7 @@ use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::checkpoint::Fingerprint;
-use crate::observe::report::number;
+use crate::observe::report::{components, number};
 use crate::observe::summary::Decision;
 use crate::peridynamics::{Influence, Law};
 use crate::scene::points::Points;
@@ -343,11 +343,15 @@ fn horizon_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
 
 /// Says where points lie that the scene does not place.
 fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
-    let Points::Lattice { spacing, .. } = &p.points else {
+    let Points::Lattice { spacing, origin } = &p.points else {
         return None;
     };
     Some(Decision {
-        choice: format!("points on a lattice of spacing {}", number(*spacing)),
+        choice: format!(
+            "points on a lattice of spacing {}, one of them at ({})",
+            number(*spacing),
+            components(origin.as_slice())
+        ),
         why: p.points_why.clone()?,
     })
 }

@@ -167,21 +167,10 @@ pub(crate) fn closest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) 
         .map(|(_, k)| k)
 }
 
-/// Levenshtein's distance, ignoring case and taking `_` for `-`.
+/// How many letters differ, two that changed places counted once, ignoring case and taking `_` for `-`.
 fn edits(a: &str, b: &str) -> usize {
-    let plain = |s: &str| -> Vec<char> { s.to_lowercase().replace('_', "-").chars().collect() };
-    let (a, b) = (plain(a), plain(b));
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let change = diagonal + usize::from(ca != cb);
-            diagonal = row[j + 1];
-            row[j + 1] = change.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
+    let plain = |s: &str| s.to_lowercase().replace('_', "-");
+    strsim::osa_distance(&plain(a), &plain(b))
 }
 
 #[cfg(test)]
@@ -193,6 +182,7 @@ mod tests {
         assert_eq!(edits("kitten", "sitting"), 3);
         assert_eq!(edits("youngs_modulus", "youngs-modulus"), 0);
         assert_eq!(edits("", "abc"), 3);
+        assert_eq!(edits("lsp", "lps"), 1);
     }
 
     #[test]

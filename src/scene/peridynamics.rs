@@ -100,11 +100,19 @@ pub(crate) fn peridynamics<const D: usize>(
             }
             let origin = match &lattice.origin {
                 Some(o) => position("peridynamics.points.lattice.origin", o)?,
-                None => match start {
-                    // where the mesh follows the lattice, points and nodes coincide: the seam then interpolates nothing
-                    LatticeStart::OnCorner => lo,
-                    LatticeStart::Halfway => lo.add_scalar(0.5 * spacing),
-                },
+                None => {
+                    let (origin, where_to) = match start {
+                        // where the mesh follows the lattice, points and nodes coincide: the seam then interpolates nothing
+                        LatticeStart::OnCorner => (lo, "at"),
+                        LatticeStart::Halfway => {
+                            (lo.add_scalar(0.5 * spacing), "half a spacing from")
+                        }
+                    };
+                    points_why = Some(format!(
+                        "the scene leaves `origin` out; the lattice starts {where_to} the lowest corner of the mesh"
+                    ));
+                    origin
+                }
             };
             Points::Lattice { spacing, origin }
         }

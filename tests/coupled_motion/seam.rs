@@ -440,12 +440,13 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
 fn a_crack_beside_the_seam_runs_as_in_peridynamics_alone() {
     let whole = crack_beside_the_seam("\"nonlocal\"");
     let coupled = crack_beside_the_seam("\"truncated\"");
+    println!("alone {whole:?}\ncoupled {coupled:?}");
     // at first it crosses pieces only where whole bonds would be crossed: they take the same
     assert!(
         (coupled.taken[0] / whole.taken[0] - 1.0).abs() < 1e-12,
         "{whole:?} {coupled:?}"
     );
-    // then it runs to the other side of the zone: five times as much again, alike to 1.3 %, on a path that turns away from the seam, 0.8 spacings nearer to it
+    // then it runs to the other side of the zone: more than as much again, alike to 1.0 %, on a path that turns away from the seam, 0.8 spacings nearer to it
     assert!(
         (coupled.taken[1] / whole.taken[1] - 1.0).abs() < 0.03,
         "{whole:?} {coupled:?}"

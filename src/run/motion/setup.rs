@@ -100,8 +100,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         mut watch,
     } = begun;
     let (model, coupling) = setup::model(problem, rest, progress)?;
-    choices.extend(setup::volumes_choice(&model));
-    choices.extend(setup::border_choice(&model));
+    choices.extend(setup::model_choices(&model));
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;
