@@ -421,7 +421,8 @@ impl<const D: usize> NonlinearSeam<D> {
 
     /// Bytes held.
     pub(in crate::coupling) fn memory_bytes(&self) -> usize {
-        self.parts.len() * (size_of::<Part<D>>() + D * 8 + 9)
+        self.parts.len() * (size_of::<Part<D>>() + D * 8 + 8)
+            + self.breaks.as_ref().map_or(0, Breaking::memory_bytes)
             + self.states.as_ref().map_or(0, States::memory_bytes)
             + self.difference.weight_count() * 28
             + self.families.neighbours.len() * 4

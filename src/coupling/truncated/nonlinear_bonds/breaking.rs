@@ -33,6 +33,13 @@ pub(super) struct Breaking<const D: usize> {
     difference: Transfer,
 }
 
+impl<const D: usize> Breaking<D> {
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.part.len() * (size_of::<Part<D>>() + 17) + self.difference.weight_count() * 12
+    }
+}
+
 impl<const D: usize> NonlinearSeam<D> {
     /// Lets bonds break: by the numbers of its points at which stretch, and of a point whether its bonds never do.
     pub(in crate::coupling) fn let_break(
