@@ -217,38 +217,7 @@ impl MotionSummary {
             "speed                  {} steps/s",
             number(self.steps_per_second)
         )?;
-        for (name, value) in [
-            ("kinetic energy", self.kinetic_energy),
-            ("stored energy", self.stored_energy),
-            ("external work", self.external_work),
-        ] {
-            writeln!(f, "{name:<22} {}", number(value))?;
-        }
-        // of bonds that lose their stiffness by the law, breaking takes nothing more
-        let by_law_alone = self.inelastic_energy.is_some();
-        let cracks = self.cracks.as_ref();
-        if let Some(cracks) = cracks.filter(|c| c.dissipated_energy != 0.0 || !by_law_alone) {
-            cracks.write(dimension, f)?;
-        }
-        if let Some(energy) = self.inelastic_energy {
-            writeln!(f, "dissipated by the law  {}", number(energy))?;
-        }
-        // load steps leave out the motion of what breaks
-        let rest = match self.stable_step {
-            None if self.cracks.is_some() => SET_FREE,
-            _ => "energy not accounted",
-        };
-        let dissipated =
-            self.cracks.map_or(0.0, |c| c.dissipated_energy) + self.inelastic_energy.unwrap_or(0.0);
-        let free = self.missing_energy - dissipated;
-        writeln!(f, "{rest:<22} {}", number(free))?;
-        if rest == SET_FREE && free > SNAPPED * dissipated {
-            writeln!(
-                f,
-                "warning: breaking set free {:.0} % of what it dissipated: a crack ran on within a load step, where bonds beside its path break too; both its length and its energy are then too large, and [solve.explicit] follows it",
-                100.0 * free / dissipated
-            )?;
-        }
+        self.write_energies(dimension, f)?;
         self.impactors.iter().try_for_each(|i| i.write(f))?;
         if self.broken_bonds > 0 {
             writeln!(
@@ -286,5 +255,41 @@ impl MotionSummary {
                 "stopped                where an element rotated beyond largest-rotation"
             ),
         }
+    }
+
+    fn write_energies(&self, dimension: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (name, value) in [
+            ("kinetic energy", self.kinetic_energy),
+            ("stored energy", self.stored_energy),
+            ("external work", self.external_work),
+        ] {
+            writeln!(f, "{name:<22} {}", number(value))?;
+        }
+        // of bonds that lose their stiffness by the law, breaking takes nothing more
+        let by_law_alone = self.inelastic_energy.is_some();
+        let cracks = self.cracks.as_ref();
+        if let Some(cracks) = cracks.filter(|c| c.dissipated_energy != 0.0 || !by_law_alone) {
+            cracks.write(dimension, f)?;
+        }
+        if let Some(energy) = self.inelastic_energy {
+            writeln!(f, "dissipated by the law  {}", number(energy))?;
+        }
+        // load steps leave out the motion of what breaks
+        let rest = match self.stable_step {
+            None if self.cracks.is_some() => SET_FREE,
+            _ => "energy not accounted",
+        };
+        let dissipated =
+            self.cracks.map_or(0.0, |c| c.dissipated_energy) + self.inelastic_energy.unwrap_or(0.0);
+        let free = self.missing_energy - dissipated;
+        writeln!(f, "{rest:<22} {}", number(free))?;
+        if rest == SET_FREE && free > SNAPPED * dissipated {
+            writeln!(
+                f,
+                "warning: breaking set free {:.0} % of what it dissipated: a crack ran on within a load step, where bonds beside its path break too; both its length and its energy are then too large, and [solve.explicit] follows it",
+                100.0 * free / dissipated
+            )?;
+        }
+        Ok(())
     }
 }

@@ -11,7 +11,7 @@ mod construction;
 
 use rayon::prelude::*;
 
-use breaking::Breaking;
+use breaking::{Breaking, Carrier};
 
 use super::{
     bond_kinematics::Part,
@@ -20,8 +20,9 @@ use super::{
 };
 use crate::{
     assembly::{Row, Transfer},
+    coupling::Model,
     peridynamics::{
-        Families,
+        Families, PdBody,
         bond_force::{BondPass, Kinematics, pack, unpack},
     },
     system::FailureUpdate,
@@ -73,6 +74,39 @@ impl<const D: usize> NonlinearSeam<D> {
     /// How bonds follow the motion.
     pub(in crate::coupling) fn follow_motion(&mut self, kinematics: Kinematics) {
         self.kinematics = kinematics;
+    }
+
+    /// Lets bonds break: by the numbers of its points at which stretch, and of a point whether its bonds never do.
+    pub(in crate::coupling) fn let_break(
+        &mut self,
+        model: &Model<D>,
+        body: &PdBody<D>,
+        critical: impl Fn([u32; 2]) -> f64,
+        never: impl Fn(u32) -> bool,
+    ) {
+        let limit = |bond| self.kinematics.limit(critical(bond));
+        let longest = |bond| self.longest_piece(bond);
+        let bonds = &self.bonds[..self.own];
+        self.breaks = Some(Breaking::new((model, body), bonds, limit, never, longest));
+    }
+
+    fn longest_piece(&self, bond: usize) -> (f64, Carrier) {
+        let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
+        let length = |p: &usize| self.parts[*p].length;
+        let longest = parts.max_by(|p, q| length(p).total_cmp(&length(q)));
+        let longest = longest.expect("a bond of a seam has a piece");
+        (length(&longest), self.difference.row(longest).collect())
+    }
+
+    /// Breaks the bonds that are over the limit; returns how many, each counted once for each direction.
+    fn break_bonds(&mut self, u: &[f64]) -> u64 {
+        let Some(breaks) = &self.breaks else { return 0 };
+        let over = breaks.over(self.kinematics, |bond| self.stands(bond as u32), u);
+        for &bond in &over {
+            self.intact[bond / 8] &= !(1 << (bond % 8));
+            self.last.push(bond as u32);
+        }
+        2 * over.len() as u64
     }
 
     /// The families over which the body's own pass runs.

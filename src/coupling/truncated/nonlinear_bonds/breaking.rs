@@ -5,7 +5,6 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, NonlinearSeam};
 use crate::{
     assembly::Transfer,
     coupling::{Model, SiteKind},
@@ -16,11 +15,14 @@ use crate::{
 
 use super::super::bond_kinematics::Part;
 
+/// Bonds per task.
+const CHUNK: usize = 1024;
+
 /// How many places of a bond are tried, from an end outside of the mesh on.
 const PLACES: u32 = 16;
 
 /// What moves a place: sites and weights.
-type Carrier = Vec<(u32, f64)>;
+pub(super) type Carrier = Vec<(u32, f64)>;
 
 /// When bonds break.
 pub(super) struct Breaking<const D: usize> {
@@ -34,28 +36,20 @@ pub(super) struct Breaking<const D: usize> {
 }
 
 impl<const D: usize> Breaking<D> {
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        self.part.len() * (size_of::<Part<D>>() + 17) + self.difference.weight_count() * 12
-    }
-}
-
-impl<const D: usize> NonlinearSeam<D> {
-    /// Lets bonds break: by the numbers of its points at which stretch, and of a point whether its bonds never do.
-    pub(in crate::coupling) fn let_break(
-        &mut self,
-        model: &Model<D>,
-        body: &PdBody<D>,
-        critical: impl Fn([u32; 2]) -> f64,
+    /// For bonds by the numbers of their points: at which stretch one breaks, of a point whether its bonds never do, and the longest piece of a bond, its length and difference of displacement, which counts where its ends are not found.
+    pub fn new(
+        (model, body): (&Model<D>, &PdBody<D>),
+        bonds: &[[u32; 2]],
+        limit: impl Fn([u32; 2]) -> f64,
         never: impl Fn(u32) -> bool,
-    ) {
-        let own = &self.bonds[..self.own];
+        longest_piece: impl Fn(usize) -> (f64, Carrier) + Sync,
+    ) -> Self {
         let carriers = Carriers::new(model, body);
-        let (part, rows): (Vec<_>, Vec<_>) = (own.par_iter().enumerate())
+        let (part, rows): (Vec<_>, Vec<_>) = (bonds.par_iter().enumerate())
             .map(|(bond, [i, j])| {
                 let xi = body.bond(*i as usize, *j as usize);
                 let counted = carriers.of_bond(*i, *j, &xi);
-                let (length, row) = counted.unwrap_or_else(|| self.longest_piece(bond));
+                let (length, row) = counted.unwrap_or_else(|| longest_piece(bond));
                 let part = Part {
                     xi: xi.into(),
                     stiffness: 0.0,
@@ -65,47 +59,38 @@ impl<const D: usize> NonlinearSeam<D> {
                 (part, row)
             })
             .unzip();
-        self.breaks = Some(Breaking {
-            limit: own
-                .iter()
-                .map(|bond| self.kinematics.limit(critical(*bond)))
-                .collect(),
-            never: own
-                .iter()
-                .map(|bond| bond.iter().any(|&p| never(p)))
-                .collect(),
+        let fails = |bond: &[u32; 2]| bond.iter().any(|&p| never(p));
+        Self {
+            limit: bonds.iter().map(|bond| limit(*bond)).collect(),
+            never: bonds.iter().map(fails).collect(),
             part,
             difference: Transfer::from_rows(rows),
-        });
-    }
-
-    fn longest_piece(&self, bond: usize) -> (f64, Carrier) {
-        let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
-        let length = |p: &usize| self.parts[*p].length;
-        let longest = parts.max_by(|p, q| length(p).total_cmp(&length(q)));
-        let longest = longest.expect("a bond of a seam has a piece");
-        (length(&longest), self.difference.row(longest).collect())
-    }
-
-    /// Breaks the bonds that are over the limit; returns how many, each counted once for each direction.
-    pub(super) fn break_bonds(&mut self, u: &[f64]) -> u64 {
-        let Some(breaks) = &self.breaks else { return 0 };
-        let is_over = |bond: usize| {
-            let difference = breaks.difference.displacement(bond, u);
-            let strained = match self.kinematics {
-                Kinematics::Exact => breaks.part[bond].strained::<true>(&difference),
-                Kinematics::Linear => breaks.part[bond].strained::<false>(&difference),
-            };
-            strained.excess > breaks.limit[bond] * strained.square
-        };
-        let bonds = (0..self.own).into_par_iter().with_min_len(CHUNK);
-        let may = bonds.filter(|&bond| self.stands(bond as u32) && !breaks.never[bond]);
-        let over: Vec<usize> = may.filter(|&bond| is_over(bond)).collect();
-        for &bond in &over {
-            self.intact[bond / 8] &= !(1 << (bond % 8));
-            self.last.push(bond as u32);
         }
-        2 * over.len() as u64
+    }
+
+    /// The bonds that still stand and are over the limit.
+    pub fn over(
+        &self,
+        kinematics: Kinematics,
+        stands: impl Fn(usize) -> bool + Sync,
+        u: &[f64],
+    ) -> Vec<usize> {
+        let is_over = |bond: usize| {
+            let difference = self.difference.displacement(bond, u);
+            let strained = match kinematics {
+                Kinematics::Exact => self.part[bond].strained::<true>(&difference),
+                Kinematics::Linear => self.part[bond].strained::<false>(&difference),
+            };
+            strained.excess > self.limit[bond] * strained.square
+        };
+        let bonds = (0..self.part.len()).into_par_iter().with_min_len(CHUNK);
+        let may = bonds.filter(|&bond| stands(bond) && !self.never[bond]);
+        may.filter(|&bond| is_over(bond)).collect()
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.part.len() * (size_of::<Part<D>>() + 17) + self.difference.weight_count() * 12
     }
 }
 
