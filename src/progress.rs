@@ -14,6 +14,11 @@ pub trait Progress: Sync {
     /// Reports `by` further steps of the current stage; zero within a long step. A listener may end the computation here, by unwinding.
     fn advance(&self, by: u64);
 
+    /// Whether whoever listens wants the computation to end. Only what can end in order looks: load steps, from the last of which a run goes on.
+    fn asks_to_end(&self) -> bool {
+        false
+    }
+
     /// Says how the current stage stands, in a few words; for whoever watches.
     fn tell(&self, _text: &str) {}
 

@@ -15,7 +15,7 @@ use crate::scene::conditions::Condition;
 use crate::scene::validated::Solver;
 use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
-use crate::solve::quasi_static::{self, LoadState, QuasiStaticError, QuasiStaticParams};
+use crate::solve::quasi_static::{self, Aids, LoadState, QuasiStaticError, QuasiStaticParams};
 use crate::solve::statics::{
     self, Method, MethodUsed, SpreadProblem, SpreadRows, StaticError, StaticInfo, StaticParams,
     StaticProblem, StaticSolution,
@@ -281,7 +281,10 @@ fn nonlinear<const D: usize>(
             tolerance: params.tolerance.max(quasi_static::TIGHTEST),
             ..QuasiStaticParams::default()
         },
-        factors.as_ref().map(|(factor, _)| factor as &dyn LinearMap),
+        Aids {
+            near: factors.as_ref().map(|(factor, _)| factor as &dyn LinearMap),
+            progress,
+        },
         &|step| (step == 0).then_some(0.0),
         &mut state,
         &mut |seen| {

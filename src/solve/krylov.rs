@@ -72,6 +72,12 @@ pub enum KrylovError {
         /// Iterations done.
         iterations: usize,
     },
+    /// Whoever listens asked for the end.
+    #[error("interrupted at iteration {iteration}")]
+    Interrupted {
+        /// Iteration at which it was.
+        iteration: usize,
+    },
 }
 
 /// Entries per chunk of a reduction.
@@ -115,7 +121,7 @@ pub(crate) fn add_scaled(s: f64, x: &[f64], y: &mut [f64]) {
 ///
 /// # Errors
 /// [`KrylovError::Indefinite`] if `A` or the preconditioner is found not to be positive definite,
-/// [`KrylovError::NotConverged`] with the residual reached.
+/// [`KrylovError::NotConverged`] with the residual reached, [`KrylovError::Interrupted`] where `progress` asks to end.
 pub fn conjugate_gradients(
     operator: &dyn LinearMap,
     preconditioner: &dyn LinearMap,
@@ -152,6 +158,9 @@ pub fn conjugate_gradients(
         add_scaled(-step, &q, &mut r);
         residual = norm(&r) / scale;
         progress.advance(1);
+        if progress.asks_to_end() {
+            return Err(KrylovError::Interrupted { iteration });
+        }
         if residual <= params.tolerance {
             return Ok((
                 x,
@@ -196,7 +205,7 @@ fn orthogonalise(basis: &[Vec<f64>], w: &mut [f64]) -> Vec<f64> {
 /// preconditioner will do.
 ///
 /// # Errors
-/// [`KrylovError::NotConverged`] with the residual reached.
+/// [`KrylovError::NotConverged`] with the residual reached, [`KrylovError::Interrupted`] where `progress` asks to end.
 pub fn gmres(
     operator: &dyn LinearMap,
     preconditioner: &dyn LinearMap,
@@ -236,6 +245,11 @@ pub fn gmres(
             residual = least.push(column) / scale;
             iterations += 1;
             progress.advance(1);
+            if progress.asks_to_end() {
+                return Err(KrylovError::Interrupted {
+                    iteration: iterations,
+                });
+            }
             // a vanishing new direction means that the solution lies in the space already spanned
             if residual <= params.tolerance || size <= 1e-14 * before {
                 break;

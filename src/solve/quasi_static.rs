@@ -20,7 +20,7 @@ use crate::{
     solve::{
         FreeDofs,
         explicit::Drive,
-        krylov::{LinearMap, add_scaled, dot},
+        krylov::{add_scaled, dot},
     },
     system::{FailureUpdate, Halfway, Interval, SemiDiscrete},
 };
@@ -31,7 +31,7 @@ mod params;
 mod residual;
 
 pub use error::QuasiStaticError;
-pub use params::{Equilibrium, QuasiStaticParams};
+pub use params::{Aids, Equilibrium, QuasiStaticParams};
 pub use residual::TIGHTEST;
 
 /// All that a run carries from load step to load step, but for the damage, which the system keeps.
@@ -147,15 +147,14 @@ fn check_shapes(
 
 /// Runs load steps, those that `state` has done left out; `times` is the time of each by its number, none beyond the last. After each, `observe` may stop.
 ///
-/// `near` is an inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves Newton's method iterations.
-///
 /// # Errors
-/// [`QuasiStaticError`], each with load step, time, place and remedy.
+/// [`QuasiStaticError`], each with load step, time, place and remedy. After [`QuasiStaticError::Interrupted`] `state` and the damage of the system lie within a load step:
+/// a run goes on from what was kept after the last one.
 pub fn run(
     system: &mut dyn SemiDiscrete,
     drive: &dyn Drive,
     params: QuasiStaticParams,
-    near: Option<&dyn LinearMap>,
+    aids: Aids<'_>,
     times: &dyn Fn(u64) -> Option<f64>,
     state: &mut LoadState,
     observe: &mut dyn FnMut(&LoadStep<'_>) -> ControlFlow<()>,
@@ -171,7 +170,7 @@ pub fn run(
     let mut work = Run {
         inverse: vec![0.0; dofs],
         system,
-        near,
+        aids,
         params,
         free: FreeDofs::from_prescribed(&held, block),
         load: vec![0.0; dofs],
@@ -294,6 +293,10 @@ impl Run<'_> {
             self.system.account_for_breaks(&Halfway::at(u));
             broken += now;
             rounds += 1;
+            self.aids.progress.tell(&format!(
+                "{iterations} iterations, {broken} bonds broken in this load step"
+            ));
+            self.go_on()?;
             if rounds >= self.params.max_rounds {
                 return Err(QuasiStaticError::NeverHolds {
                     step: self.step,
@@ -325,6 +328,7 @@ impl Run<'_> {
                     Err(late @ QuasiStaticError::NoEquilibrium { .. }) if !self.is_loaded() => {
                         return Err(late);
                     }
+                    Err(end @ QuasiStaticError::Interrupted { .. }) => return Err(end),
                     Err(_) => return Err(stuck),
                 },
                 found => found?,
@@ -356,6 +360,7 @@ impl Run<'_> {
             if iterations >= self.params.max_iterations {
                 return Err(self.no_equilibrium(residual, iterations));
             }
+            self.go_on()?;
             // the first half step from rest has the damping 0 and half of the force
             let (keep, push) = if iterations == 0 {
                 (0.0, 0.5)

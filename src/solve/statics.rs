@@ -174,6 +174,12 @@ pub enum StaticError {
         /// The length needed.
         expected: usize,
     },
+    /// Whoever listens asked for the end.
+    #[error("interrupted after {iterations} iterations")]
+    Interrupted {
+        /// Iterations done.
+        iterations: usize,
+    },
     /// An input is not a finite number.
     #[error(
         "the {what} of site {site} at {position:?} is not a finite number; check its expression and materials"

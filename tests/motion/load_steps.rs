@@ -1,6 +1,12 @@
 //! Loads that grow step by step.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use bondline::observe::summary::Ended;
+use bondline::progress::Progress;
+use bondline::run::{AnyScene, RunOptions, StartFrom};
+use bondline::scene::Source;
 
 use crate::{BREAKING, bondline, column, run, same, table, write};
 
@@ -159,17 +165,107 @@ fn load_steps_return_to_zero_and_refuse_a_body_that_nothing_holds() {
     }
 }
 
-#[test]
-fn load_steps_break_bonds_and_resume_to_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = BREAKING
+/// The scene that breaks, by load steps.
+fn breaking(coupling: &str, method: &str) -> String {
+    let steps = format!("[solve.quasi-static]\nsteps = 8\nmethod = \"{method}\"\n");
+    BREAKING
         .replace(
             "[solve.explicit]\nduration = 60\noutputs = 6\nhistory-interval = 1\n",
-            "[solve.quasi-static]\nsteps = 8\nmethod = \"implicit\"\n",
+            &steps,
         )
         .replace("min(1, t / 8)", "t")
         .replace("0.004", "0.012")
-        .replace("x = \"-0.012", "y = 0\nx = \"-0.012");
+        .replace("x = \"-0.012", "y = 0\nx = \"-0.012")
+        .replace("coupling.splice", &format!("coupling.{coupling}"))
+}
+
+/// Asks a run to end at one of the iterations of its load steps.
+struct EndsAt {
+    at: u64,
+    iterations: AtomicU64,
+    asked: AtomicBool,
+}
+
+impl Progress for EndsAt {
+    fn stage(&self, _name: &str, _total: Option<u64>) {}
+
+    fn advance(&self, by: u64) {
+        let iteration = self
+            .iterations
+            .fetch_add(u64::from(by == 0), Ordering::Relaxed);
+        if by == 0 && iteration == self.at {
+            self.asked.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn finish(&self) {}
+}
+
+#[test]
+fn an_interrupt_within_a_load_step_goes_back_to_the_last_one() {
+    let plastic = crate::laws::scene(
+        "splice",
+        "plastic-correspondence]\npoisson-ratio = 0.3\nyield-stress = 5\nhardening-modulus = 250",
+        crate::laws::STEPS,
+    );
+    for typed in [
+        breaking("truncated", "implicit"),
+        breaking("splice", "relaxation").replace("steps = 8", "steps = 3\ntolerance = 1e-5"),
+        plastic,
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let go = |name: &str, start: StartFrom, at: u64| {
+            let source = Source::new("bar.toml", &typed);
+            let mut scene = AnyScene::from_source(&source, folder.path(), "bar").unwrap();
+            scene.set_output_directory(folder.path().join(name));
+            let listener = EndsAt {
+                at,
+                iterations: AtomicU64::new(0),
+                asked: AtomicBool::new(false),
+            };
+            let options = RunOptions {
+                start,
+                interrupt: Some(&listener.asked),
+                ..RunOptions::default()
+            };
+            let summary = scene.run_with(&options, &listener).unwrap();
+            (summary.motion.unwrap(), listener.iterations.into_inner())
+        };
+        let (_, iterations) = go("whole", StartFrom::Beginning, u64::MAX);
+        let mut within = 0;
+        for part in [1, 3, 5, 7, 9] {
+            let name = format!("part{part}");
+            let (motion, _) = go(&name, StartFrom::Beginning, iterations * part / 10);
+            assert_eq!(motion.ended, Ended::Interrupted, "{part}");
+            // what it says is of the load step that it went back to
+            let history = folder.path().join(&name).join("bar_history.csv");
+            if history.exists() {
+                let last = |name: &str| *column(&history, name).last().unwrap();
+                assert_eq!(motion.steps as f64, last("step"), "{part}");
+                let [stored, dissipated] = ["stored_energy", "dissipated_energy"].map(last);
+                let lost = motion.cracks.map_or(0.0, |c| c.dissipated_energy);
+                let lost = lost + motion.inelastic_energy.unwrap_or(0.0);
+                let all = 1e-12 * (stored + dissipated);
+                assert!((motion.stored_energy - stored).abs() <= all, "{part}");
+                assert!(
+                    (lost - dissipated).abs() <= all,
+                    "{part}: {lost} {dissipated}"
+                );
+                within += 1;
+            }
+            let (motion, _) = go(&name, StartFrom::Checkpoint, u64::MAX);
+            assert_eq!(motion.ended, Ended::Finished, "{part}");
+            let _ = std::fs::remove_file(folder.path().join(&name).join("bar.checkpoint"));
+            same(&folder.path().join("whole"), &folder.path().join(&name));
+        }
+        assert!(within > 2, "{within} interrupts within load steps");
+    }
+}
+
+#[test]
+fn load_steps_break_bonds_and_resume_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = breaking("splice", "implicit");
     write(folder.path(), "load.toml", &scene);
     let every = ["load.toml", "--checkpoint-every", "1"];
     run(

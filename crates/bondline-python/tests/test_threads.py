@@ -91,6 +91,25 @@ def test_ctrl_c_ends_a_run_in_time_with_a_checkpoint(endless: dict[str, Any], tm
     assert (tmp_path / "long.pvd").exists()
 
 
+def test_ctrl_c_ends_a_run_within_a_load_step(pulse: dict[str, Any], tmp_path: Path) -> None:
+    pulse["mesh"]["line"]["x"]["cells"] = 40_000
+    pulse["peridynamics"] = {"horizon": 0.0075, "points": {"lattice": {"spacing": 0.0025}}}
+    del pulse["initial"]
+    pulse["conditions"]["right"] = {"displacement": {"on": "right", "x": "1e-3 * t"}}
+    # so many passes take an hour
+    pulse["solve"] = {"quasi-static": {"steps": 1, "method": "relaxation", "tolerance": 1e-10, "max-iterations": 100_000_000}}
+    scene = bondline.Scene.from_dict(pulse, name="long")
+    times: list[float] = []
+    timer = after(1.0, _thread.interrupt_main)
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        scene.run(progress=False, output=tmp_path, on_frame=lambda frame: times.append(frame.time))
+    timer.join()
+    assert time.monotonic() - begun < 10
+    assert times == [0.0]
+    assert (tmp_path / "long.checkpoint").exists()
+
+
 def test_ctrl_c_ends_a_static_run(tmp_path: Path) -> None:
     keys = {
         "kinematics": "solid",

@@ -76,9 +76,9 @@ pub struct RunOptions<'a> {
     pub start: StartFrom,
     /// How often a checkpoint is written, instead of what the scene says.
     pub checkpoint_every: Option<Pace>,
-    /// Set by another thread to end the run after the step at hand, with a checkpoint.
+    /// Set by another thread to end the run with a checkpoint: of the step at hand, or, where load steps take long, of the last one.
     pub interrupt: Option<&'a AtomicBool>,
-    /// Set by the run from its first step on, when it looks at `interrupt` after every step; before, ending the process loses nothing.
+    /// Set by the run from its first step on, when it looks at `interrupt`; before, ending the process loses nothing.
     pub heeds: Option<&'a AtomicBool>,
     /// Takes the results, and says whether they are written to files as well.
     pub observer: Option<&'a dyn Observer>,

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::RunOptions;
@@ -38,7 +38,7 @@ use crate::solve::direct::Factor;
 use crate::solve::explicit::{Drive, State};
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{
-    self, Equilibrium, LoadState, LoadStep, QuasiStaticInfo, QuasiStaticParams,
+    self, Aids, Equilibrium, LoadState, LoadStep, QuasiStaticError, QuasiStaticParams,
 };
 use crate::solve::statics::{self, StaticProblem};
 use crate::system::{SemiDiscrete, Symmetry};
@@ -108,7 +108,9 @@ fn load_steps<const D: usize>(
         fields: FieldOutput::new(model, operator, &rest.stresses, &rest.output),
         recorder,
         rotations,
+        last_damage: system.damage_state(),
         state,
+        iterations: 0,
         edge,
         ended: Ended::Finished,
         rotation: None,
@@ -118,12 +120,12 @@ fn load_steps<const D: usize>(
     let near = near.as_ref().map(|f| BodyOnly::new(f, model));
     let near = near.as_ref().map(|f| f as &dyn LinearMap);
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
-    let (info, seconds) = taken?;
+    let seconds = taken?;
     choices.push(Decision {
-        choice: format!("{} products or passes", info.iterations),
+        choice: format!("{} products or passes", observer.iterations),
         why: "of all load steps of this run".to_owned(),
     });
-    let summary = observer.summary(system.as_ref(), info.iterations, first, seconds)?;
+    let summary = observer.summary(system.as_ref(), first, seconds)?;
     let mut told = warnings(model, laid_out.joining, &laid_out.proof);
     told.extend(locking(model, &model.local_laws(&rest.local_laws)));
     told.extend(summary.warnings.iter().cloned());
@@ -233,8 +235,12 @@ struct LoadStepObserver<'a, const D: usize> {
     fields: FieldOutput<'a, D>,
     recorder: Recorder<'a, D>,
     rotations: Rotations<'a, D>,
-    /// Fields, time, step, work, broken bonds: what a checkpoint keeps.
+    /// Fields, time, step, work, broken bonds of the last load step: what a checkpoint keeps.
     state: State,
+    /// What the system kept of its damage then; nothing without an interrupt, which alone leads back there.
+    last_damage: Vec<u64>,
+    /// Products or passes of the load steps so far.
+    iterations: usize,
     edge: Option<EdgeReached>,
     ended: Ended,
     rotation: Option<Rotation>,
@@ -253,7 +259,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         near: Option<&dyn LinearMap>,
         loaded: &mut LoadState,
         timings: &mut Timings,
-    ) -> Result<(QuasiStaticInfo, f64), RunError> {
+    ) -> Result<f64, RunError> {
         let written = self.recorder.seconds;
         let (progress, pace, drive) = (self.progress, self.pace, self.drive);
         let spec = self.spec;
@@ -261,13 +267,27 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         progress.stage("load steps", Some(pace.steps));
         progress.advance(self.state.step);
         let clock = Instant::now();
-        self.options.begin_steps();
+        // before the state at the start ending loses nothing
+        if loaded.step > 0 {
+            self.options.begin_steps();
+        }
+        let inside = InsideStep {
+            progress,
+            interrupt: self.options.interrupt,
+        };
+        let aids = Aids {
+            near,
+            progress: &inside,
+        };
         let model = self.model;
         let laws = &model.local_laws(&self.rest.local_laws);
         let mut observe = |seen: &LoadStep<'_>| self.observe(seen);
 
-        let info = quasi_static::run(system, drive, params, near, &times, loaded, &mut observe)
-            .map_err(|error| explained(error.into(), model, laws))?;
+        let done = quasi_static::run(system, drive, params, aids, &times, loaded, &mut observe);
+        match done {
+            Err(QuasiStaticError::Interrupted { .. }) => self.go_back(system, loaded.step)?,
+            done => drop(done.map_err(|error| explained(error.into(), model, laws))?),
+        }
         if let Some(error) = self.failed.take() {
             return Err(error.into());
         }
@@ -276,7 +296,28 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let writing = self.recorder.seconds - written;
         timings.add("load steps", seconds - writing);
         timings.add("output", writing);
-        Ok((info, seconds))
+        Ok(seconds)
+    }
+
+    /// Goes back to the last of the load steps that are `done` from within the next, and leaves a checkpoint there if there is one.
+    ///
+    /// # Errors
+    /// [`ObserveError`] for a checkpoint that cannot be written.
+    fn go_back(&mut self, system: &mut dyn SemiDiscrete, done: u64) -> Result<(), ObserveError> {
+        self.ended = Ended::Interrupted;
+        // the same system kept it
+        system.restore_damage(&self.last_damage);
+        match done {
+            0 => Ok(()),
+            _ => self.checkpoint(system),
+        }
+    }
+
+    /// Writes all that the run needs to go on from the last load step.
+    fn checkpoint(&mut self, system: &dyn SemiDiscrete) -> Result<(), ObserveError> {
+        let (pace, edge, seen) = (self.pace, self.edge, Seen::default());
+        self.recorder
+            .checkpoint(&self.state, system, pace, edge, None, &seen)
     }
 
     /// Watches and writes a load step; says whether the next is taken.
@@ -288,6 +329,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         if let Err(error) = self.write(seen, begins) {
             self.failed = Some(error);
             return ControlFlow::Break(());
+        }
+        if begins {
+            self.options.begin_steps();
         }
         let state = &self.state;
         self.progress.advance(u64::from(!begins));
@@ -309,6 +353,10 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         state.time = seen.time;
         state.u.copy_from_slice(&seen.state.u);
         state.broken = seen.state.broken;
+        self.iterations += seen.iterations;
+        if self.options.interrupt.is_some() {
+            self.last_damage = seen.system.damage_state();
+        }
     }
 
     /// Looks for damage at the edge of the nonlocal zone, as long as there is none.
@@ -374,7 +422,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             self.fields.write(recorder, &moment)?;
         }
         if leave || (!begins && recorder.is_checkpoint_due(state.step)) {
-            recorder.checkpoint(&moment, self.pace, self.edge, None, &Seen::default())?;
+            self.checkpoint(seen.system)?;
         }
         Ok(())
     }
@@ -386,7 +434,6 @@ impl<const D: usize> LoadStepObserver<'_, D> {
     fn summary(
         self,
         system: &dyn SemiDiscrete,
-        iterations: usize,
         first: u64,
         seconds: f64,
     ) -> Result<RunSummary, RunError> {
@@ -427,13 +474,37 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             applied,
             reactions: self.recorder.reactions(),
             sections: self.recorder.section_forces(),
-            iterations,
+            iterations: self.iterations,
             motion: Some(motion),
             files: self.recorder.files(),
             rotation: self.rotation,
             ..RunSummary::default()
         })
     }
+}
+
+/// What the solver of a load step reports to: iterations do not count as steps, and an interrupt ends them.
+struct InsideStep<'a> {
+    progress: &'a dyn Progress,
+    interrupt: Option<&'a AtomicBool>,
+}
+
+impl Progress for InsideStep<'_> {
+    fn stage(&self, _name: &str, _total: Option<u64>) {}
+
+    fn advance(&self, _by: u64) {
+        self.progress.advance(0);
+    }
+
+    fn asks_to_end(&self) -> bool {
+        self.interrupt.is_some_and(|i| i.load(Ordering::Relaxed))
+    }
+
+    fn tell(&self, text: &str) {
+        self.progress.tell(text);
+    }
+
+    fn finish(&self) {}
 }
 
 /// Part of the work from which on energy that load steps created is warned of. Work is summed by the trapezoidal rule, which errs by the square of a step.

@@ -432,8 +432,14 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     /// Writes all that the run needs to go on from here.
     fn write_checkpoint(&mut self, moment: &Moment<'_>) -> Result<(), ObserveError> {
         let (pace, zone) = (self.segment.pace, self.zone.clone());
-        self.recorder
-            .checkpoint(moment, pace, self.edge, zone, &self.guard.seen)
+        self.recorder.checkpoint(
+            moment.state,
+            moment.system,
+            pace,
+            self.edge,
+            zone,
+            &self.guard.seen,
+        )
     }
 
     /// Tells whoever watches where the run stands, a few times a second.

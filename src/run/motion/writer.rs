@@ -514,7 +514,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
     /// [`ObserveError`] if it cannot be written.
     pub fn checkpoint(
         &mut self,
-        moment: &Moment<'_>,
+        state: &State,
+        system: &dyn SemiDiscrete,
         pace: StepChoice,
         edge: Option<EdgeReached>,
         zone: Option<Zone>,
@@ -529,8 +530,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
             bytes.push(table.mark()?);
         }
         self.checkpoint.write(&Saved {
-            state: moment.state.clone(),
-            damage: moment.system.damage_state(),
+            state: state.clone(),
+            damage: system.damage_state(),
             pace,
             written: Written {
                 bytes,

@@ -73,6 +73,14 @@ pub enum QuasiStaticError {
         /// What to do.
         remedy: &'static str,
     },
+    /// Whoever listens asked for the end, within a load step.
+    #[error("load step {step} at time {time} was interrupted")]
+    Interrupted {
+        /// The load step.
+        step: u64,
+        /// Its time.
+        time: f64,
+    },
     /// A number is not finite.
     #[error(
         "load step {step} at time {time}: the force at site {site} is not a number; check loads and prescribed displacements there"

@@ -9,10 +9,11 @@ use std::sync::{Mutex, PoisonError};
 use super::error::QuasiStaticError;
 use super::residual::{Residual, Run, Tangent};
 use crate::{
-    progress::Silent,
     solve::{
         FreeDofs,
-        krylov::{KrylovParams, LinearMap, add_scaled, conjugate_gradients, gmres, norm},
+        krylov::{
+            KrylovError, KrylovParams, LinearMap, add_scaled, conjugate_gradients, gmres, norm,
+        },
     },
     system::{FailureUpdate, Interval, SemiDiscrete, Symmetry},
 };
@@ -125,6 +126,7 @@ impl Run<'_> {
                         add_scaled(1.0, &correction, &mut change);
                         iterations = count;
                     }
+                    Err(end @ QuasiStaticError::Interrupted { .. }) => return Err(end),
                     // where there is no prediction the first correction tells why
                     Err(_) => self.tangent = Tangent::Present,
                 }
@@ -159,7 +161,7 @@ impl Run<'_> {
             },
             ..KrylovParams::default()
         };
-        let remedy = match (self.is_loaded(), self.near) {
+        let remedy = match (self.is_loaded(), self.aids.near) {
             (true, _) => {
                 "a load that nothing bears has none: hold the body, or prescribe displacements instead of forces"
             }
@@ -169,13 +171,14 @@ impl Run<'_> {
             _ => "take smaller load steps",
         };
         let diagonal = Diagonal(&self.inverse);
-        let near = self.near.unwrap_or(&diagonal);
+        let near = self.aids.near.unwrap_or(&diagonal);
+        let progress = self.aids.progress;
         let symmetry = self.system.symmetry();
         let solve = |tangent: &dyn LinearMap| match symmetry {
             Symmetry::Symmetric => {
-                conjugate_gradients(tangent, near, &self.residual, &params, &Silent)
+                conjugate_gradients(tangent, near, &self.residual, &params, progress)
             }
-            Symmetry::Unsymmetric => gmres(tangent, near, &self.residual, &params, &Silent),
+            Symmetry::Unsymmetric => gmres(tangent, near, &self.residual, &params, progress),
         };
         let solved = match (self.tangent, length) {
             (Tangent::Present, Some(length)) => solve(&Present {
@@ -192,11 +195,14 @@ impl Run<'_> {
             }),
         };
         let (step, time) = (self.step, self.time);
-        let (correction, info) = solved.map_err(|source| QuasiStaticError::Linear {
-            step,
-            time,
-            source,
-            remedy,
+        let (correction, info) = solved.map_err(|source| match source {
+            KrylovError::Interrupted { .. } => self.interrupted(),
+            source => QuasiStaticError::Linear {
+                step,
+                time,
+                source,
+                remedy,
+            },
         })?;
         Ok((correction, info.iterations.max(1)))
     }
@@ -214,7 +220,9 @@ impl Run<'_> {
             if iterations >= self.params.max_iterations || slow == MOST_SLOW {
                 return Err(self.no_equilibrium(residual, iterations));
             }
+            self.go_on()?;
             let (correction, count) = match self.correction(u, residual, iterations) {
+                Err(end @ QuasiStaticError::Interrupted { .. }) => return Err(end),
                 Err(_) if self.tangent == Tangent::AtRest && !is_linear => {
                     self.tangent = Tangent::Present;
                     continue;

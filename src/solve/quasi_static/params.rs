@@ -1,5 +1,8 @@
 //! How load steps are solved.
 
+use crate::progress::{Progress, Silent};
+use crate::solve::krylov::LinearMap;
+
 /// How equilibrium is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -32,6 +35,24 @@ impl Default for QuasiStaticParams {
             tolerance: 1e-8,
             max_iterations: 50_000,
             max_rounds: 100_000,
+        }
+    }
+}
+
+/// What leads a run, and who hears of it.
+#[derive(Clone, Copy)]
+pub struct Aids<'a> {
+    /// An inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves Newton's method iterations.
+    pub near: Option<&'a dyn LinearMap>,
+    /// Hears of iterations within a load step, where it may end the run.
+    pub progress: &'a dyn Progress,
+}
+
+impl Default for Aids<'_> {
+    fn default() -> Self {
+        Self {
+            near: None,
+            progress: &Silent,
         }
     }
 }

@@ -1,12 +1,9 @@
 //! The residual of a load step, and the forces that it is measured by.
 
 use super::error::QuasiStaticError;
-use super::params::{Equilibrium, QuasiStaticParams};
+use super::params::{Aids, Equilibrium, QuasiStaticParams};
 use crate::{
-    solve::{
-        FreeDofs,
-        krylov::{LinearMap, norm},
-    },
+    solve::{FreeDofs, krylov::norm},
     system::{FailureUpdate, Interval, SemiDiscrete},
 };
 
@@ -37,7 +34,7 @@ pub(super) enum Tangent {
 /// The work space of a run.
 pub(super) struct Run<'a> {
     pub system: &'a mut dyn SemiDiscrete,
-    pub near: Option<&'a dyn LinearMap>,
+    pub aids: Aids<'a>,
     pub params: QuasiStaticParams,
     pub free: FreeDofs,
     pub load: Vec<f64>,
@@ -87,6 +84,25 @@ impl Run<'_> {
         for (inverse, sums) in self.inverse.chunks_mut(block).zip(sums.chunks(block)) {
             let sum = sums.iter().copied().fold(0.0, f64::max);
             inverse.fill(if sum > 0.0 { 1.0 / sum } else { 0.0 });
+        }
+    }
+
+    /// Reports a step of an iteration.
+    ///
+    /// # Errors
+    /// [`QuasiStaticError::Interrupted`] where whoever listens asks to end.
+    pub fn go_on(&self) -> Result<(), QuasiStaticError> {
+        self.aids.progress.advance(0);
+        match self.aids.progress.asks_to_end() {
+            true => Err(self.interrupted()),
+            false => Ok(()),
+        }
+    }
+
+    pub fn interrupted(&self) -> QuasiStaticError {
+        QuasiStaticError::Interrupted {
+            step: self.step,
+            time: self.time,
         }
     }
 

@@ -200,6 +200,10 @@ fn krylov(
                 info.method = MethodUsed::Gmres;
                 continue;
             }
+            Err(KrylovError::Interrupted { iteration }) => {
+                let iterations = info.iterations + iteration;
+                return Err(StaticError::Interrupted { iterations });
+            }
             Err(KrylovError::NotConverged {
                 residual,
                 iterations,

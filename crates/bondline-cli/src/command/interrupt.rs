@@ -30,7 +30,7 @@ pub fn listen() -> miette::Result<&'static Interrupt> {
         if again || !INTERRUPT.heeded.load(Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));
         }
-        tell("ending after the step at hand; once more ends at once, without a checkpoint");
+        tell("ending with a checkpoint of the last step; once more ends at once, without a checkpoint");
     })
     .map_err(|e| miette::miette!("cannot watch for Ctrl-C: {e}"))?;
     Ok(&INTERRUPT)
