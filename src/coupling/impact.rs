@@ -20,6 +20,7 @@
 //! the bound therefore counts [`RESOLVED`] times, so that `(ω Δt)² ≤ 1`. The sum over the sites that touch counts as often once more: a light impactor carries all of its energy through one contact of a few steps.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::coupling::Model;
 use crate::tensor::Vector;
@@ -59,6 +60,8 @@ pub struct Impact<const D: usize> {
     position: Vec<Vector<D>>,
     /// How far the body reaches beyond each site \[m\].
     clearance: Vec<f64>,
+    /// Sizes of the sites \[m\].
+    size: Vec<f64>,
     /// `C₁₁ V / h²` of each site \[N/m\].
     stiffness: Vec<f64>,
     /// The largest `C₁₁/h` \[N/m^D\].
@@ -69,6 +72,15 @@ pub struct Impact<const D: usize> {
     smallest: f64,
     /// How often contact counts in the bounds of eigenvalues and row sums.
     counted: f64,
+}
+
+/// The sites that touch an impactor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ContactPatch {
+    /// How many there are.
+    pub sites: u64,
+    /// How many lie side by side across the contact.
+    pub across: f64,
 }
 
 /// What one chunk of sites does to one impactor.
@@ -100,6 +112,7 @@ impl<const D: usize> Impact<D> {
             stiffest_face: largest / smallest,
             bounds: model.mesh.bounds(),
             smallest,
+            size: sizes,
             counted,
         }
     }
@@ -123,7 +136,7 @@ impl<const D: usize> Impact<D> {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.position.len() * (D + 2) * size_of::<f64>()
+        self.position.len() * (D + 3) * size_of::<f64>()
     }
 
     /// Masses of the impactors, as sites that follow those of the body \[kg\].
@@ -207,6 +220,56 @@ impl<const D: usize> Impact<D> {
             })
             .collect();
         parts.iter().sum()
+    }
+
+    /// The sites that touch an impactor: how many, and how many across the contact, which is its width over their mean size and one more.
+    ///
+    /// The width is taken across the way out and, of a cylinder, across its axis.
+    pub fn contact(&self, u: &[f64], impactor: usize) -> ContactPatch {
+        let (u, moved) = u.split_at(self.sites() * D);
+        let touched: Vec<Vec<(usize, Vector<D>)>> = u
+            .par_chunks(CHUNK * D)
+            .enumerate()
+            .map(|(chunk, u)| {
+                let mut found = Vec::new();
+                self.each(chunk, u, moved, |i, k, _, _, out| {
+                    if k == impactor {
+                        found.push((chunk * CHUNK + i, out));
+                    }
+                });
+                found
+            })
+            .collect();
+        let touched = touched.concat();
+        if touched.is_empty() {
+            return ContactPatch::default();
+        }
+        let count = touched.len() as f64;
+        let out: Vector<D> = touched.iter().map(|(_, out)| out).sum();
+        let out = out.try_normalize(0.0).unwrap_or_else(Vector::zeros);
+        let axis = self.impactors[impactor].shape.axis();
+        let along_face = |site: usize| {
+            let x = self.position[site] + Vector::from_column_slice(&u[site * D..][..D]);
+            let across = x - out * out.dot(&x);
+            match axis {
+                Some(axis) => across - axis * axis.dot(&across),
+                None => across,
+            }
+        };
+        let middle: Vector<D> = touched
+            .iter()
+            .map(|&(s, _)| along_face(s))
+            .sum::<Vector<D>>()
+            / count;
+        let half = touched
+            .iter()
+            .map(|&(s, _)| (along_face(s) - middle).norm())
+            .fold(0.0, f64::max);
+        let size = touched.iter().map(|&(s, _)| self.size[s]).sum::<f64>() / count;
+        ContactPatch {
+            sites: touched.len() as u64,
+            across: 1.0 + 2.0 * half / size,
+        }
     }
 
     /// The site that lies deepest inside an impactor: its number, that of the impactor and the depth \[m\].

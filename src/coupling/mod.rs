@@ -58,7 +58,7 @@ pub mod zone_distance;
 pub use balanced::Balanced;
 pub use blending::{Blending, BlendingFunction};
 pub use field_evaluation::{Carrier, Sampler};
-pub use impact::{Impact, ImpactedSystem, ImpactorShape, RigidImpactor};
+pub use impact::{ContactPatch, Impact, ImpactedSystem, ImpactorShape, RigidImpactor};
 pub use interface_interpolation::Bins;
 pub use least_squares_gradient::FitDegree;
 pub use model::{Model, Site, SiteKind};

@@ -127,6 +127,8 @@ pub struct ImpactorSummary {
     pub peak_force: f64,
     /// When that was \[s\].
     pub peak_time: f64,
+    /// Nodes and points that touched it then.
+    pub peak_sites: u64,
 }
 
 impl ImpactorSummary {
@@ -135,9 +137,15 @@ impl ImpactorSummary {
         match self.peak_force > 0.0 {
             true => write!(
                 f,
-                "{name:<22} peak force {} at t = {}",
+                "{name:<22} peak force {} at t = {} on {} {}",
                 number(self.peak_force),
-                number(self.peak_time)
+                number(self.peak_time),
+                self.peak_sites,
+                if self.peak_sites == 1 {
+                    "site"
+                } else {
+                    "sites"
+                }
             )?,
             false => write!(f, "{name:<22} has not touched the body")?,
         }

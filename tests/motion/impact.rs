@@ -187,11 +187,9 @@ fn what_presses_is_what_the_support_bears() {
     }
 }
 
-/// The disc of plane strain and the cylinder of a solid that is held along its axis are one.
-#[test]
-fn a_cylinder_in_space_is_a_disc_in_the_plane() {
-    let plane = PRESS.replacen("splice", "local", 1);
-    let solid = plane
+/// The scene of a disc as that of a cylinder, with two cells along its axis.
+fn cylinder(plane: &str) -> String {
+    plane
         .replace("plane-strain", "solid")
         .replace("mesh.rectangle", "mesh.box")
         .replace("min = [-1, 0]", "min = [-1, 0, 0]")
@@ -202,7 +200,14 @@ fn a_cylinder_in_space_is_a_disc_in_the_plane() {
             "sphere = { center = [0.02, 1.5], radius = 0.5 }",
             "cylinder = { point = [0.02, 1.5, 7], direction = [0, 0, -2], radius = 0.5 }",
         )
-        + "[conditions.front.symmetry]\non = \"front\"\n[conditions.back.symmetry]\non = \"back\"\n";
+        + "[conditions.front.symmetry]\non = \"front\"\n[conditions.back.symmetry]\non = \"back\"\n"
+}
+
+/// The disc of plane strain and the cylinder of a solid that is held along its axis are one.
+#[test]
+fn a_cylinder_in_space_is_a_disc_in_the_plane() {
+    let plane = PRESS.replacen("splice", "local", 1);
+    let solid = cylinder(&plane);
     let forces = [plane, solid].map(|typed| {
         let folder = tempfile::tempdir().unwrap();
         write(folder.path(), "bar.toml", &typed);
@@ -216,6 +221,45 @@ fn a_cylinder_in_space_is_a_disc_in_the_plane() {
             "{plane} {solid}"
         );
     }
+}
+
+/// A contact a few sites wide is told, with its width: that of a disc, and of a cylinder, whose length does not count.
+#[test]
+fn a_contact_that_is_not_resolved_is_told() {
+    let warning = |cells: usize, solid: bool| -> (String, u64) {
+        let mut typed = PRESS.replacen("splice", "local", 1).replacen(
+            "x = { cells = 20 }\ny = { cells = 10 }",
+            &format!("x = {{ cells = {} }}\ny = {{ cells = {cells} }}", 2 * cells),
+            1,
+        );
+        if solid {
+            typed = cylinder(&typed);
+        }
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "bar.toml", &typed);
+        let said = run(folder.path(), &["bar.toml", "--json"]);
+        let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+        let warnings = summary["warnings"].as_array().unwrap();
+        let of_impactor = |w: &&serde_json::Value| w.as_str().unwrap().contains("`punch`");
+        let warning = warnings.iter().find(of_impactor);
+        (
+            warning.map_or(String::new(), |w| w.as_str().unwrap().to_owned()),
+            summary["motion"]["impactors"][0]["peak_sites"]
+                .as_u64()
+                .unwrap(),
+        )
+    };
+    let (coarse, touched) = warning(10, false);
+    assert!(
+        coarse.contains("3 sites wide") && coarse.contains("third"),
+        "{coarse}"
+    );
+    assert_eq!(touched, 3);
+    let (solid, all) = warning(10, true);
+    assert_eq!((solid, all), (coarse, 3 * touched));
+    let (finer, _) = warning(20, false);
+    assert!(finer.contains("a tenth"), "{finer}");
+    assert_eq!(warning(40, false).0, "");
 }
 
 /// A ball breaks a plate of points that elements hold, in pieces that touch; a wall drives the other side.

@@ -10,9 +10,9 @@ use plotters::coord::{
     ranged1d::{AsRangedCoord, Ranged, ValueFormatter},
 };
 use plotters::prelude::{
-    BitMapBackend, Cartesian2d, ChartBuilder, ChartContext, Circle, DashedLineSeries, DrawingArea,
-    DrawingBackend, EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor,
-    SVGBackend, SeriesLabelPosition, Text, WHITE,
+    BindKeyPoints, BitMapBackend, Cartesian2d, ChartBuilder, ChartContext, Circle,
+    DashedLineSeries, DrawingArea, DrawingBackend, EmptyElement, IntoDrawingArea, IntoLogRange,
+    LineSeries, PathElement, RGBColor, SVGBackend, SeriesLabelPosition, Text, WHITE,
 };
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontStyle, ShapeStyle, TextStyle, register_font};
@@ -254,14 +254,18 @@ impl LinePlot {
                 what: "no point of the plot can be drawn (finite, and positive on a logarithmic axis)",
             });
         };
-        let (lx, ly) = (x.start..x.end, y.start..y.end);
+        let log = |range: &std::ops::Range<f64>| {
+            let ticks = ticks_of_factors(range);
+            (range.clone().log_scale()).with_key_points(ticks)
+        };
+        let (lx, ly) = (|| log(&x), || log(&y));
         // without it the size of a text is not known, in an SVG neither
         LazyLock::force(&FONT_READ);
         match (self.x_scale, self.y_scale) {
-            (Scale::Linear, Scale::Linear) => self.draw(&root, scale, x, y),
-            (Scale::Log, Scale::Linear) => self.draw(&root, scale, lx.log_scale(), y),
-            (Scale::Linear, Scale::Log) => self.draw(&root, scale, x, ly.log_scale()),
-            (Scale::Log, Scale::Log) => self.draw(&root, scale, lx.log_scale(), ly.log_scale()),
+            (Scale::Linear, Scale::Linear) => self.draw(&root, scale, x.clone(), y.clone()),
+            (Scale::Log, Scale::Linear) => self.draw(&root, scale, lx(), y.clone()),
+            (Scale::Linear, Scale::Log) => self.draw(&root, scale, x.clone(), ly()),
+            (Scale::Log, Scale::Log) => self.draw(&root, scale, lx(), ly()),
         }
         .map_err(|message| ObserveError::Encode {
             path: path.to_path_buf(),
@@ -461,6 +465,21 @@ pub(super) fn range(
             Some(lo / factor..hi * factor)
         }
     }
+}
+
+/// Ticks of a logarithmic axis: powers of ten, with twice and five times each, or all digits, where these are few.
+pub(super) fn ticks_of_factors(range: &std::ops::Range<f64>) -> Vec<f64> {
+    let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    let ticks = |digits: &[i32]| -> Vec<f64> {
+        let all = decades.clone().flat_map(|k| {
+            // a power of ten, as it is typed, is the nearest number to it
+            (digits.iter()).filter_map(move |d| format!("{d}e{k}").parse().ok())
+        });
+        all.filter(|t| range.contains(t)).collect()
+    };
+    let finer = [&[1][..], &[1, 2, 5], &[1, 2, 3, 4, 5, 6, 7, 8, 9]].map(ticks);
+    let enough = finer.iter().position(|t| t.len() >= 4).unwrap_or(2);
+    finer.into_iter().nth(enough).unwrap_or_default()
 }
 
 /// A number beside a tick: no more digits than it has.

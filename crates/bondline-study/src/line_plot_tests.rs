@@ -131,6 +131,16 @@ fn the_legend_leaves_the_data_alone() {
 }
 
 #[test]
+fn a_logarithmic_axis_has_some_ticks_and_not_too_many() {
+    assert_eq!(ticks_of_factors(&(0.14..3.1)), [0.2, 0.5, 1.0, 2.0]);
+    assert_eq!(ticks_of_factors(&(0.0012..0.0049)), [0.002, 0.003, 0.004]);
+    assert_eq!(
+        ticks_of_factors(&(0.9e-5..0.9)),
+        [1e-5, 1e-4, 1e-3, 1e-2, 0.1]
+    );
+}
+
+#[test]
 fn ticks_have_no_idle_digits() {
     let texts = [
         0.0,

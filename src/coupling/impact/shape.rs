@@ -67,6 +67,14 @@ impl<const D: usize> ImpactorShape<D> {
         Some((reach - distance, from / distance))
     }
 
+    /// The direction of its axis, a unit vector; none but a cylinder has one.
+    pub fn axis(&self) -> Option<Vector<D>> {
+        match self {
+            Self::Cylinder { direction, .. } => Some(*direction),
+            Self::Sphere { .. } | Self::Plane { .. } => None,
+        }
+    }
+
     /// The largest area that a body between the corners `low` and `high` may lay against the impactor \[m²\] (\[m\] in 2D, 1 in 1D): half of a sphere or cylinder, or what the box shows to it.
     pub fn largest_area(&self, low: &Vector<D>, high: &Vector<D>) -> f64 {
         let extent = high - low;

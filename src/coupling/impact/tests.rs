@@ -50,6 +50,7 @@ fn impact(sites: usize) -> Impact<3> {
             ),
         ],
         clearance: vec![0.0; position.len()],
+        size: vec![0.1; position.len()],
         position,
         stiffness,
         stiffest_face: 3.0,
@@ -66,6 +67,47 @@ fn displacement(dofs: usize) -> Vec<f64> {
     (0..dofs)
         .map(|k| 0.02 * ((k * 37 % 19) as f64 / 9.0 - 1.0))
         .collect()
+}
+
+/// Sites of a face, 0.1 apart, beneath a sphere and a cylinder that reach 0.02 into it.
+#[test]
+fn the_width_of_a_contact_is_across_the_way_out_and_the_axis() {
+    let mut contact = impact(0);
+    let grid = |k: usize| 0.1 * k as f64 - 1.0;
+    contact.position = (0..441)
+        .map(|k| Vector::<3>::new(grid(k % 21), grid(k / 21), 0.0))
+        .collect();
+    contact.size = vec![0.1; 441];
+    contact.stiffness = vec![1.0; 441];
+    contact.clearance = vec![0.0; 441];
+    let center = Vector::<3>::new(0.0, 0.0, 0.98);
+    contact.impactors[0].shape = ImpactorShape::Sphere {
+        center,
+        radius: 1.0,
+    };
+    contact.impactors[1].shape = ImpactorShape::Cylinder {
+        point: center,
+        direction: Vector::<3>::new(0.0, 1.0, 0.0),
+        radius: 1.0,
+    };
+    contact.impactors[2].shape = ImpactorShape::Plane {
+        point: Vector::<3>::new(0.0, 0.0, 5.0),
+        normal: Vector::<3>::new(0.0, 0.0, 1.0),
+    };
+    let u = vec![0.0; 444 * 3];
+    // √(1 − 0.98²) = 0.199: one row on either side, and no corner of 0.2
+    let sphere = contact.contact(&u, 0);
+    assert_eq!(sphere.sites, 9);
+    assert!((sphere.across - (1.0 + 2.0 * 2f64.sqrt())).abs() < 1e-12);
+    let cylinder = contact.contact(&u, 1);
+    assert_eq!(cylinder.sites, 63);
+    assert!((cylinder.across - 3.0).abs() < 1e-12, "{cylinder:?}");
+    assert_eq!(contact.contact(&u, 2).sites, 441);
+    contact.impactors[0].shape = ImpactorShape::Sphere {
+        center,
+        radius: 0.9,
+    };
+    assert_eq!(contact.contact(&u, 0), ContactPatch::default());
 }
 
 #[test]

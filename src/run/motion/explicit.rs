@@ -4,6 +4,7 @@ use super::RunOptions;
 use super::breaks::{Breaks, breaks};
 use super::dynamic_system::{LayoutStart, PlaneEnergy, plane_energy};
 use super::guard::Balance;
+use super::impact_record::ImpactRecord;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
 use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
@@ -315,6 +316,13 @@ impl SegmentRecord {
         told.extend(without_response(motion.system(), &motion.state().u));
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
         told.extend(rotation.as_ref().map(Rotation::warning));
+        told.extend(
+            observer
+                .recorder
+                .impact
+                .iter()
+                .flat_map(ImpactRecord::warnings),
+        );
         let files = observer.recorder.files();
         let reactions = observer.recorder.reactions();
         let sections = observer.recorder.section_forces();

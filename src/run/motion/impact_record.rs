@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::coupling::Impact;
+use serde::{Deserialize, Serialize};
+
+use crate::coupling::{ContactPatch, Impact, ImpactorShape};
+use crate::observe::report::number;
 use crate::observe::summary::ImpactorSummary;
 use crate::scene::impactors::Impactor;
 use crate::solve::explicit::State;
@@ -10,8 +13,27 @@ use crate::tensor::Vector;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The largest force of an impactor on the body so far: its size \[N\] and its time \[s\].
-pub type Peak = (f64, f64);
+/// The largest force of an impactor on the body so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Peak {
+    /// Its size \[N\].
+    force: f64,
+    /// Its time \[s\].
+    time: f64,
+    /// The sites that touched then, or when they were counted last before.
+    contact: ContactPatch,
+    /// The force at which they were counted.
+    counted: f64,
+}
+
+/// Rise of a force from which on the sites that touch are counted again: a pass over all of them, which costs as much as contact itself.
+const COUNT_AGAIN: f64 = 1.01;
+
+/// Sites across a contact, and by how much less the peak of its force varies with where a lattice lies: up to 33 % on fewer
+/// than the first, 10 % on fewer than the second, 5 % beyond (docs/dynamics.md, rigid impactors).
+const COARSE: f64 = 4.0;
+/// See [`COARSE`].
+const RESOLVED: f64 = 8.0;
 
 /// What a run tells of its impactors.
 pub struct ImpactRecord<const D: usize> {
@@ -24,7 +46,7 @@ pub struct ImpactRecord<const D: usize> {
 impl<const D: usize> ImpactRecord<D> {
     /// Of impactors whose largest forces so far are `peaks`, if there are any yet.
     pub fn new(impact: Arc<Impact<D>>, impactors: &[Impactor<D>], peaks: Option<&[Peak]>) -> Self {
-        let none = || vec![(0.0, 0.0); impactors.len()];
+        let none = || vec![Peak::default(); impactors.len()];
         Self {
             impact,
             names: impactors.iter().map(|i| i.name.clone()).collect(),
@@ -81,10 +103,33 @@ impl<const D: usize> ImpactRecord<D> {
     pub fn watch(&mut self, state: &State, forces: &[f64]) {
         for k in 0..self.names.len() {
             let force = self.force(k, state, forces).norm();
-            if force > self.peaks[k].0 {
-                self.peaks[k] = (force, state.time);
+            let peak = &mut self.peaks[k];
+            if force > peak.force {
+                (peak.force, peak.time) = (force, state.time);
+                if force > COUNT_AGAIN * peak.counted {
+                    peak.counted = force;
+                    peak.contact = self.impact.contact(&state.u, k);
+                }
             }
         }
+    }
+
+    /// Warns of round impactors that so few sites touch that the peak of the force depends on where these lie.
+    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+        let impactors = self.impact.impactors().iter();
+        let all = impactors.zip(&self.names).zip(&self.peaks);
+        all.filter_map(|((impactor, name), peak)| {
+            let across = peak.contact.across;
+            // a plane touches all of a face at once
+            let is_round = D > 1 && !matches!(impactor.shape, ImpactorShape::Plane { .. });
+            let varies = if across < COARSE { "a third" } else { "a tenth" };
+            (is_round && peak.force > 0.0 && across < RESOLVED).then(|| {
+                format!(
+                    "impactor `{name}`: the contact was {} sites wide at the peak of its force, which may be wrong by {varies}, as nodes and points happen to lie; {RESOLVED} sites resolve it; the momentum that it transfers needs fewer",
+                    number(across.round()),
+                )
+            })
+        })
     }
 
     /// What the summary tells.
@@ -97,8 +142,9 @@ impl<const D: usize> ImpactRecord<D> {
                 position: place.as_slice().to_vec(),
                 velocity: velocity.as_slice().to_vec(),
                 momentum: mass.map(|m| (velocity * m).as_slice().to_vec()),
-                peak_force: self.peaks[k].0,
-                peak_time: self.peaks[k].1,
+                peak_force: self.peaks[k].force,
+                peak_time: self.peaks[k].time,
+                peak_sites: self.peaks[k].contact.sites,
             }
         };
         self.names.iter().enumerate().map(of).collect()

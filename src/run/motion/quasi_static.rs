@@ -466,8 +466,10 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             nonlocal_share: [0.0; 3],
         };
         let warnings = without_response(system, &state.u).into_iter();
+        let impacts = self.recorder.impact.iter();
         Ok(RunSummary {
             warnings: warnings
+                .chain(impacts.flat_map(ImpactRecord::warnings))
                 .chain(created_energy(model, &motion, &state.u))
                 .collect(),
             dimension: D,
