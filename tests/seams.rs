@@ -229,3 +229,40 @@ fn the_order_of_nodes_and_cells_changes_no_result() {
         }
     }
 }
+
+/// A mesh whose curved surface cuts the lattice: points of the last layer stand for parts of cells, and so do families that reach them. That is the surface, not the lattice.
+#[test]
+fn what_a_surface_does_to_the_lattice_is_told_of_the_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("meshes/quarter_ring.msh");
+    let scene = format!(
+        r#"
+kinematics = "plane-stress"
+[mesh.file]
+path = {mesh:?}
+[materials.body.bond-based]
+youngs-modulus = 1
+[peridynamics]
+horizon = 0.15
+points.lattice = {{ spacing = 0.05, origin = [0.013, 0.031] }}
+[zones]
+nonlocal = {{ ball = {{ center = [1.06, 1.06], radius = 0.6 }} }}
+[coupling.truncated]
+[conditions.held.displacement]
+on = "left"
+x = 0
+y = 0
+"#
+    );
+    std::fs::write(folder.path().join("ring.toml"), scene).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_bondline"))
+        .args(["check", "ring.toml"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("at free surfaces"), "{said}");
+    assert!(!said.contains("among"), "{said}");
+    assert!(!said.contains("leave peridynamics"), "{said}");
+}

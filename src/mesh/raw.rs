@@ -207,10 +207,14 @@ impl RawMesh {
                 path: path(),
                 wanted: D,
                 found,
-                remedy: if found < D {
-                    "mesh the volume too (in Gmsh: gmsh -3, and a physical group for it), or use the dimension found"
-                } else {
-                    "use the dimension found"
+                remedy: match (found < D, D) {
+                    (true, 2) => {
+                        "mesh the surface too (in Gmsh: gmsh -2, and a physical group for it), or use the dimension found"
+                    }
+                    (true, _) => {
+                        "mesh the volume too (in Gmsh: gmsh -3, and a physical group for it), or use the dimension found"
+                    }
+                    (false, _) => "use the dimension found",
                 },
             });
         }

@@ -123,6 +123,8 @@ pub struct ImpactorSummary {
     pub velocity: Vec<f64>,
     /// Its momentum at the end \[kg m/s\]; none of one whose motion is prescribed.
     pub momentum: Option<Vec<f64>>,
+    /// What it has given the body of its momentum \[kg m/s\]; none as above.
+    pub transferred: Option<Vec<f64>>,
     /// The largest force between it and the body \[N\]; zero if they never touched.
     pub peak_force: f64,
     /// When that was \[s\].
@@ -149,8 +151,8 @@ impl ImpactorSummary {
             )?,
             false => write!(f, "{name:<22} has not touched the body")?,
         }
-        match &self.momentum {
-            Some(momentum) => writeln!(f, ", momentum ({})", components(momentum)),
+        match &self.transferred {
+            Some(given) => writeln!(f, ", momentum given ({})", components(given)),
             None => writeln!(f),
         }
     }

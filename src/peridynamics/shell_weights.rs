@@ -145,8 +145,8 @@ pub enum ShellError {
     },
     /// No factors of at least [`SMALLEST_SHELL_FACTOR`] meet the conditions.
     #[error(
-        "isotropic shell weights: in {dimension}D, m = {ratio} leaves {} shell(s) with weight, |k|^2 in {squares:?}, and no \
-         positive weights make them isotropic; use a wider horizon, another influence function or plain weights",
+        "`peridynamics.weights`: in {dimension}D, a horizon of {ratio} spacings leaves {} kind(s) of bonds with weight (|k|^2 in {squares:?} spacings), and no \
+         positive weights make them isotropic; make peridynamics.horizon larger or the spacing smaller (three spacings are usual), or take another influence function or plain weights",
         squares.len()
     )]
     NotIsotropic {
@@ -458,7 +458,9 @@ mod tests {
         .unwrap_err()
         .to_string();
         assert!(
-            error.contains("2D, m = 1") && error.contains("[1]") && error.contains("wider horizon"),
+            error.contains("2D, a horizon of 1 spacings")
+                && error.contains("[1]")
+                && error.contains("horizon larger"),
             "{error}"
         );
         // Diagonal bonds alone are as anisotropic as axial ones.

@@ -50,6 +50,14 @@ impl<const D: usize> Impactor<D> {
             _ => None,
         }
     }
+
+    /// Its velocity at time zero, if it moves freely.
+    pub fn thrown(&self) -> Option<Vector<D>> {
+        match self.motion {
+            ImpactorMotion::Free { velocity, .. } => Some(velocity),
+            _ => None,
+        }
+    }
 }
 
 /// Factor of the penalty stiffness in motion, if the scene leaves it out: steps grow shorter by 15 to 30 %.

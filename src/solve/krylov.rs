@@ -44,7 +44,7 @@ impl Default for KrylovParams {
 }
 
 /// What an iteration did.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct KrylovInfo {
     /// Applications of the preconditioned operator.
     pub iterations: usize,
@@ -158,9 +158,7 @@ pub fn conjugate_gradients(
         add_scaled(-step, &q, &mut r);
         residual = norm(&r) / scale;
         progress.advance(1);
-        if progress.asks_to_end() {
-            return Err(KrylovError::Interrupted { iteration });
-        }
+        goes_on(progress, iteration)?;
         if residual <= params.tolerance {
             return Ok((
                 x,
@@ -199,6 +197,14 @@ fn orthogonalise(basis: &[Vec<f64>], w: &mut [f64]) -> Vec<f64> {
     column
 }
 
+/// Whether nobody asks to end.
+fn goes_on(progress: &dyn Progress, iteration: usize) -> Result<(), KrylovError> {
+    match progress.asks_to_end() {
+        true => Err(KrylovError::Interrupted { iteration }),
+        false => Ok(()),
+    }
+}
+
 /// Solves `A x = b` by GMRES with the preconditioner on the right, restarted, from `x = 0`.
 ///
 /// The residual of the recurrence is the residual of the system itself (right preconditioning). Any fixed linear
@@ -217,13 +223,7 @@ pub fn gmres(
     let mut x = vec![0.0; n];
     let scale = norm(rhs);
     if scale == 0.0 {
-        return Ok((
-            x,
-            KrylovInfo {
-                iterations: 0,
-                relative_residual: 0.0,
-            },
-        ));
+        return Ok((x, KrylovInfo::default()));
     }
     let mut r = rhs.to_vec();
     let mut z = vec![0.0; n];
@@ -245,11 +245,7 @@ pub fn gmres(
             residual = least.push(column) / scale;
             iterations += 1;
             progress.advance(1);
-            if progress.asks_to_end() {
-                return Err(KrylovError::Interrupted {
-                    iteration: iterations,
-                });
-            }
+            goes_on(progress, iterations)?;
             // a vanishing new direction means that the solution lies in the space already spanned
             if residual <= params.tolerance || size <= 1e-14 * before {
                 break;

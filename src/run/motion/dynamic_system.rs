@@ -159,8 +159,8 @@ fn failure_text<const D: usize>(
     match (stretches, breaking.fracture) {
         (Some(s), Some(Fracture::Energy(g))) => {
             let takes = match breaking.calibration {
-                CalibrationSpec::Lattice => "a plane of the lattice takes it",
-                CalibrationSpec::Continuum => "a continuous family takes it",
+                CalibrationSpec::Lattice => "bonds through a plane of the lattice take it",
+                CalibrationSpec::Continuum => "bonds through a plane of a continuous body take it",
             };
             format!("{s}, the fracture energy is {g:e}: {takes}")
         }
@@ -185,7 +185,7 @@ fn tell_bonds<const D: usize>(
     if model.body().is_some() {
         let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
             _ if is_linear => "",
-            (Interface::Faces, true) => "; those cut at the seam likewise",
+            (Interface::Faces, true) => ", as do bonds that end on faces of elements",
             (Interface::Faces, false) => {
                 "; within two horizons of the seam they are linear and do not break"
             }

@@ -39,6 +39,8 @@ const RESOLVED: f64 = 8.0;
 pub struct ImpactRecord<const D: usize> {
     impact: Arc<Impact<D>>,
     names: Vec<String>,
+    /// Velocities at time zero of those that move freely.
+    thrown: Vec<Option<Vector<D>>>,
     /// The largest force of each so far.
     pub peaks: Vec<Peak>,
 }
@@ -50,6 +52,7 @@ impl<const D: usize> ImpactRecord<D> {
         Self {
             impact,
             names: impactors.iter().map(|i| i.name.clone()).collect(),
+            thrown: impactors.iter().map(Impactor::thrown).collect(),
             peaks: peaks.map_or_else(none, <[Peak]>::to_vec),
         }
     }
@@ -142,6 +145,9 @@ impl<const D: usize> ImpactRecord<D> {
                 position: place.as_slice().to_vec(),
                 velocity: velocity.as_slice().to_vec(),
                 momentum: mass.map(|m| (velocity * m).as_slice().to_vec()),
+                transferred: mass
+                    .zip(self.thrown[k])
+                    .map(|(m, v0)| ((v0 - velocity) * m).as_slice().to_vec()),
                 peak_force: self.peaks[k].force,
                 peak_time: self.peaks[k].time,
                 peak_sites: self.peaks[k].contact.sites,

@@ -120,16 +120,14 @@ fn load_steps<const D: usize>(
     let near = near.as_ref().map(|f| BodyOnly::new(f, model));
     let near = near.as_ref().map(|f| f as &dyn LinearMap);
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
-    let seconds = taken?;
     choices.push(Decision {
         choice: format!("{} products or passes", observer.iterations),
         why: "of all load steps of this run".to_owned(),
     });
-    let summary = observer.summary(system.as_ref(), first, seconds)?;
+    let summary = observer.summary(system.as_ref(), first, taken?)?;
     let mut told = warnings(model, laid_out.joining, &laid_out.proof);
     told.extend(locking(model, &model.local_laws(&rest.local_laws)));
     told.extend(summary.warnings.iter().cloned());
-    told.extend(summary.rotation.as_ref().map(Rotation::warning));
     Ok(RunSummary {
         scene: laid_out.title,
         coupling: laid_out.joining.name.to_owned(),
@@ -471,6 +469,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             warnings: warnings
                 .chain(impacts.flat_map(ImpactRecord::warnings))
                 .chain(created_energy(model, &motion, &state.u))
+                .chain(self.rotation.as_ref().map(Rotation::warning))
                 .collect(),
             dimension: D,
             applied,

@@ -313,7 +313,8 @@ fn unbalanced<const D: usize>(
         .iter()
         .map(|&s| cut_bonds_reach(model, s))
         .fold(0.0, f64::max);
-    let boundary = Boundary::new(model, subject.conditions, reach + widest, (low, high));
+    let widest = reach + widest + model.spacing();
+    let boundary = Boundary::new(model, subject.conditions, widest, (low, high));
     let classified: Vec<Class> = off
         .par_iter()
         .map_init(
@@ -383,15 +384,6 @@ fn class<const D: usize>(
     let model = subject.model;
     let x = &model.sites[site as usize].position;
     let reach = reach + cut_bonds_reach(model, site);
-    let near: Vec<(usize, f64)> = boundary.near(x, reach).collect();
-    // of equal distances, the first
-    let nearest = near.iter().min_by(|a, b| a.1.total_cmp(&b.1));
-    let is_alone = nearest.is_some_and(|(m, _)| {
-        let n = &boundary.normals[*m];
-        let mut others = near.iter();
-        others.all(|(f, _)| boundary.normals[*f].dot(n) > 0.99)
-    });
-    let facet = nearest.map(|(f, _)| *f);
     let taken;
     let columns: &[u32] = match subject.stiffness {
         Some(stiffness) => stiffness.row(site as usize).0,
@@ -405,11 +397,21 @@ fn class<const D: usize>(
         .iter()
         .filter(|&&c| matches!(model.sites[c as usize].kind, SiteKind::Point(_)))
         .count();
+    let is_seam = points > 0 && points < columns.len();
+    // where a surface cuts the lattice, points of the last layer stand for more or less than their cells
+    let near: Vec<(usize, f64)> = boundary.near(x, reach + model.spacing()).collect();
+    // of equal distances, the first
+    let nearest = near.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+    let is_alone = nearest.is_some_and(|(m, _)| {
+        let n = &boundary.normals[*m];
+        let mut others = near.iter();
+        others.all(|(f, _)| boundary.normals[*f].dot(n) > 0.99)
+    });
+    let facet = nearest.map(|(f, _)| *f);
     // rows that broken bonds are missing from, or in whose families they are missing
     let is_broken = columns
         .iter()
         .any(|c| subject.damaged.binary_search(c).is_ok());
-    let is_seam = points > 0 && points < columns.len();
     let is_cracked = is_broken || boundary.is_near_crack(x, reach);
     let class = match (is_seam, facet, is_cracked) {
         _ if boundary.is_near_border(x, reach) => RowClass::Border,

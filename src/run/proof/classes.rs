@@ -84,9 +84,11 @@ impl Skin {
     /// What to do about surfaces, in words.
     fn remedy(self) -> &'static str {
         match self {
-            Self::Possible => "zones.skin = \"free-surfaces\" puts elements there",
+            Self::Possible => {
+                "zones.skin = \"free-surfaces\" puts elements there, through which no crack comes"
+            }
             Self::Crossed => {
-                "a crack or void passes through the cells there, which elements cannot carry: a smaller horizon makes the layer thinner"
+                "a crack or void passes through the cells there, which elements cannot carry; a smaller horizon makes the layer thinner"
             }
             Self::NoElements => {
                 "elements there (coupling = \"truncated\" and zones.skin = \"free-surfaces\") or a smaller horizon help"
@@ -101,7 +103,7 @@ impl Skin {
                 "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface"
             }
             Self::Crossed => {
-                "a crack or void passes through the cells there, so that the zone has to end in the surface: a smaller horizon makes the layer thinner"
+                "a crack or void passes through the cells there, so that the zone has to end in the surface; a smaller horizon makes the layer thinner"
             }
         }
     }
@@ -253,13 +255,17 @@ fn verdict(rows: &Unbalanced, layout: Layout) -> Option<Finding> {
         return None;
     }
     if rows.is_unpredictable && is_surface && rows.residual >= warn {
+        let smaller = match remedy.contains("smaller horizon") {
+            true => "",
+            false => ", or take a smaller horizon",
+        };
         return Some(Finding {
             severity: Severity::Warning,
             place: rows.at.clone(),
             value: rows.residual,
             limit: warn,
             message: format!(
-                "a uniform stress is out of balance {what} by {} of it per spacing near {}, and what becomes of it cannot be predicted, as where a body is thinner than its families are wide; {remedy}, or take a smaller horizon",
+                "a uniform stress is out of balance {what} by {} of it per spacing near {}; the error of the stress there cannot be predicted, as in a body thinner than two horizons; {remedy}{smaller}",
                 number(rows.residual),
                 place(&rows.at)
             ),

@@ -78,7 +78,11 @@ pub(super) fn ratio(effort: Effort) -> Vec<Row> {
             let result = result.map(|s| s.residual);
             rows.push(if m < 2f64.sqrt() {
                 // bonds along the axes alone carry no shear
-                refused(&case, result, &["isotropic shell weights", "horizon"])
+                refused(
+                    &case,
+                    result,
+                    &["peridynamics.weights", "isotropic", "horizon"],
+                )
             } else {
                 kept(&case, "relative residual", result, RESIDUAL_LIMIT)
             });
