@@ -99,7 +99,7 @@ def test_ctrl_c_ends_a_run_within_a_load_step(pulse: dict[str, Any], tmp_path: P
     # so many passes take an hour
     pulse["solve"] = {"quasi-static": {"steps": 1, "method": "relaxation", "tolerance": 1e-10, "max-iterations": 100_000_000}}
     scene = bondline.Scene.from_dict(pulse, name="long")
-    times: list[float] = []
+    times: list[float | None] = []
     timer = after(1.0, _thread.interrupt_main)
     begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
