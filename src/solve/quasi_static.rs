@@ -181,11 +181,13 @@ pub fn run(
         time: 0.0,
         interval: Interval::AT_ONCE,
         tangent: Tangent::AtRest,
+        is_torn: false,
     };
     let mut values = vec![0.0; prescribed.len()];
     let mut info = QuasiStaticInfo::default();
     while let Some(time) = times(state.step) {
         work.step = state.step;
+        work.is_torn = state.broken > 0;
         let before = state.step.checked_sub(1).and_then(times);
         let mut account = work.apply_load(drive, before, time, &mut values, &state.u)?;
         let predicted = work.set_out(&mut state.u, &prescribed, &values)?;
@@ -293,6 +295,7 @@ impl Run<'_> {
             self.system.account_for_breaks(&Halfway::at(u));
             broken += now;
             rounds += 1;
+            self.is_torn = true;
             self.aids.progress.tell(&format!(
                 "{iterations} iterations, {broken} bonds broken in this load step"
             ));

@@ -39,11 +39,13 @@ impl Observer for Rows {
     fn snapshot(&self, _snapshot: Snapshot) {}
 }
 
-/// The rows of a scene, and the seconds that it took.
+/// The rows of a scene, and what it took.
 pub(crate) struct Seen {
     rows: Vec<Named>,
     /// Seconds of wall time.
     pub seconds: f64,
+    /// Products with the stiffness, or passes over the bonds, of its solver.
+    pub iterations: usize,
 }
 
 impl Seen {
@@ -94,12 +96,13 @@ fn run_scene_in(text: &str, overrides: &[String], directory: &Path) -> Result<Se
         observer: Some(&rows),
         ..RunOptions::default()
     };
-    scene
+    let summary = scene
         .run_with(&options, &Silent)
         .map_err(|e| e.to_string())?;
     let rows = rows.0.into_inner();
     Ok(Seen {
         rows: rows.unwrap_or_else(PoisonError::into_inner),
         seconds: start.elapsed().as_secs_f64(),
+        iterations: summary.iterations,
     })
 }

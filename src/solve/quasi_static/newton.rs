@@ -24,7 +24,8 @@ const SLOW: f64 = 0.1;
 /// The residual of a linear solve for a force that is not linear: what is solved further is lost to the next correction.
 const FORCING: f64 = 1e-3;
 
-/// So many corrections in a row that leave more than half of the residual lead nowhere: what hangs by few bonds turns too far with each.
+/// So many corrections in a row that leave more than half of the residual lead nowhere in a body of which bonds are broken: what hangs by few of them turns too far
+/// with each. In a whole body they are slow where flow spreads, and lead on.
 const MOST_SLOW: usize = 3;
 
 /// Least fall of the residual over what the length of a correction promises (Armijo's condition).
@@ -256,7 +257,7 @@ impl Run<'_> {
                 continue;
             };
             let is_slow = self.tangent == Tangent::Present && now.size > 0.5 * residual.size;
-            slow = if is_slow && !is_linear { slow + 1 } else { 0 };
+            slow = if is_slow && self.is_torn { slow + 1 } else { 0 };
             if now.size > SLOW * residual.size {
                 self.tangent = Tangent::Present;
             }

@@ -50,6 +50,8 @@ pub(super) struct Run<'a> {
     pub interval: Interval,
     /// Which tangent leads to equilibrium in this load step.
     pub tangent: Tangent,
+    /// Whether bonds are broken.
+    pub is_torn: bool,
 }
 
 /// `‖f − F‖₂` on free dofs.
