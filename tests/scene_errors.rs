@@ -409,6 +409,14 @@ fn wrong_overrides() {
         "`spline` is not known in `coupling`",
         "did you mean `splice`?",
     );
+    let e = parse(RIGHT, &["materials.plate.fracture-energy=1"]).unwrap_err();
+    check(
+        &e,
+        SceneErrorKind::UnknownKey,
+        "fracture-energy",
+        "`fracture-energy` is not known in `materials.plate`",
+        "write it as `materials.plate.bond-based.fracture-energy`",
+    );
     let e = parse(RIGHT, &["horizon"]).unwrap_err();
     check(
         &e,
@@ -487,7 +495,48 @@ fn templates_are_right_and_never_overwritten() {
 }
 
 #[test]
+fn keys_in_the_wrong_table() {
+    let unread = |from: &str, to: &str| {
+        assert!(RIGHT.contains(from), "{from}");
+        parse(&RIGHT.replacen(from, to, 1), &[]).unwrap_err()
+    };
+    let e = unread(
+        "[materials.plate.bond-based]\nyoungs-modulus = 200",
+        "[materials.plate]\nyoungs-modulus = 200",
+    );
+    check(
+        &e,
+        SceneErrorKind::UnknownKey,
+        "youngs-modulus",
+        "`youngs-modulus` is not known in `materials.plate`",
+        "`materials.plate.lps.youngs-modulus`",
+    );
+    let e = unread(
+        "bond-based]\nyoungs-modulus = 200",
+        "bond-based]\nyoungs-modulus = 200\npoisson-ratio = 0.3",
+    );
+    check(
+        &e,
+        SceneErrorKind::UnknownKey,
+        "poisson-ratio",
+        "`poisson-ratio` is not known in `materials.plate.bond-based`",
+        "1/3 in plane stress",
+    );
+    let e = parse("kinematics = \"solid\"\nmesh.path = \"a.msh\"", &[]).unwrap_err();
+    check(
+        &e,
+        SceneErrorKind::UnknownKey,
+        "path",
+        "`path` is not known in `mesh`",
+        "mesh.file.path",
+    );
+}
+
+#[test]
 fn wrong_numbers() {
+    let text = RIGHT.replacen("youngs-modulus = 200", "youngs-modulus = \"3 GPa\"", 1);
+    let e = parse(&text, &[]).unwrap_err();
+    assert!(e.message().contains("a number has no unit here"), "{e}");
     let e = wrong("youngs-modulus = 200", "youngs-modulus = -200");
     check(
         &e,

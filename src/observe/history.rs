@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::ObserveError;
 use super::csv::{CsvTable, Entry};
 
-/// A table that is made with its first row.
+/// A table that is made with its first row, or before.
 #[derive(Debug)]
 pub struct History {
     path: PathBuf,
@@ -63,14 +63,22 @@ impl History {
         &self.header
     }
 
-    /// Where the table is, once it has a row.
+    /// Where the table is, once it is begun.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether there is a row.
+    /// Whether the table is there.
     pub fn is_begun(&self) -> bool {
         self.table.is_some()
+    }
+
+    /// Makes the table, if it is not there, so that it has its header also where no row follows.
+    ///
+    /// # Errors
+    /// As [`CsvTable::create`].
+    pub fn begin(&mut self) -> Result<(), ObserveError> {
+        self.begun().map(drop)
     }
 
     /// Appends a row.
@@ -78,14 +86,17 @@ impl History {
     /// # Errors
     /// As [`CsvTable::entries`].
     pub fn row(&mut self, entries: &[Entry]) -> Result<(), ObserveError> {
-        let table = match &mut self.table {
+        self.begun()?.entries(entries)
+    }
+
+    fn begun(&mut self) -> Result<&mut CsvTable, ObserveError> {
+        Ok(match &mut self.table {
             Some(table) => table,
             none => {
                 let columns: Vec<&str> = self.header.iter().map(String::as_str).collect();
                 none.insert(CsvTable::create(&self.path, &columns)?)
             }
-        };
-        table.entries(entries)
+        })
     }
 
     /// Forces the rows to the disk and returns the length of the file, for a checkpoint.

@@ -321,7 +321,7 @@ fn steps<const D: usize>(
         motion: Some(motion_of(model, &pace, seconds_per_step)),
         ..prediction(&laid_out, held.len(), files, Some(state_bytes))
     };
-    prediction.warnings = warnings(model, laid_out.joining, &prediction);
+    prediction.warnings = warnings(model, laid_out.rest, laid_out.joining, &prediction)?;
     holds(&prediction)?;
     Ok(prediction)
 }
@@ -378,7 +378,8 @@ pub(crate) fn load_steps<const D: usize>(
         progress.finish();
         let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);
         factors(&laid_out, spec, &held, &mut prediction, progress)?;
-        prediction.warnings = warnings(laid_out.model, laid_out.joining, &prediction);
+        prediction.warnings =
+            warnings(laid_out.model, laid_out.rest, laid_out.joining, &prediction)?;
         prediction.warnings.push(format!(
             "the time of {} load steps is not in the estimate: it depends on the bonds that break",
             spec.steps

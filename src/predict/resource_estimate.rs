@@ -29,7 +29,7 @@ use crate::run::loads;
 use crate::run::proof::{self, Subject};
 use crate::run::setup::{self, RunSettings};
 use crate::run::solution::{self, Solved};
-use crate::run::warnings::doubts;
+use crate::run::warnings::{doubts, unusual_stretch};
 use crate::scene::Scene;
 use crate::scene::spec::{CouplingTraits, ZonesNeeded};
 use crate::solve::FreeDofs;
@@ -182,7 +182,7 @@ pub(crate) fn predict<const D: usize>(
         no_error: None,
         motion: None,
     };
-    prediction.warnings = warnings(&model, joining, &prediction);
+    prediction.warnings = warnings(&model, &rest, joining, &prediction)?;
     holds(&prediction)?;
     Ok(prediction)
 }
@@ -334,11 +334,16 @@ fn solver_decisions<const D: usize>(
 /// Bonds beyond which a scene deserves a second thought.
 const MANY_BONDS: usize = 100_000_000;
 
+/// What `check` warns of.
+///
+/// # Errors
+/// [`RunError`] for a fracture energy that gives no stretch.
 pub(crate) fn warnings<const D: usize>(
     model: &Model<D>,
+    rest: &RunSettings<D>,
     joining: CouplingTraits,
     prediction: &Prediction,
-) -> Vec<String> {
+) -> Result<Vec<String>, RunError> {
     let mut list = Vec::new();
     // families are judged by the one spacing of a model
     let alone =
@@ -381,6 +386,7 @@ pub(crate) fn warnings<const D: usize>(
         }
     }
     list.extend(doubts(model, joining));
+    list.extend(unusual_stretch(model, rest)?);
     let proof = &prediction.proof;
     list.extend(proof.messages(Severity::Warning).map(str::to_owned));
     if prediction.sizes.bonds > MANY_BONDS {
@@ -389,7 +395,7 @@ pub(crate) fn warnings<const D: usize>(
             grouped(prediction.sizes.bonds)
         ));
     }
-    list
+    Ok(list)
 }
 
 /// Smallest and largest factor of a shell of the lattice; none where the points are no lattice or no factors exist.

@@ -45,6 +45,7 @@ mod samples;
 mod sections;
 pub mod setup;
 pub mod solution;
+mod solution_samples;
 mod springs;
 mod statics;
 mod stress_probes;

@@ -1,9 +1,9 @@
 //! Stresses at probes with each row of a history.
 
 use super::solution::Solved;
+use super::solution_samples::Intact;
 use super::stress_settings::StressSettings;
 use super::stresses::{KnownStresses, names};
-use super::write::Intact;
 use crate::coupling::{Carrier, Model, Sampler};
 use crate::scene::validated::Output;
 use crate::tensor::Vector;

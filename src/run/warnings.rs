@@ -7,6 +7,9 @@ use crate::material::LocalLaw;
 use crate::mesh::CellShape;
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::report::number;
+use crate::run::error::RunError;
+use crate::run::motion::dynamic_system::failing_stretch;
+use crate::run::setup::RunSettings;
 use crate::scene::spec::CouplingTraits;
 use crate::shape::Barrier;
 use crate::solve::statics::MethodUsed;
@@ -27,6 +30,27 @@ pub(crate) fn warnings<const D: usize>(
 ) -> Vec<String> {
     let proved = proof.messages(Severity::Warning).map(str::to_owned);
     proved.chain(doubts(model, joining)).collect()
+}
+
+/// Stretches at which bonds of solids break: the least is that of concrete (100 J/m², 30 GPa) with a horizon of 10 m, brittle parts
+/// of millimetres have 1e-4 to 1e-2, and rubber less than the largest.
+const USUAL_STRETCHES: std::ops::RangeInclusive<f64> = 2e-5..=1.0;
+
+/// A stretch at which bonds break, or soften, that no solid has: constants in other units than lengths, most likely.
+///
+/// # Errors
+/// [`RunError`] for a fracture energy that gives no stretch.
+pub(crate) fn unusual_stretch<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+) -> Result<Option<String>, RunError> {
+    let stretch = failing_stretch(model, rest)?;
+    Ok(stretch.filter(|s| !USUAL_STRETCHES.contains(s)).map(|s| {
+        format!(
+            "bonds break at a stretch of {}: check the units of Young's modulus, fracture energy and lengths, which must be consistent (N, m, Pa and J/m², or N, mm, MPa and N/mm)",
+            number(s)
+        )
+    }))
 }
 
 /// Points of a torn body whose law no longer responds.

@@ -148,9 +148,11 @@ impl Expression {
         let root = parser.comparison()?;
         parser.skip_blanks();
         if parser.at < text.len() {
-            return Err(parser.error(
-                "an operator such as `*` is missing here, or this is one bracket too many",
-            ));
+            let is_word = text[parser.at..].starts_with(char::is_alphabetic);
+            return Err(parser.error(match is_word && matches!(root, Term::Constant(_)) {
+                true => "a number has no unit here: type it in the units of the scene, which are yours and consistent throughout; between factors an operator such as `*` is missing",
+                false => "an operator such as `*` is missing here, or this is one bracket too many",
+            }));
         }
         Ok(Self {
             text: text.to_owned(),

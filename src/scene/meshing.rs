@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::{SceneError, SceneErrorKind, closest};
 use super::region::{corners, position};
 use super::source::Span;
 use super::spec::{
@@ -27,7 +27,12 @@ fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Me
     let failed = |error: MeshError| {
         SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
             .label(file.path.span.clone(), "this mesh")
-            .help("the path is relative to the scene file")
+            .help(match similar(&path) {
+                Some(name) => {
+                    format!("did you mean `{name}`? The path is relative to the scene file")
+                }
+                None => "the path is relative to the scene file".to_owned(),
+            })
     };
     let order = match file.order {
         FileOrderSpec::Kept => Order::Kept,
@@ -51,6 +56,22 @@ fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Me
             .help("straighten the sides of the cell, refine the mesh there, or set order = \"linear\"")
     })?;
     Ok(mesh)
+}
+
+/// The file beside a missing one whose name is most like its own.
+fn similar(path: &Path) -> Option<String> {
+    let wanted = path.file_name()?.to_str()?;
+    if path.exists() {
+        return None;
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let names = std::fs::read_dir(folder.unwrap_or(Path::new(".")))
+        .ok()?
+        .flatten();
+    let names: Vec<String> = names
+        .filter_map(|e| e.file_name().into_string().ok())
+        .collect();
+    closest(wanted, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
 fn raised<const D: usize>(mut mesh: Mesh<D>) -> Mesh<D> {

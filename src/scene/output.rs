@@ -1,12 +1,14 @@
 //! What a scene writes: lines, probes, tips of cracks.
 
+use toml::Spanned;
+
 use super::bounds_checks;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::region::{self, Region};
 use super::section;
-use super::spec::{OutputSpec, SceneSpec, TipSpec};
+use super::spec::{OutputSpec, SceneSpec, SolveSpec, TipSpec};
 use super::validated::{Output, Tip};
 use super::value::Text;
 use crate::fem::Locator;
@@ -30,6 +32,10 @@ pub(crate) fn output<const D: usize>(
     name: &str,
 ) -> Result<Output<D>, SceneError> {
     let o = &spec.output;
+    let moves = !matches!(
+        spec.solve.as_ref().map(Spanned::get_ref),
+        None | Some(SolveSpec::Static(_))
+    );
     if let Some(name) = &o.name {
         part_of_a_file_name("output.name", name)?;
     }
@@ -51,7 +57,7 @@ pub(crate) fn output<const D: usize>(
         let positions = (0..n)
             .map(|i| from.lerp(&to, i as f64 / (n - 1) as f64))
             .collect();
-        has_own_table(&place, key, o)?;
+        has_own_table(&place, key, o, moves)?;
         lines.push((key.value.clone(), positions));
     }
     let locator = Locator::new(mesh, 0..mesh.cell_count());
@@ -151,6 +157,7 @@ impl<const D: usize> Output<D> {
                 .map(str::to_owned),
             );
             ends.extend(self.tips.iter().map(|t| format!("_tip_{}.csv", t.name)));
+            ends.extend(self.lines.iter().map(|(line, _)| format!("_{line}.csv")));
         } else {
             if self.vtu {
                 ends.push(".vtu".to_owned());
@@ -171,17 +178,29 @@ impl<const D: usize> Output<D> {
     }
 }
 
-/// Refuses a line whose table would be that of all probes or all sections.
-fn has_own_table(place: &str, key: &Text, o: &OutputSpec) -> Result<(), SceneError> {
-    let taken = [
-        (PROBES, o.probes.is_empty()),
-        (SECTIONS, o.sections.is_empty()),
-    ];
-    match taken.iter().find(|(t, none)| key.value == *t && !none) {
+/// Refuses a line whose table would be another one: in a static scene that of all probes or all sections, in others the history or that of a tip.
+fn has_own_table(place: &str, key: &Text, o: &OutputSpec, moves: bool) -> Result<(), SceneError> {
+    let mut taken: Vec<(String, String)> = Vec::new();
+    if moves {
+        taken.push(("history".to_owned(), "the history".to_owned()));
+        let of_tips = o
+            .tips
+            .keys()
+            .map(|t| (format!("tip_{t}"), format!("the table of the tip `{t}`")));
+        taken.extend(of_tips);
+    } else {
+        let of_all = [
+            (PROBES, o.probes.is_empty()),
+            (SECTIONS, o.sections.is_empty()),
+        ];
+        let typed = of_all.iter().filter(|(_, none)| !none);
+        taken.extend(typed.map(|(t, _)| ((*t).to_owned(), format!("the table of all {t}"))));
+    }
+    match taken.iter().find(|(name, _)| key.value == *name) {
         None => Ok(()),
-        Some((table, _)) => Err(SceneError::new(
+        Some((_, table)) => Err(SceneError::new(
             SceneErrorKind::WrongValue,
-            format!("the line `{place}` has the name of the table of all {table}"),
+            format!("the line `{place}` has the name of {table}"),
         )
         .label(key.span.clone(), "both would be one file")
         .help("give the line another name")),

@@ -6,7 +6,7 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::{SceneError, SceneErrorKind, closest};
 use std::sync::LazyLock;
 
 use super::spec::CouplingSpec;
@@ -146,9 +146,11 @@ pub(crate) fn merge<'i>(
     }
 }
 
+/// Whether all keys of `new` are choices, none of which `old` has: a key that is none goes in beside what stands there, and is told as a mistake.
 fn chooses_otherwise(path: &[String], old: &DeTable<'_>, new: &DeTable<'_>) -> bool {
     let path: Vec<&str> = path.iter().map(String::as_str).collect();
-    options(&path).is_some() && !new.keys().any(|k| old.contains_key(k.get_ref().as_ref()))
+    let mut keys = new.keys().map(|k| k.get_ref().as_ref());
+    options(&path).is_some_and(|all| keys.all(|k| all.contains(&k) && !old.contains_key(k)))
 }
 
 fn text_to_table(value: &mut Spanned<DeValue<'_>>, path: &[String]) {
@@ -214,14 +216,21 @@ fn check(
             let mut keys: Vec<_> = table.keys().collect();
             keys.sort_by_key(|k| k.span().start);
             // a key that is no choice at all is the likelier mistake
-            if let Some(stranger) = keys
-                .iter()
-                .find(|k| !options.contains(&k.get_ref().as_ref()))
-            {
-                return Err(unknown(stranger.get_ref(), &place, options)
-                    .label(stranger.span(), "not known here"));
-            }
             let names: Vec<&str> = keys.iter().map(|k| k.get_ref().as_ref()).collect();
+            if let Some(stranger) = (keys.iter()).find(|k| !options.contains(&k.get_ref().as_ref()))
+            {
+                let word = stranger.get_ref();
+                let chosen: Vec<&str> = (names.iter().copied())
+                    .filter(|n| options.contains(n))
+                    .collect();
+                let mut error = unknown(word, &place, options);
+                if let ([chosen], None) = (&chosen[..], closest(word, options.iter().copied())) {
+                    error = error.help(format!(
+                        "write it as `{place}.{chosen}.{word}`, if it belongs to the `{chosen}` chosen there"
+                    ));
+                }
+                return Err(error.label(stranger.span(), "not known here"));
+            }
             let mut error = SceneError::new(
                 SceneErrorKind::Choice,
                 format!("`{place}` holds {} at once", quoted(&names)),
@@ -255,7 +264,15 @@ pub(crate) fn unknown(word: &str, place: &str, known: &[&str]) -> SceneError {
     } else {
         format!("known here: {}", quoted(known))
     };
-    let help = match super::error::closest(word, known.iter().copied()) {
+    let path: Vec<&str> = place.split('.').collect();
+    let help = match closest(word, known.iter().copied()) {
+        _ if path[..] == ["mesh"] && word == "path" => format!("write mesh.file.path = \"part.msh\"; {list}"),
+        _ if matches!(path[..], ["materials", _, "bond-based"]) && word == "poisson-ratio" => {
+            "a bond-based material has the Poisson's ratio 1/3 in plane stress and 1/4 in plane strain and in solids: leave it out, or take `lps`, which has any".to_owned()
+        }
+        None if matches!(path[..], ["materials", _]) => {
+            format!("a material names its law first, and its constants below it, as in `{place}.lps.youngs-modulus`; {list}")
+        }
         // a line below a table's header belongs to that table
         _ if !place.is_empty() && TOP.contains(&word) => format!(
             "`{word}` belongs at the top of the scene: move the line above the first [table], or write it as [{word}]; {list}"

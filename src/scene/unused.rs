@@ -3,12 +3,10 @@
 //! A shape beside the body is no mistake of the format, and nothing else tells of it: the run goes on as if it had not been typed. So each is warned of
 //! by its name. Points are taken where the lattice or the cells of the zone have them, and the search ends with the first that is touched.
 
-use toml::Spanned;
-
 use super::material_interfaces;
 use super::peridynamics::Peridynamics;
 use super::region::Region;
-use super::spec::{SceneSpec, SolveSpec, ZonesNeeded};
+use super::spec::{SceneSpec, ZonesNeeded};
 use super::validated::Scene;
 use crate::coupling::Zone;
 use crate::observe::report::number;
@@ -42,11 +40,6 @@ impl<const D: usize> Parts<'_, D> {
                     "`{key}` of the material `{name}` is not used: the body is all finite elements, and they do not break"
                 ));
             }
-        }
-        let solve = self.spec.solve.as_ref().map(Spanned::get_ref);
-        let static_scene = matches!(solve, None | Some(SolveSpec::Static(_)));
-        if !self.spec.output.lines.is_empty() && !static_scene {
-            list.push("`output.lines` is not written in time, nor in load steps: use `output.probes`, or a viewer's plot over a line".to_owned());
         }
         if self.spec.zones.transition.is_some() && matches!(joining.zones, ZonesNeeded::Nonlocal) {
             list.push(format!(

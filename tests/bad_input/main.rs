@@ -433,6 +433,15 @@ fn mesh_missing() {
         &[],
         &["`mesh.file.path`", "none.msh", "check that the file exists"],
     );
+    // the scene itself lies in the folder
+    wrong_scene(
+        &[(
+            "[mesh.rectangle]\nmin = [0, 0]\nmax = [1, 1]\nx = { cells = 20 }\ny = { cells = 20 }\n\n",
+            "[mesh.file]\npath = \"scenes.toml\"\n\n",
+        )],
+        &[],
+        &["`mesh.file.path`", "did you mean `scene.toml`?"],
+    );
 }
 
 #[test]

@@ -329,3 +329,26 @@ output.vtu = false",
         assert!(said.contains(part), "{said}");
     }
 }
+
+/// A modulus typed in GPa beside lengths in metres, and one in Pa beside lengths in millimetres.
+#[test]
+fn constants_in_mixed_units_are_told() {
+    let scene = |modulus: &str, energy: &str| {
+        format!(
+            "kinematics = 'plane-stress'
+coupling = 'nonlocal'
+mesh.rectangle = {{ min = [0, 0], max = [0.01, 0.01], x = {{ cells = 10 }}, y = {{ cells = 10 }} }}
+materials.glass.bond-based = {{ youngs-modulus = {modulus}, fracture-energy = {energy}, density = 2440 }}
+peridynamics.horizon = 0.003
+solve.explicit = {{ duration = 1e-9, outputs = 1 }}
+output.vtu = false"
+        )
+    };
+    for (modulus, energy) in [("72", "9"), ("72e9", "1e-6")] {
+        let said = said_by(&scene(modulus, energy));
+        assert!(said.contains("bonds break at a stretch of"), "{said}");
+        assert!(said.contains("check the units"), "{said}");
+    }
+    let said = said_by(&scene("72e9", "9"));
+    assert!(!said.contains("check the units"), "{said}");
+}

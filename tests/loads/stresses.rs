@@ -19,6 +19,7 @@ vtu = false
 stresses = ["von-mises", "max-principal"]
 probes.element.at = [0.4, 0.55]
 probes.point.at = [2, 0.5]
+lines.through = { from = [0.4, 0.55], to = [3.6, 0.55], samples = 9 }
 "#;
 
 const COLUMNS: [&str; 5] = ["sxx", "sxy", "syy", "von_mises", "max_principal"];
@@ -52,6 +53,16 @@ fn a_plate_that_is_pulled_tells_its_stress_step_by_step() {
         }
         for (half, whole) in rows[1].iter().zip(&rows[2]) {
             assert!((2.0 * half - whole).abs() < 1e-6, "{rows:?}");
+        }
+    }
+    // along the line each state that is shown, the last of them that at rest
+    let time = done.column("scene_through.csv", "time");
+    assert_eq!(time, [[0.0; 9], [0.5; 9], [1.0; 9]].concat());
+    for column in ["x", "ux", "uy", "exx", "sxx", "von_mises", "model"] {
+        let along = done.column("scene_through.csv", column);
+        let still = at_rest.column("scene_through.csv", column);
+        for (last, still) in along[18..].iter().zip(&still) {
+            assert!((last - still).abs() < 1e-6, "{column}: {last} {still}");
         }
     }
     // uniaxial in the plane, ν σ across it

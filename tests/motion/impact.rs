@@ -223,6 +223,21 @@ fn a_cylinder_in_space_is_a_disc_in_the_plane() {
     }
 }
 
+/// A mass that flies the other way.
+#[test]
+fn an_impactor_that_misses_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let away = BAR
+        .replace("x = 0.01 }", "x = -0.01 }")
+        .replace("cells = 800", "cells = 8");
+    write(folder.path(), "bar.toml", &away);
+    let said = run(folder.path(), &["bar.toml"]);
+    assert!(
+        said.contains("impactor `mass` has not touched the body"),
+        "{said}"
+    );
+}
+
 /// A contact a few sites wide is told, with its width: that of a disc, and of a cylinder, whose length does not count.
 #[test]
 fn a_contact_that_is_not_resolved_is_told() {

@@ -295,6 +295,18 @@ fn load_steps_break_bonds_and_resume_to_the_same_bytes() {
     same(&folder.path().join("whole"), &folder.path().join("again"));
 }
 
+/// A script that reads the table of a tip need not know whether anything broke.
+#[test]
+fn a_tip_that_never_begins_has_a_table_without_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = breaking("splice", "implicit").replace("0.012", "0.0001");
+    write(folder.path(), "load.toml", &scene);
+    run(folder.path(), &["load.toml"]);
+    let (header, rows) = table(&folder.path().join("out/load_tip_notch.csv"));
+    assert_eq!(header, ["step", "time", "x", "y", "damage"]);
+    assert!(rows.is_empty(), "{rows:?}");
+}
+
 /// A quarter of a ring from Gmsh, sheared at one end; the seam fits nothing and meets both arcs.
 const RING: &str = r#"
 kinematics = "plane-stress"

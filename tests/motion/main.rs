@@ -63,6 +63,7 @@ x = "0.004 * min(1, t / 8)"
 probes.middle = { at = [6, 2] }
 sections.cut = { point = [6, 3], normal = [1, 0] }
 tips.notch = { direction = [0, -1], threshold = 0.2 }
+lines.through = { from = [1, 2], to = [11, 2], samples = 7 }
 "#;
 
 fn bondline(folder: &Path) -> Command {

@@ -117,16 +117,21 @@ impl<const D: usize> ImpactRecord<D> {
         }
     }
 
-    /// Warns of round impactors that so few sites touch that the peak of the force depends on where these lie.
+    /// Warns of impactors that have not touched the body, and of round ones that so few sites touch that the peak of the force depends on where these lie.
     pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         let impactors = self.impact.impactors().iter();
         let all = impactors.zip(&self.names).zip(&self.peaks);
         all.filter_map(|((impactor, name), peak)| {
+            if peak.force == 0.0 {
+                return Some(format!(
+                    "impactor `{name}` has not touched the body: look at where it begins, which way it moves, and how long the scene lasts"
+                ));
+            }
             let across = peak.contact.across;
             // a plane touches all of a face at once
             let is_round = D > 1 && !matches!(impactor.shape, ImpactorShape::Plane { .. });
             let varies = if across < COARSE { "a third" } else { "a tenth" };
-            (is_round && peak.force > 0.0 && across < RESOLVED).then(|| {
+            (is_round && across < RESOLVED).then(|| {
                 format!(
                     "impactor `{name}`: the contact was {} sites wide at the peak of its force, which may be wrong by {varies}, as nodes and points happen to lie; {RESOLVED} sites resolve it; the momentum that it transfers needs fewer",
                     number(across.round()),

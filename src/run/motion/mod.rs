@@ -23,6 +23,7 @@
 
 pub(crate) mod bounding_boxes;
 pub mod breaks;
+mod crack_growth;
 pub(crate) mod driven_impactors;
 pub mod dynamic_system;
 pub mod explicit;
@@ -39,6 +40,7 @@ pub(crate) mod seen;
 pub mod setup;
 pub(crate) mod step_observer;
 mod supports;
+mod tables;
 pub mod time_dependent_loads;
 pub mod time_step;
 mod tips;

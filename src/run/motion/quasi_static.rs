@@ -30,7 +30,7 @@ use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::springs::Springs;
-use crate::run::warnings::{locking, warnings, without_response};
+use crate::run::warnings::{locking, unusual_stretch, warnings, without_response};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
 use crate::scene::validated::Scene;
@@ -464,11 +464,15 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             nonlocal_share: [0.0; 3],
         };
         let warnings = without_response(system, &state.u).into_iter();
+        let horizons = model.body().map(|body| body.cloud.horizon.iter().copied());
+        let horizon = horizons.into_iter().flatten().fold(0.0, f64::max);
         let impacts = self.recorder.impact.iter();
         Ok(RunSummary {
             warnings: warnings
                 .chain(impacts.flat_map(ImpactRecord::warnings))
                 .chain(created_energy(model, &motion, &state.u))
+                .chain(self.recorder.growth.warning::<D>(horizon))
+                .chain(unusual_stretch(model, self.rest)?)
                 .chain(self.rotation.as_ref().map(Rotation::warning))
                 .collect(),
             dimension: D,

@@ -1,4 +1,4 @@
-//! What a run writes while it goes on: history, VTU files, tips of cracks, checkpoints.
+//! What a run writes while it goes on: history, VTU files, lines, tips of cracks, checkpoints.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,12 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use super::RunOptions;
 use super::breaks::Breaks;
+use super::crack_growth::CrackGrowth;
 use super::impact_record::{ImpactRecord, Peak};
 use super::probe_rows::ProbeRows;
 use super::rezoning::{nonlocal, share};
 use super::section_rows::SectionRows;
 use super::supports::Supports;
-use super::tips::farthest;
+use super::tables::Tables;
 use crate::coupling::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
@@ -142,7 +143,7 @@ pub struct EdgeReached {
 /// What of a run's files belongs to a state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Written {
-    /// Lengths of the history and of the tables of tips.
+    /// Lengths of the history and of the [`Tables`] beside it.
     pub bytes: Vec<u64>,
     /// Times of the VTU files.
     pub times: Vec<f64>,
@@ -150,6 +151,8 @@ pub struct Written {
     pub energy_at_start: f64,
     /// The largest forces of impactors so far.
     pub peaks: Vec<Peak>,
+    /// How far cracks grew.
+    pub growth: CrackGrowth,
 }
 
 /// A state to tell of.
@@ -222,7 +225,7 @@ pub struct Recorder<'a, const D: usize> {
     pub impact: Option<ImpactRecord<D>>,
     breaks: Breaks,
     history: History,
-    tips: Vec<History>,
+    tables: Tables,
     series: Series,
     checkpoint: CheckpointFile,
     options: RunOptions<'a>,
@@ -231,6 +234,8 @@ pub struct Recorder<'a, const D: usize> {
     pub energy_at_start: f64,
     /// Energies of the last row.
     pub last: Row,
+    /// How far cracks grew between rows.
+    pub growth: CrackGrowth,
     /// Seconds that writing took.
     pub seconds: f64,
 }
@@ -266,16 +271,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         header.extend(stress_probes::header(output));
         header.extend(impact.iter().flat_map(ImpactRecord::header));
         let history = table("history", header, 0)?;
-        let tips = output
-            .tips
-            .iter()
-            .enumerate()
-            .map(|(i, tip)| {
-                let header = ["step", "time"].iter().chain(&AXES[..D]).chain(&["damage"]);
-                let header = header.map(|&h| h.to_owned()).collect();
-                table(&format!("tip_{}", tip.name), header, i + 1)
-            })
-            .collect::<Result<_, _>>()?;
+        let tables = Tables::new(output, |name, header, place| table(name, header, place + 1))?;
         let series = match written {
             _ if !options.writes() => Series::new(&output.directory, &output.name),
             Some(w) => Series::resumed(&output.directory, &output.name, w.times.clone()),
@@ -295,13 +291,14 @@ impl<'a, const D: usize> Recorder<'a, D> {
             impact,
             breaks,
             history,
-            tips,
+            tables,
             series,
             checkpoint,
             options,
             last_checkpoint: Instant::now(),
             energy_at_start: written.map_or(0.0, |w| w.energy_at_start),
             last: Row::default(),
+            growth: written.map_or_else(CrackGrowth::default, |w| w.growth),
             seconds: 0.0,
         })
     }
@@ -397,7 +394,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         if self.breaks.may() {
             row.push((state.broken as i64).into());
-            row.push(system.dissipation().map_or(0.0, |d| d.area).into());
+            let area = system.dissipation().map_or(0.0, |d| d.area);
+            self.growth.watch(state, area);
+            row.push(area.into());
         }
         let mut momentum = [0.0; D];
         for (v, m) in state.v.chunks_exact(D).zip(system.mass()) {
@@ -420,44 +419,30 @@ impl<'a, const D: usize> Recorder<'a, D> {
         row.extend(impact.map(Entry::from));
         self.options.keep("history", &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
-        if may_be_damaged && !self.tips.is_empty() {
-            self.tips(moment, positions)?;
-        }
+        self.tables.tips(
+            self.output,
+            &self.options,
+            (state, *system),
+            may_be_damaged,
+            positions,
+        )?;
         self.seconds += begun.elapsed().as_secs_f64();
         Ok(())
     }
 
-    fn tips(
-        &mut self,
-        moment: &Moment<'_>,
-        positions: impl Fn(usize) -> Vector<D>,
-    ) -> Result<(), ObserveError> {
-        let Some(damage) = moment.system.damage() else {
-            return Ok(());
-        };
-        for (tip, table) in self.output.tips.iter().zip(&mut self.tips) {
-            let Some(site) = farthest(tip, &damage, &positions) else {
-                continue;
-            };
-            let mut row: Vec<Entry> =
-                vec![(moment.state.step as i64).into(), moment.state.time.into()];
-            row.extend(positions(site).iter().map(|&x| Entry::from(x)));
-            row.push(damage[site].into());
-            self.options
-                .keep(&format!("tip_{}", tip.name), table, &row)?;
-        }
-        Ok(())
-    }
-
-    /// Writes a VTU file, if the scene wants any, and shows the same to the observer.
+    /// Appends the state to the tables of the lines, writes a VTU file, if the scene wants any, and shows the same to the observer.
     ///
     /// # Errors
-    /// [`ObserveError`] if it cannot be written.
+    /// [`ObserveError`] if a file cannot be written.
     pub fn output(
         &mut self,
         moment: &Moment<'_>,
         solved: &Solved<'_, D>,
     ) -> Result<(), ObserveError> {
+        let begun = Instant::now();
+        self.tables
+            .lines(self.output, &self.options, moment.state, solved)?;
+        self.seconds += begun.elapsed().as_secs_f64();
         let writes = self.output.vtu && self.options.writes();
         if !writes && self.options.observer.is_none() {
             return Ok(());
@@ -526,7 +511,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         let begun = Instant::now();
         let mut bytes = vec![self.history.mark()?];
-        for table in &self.tips {
+        for table in self.tables.iter() {
             bytes.push(table.mark()?);
         }
         self.checkpoint.write(&Saved {
@@ -537,6 +522,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 bytes,
                 times: self.series.times().to_vec(),
                 energy_at_start: self.energy_at_start,
+                growth: self.growth,
                 peaks: self.impact.as_ref().map_or(Vec::new(), |i| i.peaks.clone()),
             },
             edge,
@@ -555,7 +541,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if times > 0 {
             files.push(self.series.collection());
         }
-        let tables = std::iter::once(&self.history).chain(&self.tips);
+        let tables = std::iter::once(&self.history).chain(self.tables.iter());
         files.extend(
             tables
                 .filter(|t| t.is_begun())

@@ -117,7 +117,7 @@ class Result(Frame):
 
     #: What ``bondline run --json`` prints.
     summary: dict[str, Any] = field(default_factory=dict)
-    #: The columns of each table by name: lines and ``probes`` of a static scene, ``history`` and ``tip_NAME`` of a run in time.
+    #: The columns of each table by name: lines, and ``probes`` of a static scene, ``history`` and ``tip_NAME`` of a run in time.
     tables: dict[str, dict[str, NDArray[Any]]] = field(default_factory=dict)
     #: All solutions that were kept.
     kept: tuple[Frame, ...] = ()

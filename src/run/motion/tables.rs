@@ -1,0 +1,113 @@
+//! Tables beside the history: the tip of each crack with every row, and the state along each line with every output.
+
+use super::RunOptions;
+use super::tips::farthest;
+use crate::observe::ObserveError;
+use crate::observe::csv::Entry;
+use crate::observe::history::History;
+use crate::run::solution::Solved;
+use crate::run::solution_samples::{SampledSolution, table_header};
+use crate::scene::validated::Output;
+use crate::solve::explicit::State;
+use crate::system::SemiDiscrete;
+use crate::tensor::Vector;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The tables of a scene's tips and lines, in the order in which it names them.
+pub(super) struct Tables {
+    tips: Vec<History>,
+    lines: Vec<History>,
+}
+
+impl Tables {
+    /// Of a scene; `open` makes the table of a name and some columns at its place among all.
+    ///
+    /// # Errors
+    /// Those of `open`.
+    pub fn new<const D: usize>(
+        output: &Output<D>,
+        open: impl Fn(&str, Vec<String>, usize) -> Result<History, ObserveError>,
+    ) -> Result<Self, ObserveError> {
+        let when = || ["step", "time"].map(str::to_owned).into_iter();
+        let of_tip = AXES[..D].iter().chain(&["damage"]).map(|&h| h.to_owned());
+        let of_tip: Vec<String> = when().chain(of_tip).collect();
+        let tips = output.tips.iter().enumerate();
+        let tips = tips.map(|(i, tip)| open(&format!("tip_{}", tip.name), of_tip.clone(), i));
+        let of_line: Vec<String> = when().chain(table_header::<D>(&output.stresses)).collect();
+        let lines = output.lines.iter().zip(output.tips.len()..);
+        let lines = lines.map(|((name, _), i)| open(name, of_line.clone(), i));
+        Ok(Self {
+            tips: tips.collect::<Result<_, _>>()?,
+            lines: lines.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// All tables.
+    pub fn iter(&self) -> impl Iterator<Item = &History> {
+        self.tips.iter().chain(&self.lines)
+    }
+
+    /// Appends the tips of a state, as far as points are damaged; a table has its header before.
+    ///
+    /// # Errors
+    /// [`ObserveError`] if a row cannot be written.
+    pub fn tips<const D: usize>(
+        &mut self,
+        output: &Output<D>,
+        options: &RunOptions<'_>,
+        (state, system): (&State, &dyn SemiDiscrete),
+        may_be_damaged: bool,
+        positions: impl Fn(usize) -> Vector<D>,
+    ) -> Result<(), ObserveError> {
+        if self.tips.is_empty() {
+            return Ok(());
+        }
+        if options.writes() {
+            self.tips.iter_mut().try_for_each(History::begin)?;
+        }
+        let Some(damage) = system.damage().filter(|_| may_be_damaged) else {
+            return Ok(());
+        };
+        for (tip, table) in output.tips.iter().zip(&mut self.tips) {
+            let Some(site) = farthest(tip, &damage, &positions) else {
+                continue;
+            };
+            let mut row = when(state);
+            row.extend(positions(site).iter().map(|&x| Entry::from(x)));
+            row.push(damage[site].into());
+            options.keep(&format!("tip_{}", tip.name), table, &row)?;
+        }
+        Ok(())
+    }
+
+    /// Appends a state along each line.
+    ///
+    /// # Errors
+    /// [`ObserveError`] if a row cannot be written.
+    pub fn lines<const D: usize>(
+        &mut self,
+        output: &Output<D>,
+        options: &RunOptions<'_>,
+        state: &State,
+        solved: &Solved<'_, D>,
+    ) -> Result<(), ObserveError> {
+        if self.lines.is_empty() || !(options.writes() || options.observer.is_some()) {
+            return Ok(());
+        }
+        let solution = SampledSolution::new(solved);
+        for ((name, positions), table) in output.lines.iter().zip(&mut self.lines) {
+            for values in solution.rows(positions) {
+                let mut row = when(state);
+                row.extend(values.into_iter().map(Entry::from));
+                options.keep(name, table, &row)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The first entries of a row.
+fn when(state: &State) -> Vec<Entry> {
+    vec![(state.step as i64).into(), state.time.into()]
+}

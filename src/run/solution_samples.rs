@@ -1,0 +1,230 @@
+//! A solution at places between its nodes and points: tables along lines and at probes.
+
+use rayon::prelude::*;
+use rustc_hash::FxHashSet;
+
+use super::solution::Solved;
+use super::stresses::{KnownStresses, Place, names};
+use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
+use crate::fem::{self, Locator};
+use crate::scene::spec::StressSpec;
+use crate::shape::Shape;
+use crate::tensor::{Tensor, Vector, strain};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The columns of a table along positions: place, displacement, strain, the stress where it is `asked` for, and the model.
+pub(super) fn table_header<const D: usize>(asked: &[StressSpec]) -> Vec<String> {
+    let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
+    header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
+    for (i, first) in AXES[..D].iter().enumerate() {
+        header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
+    }
+    if !asked.is_empty() {
+        header.extend(names::<D>(asked));
+    }
+    header.push("model".to_owned());
+    header
+}
+
+struct Sample<const D: usize> {
+    displacement: Vector<D>,
+    gradient: Tensor<D>,
+    zone: Zone,
+    /// The stress and the numbers made of it, if they are asked for.
+    stress: Option<(Tensor<D>, Vec<f64>)>,
+}
+
+/// The solution at sites and between them.
+pub(super) struct SampledSolution<'a, const D: usize> {
+    solved: &'a Solved<'a, D>,
+    intact: Intact,
+    known: KnownStresses,
+    sampler: Sampler<'a, D>,
+    body: Locator<D>,
+    tolerance: f64,
+}
+
+impl<'a, const D: usize> SampledSolution<'a, D> {
+    /// Of a solution, with an index of its cells and points.
+    pub fn new(solved: &'a Solved<'a, D>) -> Self {
+        let model = solved.model;
+        let (lo, hi) = model.mesh.bounds();
+        Self {
+            solved,
+            intact: Intact::of(solved),
+            known: match solved.has_derived() {
+                true => KnownStresses::of(solved),
+                false => KnownStresses::default(),
+            },
+            sampler: Sampler::new(model),
+            body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
+            tolerance: 1e-9 * (hi - lo).norm(),
+        }
+    }
+
+    /// Whether a position lies in the mesh and in no void.
+    fn is_inside(&self, x: &Vector<D>) -> bool {
+        let model = self.solved.model;
+        let in_void = model.peridynamics.as_ref().is_some_and(|p| {
+            let inside = |v: &Shape<D>| v.signed_distance(x) < -self.tolerance;
+            p.voids.iter().any(inside)
+        });
+        !in_void && self.body.locate(&model.mesh, x, self.tolerance).is_some()
+    }
+
+    /// In an element its strain; among points that of the nearest point's family. `None` outside of the body.
+    fn at(&self, x: &Vector<D>) -> Option<Sample<D>> {
+        if !self.is_inside(x) {
+            return None;
+        }
+        let displacement = self.sampler.displacement(x, self.solved.displacement)?;
+        let solved = self.solved;
+        let carrier = self.sampler.carrier(x)?;
+        let stress = solved
+            .has_derived()
+            .then(|| solved.carried_stress(carrier, &self.known, &self.intact));
+        let (gradient, zone) = match carrier {
+            Carrier::Element(c) => (solved.element_gradient(c), solved.model.zones[c]),
+            Carrier::Point(site) => (
+                solved.point_gradient(site, &self.intact),
+                solved.zone_of_site[site],
+            ),
+        };
+        Some(Sample {
+            displacement,
+            gradient,
+            zone,
+            stress,
+        })
+    }
+
+    /// The rows of a table along positions, with the columns of [`table_header`]; none for a position outside of the body.
+    pub fn rows(&self, positions: &[Vector<D>]) -> Vec<Vec<f64>> {
+        let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| self.at(x)).collect();
+        let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
+            // a line may cross a slit: there is nothing to tell in it
+            let sample = sample?;
+            let e = strain(&sample.gradient);
+            let mut row: Vec<f64> = x
+                .iter()
+                .chain(sample.displacement.iter())
+                .copied()
+                .collect();
+            for i in 0..D {
+                row.extend((i..D).map(|j| e[(i, j)]));
+            }
+            if let Some((stress, derived)) = &sample.stress {
+                for i in 0..D {
+                    row.extend((i..D).map(|j| stress[(i, j)]));
+                }
+                row.extend(derived);
+            }
+            row.push(f64::from(label(sample.zone)));
+            Some(row)
+        });
+        told.collect()
+    }
+}
+
+/// 0 local, 1 transition, 2 nonlocal.
+pub(super) fn label(zone: Zone) -> u8 {
+    match zone {
+        Zone::Local => 0,
+        Zone::Transition => 1,
+        Zone::Nonlocal => 2,
+    }
+}
+
+/// Which bonds between points stand.
+pub(super) struct Intact(FxHashSet<(u32, u32)>);
+
+impl Intact {
+    pub fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
+        let sites = &solved.model.sites;
+        let point = |site: u32| match sites[site as usize].kind {
+            SiteKind::Point(p) => Some(p),
+            SiteKind::Node(_) => None,
+        };
+        let broken = solved.broken.iter();
+        Self(
+            broken
+                .filter_map(|&(i, j)| point(i).zip(point(j)))
+                .collect(),
+        )
+    }
+
+    pub(super) fn is_intact(&self, i: usize, j: usize) -> bool {
+        self.0.is_empty() || !self.0.contains(&(i as u32, j as u32))
+    }
+}
+
+impl<const D: usize> Solved<'_, D> {
+    pub(super) fn node(&self, n: usize) -> Vector<D> {
+        let transfer = &self.model.node_transfer;
+        transfer.displacement(n, self.displacement)
+    }
+
+    pub(super) fn site(&self, site: usize) -> Vector<D> {
+        Vector::from_column_slice(&self.displacement[site * D..][..D])
+    }
+
+    pub(super) fn element_gradient(&self, c: usize) -> Tensor<D> {
+        fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
+    }
+
+    /// Stress of what carries a position, and the numbers made of it.
+    pub(super) fn carried_stress(
+        &self,
+        carrier: Carrier,
+        known: &KnownStresses,
+        intact: &Intact,
+    ) -> (Tensor<D>, Vec<f64>) {
+        let (stress, place) = match carrier {
+            Carrier::Element(c) => {
+                let gradient = self.element_gradient(c);
+                (self.cell_stress(c, &gradient, known), Place::Cell(c))
+            }
+            Carrier::Point(site) => {
+                let stands = |p, j| intact.is_intact(p, j);
+                let stress = self.point_stress(site, stands, known);
+                (stress, Place::Point(site))
+            }
+        };
+        (stress, self.derived(&stress, place))
+    }
+
+    /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.
+    pub(super) fn point_gradient(&self, site: usize, intact: &Intact) -> Tensor<D> {
+        let Some((body, p)) = self.model.point_of(site) else {
+            return Tensor::zeros();
+        };
+        let here = self.site(site);
+        let bonds: Vec<(Vector<D>, usize)> = body
+            .families
+            .of(p)
+            .iter()
+            .filter(|&&j| intact.is_intact(p, j as usize))
+            .map(|&j| (body.bond(p, j as usize), j as usize))
+            .collect();
+        let nearest = bonds
+            .iter()
+            .map(|(xi, _)| xi.norm())
+            .fold(f64::INFINITY, f64::min);
+        // the full family where the nearest shells do not span the space
+        for reach in [1.5 * nearest, f64::INFINITY] {
+            let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
+            for (xi, j) in bonds.iter().filter(|(xi, _)| xi.norm() <= reach) {
+                let w = 1.0 / xi.norm_squared();
+                let eta: Vector<D> =
+                    body.cloud.transfer.displacement::<D>(*j, self.displacement) - here;
+                shape += xi * xi.transpose() * w;
+                moment += eta * xi.transpose() * w;
+            }
+            if let Ok(inverse) = crate::peridynamics::invert_shape_tensor(&shape, bonds.len()) {
+                return moment * inverse;
+            }
+        }
+        Tensor::zeros()
+    }
+}
