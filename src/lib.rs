@@ -186,6 +186,7 @@
 
 pub mod assembly;
 pub mod coupling;
+mod dimension;
 pub mod fem;
 pub mod material;
 pub mod mesh;

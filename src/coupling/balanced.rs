@@ -2,9 +2,10 @@
 
 use crate::{
     coupling::{
-        BlendingFunction, CellRole, Coupling, Model, ModelError, Operator, Zone,
+        BlendingFunction, CellRole, Coupling, Model, ModelError, Operator, Rows, Zone,
         blending::{self, Blended, SpliceShare},
     },
+    dimension,
     mesh::Mesh,
     peridynamics::PdBody,
 };
@@ -38,8 +39,19 @@ impl<const D: usize> Coupling<D> for Balanced {
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        static ROWS: (Rows<Balanced, 1>, Rows<Balanced, 2>, Rows<Balanced, 3>) =
+            (Balanced::rows, Balanced::rows, Balanced::rows);
+        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
+    }
+}
+
+impl Balanced {
+    fn rows<'a, const D: usize>(
+        &self,
+        model: &'a Model<D>,
+    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         let Some(body) = model.body() else {
-            return Ok(Box::new(super::uncoupled::OwnModel { model }));
+            return Ok(super::uncoupled::own_model(model));
         };
         let share = SpliceShare {
             pair: 0.5,

@@ -5,10 +5,11 @@ use rayon::prelude::*;
 use crate::{
     assembly::Row,
     coupling::{
-        CellRole, Coupling, Model, ModelError, Operator, Zone,
+        CellRole, Coupling, Model, ModelError, Operator, Rows, Zone,
         least_squares_gradient::{self, DerivativeWeights},
         zone_distance::Edge,
     },
+    dimension,
     mesh::Mesh,
     peridynamics::PdBody,
     tensor::{Tensor, Vector},
@@ -67,8 +68,19 @@ impl<const D: usize> Coupling<D> for Blending {
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        static ROWS: (Rows<Blending, 1>, Rows<Blending, 2>, Rows<Blending, 3>) =
+            (Blending::rows, Blending::rows, Blending::rows);
+        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
+    }
+}
+
+impl Blending {
+    fn rows<'a, const D: usize>(
+        &self,
+        model: &'a Model<D>,
+    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         let Some(body) = model.body() else {
-            return Ok(Box::new(super::uncoupled::OwnModel { model }));
+            return Ok(super::uncoupled::own_model(model));
         };
         let beta = at_points(Some(self.function), model, body);
         Ok(Box::new(Blended::new(

@@ -7,7 +7,7 @@
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
 //! | `balanced.rs` | half of a splice's rows, half of a blending's: no force out of balance under quartic fields | `docs/methods.md` |
 //! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
-//! | `partial_stress.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
+//! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
 //! | `multi_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
@@ -40,6 +40,7 @@ pub mod least_squares_gradient;
 pub mod model;
 mod multi_lattice;
 pub mod partial_stress;
+pub mod partial_stress_elements;
 pub mod point_cloud;
 mod point_generation;
 mod point_materials;
@@ -62,7 +63,8 @@ pub use impact::{ContactPatch, Impact, ImpactedSystem, ImpactorShape, RigidImpac
 pub use interface_interpolation::Bins;
 pub use least_squares_gradient::FitDegree;
 pub use model::{Model, Site, SiteKind};
-pub use partial_stress::{PartialStressElements, PartialStressMeshfree};
+pub use partial_stress::PartialStressMeshfree;
+pub use partial_stress_elements::PartialStressElements;
 pub use problem::{Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
 pub use semidiscrete::CoupledSystem;
 pub use splice::Splice;
@@ -154,6 +156,10 @@ pub trait Coupling<const D: usize>: Send + Sync {
     /// [`ModelError`] if the method cannot be applied to this model, with the remedy.
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
 }
+
+/// [`Coupling::operator`] of the method `C` in `D` dimensions.
+type Rows<C, const D: usize> =
+    for<'a> fn(&C, &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
 
 /// What shows that the energy behind symmetric rows is never negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -18,7 +18,7 @@ use crate::{
         seam_order::{self, Ties},
         tributary::Tributary,
     },
-    fem,
+    dimension, fem,
     material::LocalLaw,
     mesh::{CellShape, Mesh},
     peridynamics::{BondWeights, CauchyBorn, Cloud, Ends, Factors, Families, PdBody},
@@ -112,15 +112,21 @@ fn takes_law<const D: usize>(
     }
 }
 
+type LaidOut<const D: usize> = Result<(Model<D>, Box<dyn Coupling<D>>), ModelError>;
+type Layout<const D: usize> = fn(Problem<D>, &dyn Progress) -> LaidOut<D>;
+static LAYOUTS: (Layout<1>, Layout<2>, Layout<3>) =
+    (Model::laid_out, Model::laid_out, Model::laid_out);
+
 impl<const D: usize> Model<D> {
     /// Lays out sites and families.
     ///
     /// # Errors
     /// [`ModelError`], each with place and remedy.
-    pub fn new(
-        problem: Problem<D>,
-        progress: &dyn Progress,
-    ) -> Result<(Self, Box<dyn Coupling<D>>), ModelError> {
+    pub fn new(problem: Problem<D>, progress: &dyn Progress) -> LaidOut<D> {
+        dimension::of::<Layout<D>>(&LAYOUTS)(problem, progress)
+    }
+
+    fn laid_out(problem: Problem<D>, progress: &dyn Progress) -> LaidOut<D> {
         let Problem {
             mesh,
             zones,

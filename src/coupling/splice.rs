@@ -1,7 +1,7 @@
 //! Splice: each site takes the equation of its own model, and sees across the seam the continuation of that model.
 
 use crate::{
-    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, uncoupled::OwnModel},
+    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, uncoupled::own_model},
     mesh::Mesh,
 };
 
@@ -33,6 +33,6 @@ impl<const D: usize> Coupling<D> for Splice {
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        Ok(Box::new(OwnModel { model }))
+        Ok(own_model(model))
     }
 }

@@ -3,6 +3,7 @@
 use crate::{
     assembly::Row,
     coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone},
+    dimension,
     mesh::Mesh,
     system::Symmetry,
 };
@@ -33,7 +34,7 @@ impl<const D: usize> Coupling<D> for Local {
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        Ok(Box::new(OwnModel { model }))
+        Ok(own_model(model))
     }
 }
 
@@ -55,13 +56,24 @@ impl<const D: usize> Coupling<D> for Nonlocal {
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        Ok(Box::new(OwnModel { model }))
+        Ok(own_model(model))
     }
 }
 
+type Own<const D: usize> = for<'a> fn(&'a Model<D>) -> Box<dyn Operator<D> + 'a>;
+
+/// The rows of a model of which each site takes the equation of its own model.
+pub(super) fn own_model<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
+    fn rows<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
+        Box::new(OwnModel { model })
+    }
+    static OWN: (Own<1>, Own<2>, Own<3>) = (rows, rows, rows);
+    dimension::of::<Own<D>>(&OWN)(model)
+}
+
 /// Each site takes the equation of its own model.
-pub(super) struct OwnModel<'a, const D: usize> {
-    pub(super) model: &'a Model<D>,
+struct OwnModel<'a, const D: usize> {
+    model: &'a Model<D>,
 }
 
 impl<const D: usize> Operator<D> for OwnModel<'_, D> {

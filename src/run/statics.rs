@@ -10,9 +10,11 @@ use super::setup::{RunSettings, model, model_choices, problem};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::coupling::{Coupling, Model, Operator, SiteKind};
+use crate::dimension;
 use crate::observe::ObserveError;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
@@ -45,7 +47,7 @@ pub(crate) fn run<const D: usize>(
     if moves {
         return with_choice(scene.scene, |scene| motion::run(scene, options, progress));
     }
-    solve_over(scene, options.ranks, progress, |output, solved| {
+    solve_over(scene, options.ranks, progress, &mut |output, solved| {
         super::write::write_for(output, solved, options)
     })
 }
@@ -57,20 +59,38 @@ pub(crate) fn run<const D: usize>(
 pub fn solve_with<const D: usize>(
     scene: impl Into<PlacedScene<D>>,
     progress: &dyn Progress,
-    visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
+    visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<PathBuf>, ObserveError>,
 ) -> Result<RunSummary, RunError> {
-    solve_over(scene, None, progress, visit)
+    let mut visit = Some(visit);
+    let mut visit = |output: &Output<D>, solved: &Solved<'_, D>| match visit.take() {
+        Some(visit) => visit(output, solved),
+        // a solved scene is not solved again
+        None => Ok(Vec::new()),
+    };
+    dimension::of::<Solver<D>>(&SOLVERS)(scene.into(), None, progress, &mut visit)
 }
+
+/// What becomes of a solution; returns the files that it wrote.
+type Visit<'a, const D: usize> =
+    &'a mut dyn FnMut(&Output<D>, &Solved<'_, D>) -> Result<Vec<PathBuf>, ObserveError>;
+
+type Solver<const D: usize> = fn(
+    PlacedScene<D>,
+    Option<&dyn Ranks>,
+    &dyn Progress,
+    Visit<'_, D>,
+) -> Result<RunSummary, RunError>;
+
+static SOLVERS: (Solver<1>, Solver<2>, Solver<3>) = (solve_over, solve_over, solve_over);
 
 /// As [`solve_with`], by several processes, if there are.
 fn solve_over<const D: usize>(
-    scene: impl Into<PlacedScene<D>>,
+    scene: PlacedScene<D>,
     ranks: Option<&dyn Ranks>,
     progress: &dyn Progress,
-    visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
+    visit: Visit<'_, D>,
 ) -> Result<RunSummary, RunError> {
-    let mut visit = Some(visit);
-    let PlacedScene { scene, mut kept } = scene.into();
+    let PlacedScene { scene, mut kept } = scene;
     with_choice(scene, |scene| {
         // what placed the zone knows of linear elements only
         let kept = kept
@@ -78,13 +98,7 @@ fn solve_over<const D: usize>(
             .filter(|_| scene.elements == ElementsSpec::Linear)
             // whose stiffness has the springs in it, and is not that of the body
             .filter(|k| k.equilibrium.springs.is_empty());
-        solve_chosen(scene, kept, ranks, progress, |output, solved| {
-            match visit.take() {
-                Some(visit) => visit(output, solved),
-                // a solved scene is not solved again
-                None => Ok(Vec::new()),
-            }
-        })
+        solve_chosen(scene, kept, ranks, progress, &mut *visit)
     })
 }
 
@@ -94,7 +108,7 @@ fn solve_chosen<const D: usize>(
     kept: Option<Arc<CachedSolution<D>>>,
     ranks: Option<&dyn Ranks>,
     progress: &dyn Progress,
-    visit: impl FnOnce(&Output<D>, &Solved<'_, D>) -> Result<Vec<std::path::PathBuf>, ObserveError>,
+    visit: Visit<'_, D>,
 ) -> Result<RunSummary, RunError> {
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use imports::{Imports, ItemPath};
 
 /// Modules of the library and, above them, the other crates, the lowest first.
-const FLOORS: [&str; 22] = [
+const FLOORS: [&str; 23] = [
+    "dimension",
     "tensor",
     "progress",
     "regular_file",

@@ -53,8 +53,9 @@ use self::{
 use crate::{
     assembly::Row,
     coupling::{
-        CellRole, Coupling, Definiteness, Interface, Model, ModelError, Operator, Reach, Zone,
+        CellRole, Coupling, Definiteness, Interface, Model, ModelError, Operator, Reach, Rows, Zone,
     },
+    dimension,
     mesh::Mesh,
     peridynamics::LinearForceState,
     system::Symmetry,
@@ -107,8 +108,19 @@ impl<const D: usize> Coupling<D> for Truncated {
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+        static ROWS: (Rows<Truncated, 1>, Rows<Truncated, 2>, Rows<Truncated, 3>) =
+            (Truncated::rows, Truncated::rows, Truncated::rows);
+        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
+    }
+}
+
+impl Truncated {
+    fn rows<'a, const D: usize>(
+        &self,
+        model: &'a Model<D>,
+    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         let (Some(body), Some(passing)) = (model.body(), model.passing()) else {
-            return Ok(Box::new(super::uncoupled::OwnModel { model }));
+            return Ok(super::uncoupled::own_model(model));
         };
         let known = model.operator_cache.get();
         if let Some(pieces) = known.and_then(|known| known.downcast_ref::<Arc<Pieces<D>>>()) {

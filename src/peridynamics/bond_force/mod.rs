@@ -69,6 +69,7 @@ pub use stencil::BlockSetup;
 
 pub(crate) use list::{extension, ratio, stretched};
 
+use crate::dimension;
 use crate::system::{FailureUpdate, Interval};
 use crate::tensor::Tensor;
 
@@ -188,6 +189,14 @@ pub trait ForceStates<const D: usize> {
 pub fn bond_pass<const D: usize>(
     setup: &BondSetup<'_, D>,
 ) -> Result<Box<dyn BondPass<D>>, KernelError> {
+    dimension::of::<Pass<D>>(&PASSES)(setup)
+}
+
+type Pass<const D: usize> = fn(&BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>, KernelError>;
+
+static PASSES: (Pass<1>, Pass<2>, Pass<3>) = (pass, pass, pass);
+
+fn pass<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>, KernelError> {
     setup.check_lists()?;
     let tears = (setup.failure.as_ref())
         .is_some_and(|f| matches!(f.critical, CriticalStretch::TearingParameter(_)));
