@@ -1,6 +1,6 @@
 //! The state of a long run on disk, from which it goes on as if it had never stopped.
 //!
-//! A checkpoint is one file: eight letters, the version of the format, the identity of what was computed, the state in
+//! A checkpoint is one file: eight letters, the version of the format, the identity of what was computed, the keys of its scene and the state in
 //! [postcard](https://docs.rs/postcard)'s encoding, its length and its CRC-32. It is written beside its place, forced to
 //! the disk and renamed, after the one before has been renamed to `….previous`; so whenever a run is killed, one of the
 //! two is whole.
@@ -135,10 +135,12 @@ pub enum CheckpointError {
         found: u32,
     },
     /// It belongs to another computation.
-    #[error("the checkpoint {} belongs to another scene or mesh; resume with the scene, the mesh and the overrides that it was run with, or start again without --resume", path.display())]
+    #[error("the checkpoint {} belongs to another scene or mesh{}; resume with the scene, the mesh and the overrides that it was run with, or start again without --resume", path.display(), named(keys))]
     OtherScene {
         /// The file.
         path: PathBuf,
+        /// Keys of the scene that differ; none where a file that it reads does.
+        keys: Vec<String>,
     },
     /// Its content cannot be understood.
     #[error("the checkpoint {} does not hold what this scene needs: {message}; start again without --resume", path.display())]
@@ -148,6 +150,19 @@ pub enum CheckpointError {
         /// What is wrong.
         message: String,
     },
+}
+
+/// Keys that differ, in brackets: no more than three.
+fn named(keys: &[String]) -> String {
+    const MOST: usize = 3;
+    let names: Vec<String> = keys.iter().take(MOST).map(|k| format!("`{k}`")).collect();
+    let names = names.join(", ");
+    match keys.len() {
+        0 => " (a file that the scene reads has changed)".to_owned(),
+        1 => format!(" ({names} differs)"),
+        n if n <= MOST => format!(" ({names} differ)"),
+        n => format!(" ({names} and {} more differ)", n - MOST),
+    }
 }
 
 impl CheckpointError {
@@ -160,7 +175,7 @@ impl CheckpointError {
             | Self::Version { path, .. }
             | Self::Truncated { path, .. }
             | Self::Damaged { path, .. }
-            | Self::OtherScene { path }
+            | Self::OtherScene { path, .. }
             | Self::Content { path, .. } => path,
         }
     }
@@ -179,13 +194,13 @@ pub enum Found {
 #[derive(Clone, Debug)]
 pub struct CheckpointFile {
     path: PathBuf,
-    identity: u64,
+    print: Fingerprint,
 }
 
 impl CheckpointFile {
-    /// The place `path` for the computation `identity`, a hash of all that determines it.
-    pub fn new(path: PathBuf, identity: u64) -> Self {
-        Self { path, identity }
+    /// The place `path` for the computation of which `print` is the fingerprint.
+    pub fn new(path: PathBuf, print: Fingerprint) -> Self {
+        Self { path, print }
     }
 
     /// Where the last checkpoint lies.
@@ -214,8 +229,8 @@ impl CheckpointFile {
             };
             out.write_all(MAGIC)?;
             out.write_all(&VERSION.to_le_bytes())?;
-            out.write_all(&self.identity.to_le_bytes())?;
-            if let Err(error) = postcard::to_io(state, &mut out) {
+            out.write_all(&self.print.value.to_le_bytes())?;
+            if let Err(error) = postcard::to_io(&(&self.print.keys, state), &mut out) {
                 // postcard says of each failed write that its buffer is full
                 return Err(out.failed.unwrap_or_else(|| std::io::Error::other(error)));
             }
@@ -313,15 +328,19 @@ impl CheckpointFile {
                 found,
             });
         }
-        if u64::from_le_bytes(identity) != self.identity {
-            return Err(CheckpointError::OtherScene { path: path_buf() });
-        }
         let content = |message: String| CheckpointError::Content {
             path: path_buf(),
             message,
         };
-        let (value, rest) =
-            postcard::take_from_bytes(&bytes[HEAD..end]).map_err(|e| content(e.to_string()))?;
+        let (keys, state) = postcard::take_from_bytes::<Vec<(String, u64)>>(&bytes[HEAD..end])
+            .map_err(|e| content(e.to_string()))?;
+        if u64::from_le_bytes(identity) != self.print.value {
+            return Err(CheckpointError::OtherScene {
+                path: path_buf(),
+                keys: self.print.differing(&keys),
+            });
+        }
+        let (value, rest) = postcard::take_from_bytes(state).map_err(|e| content(e.to_string()))?;
         if rest.is_empty() {
             Ok(value)
         } else {
@@ -369,13 +388,19 @@ impl<W> Checked<W> {
     }
 }
 
-/// FNV-1a of 64 bits: a name for what a computation is made of, the same on every machine and in every build.
-#[derive(Clone, Copy, Debug)]
-pub struct Fingerprint(u64);
+/// A name for what a computation is made of, the same on every machine and in every build: FNV-1a of 64 bits, of all of it and of each key of its scene.
+#[derive(Clone, Debug)]
+pub struct Fingerprint {
+    value: u64,
+    keys: Vec<(String, u64)>,
+}
 
 impl Default for Fingerprint {
     fn default() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
+        Self {
+            value: 0xcbf2_9ce4_8422_2325,
+            keys: Vec::new(),
+        }
     }
 }
 
@@ -384,13 +409,28 @@ impl Fingerprint {
     pub fn add(&mut self, bytes: &[u8]) {
         let length = (bytes.len() as u64).to_le_bytes();
         for &byte in bytes.iter().chain(&length) {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+            self.value = (self.value ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
         }
     }
 
+    /// Notes a key whose value has the fingerprint `of_value`, so that it can be named where it differs.
+    pub fn note(&mut self, key: String, of_value: &Self) {
+        self.keys.push((key, of_value.value));
+    }
+
     /// The number for all that was added.
-    pub fn value(self) -> u64 {
-        self.0
+    pub fn value(&self) -> u64 {
+        self.value
+    }
+
+    /// The keys whose values are others among `theirs`, or that one of the two lacks.
+    fn differing(&self, theirs: &[(String, u64)]) -> Vec<String> {
+        let lacks = |list: &[(String, u64)], entry: &(String, u64)| !list.contains(entry);
+        let ours = self.keys.iter().filter(|k| lacks(theirs, k));
+        let others = theirs.iter().filter(|k| lacks(&self.keys, k));
+        let names: std::collections::BTreeSet<&String> =
+            ours.chain(others).map(|(key, _)| key).collect();
+        names.into_iter().cloned().collect()
     }
 }
 
@@ -400,6 +440,13 @@ mod tests {
 
     type State = (u64, Vec<f64>);
 
+    fn print(value: u64) -> Fingerprint {
+        Fingerprint {
+            value,
+            keys: Vec::new(),
+        }
+    }
+
     fn state(step: u64) -> State {
         (step, vec![0.1 + step as f64, -0.0, f64::MIN_POSITIVE / 4.0])
     }
@@ -407,7 +454,7 @@ mod tests {
     #[test]
     fn states_read_back_bit_for_bit_and_the_one_before_is_kept() {
         let folder = tempfile::tempdir().unwrap();
-        let file = CheckpointFile::new(folder.path().join("run.checkpoint"), 7);
+        let file = CheckpointFile::new(folder.path().join("run.checkpoint"), print(7));
         assert!(matches!(
             file.read::<State>(),
             Err(CheckpointError::None { .. })
@@ -435,7 +482,7 @@ mod tests {
     fn whatever_is_wrong_has_a_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.checkpoint");
-        let file = CheckpointFile::new(path.clone(), 7);
+        let file = CheckpointFile::new(path.clone(), print(7));
         file.write(&state(1)).unwrap();
         let whole = std::fs::read(&path).unwrap();
         let read = |bytes: &[u8]| -> CheckpointError {
@@ -466,7 +513,7 @@ mod tests {
             assert!(named, "bit {bit}: {error}");
         }
         std::fs::write(&path, &whole).unwrap();
-        let other = CheckpointFile::new(path.clone(), 8);
+        let other = CheckpointFile::new(path.clone(), print(8));
         let error = other.read::<State>().unwrap_err();
         assert!(error.to_string().contains("another scene"), "{error}");
         let error = file.read::<(String, u8)>().unwrap_err();
@@ -496,6 +543,25 @@ mod tests {
             let error = text.parse::<Pace>().unwrap_err();
             assert!(error.to_string().contains("number of steps"), "{error}");
         }
+    }
+
+    #[test]
+    fn keys_that_differ_are_named() {
+        let of = |keys: &[(&str, u64)]| Fingerprint {
+            value: 0,
+            keys: keys.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
+        };
+        let (ours, theirs) = (
+            of(&[("a", 1), ("b.c", 2), ("d", 3)]),
+            of(&[("a", 1), ("b.c", 4), ("e", 3)]),
+        );
+        let keys = ours.differing(&theirs.keys);
+        assert_eq!(keys, ["b.c", "d", "e"]);
+        assert_eq!(named(&keys), " (`b.c`, `d`, `e` differ)");
+        assert_eq!(named(&keys[..1]), " (`b.c` differs)");
+        let five: Vec<String> = (0..5).map(|k| k.to_string()).collect();
+        assert_eq!(named(&five), " (`0`, `1`, `2` and 2 more differ)");
+        assert!(ours.differing(&ours.keys).is_empty());
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::resource_estimate::{MotionPrediction, Prediction, holds, warnings};
 use super::solver_estimate::{Planned, output_bytes};
 use crate::coupling::impact::RESOLVED;
 use crate::coupling::{Impact, Model, Operator, Sampler};
-use crate::observe::checkpoint::CheckpointFile;
+use crate::observe::checkpoint::{CheckpointFile, Fingerprint};
 use crate::observe::series::Series;
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
@@ -199,7 +199,10 @@ impl OutputCost {
             impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, None)),
             breaks,
             is_linear,
-            CheckpointFile::new(folder.path().join("trial.checkpoint"), 0),
+            CheckpointFile::new(
+                folder.path().join("trial.checkpoint"),
+                Fingerprint::default(),
+            ),
             RunOptions::default(),
             None,
         )?;

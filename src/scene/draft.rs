@@ -309,7 +309,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             output,
             otherwise: None,
             unused: Vec::new(),
-            fingerprint: self.fingerprint,
+            fingerprint: self.fingerprint.clone(),
         };
         Ok((scene, joined.otherwise))
     }

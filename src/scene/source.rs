@@ -387,6 +387,11 @@ fn add_table(table: &DeTable<'_>, path: &mut Vec<String>, print: &mut Fingerprin
         if !WITHOUT_EFFECT.iter().any(|p| path.iter().eq(p.iter())) {
             print.add(key.get_ref().as_bytes());
             add_value(value.get_ref(), path, print);
+            if !value.get_ref().is_table() {
+                let mut of_value = Fingerprint::default();
+                add_value(value.get_ref(), path, &mut of_value);
+                print.note(path.join("."), &of_value);
+            }
         }
         path.pop();
     }

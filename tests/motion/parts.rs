@@ -83,5 +83,6 @@ fn parts_resume_with_the_same_bytes_on_any_number_of_threads() {
             .unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(said.contains("another scene or mesh"), "{said}");
+        assert!(said.contains("that the scene reads has changed"), "{said}");
     }
 }

@@ -152,6 +152,10 @@ fn checkpoints_of_another_scene_and_damaged_ones_are_refused_by_name() {
     };
     let said = refused(&[]);
     assert!(said.contains("another scene or mesh"), "{said}");
+    assert!(
+        said.contains("(`solve.explicit.duration` differs)"),
+        "{said}"
+    );
     let same_scene = ["--set", "solve.explicit.duration=6"];
     // what changes no result does not matter
     run(

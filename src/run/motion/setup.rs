@@ -203,7 +203,7 @@ pub(crate) fn opened<const D: usize>(
 ) -> Result<(CheckpointFile, Option<Saved>), RunError> {
     let name = format!("{}.checkpoint", rest.output.name);
     let path = rest.output.directory.join(name);
-    let file = CheckpointFile::new(path, rest.fingerprint.value());
+    let file = CheckpointFile::new(path, rest.fingerprint.clone());
     let saved = match options.start {
         StartFrom::Beginning => None,
         StartFrom::Checkpoint => read(&file, choices)?,

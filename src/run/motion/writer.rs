@@ -143,7 +143,7 @@ pub struct EdgeReached {
 /// What of a run's files belongs to a state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Written {
-    /// Lengths of the history and of the [`Tables`] beside it.
+    /// Lengths of the history and of the tables beside it: tips, then lines.
     pub bytes: Vec<u64>,
     /// Times of the VTU files.
     pub times: Vec<f64>,

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use bondline::Silent;
-use bondline::observe::checkpoint::CheckpointFile;
+use bondline::observe::checkpoint::{CheckpointFile, Fingerprint};
 use bondline::run::{AnyScene, RunError, RunOptions, StartFrom};
 use bondline::scene::Source;
 
@@ -95,7 +95,7 @@ const PLATE: &str = "
     conditions.left.displacement = { on = 'left', x = '-0.001*t' }
     output = { vtu = false, probes.middle.at = [3, 1.5] }";
 
-fn scene(folder: &Path) -> (AnyScene, u64) {
+fn scene(folder: &Path) -> (AnyScene, Fingerprint) {
     let source = Source::new("fuzz.toml", PLATE);
     let mut scene =
         bondline_study::from_source(&source, folder, "fuzz").expect("the plate is right");
@@ -103,15 +103,15 @@ fn scene(folder: &Path) -> (AnyScene, u64) {
     let AnyScene::Plane(plane) = &scene else {
         panic!("the plate is plane")
     };
-    let identity = plane.fingerprint.value();
-    (scene, identity)
+    let print = plane.fingerprint.clone();
+    (scene, print)
 }
 
 /// A run that goes on from these bytes ends after a step, or with an error by name.
 fn checkpoint(state: &[u8]) -> Outcome {
     let folder = folder();
-    let (scene, identity) = scene(folder.path());
-    let file = CheckpointFile::new(folder.path().join("fuzz.checkpoint"), identity);
+    let (scene, print) = scene(folder.path());
+    let file = CheckpointFile::new(folder.path().join("fuzz.checkpoint"), print);
     file.write(&())
         .expect("the folder for temporary files can be written");
     let mut bytes = std::fs::read(file.path()).expect("it was written");
