@@ -107,8 +107,9 @@ def check_csv(path):
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
     # a tip has rows from the first damage on
-    least = 1 if "_tip_" in path.name else 2
-    if len(rows) < least:
+    if len(rows) == 1 and "_tip_" in path.name:
+        return f"no rows, {len(rows[0])} columns"
+    if len(rows) < 2:
         raise Wrong("no rows")
     header, numbers = rows[0], 0
     for line, row in enumerate(rows[1:], 2):
