@@ -257,7 +257,11 @@ impl Run<'_> {
                 continue;
             };
             let is_slow = self.tangent == Tangent::Present && now.size > 0.5 * residual.size;
-            slow = if is_slow && self.is_torn { slow + 1 } else { 0 };
+            slow = if is_slow && self.is_torn && !is_linear {
+                slow + 1
+            } else {
+                0
+            };
             if now.size > SLOW * residual.size {
                 self.tangent = Tangent::Present;
             }
