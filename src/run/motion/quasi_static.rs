@@ -471,7 +471,11 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             warnings: warnings
                 .chain(impacts.flat_map(ImpactRecord::warnings))
                 .chain(created_energy(model, &motion, &state.u))
-                .chain(self.recorder.growth.warning::<D>(horizon))
+                .chain(
+                    self.recorder
+                        .growth
+                        .warning::<D>(horizon, set_free(&motion)),
+                )
                 .chain(unusual_stretch(model, self.rest)?)
                 .chain(self.rotation.as_ref().map(Rotation::warning))
                 .collect(),
@@ -512,6 +516,13 @@ impl Progress for InsideStep<'_> {
     fn finish(&self) {}
 }
 
+/// Energy that load steps set free by breaking, and that they dissipated \[J\] (per metre of thickness in 2D, per square metre of section in 1D).
+fn set_free(motion: &MotionSummary) -> [f64; 2] {
+    let dissipated =
+        motion.cracks.map_or(0.0, |c| c.dissipated_energy) + motion.inelastic_energy.unwrap_or(0.0);
+    [motion.missing_energy - dissipated, dissipated]
+}
+
 /// Part of the work from which on energy that load steps created is warned of. Work is summed by the trapezoidal rule, which errs by the square of a step.
 const CREATED: f64 = 0.02;
 
@@ -523,9 +534,7 @@ fn created_energy<const D: usize>(
 ) -> Option<String> {
     /// Part of the energy of a strain as large as the displacement over the size of the body that is left by equilibria that are found to a tolerance: 2e-12 of a body that load steps rotate by half a radian.
     const ROUND_OFF: f64 = 1e-11;
-    let dissipated =
-        motion.cracks.map_or(0.0, |c| c.dissipated_energy) + motion.inelastic_energy.unwrap_or(0.0);
-    let created = dissipated - motion.missing_energy;
+    let created = -set_free(motion)[0];
     let work = motion.external_work.abs().max(motion.stored_energy);
     let volume: f64 = (0..model.mesh.cell_count())
         .map(|c| model.mesh.cell_volume(c).abs())
