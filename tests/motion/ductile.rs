@@ -281,7 +281,7 @@ fn wherever_the_lattice_lies_in_a_round_bar_each_point_stands_for_some_mass() {
         let output = crate::bondline(folder.path())
             .arg("check")
             .arg(&scene)
-            .args(["--set", "peridynamics.points.lattice.spacing=1.2"])
+            .args(["--set", "peridynamics.points.lattice.spacing=1.5"])
             .args(["--set", "peridynamics.horizon=3"])
             .arg("--set")
             .arg(format!("peridynamics.points.lattice.origin={origin}"))
