@@ -264,7 +264,14 @@ fn row(family: &Family, law: (&str, &str), coupling: (&str, &str, bool), per_ele
         family.name, coupling.0, law.0
     );
     let text = text(family, law.1, coupling.1, coupling.2, per_element);
-    match scene::solve(&text, &[], &[("m.msh", &family.mesh)]) {
+    // multigrid ends without a solution, far later than factors give one
+    let is_slow = family.name.starts_with("tet10") && coupling.0 == "partial stress, points";
+    let solver: &[&str] = if is_slow {
+        &["solver.method=direct"]
+    } else {
+        &[]
+    };
+    match scene::solve(&text, solver, &[("m.msh", &family.mesh)]) {
         Ok((summary, sites)) => {
             let (mut error, mut largest) = (0.0f64, 0.0f64);
             for site in &sites {
