@@ -1,5 +1,6 @@
 //! The additions of `docs/extending.md`, applied as they stand there to a copy of the sources, built and run.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,13 +8,29 @@ use std::process::Command;
 /// The name of the program that is built.
 const NAME: &str = "bondline-extended";
 
-/// The packages of which the program is built, the library first.
+/// Runs a scene, as `bondline run SCENE --set KEY=VALUE` does: with the library alone, which is all that the page changes.
+const PROGRAM: &str = r#"//! Runs a scene with overrides.
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let scene = arguments.next().ok_or("a scene")?;
+    let overrides: Vec<String> = arguments.collect();
+    let scene = bondline::AnyScene::load(std::path::Path::new(&scene), &overrides)?;
+    scene.run(&bondline::Silent)?;
+    Ok(())
+}
+"#;
+
+/// The packages of the copied workspace. The program needs the library alone; the others see to it that dependencies have the features with which they are built already.
 const PACKAGES: [&str; 4] = [
     "bondline",
     "bondline-study",
     "bondline-terminal",
     "bondline-cli",
 ];
+
+/// The files of the copy by their paths within it.
+type Files = BTreeMap<PathBuf, String>;
 
 /// A fenced block of the page: language, file, text.
 struct Block<'a> {
@@ -71,14 +88,16 @@ fn patched(source: &str, hunks: &str, file: &str) -> String {
     result
 }
 
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let (path, name) = entry.map(|e| (e.path(), e.file_name())).unwrap();
-        if path.is_dir() {
-            copy(&path, &to.join(name));
+/// All files below a folder, by their paths from `root` on.
+fn read(root: &Path, folder: &Path, files: &mut Files) {
+    for entry in fs::read_dir(root.join(folder)).unwrap() {
+        let entry = entry.unwrap();
+        let path = folder.join(entry.file_name());
+        if entry.path().is_dir() {
+            read(root, &path, files);
         } else {
-            fs::copy(&path, to.join(name)).unwrap();
+            let text = fs::read_to_string(entry.path()).unwrap();
+            files.insert(path, text);
         }
     }
 }
@@ -92,11 +111,10 @@ fn rows(path: &Path) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Copies what the program needs, without tests and suites.
-fn copy_packages(root: &Path, copied: &Path) {
-    for folder in ["src", "crates"] {
-        copy(&root.join(folder), &copied.join(folder));
-    }
+/// What the program needs, without tests and suites.
+fn packages(root: &Path) -> Files {
+    let mut files = Files::new();
+    read(root, Path::new("src"), &mut files);
     let manifest = fs::read_to_string(root.join("Cargo.toml")).unwrap();
     let packages = manifest.find("[workspace.package]").unwrap();
     let (needed, tests) = manifest[packages..]
@@ -106,33 +124,53 @@ fn copy_packages(root: &Path, copied: &Path) {
     let members = PACKAGES.map(|p| format!("\"crates/{p}\""));
     let members = members[1..].join(", ");
     let manifest = format!("[workspace]\nmembers = [\".\", {members}]\n\n{needed}{profiles}");
-    fs::write(copied.join("Cargo.toml"), manifest).unwrap();
+    files.insert("Cargo.toml".into(), manifest);
+    // an optional dependency, which has to lie where it is named
+    read(root, Path::new("crates/bondline-petsc"), &mut files);
     for package in &PACKAGES[1..] {
-        let path = copied.join("crates").join(package).join("Cargo.toml");
-        let manifest = fs::read_to_string(&path).unwrap();
+        let folder = Path::new("crates").join(package);
+        read(root, &folder, &mut files);
+        let manifest = files.get_mut(&folder.join("Cargo.toml")).unwrap();
         let needed = manifest.split("[dev-dependencies]").next().unwrap();
-        // under another name, so that the program itself is not overwritten
-        let renamed = needed.replace("= \"bondline\"", &format!("= \"{NAME}\""));
-        fs::write(&path, renamed).unwrap();
+        *manifest = needed.to_owned();
     }
-    fs::copy(root.join("Cargo.lock"), copied.join("Cargo.lock")).unwrap();
+    let lock = fs::read_to_string(root.join("Cargo.lock")).unwrap();
+    files.insert("Cargo.lock".into(), lock);
+    let program = Path::new("src/bin").join(NAME).with_extension("rs");
+    files.insert(program, PROGRAM.to_owned());
+    files
 }
 
 /// Applies the blocks of the page to the copy.
-fn apply(page: &str, copied: &Path) {
+fn apply(page: &str, files: &mut Files) {
     for block in blocks(page) {
-        let path = copied.join(block.file);
+        let path = PathBuf::from(block.file);
         match block.language {
             "diff" => {
-                let source = fs::read_to_string(&path).unwrap();
-                fs::write(&path, patched(&source, &block.text, block.file)).unwrap();
+                let source = files.get_mut(&path).expect(block.file);
+                *source = patched(source, &block.text, block.file);
             }
             "rust" | "toml" | "text" => {
-                assert!(!path.exists(), "{} is not new", block.file);
-                fs::write(&path, block.text).unwrap();
+                let before = files.insert(path, block.text);
+                assert!(before.is_none(), "{} is not new", block.file);
             }
             other => panic!("{other}: {}", block.file),
         }
+    }
+}
+
+/// Makes a folder hold these files and no other; one that holds its text already is left alone, so that cargo builds nothing twice.
+fn write(files: &Files, folder: &Path) {
+    let mut found = Files::new();
+    fs::create_dir_all(folder).unwrap();
+    read(folder, Path::new(""), &mut found);
+    for path in found.keys().filter(|path| !files.contains_key(*path)) {
+        fs::remove_file(folder.join(path)).unwrap();
+    }
+    for (path, text) in files.iter().filter(|(p, t)| found.get(*p) != Some(t)) {
+        let path = folder.join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
     }
 }
 
@@ -167,18 +205,16 @@ fn the_additions_of_the_page_build_and_run() {
     let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let page = fs::read_to_string(root.join("docs/extending.md")).unwrap();
     let copied = Path::new(env!("CARGO_TARGET_TMPDIR")).join("worked_additions");
-    let _ = fs::remove_dir_all(&copied);
-    copy_packages(&root, &copied);
-
-    apply(&page, &copied);
+    // what the last run wrote
+    let _ = fs::remove_dir_all(copied.join("out"));
+    let mut files = packages(&root);
+    apply(&page, &mut files);
+    write(&files, &copied);
 
     let program = build(&copied);
     let run = |scene: &str, overrides: &[&str]| {
         let mut command = Command::new(&program);
-        command.arg("run").arg(scene).current_dir(&copied);
-        for key in overrides {
-            command.args(["--set", key]);
-        }
+        command.arg(scene).args(overrides).current_dir(&copied);
         let output = command.output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{scene}: {said}");
