@@ -192,6 +192,7 @@ impl<const D: usize> CauchyBorn<D> {
             direction: &direction,
             is_whole: true,
             damage: 0.0,
+            carried: None,
             keeps_damage: false,
             material: self.material,
             kinematics: self.kinematics,

@@ -61,6 +61,8 @@ pub struct DeformedFamily<'a, const D: usize> {
     pub is_whole: bool,
     /// Share of the family's volume whose bonds are broken, the `D = τ • φ` of [SAND2015-7998] eq. (6.28) with `τ = 1/V`.
     pub damage: f64,
+    /// `C − I` of a point that has flowed and lost bonds, which a local law is asked at: its deformation gradient is `F̄ C`, so that it does not jump where bonds break. None where there is nothing to carry.
+    pub carried: Option<&'a Tensor<D>>,
     /// Whether the point keeps the damage that it has: in a region `no-fail`, and where its row is not that of its bonds alone.
     pub keeps_damage: bool,
     /// The material of the point, 0 in a body of one.

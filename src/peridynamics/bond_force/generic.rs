@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::{
     BondPass, BondSetup, ForceStates, Kinematics,
     bond_failure::BondFailure,
+    carried_deformation::CarriedDeformation,
     list::{extension, ratio, stretched},
     point_state::PointForces,
 };
@@ -18,7 +19,7 @@ use crate::{
         Present, StatePart, body::split_rows, tearing_parameter::Flow,
     },
     system::{FailureUpdate, Interval},
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// No bond from the other end.
@@ -56,9 +57,8 @@ pub(super) struct Generic<const D: usize> {
     pub(super) omega: Vec<f64>,
     pub(super) state: Vec<Option<StatePart<D>>>,
     pub(super) failure: BondFailure,
+    pub(super) carried: Option<CarriedDeformation<D>>,
     pub(super) kinematics: Kinematics,
-    /// Whether the law holds for rotations of any size.
-    pub(super) is_objective: bool,
     pub(super) intact: Vec<bool>,
     /// Bonds that were told to be broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
     pub(super) damaged_through: Vec<bool>,
@@ -99,6 +99,7 @@ pub(super) struct Scratch<const D: usize> {
     force: Vec<Vector<D>>,
     is_whole: bool,
     damage: f64,
+    pub(super) carried: Option<Tensor<D>>,
 }
 
 /// What a law reads of a family, and what it overwrites.
@@ -127,6 +128,7 @@ impl<const D: usize> Scratch<D> {
                 direction: &self.direction,
                 is_whole: self.is_whole,
                 damage: self.damage,
+                carried: self.carried.as_ref(),
                 keeps_damage: self.keeps_damage,
                 material: self.material,
                 kinematics: self.kinematics,
@@ -178,6 +180,7 @@ impl<const D: usize> Generic<D> {
         let damaged_through = vec![false; layout.damage.map_or(0, |_| bonds)];
         let by_points = PointForces::new(states, points);
         let kept = if by_points.is_some() { 0 } else { bonds };
+        let failure = BondFailure::new(setup, body);
         let mut pass = Self {
             law: Arc::clone(law),
             layout,
@@ -190,7 +193,8 @@ impl<const D: usize> Generic<D> {
             reverse,
             pair,
             omega,
-            failure: BondFailure::new(setup, body),
+            carried: CarriedDeformation::new(&layout, &failure, points),
+            failure,
             kinematics: setup.kinematics,
             family_volume: match setup.failure.is_some() || setup.precracked.is_some() {
                 true => (0..points)
@@ -212,7 +216,6 @@ impl<const D: usize> Generic<D> {
             last: Vec::new(),
             force_state: vec![Vector::zeros(); kept],
             points: by_points,
-            is_objective: states.is_objective(),
             families,
         };
         pass.recall_intact(None);
@@ -342,6 +345,7 @@ impl<const D: usize> Generic<D> {
                     }
                     let displaced = |j: usize| at(u, j);
                     let intact = |bond: usize| self.intact[bond];
+                    s.carried = self.carried_of(i).copied();
                     let energy = self.respond(i, &displaced, intact, step, &self.past, s);
                     outcome.dissipated = energy.dissipated * self.volume[i];
                     outcome.flow = self.flow(i, s);
@@ -424,10 +428,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         self.last.clear();
         if breakage == FailureUpdate::Update {
             self.last = self.failing(u);
-            for &(_, bond) in &self.last {
-                self.intact[bond] = false;
-            }
             if !self.last.is_empty() {
+                self.break_last(u);
                 let last = std::mem::take(&mut self.last);
                 self.recall_intact(Some(&last));
                 self.last = last;
@@ -485,6 +487,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             if let Some(points) = &self.points {
                 return self.point_energy(points, i, u, &self.past, &mut s.point);
             }
+            s.carried = self.carried_of(i).copied();
             self.energy_of(i, &|j| at(u, j), |bond| self.intact[bond], &self.past, s)
         };
         let energies: Vec<f64> = (0..self.position.len())
@@ -557,6 +560,10 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             + bonds * 9
             + self.damaged_through.len()
             + self.points.as_ref().map_or(0, PointForces::memory_bytes)
+            + self
+                .carried
+                .as_ref()
+                .map_or(0, CarriedDeformation::memory_bytes)
             + (self.row.len() + self.material.len()) * 2
             + history * 8
     }

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     bond_failure::BondFailure,
+    carried_deformation::CarriedDeformation,
     generic::{Generic, Scratch, at},
 };
 use crate::{
@@ -81,13 +82,15 @@ impl<const D: usize> Generic<D> {
             let broke = |bond: usize| of_point.iter().any(|l| l.1 == bond);
             let before = |bond: usize| self.intact[bond] || broke(bond);
             let after = |bond: usize| self.intact[bond];
-            lost += self.energy_of(i, &displaced, before, &self.past, &mut scratch)
-                - self.energy_of(i, &displaced, after, &self.past, &mut scratch);
+            scratch.carried = self.carried_before(i).copied();
+            lost += self.energy_of(i, &displaced, before, &self.past, &mut scratch);
+            scratch.carried = self.carried_of(i).copied();
+            lost -= self.energy_of(i, &displaced, after, &self.past, &mut scratch);
         }
         lost
     }
 
-    /// Bonds that stand, history and tearing parameter.
+    /// Bonds that stand, history, tearing parameter, and what drags and points remember.
     pub(super) fn words(&self) -> Vec<u64> {
         let mut words = Vec::new();
         if !matches!(self.failure, BondFailure::Never) {
@@ -107,6 +110,8 @@ impl<const D: usize> Generic<D> {
         let drag = self.points.as_ref().and_then(|p| p.drag.as_ref());
         let moved = drag.into_iter().flat_map(|drag| drag.kept());
         words.extend(moved.map(|x| x.to_bits()));
+        let carried = self.carried.iter().flat_map(CarriedDeformation::numbers);
+        words.extend(carried.map(|x| x.to_bits()));
         words
     }
 
@@ -118,7 +123,8 @@ impl<const D: usize> Generic<D> {
         };
         let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
         let dragged = drag.map_or(0, |drag| drag.kept().count());
-        let kept = self.past.point.len() + self.past.bonds.len() + torn + dragged;
+        let carried = self.carried.as_ref().map_or(0, |c| c.numbers().count());
+        let kept = self.past.point.len() + self.past.bonds.len() + torn + dragged + carried;
         let Some(words) = state.len().checked_sub(kept) else {
             return false;
         };
@@ -142,7 +148,8 @@ impl<const D: usize> Generic<D> {
         let own = self.past.point.iter_mut().chain(&mut self.past.bonds);
         let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
         let moved = drag.into_iter().flat_map(|drag| drag.kept_mut());
-        for (number, word) in own.chain(torn).chain(moved).zip(history) {
+        let carried = self.carried.iter_mut().flat_map(|c| c.numbers_mut());
+        for (number, word) in own.chain(torn).chain(moved).chain(carried).zip(history) {
             *number = f64::from_bits(*word);
         }
         self.present.clone_from(&self.past);

@@ -10,6 +10,7 @@ use crate::{peridynamics::Past, tensor::Tensor};
 impl<const D: usize> ForceStates<D> for Generic<D> {
     fn partial_stress(&self, i: usize, u: &[f64]) -> Tensor<D> {
         let mut s = Scratch::default();
+        s.carried = self.carried_of(i).copied();
         self.respond(
             i,
             &|j| at(u, j),
@@ -33,6 +34,7 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
     fn energy_density(&self, i: usize, u: &[f64]) -> f64 {
         let (displaced, intact) = (|j| at(u, j), |bond: usize| self.intact[bond]);
         let mut s = Scratch::default();
+        s.carried = self.carried_of(i).copied();
         self.respond(i, &displaced, intact, 0.0, &self.past, &mut s)
             .stored
     }
@@ -48,6 +50,7 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
         let mut s = Scratch::default();
         let lacks = |i: &usize| {
             let intact = |bond: usize| self.intact[bond];
+            s.carried = self.carried_of(*i).copied();
             self.respond(*i, &|j| at(u, j), intact, 0.0, &self.past, &mut s);
             !law.responds(&s.split(self.state[*i].as_ref(), false).family)
         };

@@ -28,6 +28,7 @@
 mod bond_failure;
 pub(crate) mod bond_list;
 mod breaks;
+mod carried_deformation;
 mod compressed_list;
 mod drag;
 mod force_problem;
@@ -67,6 +68,7 @@ pub use kinematics::Kinematics;
 
 pub use stencil::BlockSetup;
 
+pub(crate) use carried_deformation::{conjugate, felt};
 pub(crate) use list::{extension, ratio, stretched};
 
 use crate::dimension;

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::{
     Kinematics,
     bond_failure::BondFailure,
+    carried_deformation::{conjugate, felt},
     generic::{Generic, History, NONE, Outcome},
     point_state::{Intact, PointForces, PointTensor},
 };
@@ -105,7 +106,7 @@ impl<const D: usize> Generic<D> {
         }
     }
 
-    /// The local response of a point at the displacement gradient `gradient`, and the share of its stress that is left; none if its family has no response.
+    /// The local response of a point whose intact bonds have the displacement gradient `gradient`, the gradient at which the law was asked, and whether it is one for strains of any size; none if its family has no response.
     fn local_response(
         &self,
         i: usize,
@@ -114,17 +115,19 @@ impl<const D: usize> Generic<D> {
         step: f64,
         past: &[f64],
         present: &mut [f64],
-    ) -> Option<LocalResponse<D>> {
+    ) -> Option<(LocalResponse<D>, Tensor<D>, bool)> {
         let material = self.material.get(i).copied().unwrap_or(0);
         let states = self.law.force_state()?;
         let law = states.correspondence(Some(material))?.law;
-        let found = law.respond(gradient, step, past, present);
+        let objective = law.is_objective();
+        let felt = felt(gradient, self.carried_of(i), objective);
+        let found = law.respond(&felt, step, past, present);
         if damage > 0.0 && !found.stored.is_finite() {
             // what is left of the family is turned inside out
             present.copy_from_slice(past);
             return None;
         }
-        Some(found)
+        Some((found, felt, objective))
     }
 
     /// Stress and history of all points at the end of a step.
@@ -157,7 +160,9 @@ impl<const D: usize> Generic<D> {
             let (sum, first) = self.moments(i, weight, u);
             *gradient = sum * inverse;
             let damage = intact[i].damage;
-            let Some(found) = self.local_response(i, gradient, damage, step, past, present) else {
+            let Some((found, felt, objective)) =
+                self.local_response(i, gradient, damage, step, past, present)
+            else {
                 return;
             };
             let left = 1.0 - damage;
@@ -169,12 +174,13 @@ impl<const D: usize> Generic<D> {
                     growth: strain - past[place],
                     // asked for of points that have flowed alone
                     tension: match strain > 0.0 {
-                        true => tension(&found.principal_stresses(gradient, self.is_objective)),
+                        true => tension(&found.principal_stresses(&felt, objective)),
                         false => 0.0,
                     },
                 };
             }
-            tensor.through = found.stress * inverse * left;
+            tensor.through =
+                conjugate(&found.stress, self.carried_of(i), objective) * inverse * left;
             tensor.strength = state.stabilisation;
             match points.control {
                 ZeroEnergyControl::BondForce => {
@@ -301,7 +307,8 @@ impl<const D: usize> Generic<D> {
         present.clear();
         present.extend(past);
         let gradient = self.moments(i, &points.weight, u).0 * inverse;
-        let Some(found) = self.local_response(i, &gradient, *damage, 0.0, past, present) else {
+        let Some((found, ..)) = self.local_response(i, &gradient, *damage, 0.0, past, present)
+        else {
             return 0.0;
         };
         let mut squares = 0.0;

@@ -12,7 +12,7 @@ use crate::{
     tensor::{Tensor, Vector},
 };
 
-const CONSTANTS: Constants = Constants {
+pub(super) const CONSTANTS: Constants = Constants {
     lambda: 1.7,
     shear: 1.3,
     influence: Influence::Gaussian,
@@ -41,7 +41,7 @@ fn laws(control: ZeroEnergyControl, strength: f64) -> [Arc<dyn Law<3>>; 2] {
 }
 
 /// The pass over a case, with bonds that break at `critical`.
-fn pass(
+pub(super) fn pass(
     case: &Case<3>,
     law: &Arc<dyn Law<3>>,
     kinematics: Kinematics,
@@ -78,7 +78,7 @@ fn pass(
 
 const STEP: f64 = 0.3;
 
-fn step(pass: &mut Generic<3>, u: &[f64], length: f64) -> Vec<f64> {
+pub(super) fn step(pass: &mut Generic<3>, u: &[f64], length: f64) -> Vec<f64> {
     let mut force = vec![f64::NAN; u.len()];
     let interval = Interval {
         end: length,

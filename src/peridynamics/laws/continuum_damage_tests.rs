@@ -108,6 +108,7 @@ impl Point {
             keeps_damage,
             is_whole: true,
             damage: 0.0,
+            carried: None,
             material: 0,
             kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
         };

@@ -8,7 +8,9 @@ use crate::{
     peridynamics::{
         BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Past, PointStress, Present, ZeroEnergyControl,
-        shape_tensor::spanned_inverse, zero_energy::excess_length,
+        bond_force::{conjugate, felt},
+        shape_tensor::spanned_inverse,
+        zero_energy::excess_length,
     },
     tensor::{Tensor, Vector, determinant},
 };
@@ -17,7 +19,7 @@ use crate::{
 ///
 /// Source: [SAND2015-7998] section 7.2 (after \[Silling2007\]) and eq. (6.30), (6.32), with the first Piola–Kirchhoff stress of any local law. Its linearisation is [`Correspondence`] with the same constants.
 ///
-/// Broken bonds drop out of `F̄` and K, and the stress falls with the damage, `σ = (1 − D) σ₀` (section 6.3), or what bonds are left would carry more. A family whose intact bonds no longer span the space
+/// Broken bonds drop out of `F̄` and K (a point that has flowed keeps the deformation they had, [`DeformedFamily::carried`]), and the stress falls with the damage, `σ = (1 − D) σ₀` (section 6.3), or what bonds are left would carry more. A family whose intact bonds no longer span the space
 /// ([`SPANNED`](crate::peridynamics::shape_tensor::SPANNED)), or that have turned inside out, has no deformation gradient: its point carries no stress of its own, and follows what the families of its neighbours do to it.
 #[derive(Clone, Debug)]
 pub struct LocalCorrespondence<const D: usize> {
@@ -131,19 +133,21 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         let Some(state) = family.state else {
             return energy;
         };
-        let local = (self.local).respond(&gradient, step, past.point, present.point);
+        let objective = self.local.is_objective();
+        let felt = felt(&gradient, family.carried, objective);
+        let local = (self.local).respond(&felt, step, past.point, present.point);
         if family.damage > 0.0 && !local.stored.is_finite() {
             // what is left of the family is turned inside out
             present.point.copy_from_slice(past.point);
             return energy;
         }
         if let Some(principal) = present.principal_stress {
-            *principal = local.principal_stresses(&gradient, self.local.is_objective());
+            *principal = local.principal_stresses(&felt, objective);
         }
         let left = 1.0 - family.damage;
         energy.stored = left * local.stored;
         energy.dissipated = left * local.dissipated;
-        let through = local.stress * shape * left;
+        let through = conjugate(&local.stress, family.carried, objective) * shape * left;
         for (k, force) in force.iter_mut().enumerate() {
             let (xi, eta, omega) = (family.bonds[k], family.difference[k], family.omega[k]);
             let (resisting, stored) = match self.linear.control {
@@ -177,8 +181,10 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
             return Tensor::zeros();
         };
         let mut present = past.point.to_vec();
-        let found = (self.local).respond(&gradient, 0.0, past.point, &mut present);
-        found.cauchy(&gradient, self.local.is_objective()) * (1.0 - family.damage)
+        let objective = self.local.is_objective();
+        let felt = felt(&gradient, family.carried, objective);
+        let found = (self.local).respond(&felt, 0.0, past.point, &mut present);
+        found.cauchy(&felt, objective) * (1.0 - family.damage)
     }
 
     fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
@@ -190,7 +196,10 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
 
     fn responds(&self, family: &DeformedFamily<'_, D>) -> bool {
         let gradient = displacement_gradient(family);
-        gradient.is_some_and(|(g, _)| determinant(&(Tensor::identity() + g)) > 0.0)
+        gradient.is_some_and(|(g, _)| {
+            let felt = felt(&g, family.carried, self.local.is_objective());
+            determinant(&(Tensor::identity() + felt)) > 0.0
+        })
     }
 
     fn is_objective(&self) -> bool {

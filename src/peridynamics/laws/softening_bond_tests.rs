@@ -91,6 +91,7 @@ impl<const D: usize> Point<D> {
             direction: &direction,
             is_whole: true,
             damage: 0.0,
+            carried: None,
             keeps_damage: false,
             material: 0,
             kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
