@@ -24,6 +24,7 @@ use crate::observe::summary::{
 use crate::progress::Progress;
 use crate::run::definiteness;
 use crate::run::error::RunError;
+use crate::run::surface_gradient::missed_peak;
 use crate::run::warnings::{indefinite, out_of_balance, warnings};
 use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
@@ -315,6 +316,8 @@ impl<const D: usize> StaticBody<'_, D> {
         told.extend(indefinite(equilibrium.symmetry, info.method));
         told.extend(rotation.as_ref().map(Rotation::warning));
         told.extend(out_of_balance(force, relative, joining));
+        let kinematics = self.rest.stresses.kinematics;
+        told.extend(missed_peak(self.model, kinematics, &solution.displacement));
         RunSummary {
             dimension: D,
             coupling: joining.name.to_owned(),

@@ -201,7 +201,7 @@ impl<const D: usize> Solved<'_, D> {
 }
 
 /// Principal stresses of a tensor and a stress `across` its plane.
-fn principal<const D: usize>(stress: &Tensor<D>, across: f64) -> [f64; 3] {
+pub(super) fn principal<const D: usize>(stress: &Tensor<D>, across: f64) -> [f64; 3] {
     let entry = |i: usize, j: usize| match (i < D && j < D, i == j) {
         (true, _) => 0.5 * (stress[(i, j)] + stress[(j, i)]),
         (false, true) if D == 2 => across,

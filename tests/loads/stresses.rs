@@ -109,3 +109,40 @@ probes.middle.at = 1.002
             .all(|(m, s)| (m - s.abs()).abs() < 1e-15)
     );
 }
+
+/// A plate of points that is pulled, with a hole or without.
+const HOLE: &str = r#"
+kinematics = "plane-stress"
+coupling = "nonlocal"
+mesh.rectangle = { min = [-40, -40], max = [40, 40], x = { cells = 80 }, y = { cells = 80 } }
+materials.m.correspondence = { youngs-modulus = 100, poisson-ratio = 0.3 }
+peridynamics = { horizon = 3, points = { lattice = { spacing = 1, origin = [-39.5, -39.5] } } }
+voids.hole.inside.ball = { center = [0, 0], radius = 10 }
+conditions.left.displacement = { inside.box = { min = [-41, -41], max = [-37, 41] }, x = "0.01*x", y = "-0.003*y" }
+conditions.right.displacement = { inside.box = { min = [37, -41], max = [41, 41] }, x = "0.01*x", y = "-0.003*y" }
+[output]
+vtu = false
+"#;
+
+#[test]
+fn a_peak_of_stress_that_families_do_not_resolve_is_told() {
+    let told = |text: &str| -> Option<String> {
+        let done = run(text, &[]);
+        let mut texts = done.summary.warnings.into_iter();
+        texts.find(|w| w.contains("falls off within a family"))
+    };
+    let found = told(HOLE).unwrap();
+    // at the edge of the hole, across the pull
+    assert!(found.contains("(0.5") && found.contains("10.5"), "{found}");
+    let uniform = HOLE.replace(
+        "voids.hole.inside.ball = { center = [0, 0], radius = 10 }\n",
+        "",
+    );
+    assert_eq!(told(&uniform), None);
+    // the tip of a crack has no peak that a finer lattice would show
+    let crack = HOLE.replace(
+        "voids.hole.inside.ball = { center = [0, 0], radius = 10 }",
+        "cracks.slit.segment = { from = [0, -8], to = [0, 8] }",
+    );
+    assert_eq!(told(&crack), None);
+}
