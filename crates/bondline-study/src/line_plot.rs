@@ -47,7 +47,7 @@ pub enum Stroke {
 /// A named series of points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// What the legend says.
+    /// What the legend says; a series without a name is not in it.
     pub name: String,
     /// Points in the order in which a line joins them.
     pub points: Vec<(f64, f64)>,
@@ -349,7 +349,7 @@ impl LinePlot {
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let line = colour.stroke_width(pixels(2));
-            let mut named = false;
+            let mut named = series.name.is_empty();
             let runs = series.points.split(|&p: &(f64, f64)| !self.drawable(p));
             for run in runs.filter(|run| !run.is_empty()) {
                 let run = run.to_vec();

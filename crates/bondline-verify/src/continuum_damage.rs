@@ -2,12 +2,15 @@
 //!
 //! The report's plate is a solid of some 38 000 points with ν = 1/4. Here it is in plane stress, where bonds that act alone have ν = 1/3; the plate is thin against its hole.
 
+use std::path::{Path, PathBuf};
+
 use crate::Effort;
 use crate::observed::{Seen, run_scene};
 use bondline::{
     observe::report::{Columns, Row, Table},
     progress::Progress,
 };
+use bondline_study::line_plot::{LinePlot, Series, Stroke};
 
 /// Largest error of the stress of the bar, over its largest stress.
 pub const STRESS_LIMIT: f64 = 1e-8;
@@ -184,13 +187,52 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     vec![table, found]
 }
 
-/// The plate with finite elements away from the hole, two spacings wide, beside the one of points alone.
-fn coupled(whole: &Seen, spacing: f64, table: &mut Table) {
+/// The plate with finite elements away from the hole, two spacings wide.
+fn with_elements(material: &str, spacing: f64) -> Result<Seen, String> {
     let zones = format!(
         "points.lattice = {{ spacing = {spacing} }}\n[zones.nonlocal]\nbox = {{ min = [-26, -30], max = [26, 30] }}\n"
     );
+    plate(material, [spacing, 2.0 * spacing], "truncated", &zones)
+}
+
+/// Draws figure 6.2, how far damage and cracks reach from the hole by the nominal strain, as `damaged_plate.svg`.
+///
+/// # Errors
+/// What a run says, or the file.
+pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<Vec<PathBuf>, String> {
+    progress.stage("damaged plates", Some(4));
+    let mut series = Vec::new();
+    let runs: [(&str, &str, fn(&str, f64) -> Result<Seen, String>); 4] = [
+        ("continuum damage, points alone", DAMAGING, whole),
+        ("continuum damage, with elements", DAMAGING, with_elements),
+        ("critical stretch, points alone", BRITTLE, whole),
+        ("critical stretch, with elements", BRITTLE, with_elements),
+    ];
+    for (name, material, run) in runs {
+        progress.advance(1);
+        let seen = run(material, 1.0)?;
+        let strains = (0..=180).map(|k| SHOWN[1] * f64::from(k) / 180.0);
+        let reached = strains.map(|strain| (100.0 * strain, extent(&seen, 0, strain)));
+        series.push(Series::new(name, Stroke::Line, reached.collect()));
+    }
+    progress.finish();
+    let path = folder.join("damaged_plate.svg");
+    LinePlot {
+        title: "Plate with a hole, strained at 45/s: how far damage reaches".into(),
+        x_label: "nominal strain [%]".into(),
+        y_label: "damaged region, from the hole [mm]".into(),
+        series,
+        ..LinePlot::default()
+    }
+    .write(&path)
+    .map_err(|e| e.to_string())?;
+    Ok(vec![path])
+}
+
+/// The plate with elements beside the one of points alone.
+fn coupled(whole: &Seen, spacing: f64, table: &mut Table) {
     let case = "continuum damage, elements away from the hole";
-    match plate(DAMAGING, [spacing, 2.0 * spacing], "truncated", &zones) {
+    match with_elements(DAMAGING, spacing) {
         Ok(seen) => {
             let strains = [0.0035, 0.0045, 0.0055, SHOWN[0], 0.006, 0.0065, SHOWN[1]];
             let off = |level: usize| {

@@ -47,6 +47,7 @@ pub mod enclosed;
 pub mod estimates;
 pub mod extremes;
 pub mod fields;
+pub mod figures;
 pub mod horizons;
 pub mod interfaces;
 pub mod large_deformation;
@@ -123,7 +124,7 @@ pub const SUITES: &[Suite] = &[
     },
     Suite {
         name: "pals",
-        about: "SAND2015-7998 section 4.2: energies of a position-aware solid at surfaces, Young's modulus of a tension bar (figure 4.2)",
+        about: "SAND2015-7998 chapter 4: energies of a position-aware solid at surfaces, Young's modulus of a tension bar (figure 4.2), relaxation (figure 4.7)",
         run: position_aware::run,
     },
     Suite {

@@ -1,12 +1,13 @@
 //! The program that runs the suites; `bondline verify` starts it with the same arguments.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use bondline::observe::report::{Format, Table, exit_code, render};
 use bondline_terminal::memory::{self, Allocator};
 use bondline_terminal::{TerminalProgress, print, tell};
+use bondline_verify::figures::{FIGURES, figures};
 use bondline_verify::report_page::{Outcome, page};
 use bondline_verify::{Effort, LONG_SUITES, SUITES, Suite, suite};
 use clap::Parser;
@@ -31,6 +32,9 @@ struct Arguments {
     /// Also write the tables as a page in Markdown.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
+    /// Also draw the figures of the suites that have some, as SVG.
+    #[arg(long, value_name = "FOLDER")]
+    figures: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -77,6 +81,9 @@ fn execute(arguments: &Arguments) -> miette::Result<ExitCode> {
         })?;
         tell(format_args!("wrote {}", path.display()));
     }
+    if let Some(folder) = &arguments.figures {
+        draw(folder, &outcomes, &progress)?;
+    }
     let tables: Vec<Table> = outcomes.into_iter().flat_map(|o| o.tables).collect();
     let format = if arguments.json {
         Format::Json
@@ -85,6 +92,28 @@ fn execute(arguments: &Arguments) -> miette::Result<ExitCode> {
     };
     print(render(&tables, format).trim_end())?;
     Ok(ExitCode::from(exit_code(&tables)))
+}
+
+/// Draws the figures of the suites that were run.
+fn draw(folder: &Path, outcomes: &[Outcome], progress: &TerminalProgress) -> miette::Result<()> {
+    let mut drawn = 0;
+    for outcome in outcomes {
+        let Some(draw) = figures(outcome.suite.name) else {
+            continue;
+        };
+        for path in draw(folder, progress).map_err(|e| miette::miette!("{e}"))? {
+            tell(format_args!("wrote {}", path.display()));
+            drawn += 1;
+        }
+    }
+    if drawn == 0 {
+        let with: Vec<&str> = FIGURES.iter().map(|(name, _)| *name).collect();
+        return Err(miette::miette!(
+            "no suite that was run has figures; those of {} have some",
+            with.join(", ")
+        ));
+    }
+    Ok(())
 }
 
 fn suites() -> PossibleValuesParser {

@@ -1,11 +1,11 @@
-//! The position-aware linear solid (PALS) of [SAND2015-7998] section 4.2: energies at surfaces, and Young's modulus of a bar, by scenes.
+//! The position-aware solids of [SAND2015-7998] chapter 4, by scenes: energies at surfaces and Young's modulus of a bar with the linear one (PALS), relaxation with the viscoelastic one (PAVE).
 //!
 //! The paper prints no geometry, moduli or horizon. The cube has 7 × 7 × 7 points, as in figures 4.6 and 4.7; the bar stands for that of figures 4.1 and 4.2.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::Effort;
+use crate::{Effort, observed};
 use bondline::{
     observe::{
         Observer,
@@ -17,6 +17,7 @@ use bondline::{
     run::{AnyScene, RunOptions},
     scene::Source,
 };
+use bondline_study::line_plot::{LinePlot, Series, Stroke};
 
 /// Largest relative deviation of the energy density of a point under a field that the law is calibrated on.
 pub const ENERGY_LIMIT: f64 = 1e-12;
@@ -212,10 +213,111 @@ fn tension(progress: &dyn Progress) -> Table {
     table
 }
 
+/// Parts of the shear modulus that relax, and the relaxation time \[s\], of section 4.4.1.
+const SHARES: [f64; 3] = [0.01, 0.5, 0.99];
+const RELAXATION_TIME: f64 = 2.0;
+
+/// Largest deviation of the energy of a sheared cube that relaxes from its closed form, over the energy at once.
+pub const RELAXATION_LIMIT: f64 = 1e-12;
+
+/// Energy that a cube stores over that at once, by the time \[s\]: sheared within 1e-13 s and held; `share` 0 is the position-aware solid.
+fn relaxation(share: f64) -> Result<Vec<[f64; 2]>, String> {
+    let law = match share {
+        0.0 => material("pals"),
+        _ => {
+            material("pave")
+                + &format!("relaxing-share = {share}\nrelaxation-time = {RELAXATION_TIME}\n")
+        }
+    };
+    let steps: Vec<String> = (1..=20)
+        .map(|k| format!("{}", 0.1 * f64::from(k)))
+        .collect();
+    let text = format!(
+        "kinematics = \"solid\"\ncoupling = \"nonlocal\"\nmesh.box = {{ min = [0, 0, 0], max = [7, 7, 7], x = {{ cells = 7 }}, y = {{ cells = 7 }}, z = {{ cells = 7 }} }}\n{law}[peridynamics]\nhorizon = 3\nbonds = \"linear\"\npoints.lattice = {{ spacing = 1, origin = [0.5, 0.5, 0.5] }}\n[conditions.sheared.displacement]\ninside.box = {{ min = [0, 0, 0], max = [7, 7, 7] }}\nx = \"{STRAIN}*y\"\ny = 0\nz = 0\n[solve.quasi-static]\nsteps = [1e-13, {}]\noutputs = 1\n",
+        steps.join(", ")
+    );
+    let seen = observed::run_scene(&text)?;
+    let rows = seen.columns("history", ["time", "stored_energy"]);
+    let at_once = rows.iter().find(|row| row[0] > 0.0);
+    let at_once = at_once.ok_or("the run has no rows")?[1];
+    let later = rows.iter().filter(|row| row[0] > 0.0);
+    Ok(later.map(|[t, w]| [*t, w / at_once]).collect())
+}
+
+/// `(1 − λ) + λ exp(−2 t/τ)`, by the springs of (4.12)–(4.15) under a shear at once.
+fn relaxed(share: f64, t: f64) -> f64 {
+    1.0 - share + share * (-2.0 * t / RELAXATION_TIME).exp()
+}
+
+/// Relaxation of the cube that is sheared at once.
+fn relaxations(progress: &dyn Progress) -> Table {
+    let mut table = Table::new(
+        "Cube of 7 x 7 x 7 points of PAVE, sheared at once and held, relaxation time 2 s (figure 4.7): W(t)/W(0)",
+        Columns::Full,
+    );
+    for share in SHARES {
+        progress.advance(1);
+        let case = format!("lambda = {share}");
+        match relaxation(share) {
+            Ok(rows) => {
+                let off = rows.iter().map(|[t, w]| (w - relaxed(share, *t)).abs());
+                let last = rows.last().map_or(f64::NAN, |row| row[1]);
+                table.push(Row::info(&case, "W(2 s)/W(0)", last));
+                let quantity = "W(t)/W(0) beside the closed form, largest difference of 21 steps";
+                let off = match rows.len() {
+                    21 => off.fold(0.0, f64::max),
+                    _ => f64::NAN,
+                };
+                table.push(Row::at_most(&case, quantity, off, RELAXATION_LIMIT));
+            }
+            Err(why) => {
+                table.push(Row::at_most(case, "W(t)/W(0)", f64::NAN, RELAXATION_LIMIT).because(why))
+            }
+        }
+    }
+    table
+}
+
+/// Draws figure 4.7, the energy of the sheared cube by the time, as `pave_relaxation.svg`.
+///
+/// # Errors
+/// What a run says, or the file.
+pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<Vec<PathBuf>, String> {
+    progress.stage("relaxation", Some(4));
+    let mut series = Vec::new();
+    for share in [&[0.0], &SHARES[..]].concat() {
+        progress.advance(1);
+        let points = relaxation(share)?.into_iter().map(|[t, w]| (t, w));
+        let name = match share {
+            0.0 => "PALS".to_owned(),
+            _ => format!("PAVE, λ = {share}"),
+        };
+        series.push(Series::new(name, Stroke::Dots, points.collect()));
+    }
+    for share in SHARES {
+        let exact = (0..=100).map(|k| 0.02 * f64::from(k));
+        let exact = exact.map(|t| (t, relaxed(share, t))).collect();
+        series.push(Series::new("", Stroke::Line, exact));
+    }
+    progress.finish();
+    let path = folder.join("pave_relaxation.svg");
+    LinePlot {
+        title: "Cube of 7 × 7 × 7 points sheared at once and held: dots computed, lines exact"
+            .into(),
+        x_label: "time [s]".into(),
+        y_label: "strain energy over that at once".into(),
+        series,
+        ..LinePlot::default()
+    }
+    .write(&path)
+    .map_err(|e| e.to_string())?;
+    Ok(vec![path])
+}
+
 /// The suite `pals`.
 pub fn run(_effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    progress.stage("position-aware solid", Some(12));
-    let tables = vec![energies(progress), tension(progress)];
+    progress.stage("position-aware solid", Some(15));
+    let tables = vec![energies(progress), tension(progress), relaxations(progress)];
     progress.finish();
     tables
 }
