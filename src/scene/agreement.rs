@@ -8,6 +8,7 @@ use super::spec::{
     BondsSpec, CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded,
 };
 use crate::coupling::Zone;
+use crate::fem::crack_band;
 use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::peridynamics::ZeroEnergyControl;
@@ -81,6 +82,48 @@ pub(crate) fn elastic_elements<const D: usize>(
         "of this material",
     )
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
+}
+
+/// Refuses elements that are too large for the fracture energy of their material.
+pub(crate) fn crack_bands<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    cell_material: &[u16],
+    (mesh, zones): (&Mesh<D>, &[Zone]),
+) -> Result<(), SceneError> {
+    for (own, material) in materials.iter().enumerate() {
+        let Some(law) = material.law.local_law().filter(|l| l.damage().is_some()) else {
+            continue;
+        };
+        let cells = (0..mesh.cell_count())
+            .filter(|&c| zones[c] == Zone::Local && usize::from(cell_material[c]) == own);
+        let bands = cells.map(|c| (c, crack_band(mesh, c)));
+        // the widest speaks for all
+        let Some((cell, width)) = bands.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            continue;
+        };
+        let Some(Err(why)) = law.in_band(width) else {
+            continue;
+        };
+        let name = spec.materials.get_key_value(material.name.as_str());
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!(
+                "cell {cell} of the material `{}`, at {:?}, is too large: {why}",
+                material.name,
+                mesh.centroid(cell).as_slice()
+            ),
+        )
+        .label(
+            name.map_or(0..0, |(k, _)| k.span.clone()),
+            "a crack is one row of cells wide",
+        )
+        .help(format!(
+            "refine the mesh to cells below {}, better a tenth of that, or give the material a larger `fracture-energy` or a lower `tensile-strength`",
+            number(why.widest)
+        )));
+    }
+    Ok(())
 }
 
 /// Refuses the energy density of points whose bonds are exact and have a fast pass: that adds energies up without those of single points.

@@ -110,4 +110,7 @@ pub enum SystemError {
     /// The contact cannot be set up.
     #[error(transparent)]
     Contact(#[from] ContactError),
+    /// An element is too large for a law that softens.
+    #[error(transparent)]
+    Band(#[from] crate::fem::WideCell),
 }
