@@ -146,7 +146,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// Lets finite elements follow the local laws of their materials, by the number of a material; those that are linear, or that only other rows hold, stay as they are.
     ///
     /// # Errors
-    /// [`SystemError::Band`] for an element that is too large for its law.
+    /// [`SystemError::Band`] for an element in which a law that softens would not take its fracture energy.
     pub fn with_local_laws(
         mut self,
         laws: &[Option<Arc<dyn LocalLaw<D>>>],

@@ -73,7 +73,7 @@ mod second_order_tests;
 
 pub use body::{FemError, assemble, check, internal_force};
 pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
-pub use crack_band::{WideCell, crack_band};
+pub use crack_band::{CellBandError, banded_law, crack_band};
 pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at,
     displacement_gradient_at_centre, for_each_point, quadrature, quadrature_of, row_at,

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::cell::{MAX_NODES, Rule};
-use super::crack_band::{CellLaws, WideCell};
+use super::crack_band::{CellBandError, CellLaws};
 use super::element::{displacement_gradient, for_each_point};
 use crate::{
     material::LocalLaw,
@@ -75,12 +75,12 @@ impl<const D: usize> NonlinearElements<D> {
     /// The elements among `cells` (ascending, with whether their energy counts) whose law `law_of` is not linear; none if there are none. A law that softens has the crack band of its cell.
     ///
     /// # Errors
-    /// [`WideCell`] for a cell that is too large for its law.
+    /// [`CellBandError`] for a cell in which a law that softens would not take its fracture energy.
     pub fn new(
         mesh: &Mesh<D>,
         cells: impl Iterator<Item = (usize, bool)>,
         law_of: impl Fn(usize) -> Option<Arc<dyn LocalLaw<D>>>,
-    ) -> Result<Option<Self>, WideCell> {
+    ) -> Result<Option<Self>, CellBandError> {
         let mut laws = CellLaws::new();
         let (mut elements, mut numbers, mut held) = (Vec::new(), 0, 0);
         let mut count = vec![0u32; mesh.nodes.len() + 1];
@@ -494,6 +494,7 @@ mod tests {
         let law: Arc<dyn LocalLaw<2>> = Arc::new(J2::<2>::new(LAME.0, LAME.1, 1e9, 0.0));
         let mut elements =
             NonlinearElements::new(&mesh, [(0, true)].into_iter(), |_| Some(Arc::clone(&law)))
+                .unwrap()
                 .unwrap();
         let u: Vec<Vector<2>> = (mesh.nodes.iter())
             .map(|x| Vector::<2>::new((x[0] - 0.5) * (x[1] - 0.5), 0.0))

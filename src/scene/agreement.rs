@@ -8,7 +8,7 @@ use super::spec::{
     BondsSpec, CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded,
 };
 use crate::coupling::Zone;
-use crate::fem::crack_band;
+use crate::fem::{CellBandError, banded_law, crack_band};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::peridynamics::ZeroEnergyControl;
@@ -84,7 +84,7 @@ pub(crate) fn elastic_elements<const D: usize>(
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
 }
 
-/// Refuses elements that are too large for the fracture energy of their material.
+/// Refuses elements in which a material that softens would not take its fracture energy.
 pub(crate) fn crack_bands<const D: usize>(
     spec: &SceneSpec,
     materials: &[Material<D>],
@@ -97,19 +97,34 @@ pub(crate) fn crack_bands<const D: usize>(
         };
         let cells = (0..mesh.cell_count())
             .filter(|&c| zones[c] == Zone::Local && usize::from(cell_material[c]) == own);
-        let bands = cells.map(|c| (c, crack_band(mesh, c)));
         // the widest speaks for all
-        let Some((cell, width)) = bands.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        let widest = (cells.clone()).max_by(|a, b| {
+            let width = |c: &usize| crack_band(mesh, *c);
+            width(a).total_cmp(&width(b))
+        });
+        let of_second_order = cells.clone().find(|&c| mesh.shapes[c].is_quadratic());
+        let asked = of_second_order.or(widest);
+        let Some(Err(why)) = asked.map(|c| banded_law(law.as_ref(), mesh, c)) else {
             continue;
         };
-        let Some(Err(why)) = law.in_band(width) else {
-            continue;
+        let (cell, help) = match why {
+            CellBandError::Wide { cell, source } => (
+                cell,
+                format!(
+                    "refine the mesh to cells below {}, better a tenth of that, or give the material a larger `fracture-energy` or a lower `tensile-strength`",
+                    number(source.widest)
+                ),
+            ),
+            CellBandError::SecondOrder { cell } => (
+                cell,
+                "use cells of first order where this material is".to_owned(),
+            ),
         };
         let name = spec.materials.get_key_value(material.name.as_str());
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
             format!(
-                "cell {cell} of the material `{}`, at {:?}, is too large: {why}",
+                "the material `{}` at {:?}: {why}",
                 material.name,
                 mesh.centroid(cell).as_slice()
             ),
@@ -118,10 +133,7 @@ pub(crate) fn crack_bands<const D: usize>(
             name.map_or(0..0, |(k, _)| k.span.clone()),
             "a crack is one row of cells wide",
         )
-        .help(format!(
-            "refine the mesh to cells below {}, better a tenth of that, or give the material a larger `fracture-energy` or a lower `tensile-strength`",
-            number(why.widest)
-        )));
+        .help(help));
     }
     Ok(())
 }

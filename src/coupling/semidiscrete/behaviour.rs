@@ -110,7 +110,7 @@ pub enum SystemError {
     /// The contact cannot be set up.
     #[error(transparent)]
     Contact(#[from] ContactError),
-    /// An element is too large for a law that softens.
+    /// A law that softens would not take its fracture energy in an element.
     #[error(transparent)]
-    Band(#[from] crate::fem::WideCell),
+    Band(#[from] crate::fem::CellBandError),
 }

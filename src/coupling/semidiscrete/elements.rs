@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::behaviour::CHUNK;
 use crate::{
     coupling::{CellRole, Model, SiteKind},
-    fem::{NonlinearElements, WideCell},
+    fem::{CellBandError, NonlinearElements},
     material::LocalLaw,
     tensor::{Tensor, Vector},
 };
@@ -21,11 +21,11 @@ impl<const D: usize> LocalElements<D> {
     /// The elements among the rows of nodes whose material has a law that is not linear; none if there are none.
     ///
     /// # Errors
-    /// [`WideCell`] for an element that is too large for its law.
+    /// [`CellBandError`] for an element in which a law that softens would not take its fracture energy.
     pub fn new(
         model: &Model<D>,
         laws: &[Option<Arc<dyn LocalLaw<D>>>],
-    ) -> Result<Option<Self>, WideCell> {
+    ) -> Result<Option<Self>, CellBandError> {
         if laws.iter().all(Option::is_none) {
             return Ok(None);
         }

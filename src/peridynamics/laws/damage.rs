@@ -211,7 +211,8 @@ mod tests {
         let case = case();
         let eta: Vec<Vector<3>> = (case.bonds.iter().enumerate())
             .map(|(k, xi)| {
-                let turned = Vector::new(0.08 * xi[0] + 0.02 * xi[1], -0.03 * xi[2], 0.05 * xi[0]);
+                let turned =
+                    Vector::<3>::new(0.08 * xi[0] + 0.02 * xi[1], -0.03 * xi[2], 0.05 * xi[0]);
                 turned + Vector::from_fn(|j, _| 4e-3 * ((5 * k + j) as f64).cos())
             })
             .collect();
