@@ -73,8 +73,8 @@ pub(super) struct CellLaws<const D: usize> {
     typed: Vec<Arc<dyn LocalLaw<D>>>,
     /// The laws of the cells.
     pub laws: Vec<Arc<dyn LocalLaw<D>>>,
-    /// By the number among those typed, and the width so that equal cells share one law.
-    number: HashMap<(usize, u32), u32>,
+    /// By the number among those typed, the width, and whether the cell is of second order: equal cells share one law.
+    number: HashMap<(usize, u32, bool), u32>,
 }
 
 impl<const D: usize> CellLaws<D> {
@@ -105,7 +105,8 @@ impl<const D: usize> CellLaws<D> {
             Some(_) => crack_band(mesh, cell) as f32,
             None => 0.0,
         };
-        let key = (typed, width.to_bits());
+        let is_quadratic = mesh.shapes[cell].is_quadratic();
+        let key = (typed, width.to_bits(), is_quadratic);
         if let Some(number) = self.number.get(&key) {
             return Ok(*number);
         }
