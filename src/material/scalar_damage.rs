@@ -100,7 +100,7 @@ impl ScalarDamage {
         let widest = settings.widest_band();
         // the area G_f/h is ½ f_t ε₀ (1 + a)
         let after = widest / width - 1.0;
-        if !(after > 0.0) {
+        if after.is_nan() || after <= 0.0 {
             return Err(WideBand {
                 width,
                 widest,

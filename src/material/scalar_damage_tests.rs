@@ -93,7 +93,7 @@ fn uniaxial_tension_follows_its_curve_unloads_to_the_origin_and_reloads() {
             is_near(&mut point, part * onset, envelope(curve, part * onset));
         }
         assert!((envelope(curve, onset) / STRENGTH - 1.0).abs() < 1e-15);
-        assert_eq!(point.dissipated > 0.0, true);
+        assert!(point.dissipated > 0.0);
         // along the secant to the origin and back, with nothing dissipated
         let (top, spent) = (1.7 * onset, point.dissipated);
         for part in [0.6, 0.0, 0.4, 1.0] {
