@@ -144,9 +144,14 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     }
 
     /// Lets finite elements follow the local laws of their materials, by the number of a material; those that are linear, or that only other rows hold, stay as they are.
-    #[must_use]
-    pub fn with_local_laws(mut self, laws: &[Option<Arc<dyn LocalLaw<D>>>]) -> Self {
-        self.elements = LocalElements::new(self.model, laws);
+    ///
+    /// # Errors
+    /// [`SystemError::Band`] for an element in which a law that softens would not take its fracture energy.
+    pub fn with_local_laws(
+        mut self,
+        laws: &[Option<Arc<dyn LocalLaw<D>>>],
+    ) -> Result<Self, SystemError> {
+        self.elements = LocalElements::new(self.model, laws)?;
         if self.elements.is_some() && self.difference_length.is_none() {
             // there may be no points, and no spacing
             let mesh = &self.model.mesh;
@@ -155,7 +160,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             let size = (volume / mesh.cell_count() as f64).powf(1.0 / D as f64);
             self.difference_length = Some(DIFFERENCED * size);
         }
-        self
+        Ok(self)
     }
 
     /// The pass over the bonds, if there is a peridynamic body.

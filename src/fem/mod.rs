@@ -38,6 +38,7 @@
 //! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one linear cell each |
 //! | `line3.rs`, `tri6.rs`, `quad8.rs`, `tet10.rs`, `hex20.rs` | one cell of second order each |
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
+//! | `crack_band.rs` | the width in which a law that softens localises in a cell |
 //! | `nonlinear.rs` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
 //! | `locate.rs` | from a point in space to a cell and its shape functions |
@@ -48,6 +49,7 @@
 
 mod body;
 mod cell;
+mod crack_band;
 mod element;
 mod hex20;
 mod hex8;
@@ -71,6 +73,7 @@ mod second_order_tests;
 
 pub use body::{FemError, assemble, check, internal_force};
 pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
+pub use crack_band::{CellBandError, banded_law, crack_band};
 pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at,
     displacement_gradient_at_centre, for_each_point, quadrature, quadrature_of, row_at,

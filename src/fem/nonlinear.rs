@@ -15,6 +15,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::cell::{MAX_NODES, Rule};
+use super::crack_band::{CellBandError, CellLaws};
 use super::element::{displacement_gradient, for_each_point};
 use crate::{
     material::LocalLaw,
@@ -71,30 +72,29 @@ pub struct NonlinearElements<const D: usize> {
 }
 
 impl<const D: usize> NonlinearElements<D> {
-    /// The elements among `cells` (ascending, with whether their energy counts) whose law `law_of` is not linear; none if there are none.
+    /// The elements among `cells` (ascending, with whether their energy counts) whose law `law_of` is not linear; none if there are none. A law that softens has the crack band of its cell.
+    ///
+    /// # Errors
+    /// [`CellBandError`] for a cell in which a law that softens would not take its fracture energy.
     pub fn new(
         mesh: &Mesh<D>,
         cells: impl Iterator<Item = (usize, bool)>,
         law_of: impl Fn(usize) -> Option<Arc<dyn LocalLaw<D>>>,
-    ) -> Option<Self> {
-        let mut laws: Vec<Arc<dyn LocalLaw<D>>> = Vec::new();
+    ) -> Result<Option<Self>, CellBandError> {
+        let mut laws = CellLaws::new();
         let (mut elements, mut numbers, mut held) = (Vec::new(), 0, 0);
         let mut count = vec![0u32; mesh.nodes.len() + 1];
         for (cell, counts) in cells {
             let Some(law) = law_of(cell).filter(|law| !law.is_linear()) else {
                 continue;
             };
-            let known = laws.iter().position(|l| Arc::ptr_eq(l, &law));
-            let number = known.unwrap_or_else(|| {
-                laws.push(law);
-                laws.len() - 1
-            });
-            let each = laws[number].history().len();
+            let each = law.history().len();
+            let number = laws.number(law, mesh, cell)?;
             let mut points = 0;
             for_each_point(mesh, cell, Rule::Stiffness, |_| points += 1);
             elements.push(Element {
                 cell: cell as u32,
-                law: number as u32,
+                law: number,
                 first: numbers,
                 node: held,
                 each,
@@ -107,7 +107,7 @@ impl<const D: usize> NonlinearElements<D> {
             }
         }
         if elements.is_empty() {
-            return None;
+            return Ok(None);
         }
         for n in 1..count.len() {
             count[n] += count[n - 1];
@@ -121,8 +121,8 @@ impl<const D: usize> NonlinearElements<D> {
                 *next += 1;
             }
         }
-        Some(Self {
-            laws,
+        Ok(Some(Self {
+            laws: laws.laws,
             excess: Vec::new(),
             forces: vec![Vector::zeros(); held],
             elements,
@@ -130,7 +130,7 @@ impl<const D: usize> NonlinearElements<D> {
             present: vec![0.0; numbers],
             offsets,
             of_node,
-        })
+        }))
     }
 
     /// Whether points remember anything.
@@ -419,8 +419,9 @@ mod tests {
         for mesh in boxes::<D>(3, 0.3) {
             let law: Arc<dyn LocalLaw<D>> = Arc::new(J2::<D>::new(LAME.0, LAME.1, 2.0, 50.0));
             let cells = || (0..mesh.cell_count()).map(|c| (c, true));
-            let mut elements =
-                NonlinearElements::new(&mesh, cells(), |_| Some(Arc::clone(&law))).unwrap();
+            let mut elements = NonlinearElements::new(&mesh, cells(), |_| Some(Arc::clone(&law)))
+                .unwrap()
+                .unwrap();
             let name = format!("{:?}", mesh.shapes[0]);
 
             // a uniform gradient: nodes within are in equilibrium, and the virial is the stress of the law times the volume
@@ -460,8 +461,9 @@ mod tests {
             );
 
             // the stress is the derivative of the energy stored and dissipated over an interval
-            let mut fresh =
-                NonlinearElements::new(&mesh, cells(), |_| Some(Arc::clone(&law))).unwrap();
+            let mut fresh = NonlinearElements::new(&mesh, cells(), |_| Some(Arc::clone(&law)))
+                .unwrap()
+                .unwrap();
             let bent: Vec<Vector<D>> = (affine.iter().enumerate())
                 .map(|(n, u)| u + Vector::from_fn(|i, _| 2e-3 * noise(n, i)))
                 .collect();
@@ -492,6 +494,7 @@ mod tests {
         let law: Arc<dyn LocalLaw<2>> = Arc::new(J2::<2>::new(LAME.0, LAME.1, 1e9, 0.0));
         let mut elements =
             NonlinearElements::new(&mesh, [(0, true)].into_iter(), |_| Some(Arc::clone(&law)))
+                .unwrap()
                 .unwrap();
         let u: Vec<Vector<2>> = (mesh.nodes.iter())
             .map(|x| Vector::<2>::new((x[0] - 0.5) * (x[1] - 0.5), 0.0))

@@ -7,6 +7,7 @@
 //! | `hardening.rs` | its yield stress: linear, Voce, Johnson–Cook |
 //! | `hyperelastic.rs` | St Venant–Kirchhoff and Neo-Hooke, for strains of any size |
 //! | `logarithmic_j2.rs` | the same for strains of any size |
+//! | `scalar_damage.rs`, `softening.rs` | isotropic scalar damage with a tensile strength and a fracture energy, and how it softens |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
 //! | `umat.rs`, `umat/` | a user's routine with the calling convention of Abaqus' UMAT (feature `umat`) |
 //!
@@ -23,6 +24,8 @@ mod logarithmic_j2;
 #[cfg(test)]
 mod path_tests;
 mod reduction;
+mod scalar_damage;
+mod softening;
 #[cfg(feature = "umat")]
 mod umat;
 
@@ -32,8 +35,14 @@ pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
 pub use j2::J2;
 pub use logarithmic_j2::LogarithmicJ2;
 pub use reduction::Reduced;
+pub use scalar_damage::{
+    EquivalentStrain, RESIDUAL, ScalarDamage, ScalarDamageSettings, SofteningCurve,
+};
+pub use softening::Envelope;
 #[cfg(feature = "umat")]
 pub use umat::{Routine, RoutineError, Umat, UmatEnergies, UmatSettings};
+
+use std::sync::Arc;
 
 use crate::tensor::{Tensor, Tensor4};
 
@@ -123,6 +132,22 @@ pub enum MaterialError {
     },
 }
 
+/// A band of localised deformation in which a law cannot have its fracture energy.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a crack band of the width {width:.4e} is too wide for the tensile strength {strength:e} and the fracture energy {energy:e}: at the strength it stores more than that energy, and would snap back; it has to be narrower than 2 E G/f² = {widest:.4e}"
+)]
+pub struct WideBand {
+    /// Its width h \[m\].
+    pub width: f64,
+    /// The width above which this happens \[m\].
+    pub widest: f64,
+    /// Tensile strength \[Pa\].
+    pub strength: f64,
+    /// Fracture energy \[J/m²\].
+    pub energy: f64,
+}
+
 /// What a local law answers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalResponse<const D: usize> {
@@ -187,6 +212,16 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
         present: &mut [f64],
     ) -> LocalResponse<D>;
 
+    /// Which of the numbers that it remembers is the damage D, by which it loses its stiffness; none of a law that does not.
+    fn damage(&self) -> Option<usize> {
+        None
+    }
+
+    /// The law where its deformation localises in a band of the width `width` \[m\]: of a law whose softening takes an energy per area, so that what it does at a point depends on that length. None of a law without one.
+    fn in_band(&self, _width: f64) -> Option<Result<Arc<dyn LocalLaw<D>>, WideBand>> {
+        None
+    }
+
     /// What failed last within the law, with its remedy; none of a law that computes what it is given. What fails has a response that is not a number.
     fn failure(&self) -> Option<String> {
         None
@@ -196,7 +231,6 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
 
     fn elastic() -> Elastic {
         Elastic::new(72e9, 0.22, 2440.0).unwrap()
@@ -225,7 +259,19 @@ mod tests {
             saturation: 0.0,
             rate: 0.0,
         };
-        let solids: [(&str, Arc<dyn LocalLaw<3>>); 4] = [
+        let damage = ScalarDamage::new(ScalarDamageSettings {
+            lambda,
+            shear,
+            strength: 1e10,
+            energy: 1e10,
+            measure: EquivalentStrain::Mazars,
+            curve: SofteningCurve::Exponential,
+        });
+        let solids: [(&str, Arc<dyn LocalLaw<3>>); 5] = [
+            (
+                "scalar damage",
+                Arc::new(damage.banded(1.0).expect("14 at most")),
+            ),
             (
                 "J2 in logarithmic strains",
                 Arc::new(LogarithmicJ2::new(lambda, shear, hardening)),

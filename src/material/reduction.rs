@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Kinematics, LocalLaw, LocalResponse};
+use super::{Kinematics, LocalLaw, LocalResponse, WideBand};
 use crate::tensor::{Tensor, Tensor4};
 
 /// Most corrections of the strain out of the body.
@@ -115,6 +115,20 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
 
     fn history(&self) -> &'static [&'static str] {
         self.law.history()
+    }
+
+    fn damage(&self) -> Option<usize> {
+        self.law.damage()
+    }
+
+    fn in_band(&self, width: f64) -> Option<Result<Arc<dyn LocalLaw<D>>, WideBand>> {
+        let banded = |law| -> Arc<dyn LocalLaw<D>> {
+            Arc::new(Self {
+                law,
+                ..self.clone()
+            })
+        };
+        Some(self.law.in_band(width)?.map(banded))
     }
 
     fn failure(&self) -> Option<String> {

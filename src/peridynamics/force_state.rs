@@ -16,10 +16,19 @@ pub struct HistoryLayout {
     pub point: &'static [&'static str],
     /// Of each bond, seen from either end.
     pub bond: &'static [&'static str],
-    /// Which of the numbers of a bond is its damage φ, from 0 to 1; none for a law whose bonds are whole until they break by their stretch.
+    /// Where the damage of bonds is kept; none for a law whose bonds are whole until they break by their stretch.
     ///
-    /// By this results show damage, and a bond counts as broken once φ is 1 at both of its ends. Every law says it: what it left out would pass for undamaged.
-    pub damage: Option<usize>,
+    /// By this results show damage. Every law says it: what it left out would pass for undamaged.
+    pub damage: Option<KeptDamage>,
+}
+
+/// Which number that a law keeps is a damage, from 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KeptDamage {
+    /// The damage φ of a bond, by its place among the numbers of bonds. A bond counts as broken once φ is 1 at both of its ends.
+    Bond(usize),
+    /// The damage D of a point, by its place among the numbers of points: that of all bonds of its family alike, `φ⟨ξ⟩ = D`, [SAND2015-7998] eq. (6.28). No bond breaks by it.
+    Point(usize),
 }
 
 impl HistoryLayout {
@@ -120,6 +129,8 @@ pub struct EnergyDensity {
 pub struct PointStress<'a, const D: usize> {
     /// What gives P.
     pub law: &'a dyn LocalLaw<D>,
+    /// What gives P where the point keeps the damage that it has, if that is another law.
+    pub keeping: Option<&'a dyn LocalLaw<D>>,
     /// What resists the rest of the deformation.
     pub control: ZeroEnergyControl,
 }

@@ -57,7 +57,8 @@ pub use crack_area::CrackArea;
 pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{
-    DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Past, PointStress, Present,
+    DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past, PointStress,
+    Present,
 };
 pub use influence::{Influence, Micromodulus};
 pub use law::{Accelerator, Calibrate, Law, Mixture};

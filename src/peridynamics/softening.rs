@@ -3,6 +3,7 @@
 //! A body of softening bonds is a smeared cohesive zone as wide as the horizon δ. Of a given strength and energy, a larger horizon leaves less softening to each bond; beyond a largest one a bond that is stretched alike all along would snap back.
 //! Of a continuous family it is `3 E G/σ²` in a bar, `4π/9 E G/σ²` in plane stress and `5/6 E G/σ²` in a solid, which bounds the horizon as `2 E G/σ²` bounds the width of a crack band \[BazantOh1983\].
 
+pub use crate::material::Envelope;
 use crate::tensor::Vector;
 
 /// Part of its largest force at which an exponentially softening bond lets go.
@@ -61,9 +62,22 @@ pub enum CalibrationError {
         /// Fracture energy \[J/m²\].
         energy: f64,
     },
+    /// Points would snap back.
+    #[error(
+        "a horizon of {horizon:.4e} is too large: {source}; a crack is as wide as the families that it crosses: take a horizon below {largest:.4e}, with as many points to it, or finite elements alone"
+    )]
+    Band {
+        /// δ \[m\].
+        horizon: f64,
+        /// The largest one \[m\].
+        largest: f64,
+        /// The crack band of that horizon.
+        #[source]
+        source: crate::material::WideBand,
+    },
     /// No horizon to calibrate for.
     #[error(
-        "softening bonds are calibrated for one horizon, and the horizon of this body varies; give peridynamics.horizon a number, and the body one lattice"
+        "a material that softens is calibrated for one horizon, and the horizon of this body varies; give peridynamics.horizon a number, and the body one lattice"
     )]
     Varies,
     /// The family has no stiffness along an axis.
@@ -85,79 +99,6 @@ pub struct RegularFamily<'a, const D: usize> {
     pub plane_energy: f64,
     /// δ \[m\].
     pub horizon: f64,
-}
-
-/// The force of a bond over its stretch, over its stiffness: `g(s) = s` up to `onset`, then falling to zero at `end`.
-///
-/// Bilinear: `g = s₀ (s₁ − s)/(s₁ − s₀)`. Exponential: `g = s₀ exp(−(s − s₀)/s_f)`, zero once it is a thousandth of `s₀`.
-/// `∫ g ds = ½ s₀² (1 + a)`, where `a` is the work of softening over that before it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Envelope {
-    /// s₀, at which softening begins.
-    pub onset: f64,
-    /// Stretch at which nothing is left.
-    pub end: f64,
-    /// s_f of an exponential.
-    decay: Option<f64>,
-}
-
-impl Envelope {
-    /// That with the work `after` of softening over that before.
-    pub fn new(onset: f64, after: f64, is_exponential: bool) -> Self {
-        match is_exponential {
-            true => {
-                let decay = 0.5 * after * onset / (1.0 - LETS_GO);
-                Self {
-                    onset,
-                    end: onset - decay * LETS_GO.ln(),
-                    decay: Some(decay),
-                }
-            }
-            false => Self {
-                onset,
-                end: onset * (1.0 + after),
-                decay: None,
-            },
-        }
-    }
-
-    /// `g(s)` of a bond that has never been stretched more.
-    pub fn force(&self, s: f64) -> f64 {
-        if s <= self.onset {
-            return s;
-        }
-        if s >= self.end {
-            return 0.0;
-        }
-        match self.decay {
-            Some(decay) => self.onset * (-(s - self.onset) / decay).exp(),
-            None => self.onset * (self.end - s) / (self.end - self.onset),
-        }
-    }
-
-    /// φ of a bond whose largest stretch is `s`.
-    pub fn damage(&self, s: f64) -> f64 {
-        match s <= self.onset {
-            true => 0.0,
-            false => 1.0 - self.force(s) / s,
-        }
-    }
-
-    /// What it has dissipated by then, over its stiffness: `∫ g ds` less what is stored.
-    pub fn spent(&self, s: f64) -> f64 {
-        if s <= self.onset {
-            return 0.0;
-        }
-        let until = s.min(self.end);
-        let before = 0.5 * self.onset * self.onset;
-        let after = match self.decay {
-            // zero at once where nothing is left to soften
-            Some(0.0) => 0.0,
-            Some(decay) => -self.onset * decay * (-(until - self.onset) / decay).exp_m1(),
-            None => 0.5 * (self.onset + self.force(until)) * (until - self.onset),
-        };
-        before + after - 0.5 * self.force(s) * s
-    }
 }
 
 /// Bonds of the same angle to the axis of a tension bar.
@@ -257,7 +198,7 @@ impl Tension {
 
     /// Stress over strain before any bond softens \[Pa\].
     fn stiffness(&self) -> f64 {
-        let linear = Envelope::new(f64::INFINITY, 0.0, false);
+        let linear = Envelope::linear(f64::INFINITY, 0.0);
         self.stress(&linear, 1.0, 0.0).0
     }
 
@@ -312,8 +253,13 @@ impl Softening {
             return Err(CalibrationError::Stiffness { stiffness });
         }
         let critical = (self.energy / family.plane_energy).sqrt();
-        let with =
-            |after: f64| Envelope::new(critical / (1.0 + after).sqrt(), after, self.is_exponential);
+        let with = |after: f64| {
+            let onset = critical / (1.0 + after).sqrt();
+            match self.is_exponential {
+                true => Envelope::exponential(onset, after, LETS_GO),
+                false => Envelope::linear(onset, after),
+            }
+        };
         let excess = |after: f64| tension.strength(&with(after)) / self.strength - 1.0;
         let brittle = excess(0.0);
         let largest_horizon = family.horizon * (1.0 + brittle).powi(2);

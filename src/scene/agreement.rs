@@ -8,6 +8,7 @@ use super::spec::{
     BondsSpec, CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded,
 };
 use crate::coupling::Zone;
+use crate::fem::{CellBandError, banded_law, crack_band};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::peridynamics::ZeroEnergyControl;
@@ -81,6 +82,60 @@ pub(crate) fn elastic_elements<const D: usize>(
         "of this material",
     )
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
+}
+
+/// Refuses elements in which a material that softens would not take its fracture energy.
+pub(crate) fn crack_bands<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    cell_material: &[u16],
+    (mesh, zones): (&Mesh<D>, &[Zone]),
+) -> Result<(), SceneError> {
+    for (own, material) in materials.iter().enumerate() {
+        let Some(law) = material.law.local_law().filter(|l| l.damage().is_some()) else {
+            continue;
+        };
+        let cells = (0..mesh.cell_count())
+            .filter(|&c| zones[c] == Zone::Local && usize::from(cell_material[c]) == own);
+        // the widest speaks for all
+        let widest = (cells.clone()).max_by(|a, b| {
+            let width = |c: &usize| crack_band(mesh, *c);
+            width(a).total_cmp(&width(b))
+        });
+        let of_second_order = cells.clone().find(|&c| mesh.shapes[c].is_quadratic());
+        let asked = of_second_order.or(widest);
+        let Some(Err(why)) = asked.map(|c| banded_law(law.as_ref(), mesh, c)) else {
+            continue;
+        };
+        let (cell, help) = match why {
+            CellBandError::Wide { cell, source } => (
+                cell,
+                format!(
+                    "refine the mesh to cells below {}, better a tenth of that, or give the material a larger `fracture-energy` or a lower `tensile-strength`",
+                    number(source.widest)
+                ),
+            ),
+            CellBandError::SecondOrder { cell } => (
+                cell,
+                "use cells of first order where this material is".to_owned(),
+            ),
+        };
+        let name = spec.materials.get_key_value(material.name.as_str());
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!(
+                "the material `{}` at {:?}: {why}",
+                material.name,
+                mesh.centroid(cell).as_slice()
+            ),
+        )
+        .label(
+            name.map_or(0..0, |(k, _)| k.span.clone()),
+            "a crack is one row of cells wide",
+        )
+        .help(help));
+    }
+    Ok(())
 }
 
 /// Refuses the energy density of points whose bonds are exact and have a fast pass: that adds energies up without those of single points.

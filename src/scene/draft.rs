@@ -204,6 +204,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             agreement::balanced_seam(spec, coupling, materials, cells, material)?;
         }
         agreement::elastic_elements(spec, materials, cells, zones)?;
+        agreement::crack_bands(spec, materials, cells, (&self.mesh, zones))?;
         agreement::drag(spec, materials, used)?;
         agreement::memory(spec, materials, cells, zones)
     }

@@ -23,6 +23,7 @@ mod parts;
 mod plasticity;
 mod position_aware;
 mod restarts;
+mod scalar_damage;
 mod softening;
 mod sub_steps;
 

@@ -240,8 +240,8 @@ pub fn measured<const D: usize>(
     );
     let laws = laid.model.local_laws(&[]);
     let mut system = system
-        .map_err(|e: SystemError| e.to_string())?
-        .with_local_laws(&laws);
+        .and_then(|system| system.with_local_laws(&laws))
+        .map_err(|e: SystemError| e.to_string())?;
     let [large, rotation] = gradients::<D>();
     let (residual, _) = forces(&laid, &mut system, &large);
     let (rotated, energy) = match D {

@@ -110,4 +110,7 @@ pub enum SystemError {
     /// The contact cannot be set up.
     #[error(transparent)]
     Contact(#[from] ContactError),
+    /// A law that softens would not take its fracture energy in an element.
+    #[error(transparent)]
+    Band(#[from] crate::fem::CellBandError),
 }

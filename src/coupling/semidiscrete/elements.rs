@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::behaviour::CHUNK;
 use crate::{
     coupling::{CellRole, Model, SiteKind},
-    fem::NonlinearElements,
+    fem::{CellBandError, NonlinearElements},
     material::LocalLaw,
     tensor::{Tensor, Vector},
 };
@@ -19,9 +19,15 @@ pub(super) struct LocalElements<const D: usize> {
 
 impl<const D: usize> LocalElements<D> {
     /// The elements among the rows of nodes whose material has a law that is not linear; none if there are none.
-    pub fn new(model: &Model<D>, laws: &[Option<Arc<dyn LocalLaw<D>>>]) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`CellBandError`] for an element in which a law that softens would not take its fracture energy.
+    pub fn new(
+        model: &Model<D>,
+        laws: &[Option<Arc<dyn LocalLaw<D>>>],
+    ) -> Result<Option<Self>, CellBandError> {
         if laws.iter().all(Option::is_none) {
-            return None;
+            return Ok(None);
         }
         let mut in_rows = vec![false; model.mesh.cell_count()];
         for site in 0..model.sites.len() {
@@ -31,10 +37,10 @@ impl<const D: usize> LocalElements<D> {
             }
         }
         let cells = (0..in_rows.len()).filter(|&c| in_rows[c]);
-        NonlinearElements::new(&model.mesh, cells.map(|c| (c, model.is_element(c))), |c| {
-            laws[model.material_of_cell(c) as usize].clone()
-        })
-        .map(|elements| Self { elements })
+        let cells = cells.map(|c| (c, model.is_element(c)));
+        let law = |c| laws[model.material_of_cell(c) as usize].clone();
+        let elements = NonlinearElements::new(&model.mesh, cells, law)?;
+        Ok(elements.map(|elements| Self { elements }))
     }
 
     /// Adds to the force of each site what its elements have beyond the linear ones.

@@ -15,8 +15,8 @@ use super::{
 };
 use crate::{
     peridynamics::{
-        DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, Law, Past, PdBody,
-        Present, StatePart, body::split_rows, tearing_parameter::Flow,
+        DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, KeptDamage, Law, Past,
+        PdBody, Present, StatePart, body::split_rows, tearing_parameter::Flow,
     },
     system::{FailureUpdate, Interval},
     tensor::{Tensor, Vector},
@@ -177,7 +177,11 @@ impl<const D: usize> Generic<D> {
             point: vec![0.0; points * layout.point.len()],
             bonds: vec![0.0; bonds * layout.bond.len()],
         };
-        let damaged_through = vec![false; layout.damage.map_or(0, |_| bonds)];
+        let counted = match layout.damage {
+            Some(KeptDamage::Bond(_)) => bonds,
+            _ => 0,
+        };
+        let damaged_through = vec![false; counted];
         let by_points = PointForces::new(states, points);
         let kept = if by_points.is_some() { 0 } else { bonds };
         let failure = BondFailure::new(setup, body);
@@ -505,7 +509,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
     }
 
     fn is_damaged(&self, i: usize) -> bool {
-        self.range(i).any(|bond| self.damage_of(bond) > 0.0)
+        self.kept_of_point(i) > 0.0 || self.range(i).any(|bond| self.damage_of(bond) > 0.0)
     }
 
     fn broken(&self) -> u64 {

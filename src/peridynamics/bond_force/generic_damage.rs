@@ -3,14 +3,15 @@
 use rayon::prelude::*;
 
 use super::generic::{Generic, NONE};
+use crate::peridynamics::KeptDamage;
 
 impl<const D: usize> Generic<D> {
-    /// The damage φ of a bond at its own end, 1 of a broken one, as committed.
+    /// The damage φ of a bond at its own end, 1 of a broken one, as committed; without what is kept of the point.
     pub(super) fn damage_of(&self, bond: usize) -> f64 {
         match self.layout.damage {
             _ if !self.intact[bond] => 1.0,
-            Some(place) => self.past.bonds[bond * self.layout.bond.len() + place],
-            None => 0.0,
+            Some(KeptDamage::Bond(place)) => self.past.bonds[bond * self.layout.bond.len() + place],
+            _ => 0.0,
         }
     }
 
@@ -21,7 +22,7 @@ impl<const D: usize> Generic<D> {
 
     /// Bonds whose damage has become 1 at both ends in the last response, with their points; one without a far family is what its own end says.
     pub(super) fn newly_damaged_through(&self) -> Vec<(u32, usize)> {
-        let Some(place) = self.layout.damage else {
+        let Some(KeptDamage::Bond(place)) = self.layout.damage else {
             return Vec::new();
         };
         let is_one = |bond: usize| self.present.bonds[bond * self.layout.bond.len() + place] == 1.0;
@@ -59,7 +60,15 @@ impl<const D: usize> Generic<D> {
         }
     }
 
-    /// `1 − Σ (1 − φ) V / Σ V` of a point; zero where there is no family.
+    /// The damage D that is kept of a point, as committed.
+    pub(super) fn kept_of_point(&self, i: usize) -> f64 {
+        match self.layout.damage {
+            Some(KeptDamage::Point(place)) => self.past.point[i * self.layout.point.len() + place],
+            _ => 0.0,
+        }
+    }
+
+    /// `1 − (1 − D) Σ (1 − φ) V / Σ V` of a point; D where there is no family.
     pub(super) fn damage_of_point(&self, i: usize) -> f64 {
         let (mut all, mut lost) = (0.0, 0.0);
         for bond in self.range(i) {
@@ -67,6 +76,11 @@ impl<const D: usize> Generic<D> {
             all += v;
             lost += v * self.damage_of(bond);
         }
-        if lost > 0.0 { lost / all } else { 0.0 }
+        let kept = self.kept_of_point(i);
+        if lost > 0.0 {
+            kept + (1.0 - kept) * (lost / all)
+        } else {
+            kept
+        }
     }
 }

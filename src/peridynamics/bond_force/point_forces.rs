@@ -16,11 +16,12 @@ use super::{
 use crate::{
     material::LocalResponse,
     peridynamics::{
+        KeptDamage, StatePart,
         body::split_rows,
         force_state::PLASTIC_STRAIN,
         shape_tensor::spanned_inverse,
         tearing_parameter::{Flow, tension},
-        zero_energy::{ZeroEnergyControl, excess_length},
+        zero_energy::{ZeroEnergyControl, control_left, excess_length},
     },
     tensor::{Tensor, Vector},
 };
@@ -118,7 +119,11 @@ impl<const D: usize> Generic<D> {
     ) -> Option<(LocalResponse<D>, Tensor<D>, bool)> {
         let material = self.material.get(i).copied().unwrap_or(0);
         let states = self.law.force_state()?;
-        let law = states.correspondence(Some(material))?.law;
+        let stress = states.correspondence(Some(material))?;
+        let law = match stress.keeping.filter(|_| self.no_fail[i]) {
+            Some(keeping) => keeping,
+            None => stress.law,
+        };
         let objective = law.is_objective();
         let felt = felt(gradient, self.carried_of(i), objective);
         let found = law.respond(&felt, step, past, present);
@@ -167,6 +172,12 @@ impl<const D: usize> Generic<D> {
             };
             let left = 1.0 - damage;
             outcome.dissipated = left * found.dissipated * self.volume[i];
+            // the control of a point that is damaged fades from step to step
+            let (fade, faded) = self.fades(past, present);
+            if faded < fade {
+                let squares = self.control_squares(i, points.control, state, weight, gradient, u);
+                outcome.dissipated += 0.5 * (fade - faded) * squares * self.volume[i];
+            }
             if let Some(place) = flows {
                 let strain = present[place];
                 outcome.flow = Flow {
@@ -181,13 +192,13 @@ impl<const D: usize> Generic<D> {
             }
             tensor.through =
                 conjugate(&found.stress, self.carried_of(i), objective) * inverse * left;
-            tensor.strength = state.stabilisation;
+            tensor.strength = fade * state.stabilisation;
             match points.control {
                 ZeroEnergyControl::BondForce => {
-                    tensor.through -= *gradient * state.stabilisation;
-                    *own = first * state.stabilisation;
+                    tensor.through -= *gradient * tensor.strength;
+                    *own = first * tensor.strength;
                 }
-                _ => tensor.strength = state.control,
+                _ => tensor.strength = fade * state.control,
             }
             *own += tensor.through * intact[i].first;
         });
@@ -311,20 +322,46 @@ impl<const D: usize> Generic<D> {
         else {
             return 0.0;
         };
+        let (control, weights) = (points.control, &points.weight);
+        let squares = self.control_squares(i, control, state, weights, &gradient, u);
+        let fade = self.fades(past, past).0;
+        ((1.0 - damage) * found.stored + 0.5 * fade * squares) * self.volume[i]
+    }
+
+    /// What is left of the control of a point over a step, and after it ([`control_left`]).
+    fn fades(&self, past: &[f64], present: &[f64]) -> (f64, f64) {
+        match self.layout.damage {
+            Some(KeptDamage::Point(place)) => {
+                (control_left(past[place]), control_left(present[place]))
+            }
+            _ => (1.0, 1.0),
+        }
+    }
+
+    /// Twice the energy density of the control of a point that is undamaged \[J/m^D\].
+    fn control_squares(
+        &self,
+        i: usize,
+        control: ZeroEnergyControl,
+        state: &StatePart<D>,
+        weights: &[f64],
+        gradient: &Tensor<D>,
+        u: &[f64],
+    ) -> f64 {
         let mut squares = 0.0;
-        self.each_bond(i, &points.weight, u, |_, w, xi, eta| {
+        self.each_bond(i, weights, u, |_, w, xi, eta| {
             let (xi, eta) = (Vector::from(*xi), Vector::from(*eta));
-            squares += w * match points.control {
+            squares += w * match control {
                 ZeroEnergyControl::BondForce => {
                     state.stabilisation * (eta - gradient * xi).norm_squared()
                 }
                 ZeroEnergyControl::Length => {
-                    let excess = excess_length(&xi, &eta, &gradient, self.kinematics);
+                    let excess = excess_length(&xi, &eta, gradient, self.kinematics);
                     state.control * excess * excess
                 }
                 ZeroEnergyControl::Drag => 0.0,
             };
         });
-        ((1.0 - damage) * found.stored + 0.5 * squares) * self.volume[i]
+        squares
     }
 }

@@ -8,6 +8,7 @@ use crate::{
     peridynamics::{
         Cloud, Ends, Factors, Influence, Law, PdBody, ZeroEnergyControl,
         laws::{Constants, Named},
+        softening::RegularFamily,
     },
     tensor::{Tensor, Vector},
 };
@@ -47,6 +48,16 @@ pub(super) fn pass(
     kinematics: Kinematics,
     critical: Option<f64>,
 ) -> Generic<3> {
+    pass_beside(case, law, kinematics, (critical, &[]))
+}
+
+/// The same with points that keep their damage.
+fn pass_beside(
+    case: &Case<3>,
+    law: &Arc<dyn Law<3>>,
+    kinematics: Kinematics,
+    (critical, no_fail): (Option<f64>, &[bool]),
+) -> Generic<3> {
     let points = case.position.len();
     let cloud = Cloud {
         position: case.position.clone(),
@@ -67,7 +78,7 @@ pub(super) fn pass(
         kinematics,
         failure: critical.map(|s| Failure {
             critical: CriticalStretch::Uniform(s),
-            no_fail: &[],
+            no_fail,
         }),
         precracked: None,
         layout: Layout::List,
@@ -135,6 +146,61 @@ fn forces_are_those_of_the_force_states_bond_by_bond() {
                     assert_eq!(found.1, expected.1);
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn points_that_soften_do_so_bond_by_bond_too_and_show_their_damage() {
+    let case = case([9, 7, 8], 0.2, false);
+    let (points, n) = (case.position.len(), case.position.len() * 3);
+    let held: Vec<bool> = (0..points).map(|i| i % 7 == 0).collect();
+    let lattice = RegularFamily {
+        bonds: &[(Vector::<3>::new(2.0 * H, 0.0, 0.0), 1.0)],
+        plane_energy: 1.0,
+        horizon: 3.0 * H,
+    };
+    for control in CONTROLS {
+        let place = control as usize as f64;
+        let values = [0.05, 0.05, 0.0, 0.0, 0.7, place];
+        let law = Named::DamageCorrespondence.build::<3>(CONSTANTS, &values);
+        let law = law.calibrate().unwrap().to_lattice(&lattice).unwrap();
+        let run = |by_bonds: bool| {
+            let breaks = (Some(f64::INFINITY), held.as_slice());
+            let mut pass = pass_beside(&case, &law, Kinematics::Linear, breaks);
+            if by_bonds {
+                pass.by_bonds();
+            }
+            let mut all = Vec::new();
+            for (size, seed) in [(0.05, 3), (0.08, 7), (0.02, 9)] {
+                let u = noise(n, size * H, seed);
+                all.extend(step(&mut pass, &u, 0.0));
+                let spent = pass.commit();
+                assert!(spent >= 0.0);
+                all.extend([spent, pass.stored_energy(&u)]);
+            }
+            let mut damage = vec![0.0; points];
+            pass.damage_into(&mut damage);
+            let state = pass.damage_state();
+            let u = noise(n, 0.2 * H, 5);
+            step(&mut pass, &u, 0.0);
+            pass.commit();
+            assert!(pass.restore_damage(&state));
+            let mut again = vec![0.0; points];
+            pass.damage_into(&mut again);
+            assert_eq!(again, damage);
+            assert!((0..points).all(|i| pass.is_damaged(i) == (damage[i] > 0.0)));
+            // damaged or not, no bond is broken by it
+            assert_eq!(pass.broken(), 0);
+            (all, damage)
+        };
+        let (found, expected) = (run(false), run(true));
+        let off = difference(&found.0, &expected.0) / largest(&expected.0);
+        assert!(off < 1e-13, "{control:?}: {off:e}");
+        let partly = found.1.iter().filter(|d| **d > 0.01 && **d < 0.99);
+        assert!(2 * partly.count() > points);
+        for (held, damage) in held.iter().zip(&found.1) {
+            assert!(!held || *damage == 0.0);
         }
     }
 }

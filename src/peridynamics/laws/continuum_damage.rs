@@ -6,7 +6,7 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
+        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Law,
         LinearForceState, Micromodulus, Past, Present,
     },
     tensor::Vector,
@@ -284,7 +284,7 @@ impl<const D: usize> ForceState<D> for ContinuumDamage<D> {
         HistoryLayout {
             point: &[],
             bond: &HISTORY[..kept],
-            damage: Some(0),
+            damage: Some(KeptDamage::Bond(0)),
         }
     }
 

@@ -6,11 +6,12 @@ use super::{Correspondence, Parameter};
 use crate::{
     material::LocalLaw,
     peridynamics::{
-        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Past, PointStress, Present, ZeroEnergyControl,
+        BondEnergy, Calibrate, DeformedFamily, EnergyDensity, ForceState, HistoryLayout,
+        KeptDamage, Law, LinearForceState, Past, PointStress, Present, ZeroEnergyControl,
         bond_force::{conjugate, felt},
         shape_tensor::spanned_inverse,
-        zero_energy::excess_length,
+        softening::{CalibrationError, RegularFamily},
+        zero_energy::{control_left, excess_length},
     },
     tensor::{Tensor, Vector, determinant},
 };
@@ -26,6 +27,15 @@ pub struct LocalCorrespondence<const D: usize> {
     name: &'static str,
     linear: Correspondence<D>,
     local: Arc<dyn LocalLaw<D>>,
+    /// `local` within the crack band of the lattice, of a law that softens.
+    band: Option<Band<D>>,
+}
+
+/// A law that softens, within the crack band of a lattice.
+#[derive(Clone, Debug)]
+struct Band<const D: usize> {
+    width: f64,
+    law: Arc<dyn LocalLaw<D>>,
 }
 
 impl<const D: usize> LocalCorrespondence<D> {
@@ -35,7 +45,13 @@ impl<const D: usize> LocalCorrespondence<D> {
             name,
             linear,
             local,
+            band: None,
         }
+    }
+
+    /// The law of points.
+    fn law(&self) -> &dyn LocalLaw<D> {
+        self.band.as_ref().map_or(&*self.local, |band| &*band.law)
     }
 
     /// The strength of the stabilising term, for scenes.
@@ -74,14 +90,62 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
         Some(Arc::clone(&self.local))
     }
 
+    /// Not of a law that softens: it loses its stiffness before.
     fn has_breakable_bonds(&self) -> bool {
-        true
+        self.local.damage().is_none()
+    }
+
+    fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
+        self.local.damage().map(|_| self as &dyn Calibrate<D>)
     }
 
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         None
     }
 }
+
+/// A law that softens has the crack band of a lattice: a crack along its layers damages every family that it crosses through, and each of them takes the energy of its volume. That is `2 n h` for layers of the spacing h, n of which have bonds of weight ω > 0 to one of them.
+impl<const D: usize> Calibrate<D> for LocalCorrespondence<D> {
+    fn to_lattice(
+        &self,
+        family: &RegularFamily<'_, D>,
+    ) -> Result<Arc<dyn Law<D>>, CalibrationError> {
+        let omega = |xi: &Vector<D>| self.linear.influence.value(xi.norm(), family.horizon);
+        let bonds = family.bonds.iter().map(|(xi, _)| xi);
+        let largest = bonds.clone().map(omega).fold(0.0, f64::max);
+        let reach = bonds
+            .filter(|xi| omega(xi) > NO_WEIGHT * largest)
+            .fold(0.0f64, |reach, xi| reach.max(xi[0].abs()));
+        let width = 2.0 * reach;
+        let Some(law) = self.local.in_band(width) else {
+            return Ok(Arc::new(self.clone()));
+        };
+        let law = law.map_err(|source| CalibrationError::Band {
+            horizon: family.horizon,
+            largest: family.horizon * source.widest / width,
+            source,
+        })?;
+        Ok(Arc::new(Self {
+            band: Some(Band { width, law }),
+            ..self.clone()
+        }))
+    }
+
+    fn found(&self) -> Option<String> {
+        let band = self.band.as_ref()?;
+        Some(format!(
+            "points soften within a crack band of the width {:.4e}: a crack damages every family that it crosses",
+            band.width
+        ))
+    }
+
+    fn elastic_limit(&self) -> Option<f64> {
+        None
+    }
+}
+
+/// Part of the largest weight of a bond below which it counts as none.
+const NO_WEIGHT: f64 = 1e-9;
 
 /// `K⁻¹` of the intact bonds; none if they do not span the space.
 fn inverse_shape<const D: usize>(family: &DeformedFamily<'_, D>) -> Option<Tensor<D>> {
@@ -113,7 +177,7 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         HistoryLayout {
             point: self.local.history(),
             bond: &[],
-            damage: None,
+            damage: self.local.damage().map(KeptDamage::Point),
         }
     }
 
@@ -133,9 +197,16 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         let Some(state) = family.state else {
             return energy;
         };
-        let objective = self.local.is_objective();
+        // without its band a law that softens keeps the damage that it has
+        let law = match family.keeps_damage {
+            true => &*self.local,
+            false => self.law(),
+        };
+        let objective = law.is_objective();
         let felt = felt(&gradient, family.carried, objective);
-        let local = (self.local).respond(&felt, step, past.point, present.point);
+        let local = law.respond(&felt, step, past.point, present.point);
+        let fades = |point: &[f64]| law.damage().map_or(1.0, |d| control_left(point[d]));
+        let (fade, faded) = (fades(past.point), fades(present.point));
         if family.damage > 0.0 && !local.stored.is_finite() {
             // what is left of the family is turned inside out
             present.point.copy_from_slice(past.point);
@@ -153,19 +224,23 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
             let (resisting, stored) = match self.linear.control {
                 ZeroEnergyControl::BondForce => {
                     let beyond = eta - gradient * xi;
-                    let resisting = beyond * state.stabilisation;
+                    let resisting = beyond * (fade * state.stabilisation);
                     (resisting, 0.5 * resisting.dot(&beyond))
                 }
                 ZeroEnergyControl::Length => {
                     let excess = excess_length(&xi, &eta, &gradient, family.kinematics);
-                    let size = state.control * excess;
+                    let size = fade * state.control * excess;
                     (family.direction[k] * size, 0.5 * size * excess)
                 }
                 // it asks for velocities, which the pass has
                 ZeroEnergyControl::Drag => (Vector::zeros(), 0.0),
             };
             *force = (through * xi + resisting) * omega;
-            energy.stored += omega * stored * family.volumes[k];
+            let stored = omega * stored * family.volumes[k];
+            energy.stored += stored;
+            if faded < fade {
+                energy.dissipated += (1.0 - faded / fade) * stored;
+            }
         }
         energy
     }
@@ -183,13 +258,14 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         let mut present = past.point.to_vec();
         let objective = self.local.is_objective();
         let felt = felt(&gradient, family.carried, objective);
-        let found = (self.local).respond(&felt, 0.0, past.point, &mut present);
+        let found = (self.law()).respond(&felt, 0.0, past.point, &mut present);
         found.cauchy(&felt, objective) * (1.0 - family.damage)
     }
 
     fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
         Some(PointStress {
-            law: self.local.as_ref(),
+            law: self.law(),
+            keeping: self.band.as_ref().map(|_| &*self.local),
             control: self.linear.control,
         })
     }

@@ -13,6 +13,7 @@
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
 //! | `several.rs` | several materials of one law in one body | |
 //! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
+//! | `damage.rs` | its stress that of scalar damage | section 6.2.6 |
 //! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | its stress hyperelastic, for large deformations | |
 //!
 //! A law that implements [`NamedLaw`] and has its line in the list at the end of this file is a material of scenes, by its key.
@@ -20,6 +21,7 @@
 mod bond_based;
 mod continuum_damage;
 mod correspondence;
+mod damage;
 mod hardening;
 mod johnson_cook;
 mod local_correspondence;
@@ -41,6 +43,7 @@ use crate::peridynamics::{Influence, Law, ZeroEnergyControl, force_state::PLASTI
 pub use bond_based::BondBased;
 pub use continuum_damage::ContinuumDamage;
 pub use correspondence::Correspondence;
+pub use damage::DamageCorrespondence;
 pub use hardening::Hardening;
 pub use johnson_cook::JohnsonCookCorrespondence;
 pub use local_correspondence::LocalCorrespondence;
@@ -367,6 +370,7 @@ named_laws! {
     PositionAwareViscoelasticSolid,
     PlasticCorrespondence,
     JohnsonCookCorrespondence,
+    DamageCorrespondence,
     NeoHookeSolid,
     StVenantKirchhoffSolid,
 }

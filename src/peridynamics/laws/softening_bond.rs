@@ -6,8 +6,8 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        BondEnergy, Calibrate, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Micromodulus, Past, Present,
+        BondEnergy, Calibrate, DeformedFamily, EnergyDensity, ForceState, HistoryLayout,
+        KeptDamage, Law, LinearForceState, Micromodulus, Past, Present,
         softening::{Calibration, CalibrationError, Envelope, RegularFamily, Softening},
     },
     tensor::Vector,
@@ -133,7 +133,7 @@ impl<const D: usize> ForceState<D> for SofteningBond<D> {
         HistoryLayout {
             point: &[],
             bond: &HISTORY,
-            damage: Some(0),
+            damage: Some(KeptDamage::Bond(0)),
         }
     }
 

@@ -92,7 +92,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     match moving {
         Ok(motion) => {
             let laws = model.local_laws(&rest.local_laws);
-            let motion = motion.with_local_laws(&laws).with_ranks(start.ranks);
+            let motion = motion.with_local_laws(&laws)?.with_ranks(start.ranks);
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms
@@ -268,7 +268,7 @@ pub(crate) fn still<'a, const D: usize>(
     let symmetry = coupling.symmetry();
     let system = CoupledSystem::new(model, operator, symmetry, density, &behaviour)?;
     Ok(Some(
-        system.with_local_laws(&model.local_laws(&rest.local_laws)),
+        system.with_local_laws(&model.local_laws(&rest.local_laws))?,
     ))
 }
 
