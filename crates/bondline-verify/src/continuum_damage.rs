@@ -202,7 +202,8 @@ fn with_elements(material: &str, spacing: f64) -> Result<Seen, String> {
 pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<Vec<PathBuf>, String> {
     progress.stage("damaged plates", Some(4));
     let mut series = Vec::new();
-    let runs: [(&str, &str, fn(&str, f64) -> Result<Seen, String>); 4] = [
+    type Plate = fn(&str, f64) -> Result<Seen, String>;
+    let runs: [(&str, &str, Plate); 4] = [
         ("continuum damage, points alone", DAMAGING, whole),
         ("continuum damage, with elements", DAMAGING, with_elements),
         ("critical stretch, points alone", BRITTLE, whole),
