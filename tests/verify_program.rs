@@ -17,7 +17,16 @@ fn verify(folder: &Path, script: Option<&str>, arguments: &[&str]) -> Output {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
     }
     let mut command = Command::new(program);
-    command.arg("verify").args(arguments).output().unwrap()
+    command.arg("verify").args(arguments);
+    loop {
+        match command.output() {
+            // another test forked while the copy was open for writing, and its child holds it until it executes
+            Err(e) if e.kind() == std::io::ErrorKind::ExecutableFileBusy => {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
+            output => return output.unwrap(),
+        }
+    }
 }
 
 #[test]

@@ -33,6 +33,7 @@ mod compressed_list;
 mod drag;
 mod force_problem;
 mod generic;
+mod generic_carried;
 mod generic_damage;
 mod generic_failure;
 mod generic_states;
