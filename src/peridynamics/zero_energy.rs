@@ -22,7 +22,7 @@ pub enum ZeroEnergyControl {
     /// Along the part of the bond that is not uniform: elastic.
     #[default]
     BondForce,
-    /// Along the deformed bond, by its length: elastic; rotations of bonds are not resisted.
+    /// Along the deformed bond, by its length; rotations of bonds are not resisted. The force state of the report: it follows the deformation at once, but is not quite the derivative of the energy that is told of it, `½ q ω (|Y| − |F̄ ξ|)²`, since that depends on `F̄`, too.
     Length,
     /// Against velocities that are not uniform: dissipates, and holds no mode in place.
     Drag,

@@ -158,11 +158,8 @@ impl<const D: usize> Solved<'_, D> {
         };
         let across = self.stress_out_of_plane(settings, t, stress, place);
         let principal = principal(stress, across);
-        let [a, b, c] = principal;
         let of = |s: &StressSpec| match s {
-            StressSpec::VonMises => {
-                (0.5 * ((a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2))).sqrt()
-            }
+            StressSpec::VonMises => von_mises(&principal),
             StressSpec::MaxPrincipal => principal.into_iter().fold(f64::NEG_INFINITY, f64::max),
             StressSpec::MinPrincipal => principal.into_iter().fold(f64::INFINITY, f64::min),
         };
@@ -198,6 +195,11 @@ impl<const D: usize> Solved<'_, D> {
             .map_or(0.0, |th| th.rise_at(&x, t));
         ratio * stress.trace() - per_degree * rise
     }
+}
+
+/// The von Mises stress of principal stresses \[Pa\].
+pub(super) fn von_mises([a, b, c]: &[f64; 3]) -> f64 {
+    (0.5 * ((a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2))).sqrt()
 }
 
 /// Principal stresses of a tensor and a stress `across` its plane.

@@ -1,12 +1,14 @@
 //! Stresses that fall off from a free surface faster than families resolve.
 
+use rayon::prelude::*;
+
 use crate::coupling::Model;
 use crate::material::Kinematics;
 use crate::observe::report::number;
 use crate::shape::Barrier;
 use crate::tensor::{Tensor, Vector, inverse};
 
-use super::stresses::principal;
+use super::stresses::{principal, von_mises};
 
 /// The share of the largest stress that families may miss before it is told: that of a bent beam whose depth is ten horizons.
 const MISSED: f64 = 0.08;
@@ -41,7 +43,7 @@ pub(super) fn missed_peak<const D: usize>(
         inverse(&shape).map(|(inverse, _)| inverse)
     };
     let tensor = law.linearised().tensor();
-    let von_mises = |p: usize| {
+    let stress_of = |p: usize| {
         let sum: Tensor<D> = bonds(p)
             .map(|(j, xi, v)| (u[j] - u[p]) * xi.transpose() * v)
             .sum();
@@ -55,10 +57,10 @@ pub(super) fn missed_peak<const D: usize>(
             }
             _ => 0.0,
         };
-        let [a, b, c] = principal(&stress, across);
-        Some((0.5 * ((a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2))).sqrt())
+        Some(von_mises(&principal(&stress, across)))
     };
-    let stresses: Vec<f64> = (0..u.len()).map(|p| von_mises(p).unwrap_or(0.0)).collect();
+    let points = (0..u.len()).into_par_iter().with_min_len(64);
+    let stresses: Vec<f64> = points.map(|p| stress_of(p).unwrap_or(0.0)).collect();
     let largest = stresses.iter().copied().fold(0.0, f64::max);
     // stress at the surface beyond that of the point, for a stress that is linear over the family
     let beyond = |p: usize| {

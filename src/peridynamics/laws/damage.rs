@@ -19,7 +19,7 @@ pub struct DamageCorrespondence<const D: usize>;
 
 impl<const D: usize> NamedLaw<D> for DamageCorrespondence<D> {
     const KEY: &'static str = "damage-correspondence";
-    const ABOUT: &'static str = "Isotropic scalar damage with a tensile strength and a fracture energy, in finite elements, each with the crack band of its size.";
+    const ABOUT: &'static str = "Isotropic scalar damage with a tensile strength and a fracture energy, within crack bands: that of its cell in a finite element, that of the lattice at points.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
     const PARAMETERS: &'static [Parameter] = &[
