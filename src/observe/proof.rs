@@ -76,6 +76,15 @@ impl Proof {
     }
 }
 
+impl Proof {
+    /// The largest size of the figures whose names begin so; 0 without any.
+    pub fn largest(&self, name: &str) -> f64 {
+        let figures = self.parts.iter().flat_map(|p| &p.figures);
+        let named = figures.filter(|f| f.name.starts_with(name));
+        named.map(|f| f.value.abs()).fold(0.0, f64::max)
+    }
+}
+
 impl fmt::Display for Proof {
     /// One line per part; findings are told among the warnings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
