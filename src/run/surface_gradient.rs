@@ -19,8 +19,8 @@ const ONE_SIDED: f64 = 0.2;
 /// Tells of the largest stress of points where it lies at a free surface and changes within a family, by more than the part `uniform` of itself by which a uniform stress is wrong there: less may be the law's own surface effect.
 ///
 /// What a family knows of a deformation is its mean, that at its centroid, for fields that are linear over it. At a free surface the centroid lies inside by 0.42 of a horizon in plates and 3/8 in solids, so that a stress that falls off into the body,
-/// as beside a hole or in bending, is too low by its gradient times that distance. The gradient of the points is one of means, too, so that this is a lower bound: Kirsch's peak at a hole whose radius is 3.3 horizons
-/// is 24 % above that of the points, of which 11 % are told (`tests/loads/stresses.rs`). Cracks are left out: their stress has no bound that a mesh could resolve.
+/// as beside a hole or in bending, is wrong by its gradient times that distance, too low by correspondence; by an LPS, which strains more at surfaces, it may be too high. The gradient of the points is one of means, too, so that this is a lower bound: Kirsch's peak at a hole whose radius
+/// is 3.3 horizons is 24 % above that of points by correspondence, of which 11 % are told (`tests/loads/stresses.rs`). Cracks are left out: their stress has no bound that a mesh could resolve.
 pub(super) fn missed_peak<const D: usize>(
     model: &Model<D>,
     kinematics: Kinematics,
@@ -80,7 +80,7 @@ pub(super) fn missed_peak<const D: usize>(
     (missed > uniform.max(MISSED) * stresses[p]).then(|| {
         let place: Vec<String> = cloud.position[p].iter().map(|x| number(*x)).collect();
         format!(
-            "the largest stress of the points lies at a free surface, at ({}), and falls off within a family: each point has the mean of its family, so that the stress at the surface itself is higher than that of outputs, by {:.0} % or more; take a smaller horizon there, or let elements cover the surface (zones.skin = \"free-surfaces\")",
+            "the largest stress of the points lies at a free surface, at ({}), and falls off within a family: points have means over families, which do not resolve its peak: that of outputs may be wrong by {:.0} % and more; take a smaller horizon there, or let elements cover the surface (zones.skin = \"free-surfaces\")",
             place.join(", "),
             100.0 * missed / stresses[p]
         )
