@@ -37,6 +37,7 @@ use crate::solve::explicit::{Drive, State};
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{
     self, Aids, Equilibrium, LoadState, LoadStep, QuasiStaticError, QuasiStaticParams, Refactor,
+    TangentFactors,
 };
 use crate::system::SemiDiscrete;
 
@@ -116,20 +117,9 @@ fn load_steps<const D: usize>(
     watch.lap(&mut timings, "start");
     let refactor = (near.as_ref()).and_then(NewtonFactors::of_present_tangents);
     let near = near.as_ref().map(|f| BodyOnly::new(&f.factor, model));
-    let near = (
-        near.as_ref().map(|f| f as &dyn LinearMap),
-        refactor.as_ref().map(|f| f as &dyn Refactor),
-    );
+    let near = (near.as_ref(), refactor.as_ref());
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
-    choices.push(Decision {
-        choice: format!("{} products or passes", observer.iterations),
-        why: match observer.factorisations {
-            0 => "of all load steps of this run".to_owned(),
-            made => {
-                format!("of all load steps of this run, {made} of whose tangents were factorised")
-            }
-        },
-    });
+    choices.push(observer.spent());
     let summary = observer.summary(system.as_ref(), first, taken?)?;
     let mut told = warnings(model, laid_out.joining, &laid_out.proof);
     told.extend(locking(model, &model.local_laws(&rest.local_laws)));
@@ -253,6 +243,21 @@ struct LoadStepObserver<'a, const D: usize> {
 }
 
 impl<const D: usize> LoadStepObserver<'_, D> {
+    /// What the load steps took.
+    fn spent(&self) -> Decision {
+        Decision {
+            choice: format!("{} products or passes", self.iterations),
+            why: match self.factorisations {
+                0 => "of all load steps of this run".to_owned(),
+                made => {
+                    format!(
+                        "of all load steps of this run, {made} of whose tangents were factorised"
+                    )
+                }
+            },
+        }
+    }
+
     /// Takes the load steps to the end, or to where the run stops; adds the seconds of the stages to `timings`, and returns those of all.
     ///
     /// # Errors
@@ -261,7 +266,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         &mut self,
         system: &mut dyn SemiDiscrete,
         params: QuasiStaticParams,
-        (near, refactor): (Option<&dyn LinearMap>, Option<&dyn Refactor>),
+        (near, refactor): (Option<&BodyOnly<'_>>, Option<&TangentFactors<'_>>),
         loaded: &mut LoadState,
         timings: &mut Timings,
     ) -> Result<f64, RunError> {
@@ -281,8 +286,8 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             interrupt: self.options.interrupt,
         };
         let aids = Aids {
-            near,
-            refactor,
+            near: near.map(|f| f as &dyn LinearMap),
+            refactor: refactor.map(|f| f as &dyn Refactor),
             progress: &inside,
         };
         let model = self.model;
