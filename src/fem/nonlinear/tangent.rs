@@ -211,8 +211,9 @@ mod tests {
         for mesh in boxes::<D>(2, 0.2) {
             for law in &laws {
                 let cells = (0..mesh.cell_count()).map(|c| (c, true));
-                let mut elements =
-                    NonlinearElements::new(&mesh, cells, |_| Some(Arc::clone(law))).unwrap();
+                let mut elements = NonlinearElements::new(&mesh, cells, |_| Some(Arc::clone(law)))
+                    .unwrap()
+                    .unwrap();
                 let along: Vec<Vector<D>> = (0..mesh.nodes.len())
                     .map(|n| Vector::from_fn(|i, _| noise(n + 7, i)))
                     .collect();
