@@ -18,6 +18,13 @@ impl<const D: usize> Tensor4<D> {
         Self([[Tensor::zeros(); D]; D])
     }
 
+    /// The tensor of the components `component(i, j, k, l)`.
+    pub fn from_fn(component: impl Fn(usize, usize, usize, usize) -> f64) -> Self {
+        Self(std::array::from_fn(|i| {
+            std::array::from_fn(|j| Tensor::from_fn(|k, l| component(i, j, k, l)))
+        }))
+    }
+
     /// `C_ijkl = λ δ_ij δ_kl + μ (δ_ik δ_jl + δ_il δ_jk)`; `lambda`, `mu` are the Lamé parameters \[Pa\].
     pub fn isotropic(lambda: f64, mu: f64) -> Self {
         let mut c = Self::zeros();

@@ -18,7 +18,10 @@ use crate::{
         Families, PdBody,
         bond_force::{BondPass, Kinematics},
     },
-    system::{BlockCsr, Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
+    system::{
+        BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, SemiDiscrete,
+        Symmetry,
+    },
 };
 use behaviour::NONE;
 pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, StretchOfMaterials, SystemError};
@@ -34,6 +37,7 @@ mod rows;
 mod shared_work;
 mod split;
 mod stored_energy;
+mod tangent_pattern;
 
 /// A coupled model as a system that moves.
 pub struct CoupledSystem<'a, const D: usize> {
@@ -270,27 +274,23 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         interval: Interval,
         update: FailureUpdate,
     ) -> u64 {
-        let mut broken = 0;
-        match &mut self.body {
-            None => (self.linear).multiply_into::<D>(u, None, &mut self.products, force),
-            Some(body) => {
-                broken = body.respond(u, interval, update, self.split.as_ref());
-                let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
-                (self.linear).multiply_into::<D>(u, bonds, &mut self.products, force);
-                if let Some(seam) = &mut self.seam {
-                    seam.begin_pass();
-                    if broken > 0 {
-                        seam.follow(body.pass.as_ref());
-                    }
-                    broken += seam.add_force(u, force, update);
-                }
-            }
-        }
+        let broken = self.linear_rows_and_bonds_into(u, force, interval, update);
         if let Some(elements) = &mut self.elements {
             elements.add_force(self.model, u, interval.length, force);
         }
         self.finish(force);
         broken
+    }
+
+    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
+        let elements = self.elements.as_ref()?;
+        let is_whole = self.body.is_none();
+        Some(elements.tangent(self.model, u, interval.length, is_whole))
+    }
+
+    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
+        self.linear_rows_and_bonds_into(u, force, interval, FailureUpdate::Frozen);
+        self.finish(force);
     }
 
     fn commit(&mut self) {

@@ -14,6 +14,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+mod tangent;
+
 use super::cell::{MAX_NODES, Rule};
 use super::crack_band::{CellBandError, CellLaws};
 use super::element::{displacement_gradient, for_each_point};
@@ -297,6 +299,30 @@ impl<const D: usize> NonlinearElements<D> {
     }
 }
 
+/// Means of the gradients of the shape functions, where an element of a law takes the mean dilatation of its cell.
+fn mean_gradients<const D: usize>(
+    mesh: &Mesh<D>,
+    element: &Element,
+    law: &dyn LocalLaw<D>,
+) -> Option<[Vector<D>; MAX_NODES]> {
+    let cell = element.cell as usize;
+    if !law.flows_at_constant_volume() || mesh.shapes[cell].is_quadratic() {
+        return None;
+    }
+    let mut mean = [Vector::<D>::zeros(); MAX_NODES];
+    let mut volume = 0.0;
+    for_each_point(mesh, cell, Rule::Stiffness, |p| {
+        for (mean, g) in mean.iter_mut().zip(&p.gradient).take(p.nodes) {
+            *mean += g * p.weight;
+        }
+        volume += p.weight;
+    });
+    mean[..mesh.cell(cell).len()]
+        .iter_mut()
+        .for_each(|mean| *mean /= volume);
+    Some(mean)
+}
+
 /// What an element has beyond the linear one; overwrites what its points remember at present, and its nodal forces \[N\].
 fn excess<const D: usize>(
     mesh: &Mesh<D>,
@@ -321,23 +347,10 @@ fn excess<const D: usize>(
     forces.fill(Vector::zeros());
     let each = element.each;
     let mut point = 0;
-    // means of the gradients of the shape functions
-    let mut mean = [Vector::<D>::zeros(); MAX_NODES];
     let is_objective = law.is_objective();
-    let shape = mesh.shapes[element.cell as usize];
-    let has_mean_dilatation = law.flows_at_constant_volume() && !shape.is_quadratic();
-    if has_mean_dilatation {
-        let mut volume = 0.0;
-        for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
-            for (mean, g) in mean.iter_mut().zip(&p.gradient).take(p.nodes) {
-                *mean += g * p.weight;
-            }
-            volume += p.weight;
-        });
-        mean[..nodes.len()]
-            .iter_mut()
-            .for_each(|mean| *mean /= volume);
-    }
+    let mean = mean_gradients(mesh, element, law);
+    let has_mean_dilatation = mean.is_some();
+    let mean = mean.unwrap_or([Vector::zeros(); MAX_NODES]);
     let mean_dilatation: f64 = mean[..nodes.len()]
         .iter()
         .zip(&u)

@@ -157,6 +157,14 @@ impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
         &[]
     }
 
+    fn algorithmic_tangent(&self, _gradient: &Tensor<D>, _step: f64, _past: &[f64]) -> Tensor4<D> {
+        self.stiffness
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        true
+    }
+
     fn respond(
         &self,
         gradient: &Tensor<D>,

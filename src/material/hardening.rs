@@ -54,7 +54,7 @@ pub enum Hardening {
 
 impl Hardening {
     /// The yield stress \[Pa\] and its slope in the flow `flow`, by which α grew within a step of the length `step` \[s\] to `alpha`.
-    fn yield_stress(&self, alpha: f64, flow: f64, step: f64) -> (f64, f64) {
+    pub(super) fn yield_stress(&self, alpha: f64, flow: f64, step: f64) -> (f64, f64) {
         match *self {
             Self::Voce {
                 yield_stress,

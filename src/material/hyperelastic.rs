@@ -3,6 +3,10 @@
 use super::{LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, inverse};
 
+fn delta(i: usize, j: usize) -> f64 {
+    f64::from(u8::from(i == j))
+}
+
 /// `det(I + G) − 1`, without the difference of two ones.
 fn volume_change(g: &Tensor<3>) -> f64 {
     let minor = |i: usize, j: usize| g[(i, i)] * g[(j, j)] - g[(i, j)] * g[(j, i)];
@@ -45,6 +49,24 @@ impl LocalLaw<3> for StVenantKirchhoff {
 
     fn history(&self) -> &'static [&'static str] {
         &[]
+    }
+
+    // δ_ik S_lj + λ F_ij F_kl + μ ((F Fᵀ)_ik δ_jl + F_il F_kj)
+    fn algorithmic_tangent(&self, gradient: &Tensor<3>, _step: f64, _past: &[f64]) -> Tensor4<3> {
+        let green = (gradient + gradient.transpose() + gradient.transpose() * gradient) * 0.5;
+        let second = self.elastic.contract(&green);
+        let f = Tensor::identity() + gradient;
+        let left = f * f.transpose();
+        let (lambda, shear) = (self.elastic.get(0, 0, 1, 1), self.elastic.get(0, 1, 0, 1));
+        Tensor4::from_fn(|i, j, k, l| {
+            delta(i, k) * second[(l, j)]
+                + lambda * f[(i, j)] * f[(k, l)]
+                + shear * (left[(i, k)] * delta(j, l) + f[(i, l)] * f[(k, j)])
+        })
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        true
     }
 
     fn respond(
@@ -107,6 +129,27 @@ impl LocalLaw<3> for NeoHooke {
 
     fn history(&self) -> &'static [&'static str] {
         &[]
+    }
+
+    // μ δ_ik δ_jl + (μ − λ ln J) A_il A_kj + λ A_ij A_kl,  A = F⁻ᵀ
+    fn algorithmic_tangent(&self, gradient: &Tensor<3>, _step: f64, _past: &[f64]) -> Tensor4<3> {
+        let log = volume_change(gradient).ln_1p();
+        let Some((inverse, _)) =
+            inverse(&(Tensor::identity() + gradient)).filter(|_| log.is_finite())
+        else {
+            return Tensor4::from_fn(|_, _, _, _| f64::NAN);
+        };
+        let a = inverse.transpose();
+        let turned = self.shear - self.lambda * log;
+        Tensor4::from_fn(|i, j, k, l| {
+            self.shear * delta(i, k) * delta(j, l)
+                + turned * a[(i, l)] * a[(k, j)]
+                + self.lambda * a[(i, j)] * a[(k, l)]
+        })
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        true
     }
 
     fn respond(

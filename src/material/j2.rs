@@ -53,6 +53,100 @@ impl<const D: usize> J2<D> {
     }
 }
 
+/// The state that a step would end in without flow.
+struct Trial<const D: usize> {
+    plastic: Tensor<D>,
+    /// The stress deviator in plane, and its size with what is out of the plane; in a bar the stress.
+    deviator: Tensor<D>,
+    norm: f64,
+    equivalent: f64,
+    /// What a unit of α takes from the equivalent stress.
+    stiffness: f64,
+}
+
+/// Moduli of the return to the yield surface: `dσ = K tr dε I + m dev dε − a n (n : dε)` with the direction n of the trial deviator (\[SimoHughes1998\] box 3.2); in a bar `dσ = m dε`.
+pub(super) struct ReturnModuli<const D: usize> {
+    /// m \[Pa\].
+    pub deviatoric: f64,
+    /// a \[Pa\].
+    pub along: f64,
+    /// n, of the size one in a solid.
+    pub direction: Tensor<D>,
+}
+
+impl<const D: usize> J2<D> {
+    /// The trial state of a strain.
+    fn trial(&self, total: &Tensor<D>, past: &[f64]) -> Trial<D> {
+        let mut plastic = Tensor::<D>::zeros();
+        for ((i, j), p) in components::<D>().zip(past) {
+            plastic[(i, j)] = *p;
+            plastic[(j, i)] = *p;
+        }
+        let (deviator, out) = self.deviator(&(total - plastic), out_of_plane(&plastic));
+        let norm = (deviator.norm_squared() + out * out).sqrt();
+        let (equivalent, stiffness) = match D {
+            1 => (norm, self.elastic.get(0, 0, 0, 0)),
+            _ => (1.5f64.sqrt() * norm, 3.0 * self.shear),
+        };
+        Trial {
+            plastic,
+            deviator,
+            norm,
+            equivalent,
+            stiffness,
+        }
+    }
+
+    /// `K` of [`ReturnModuli`] \[Pa\].
+    pub(super) fn bulk(&self) -> f64 {
+        self.elastic.get(0, 0, 0, 0) - 4.0 / 3.0 * self.shear
+    }
+
+    /// The moduli at a strain.
+    pub(super) fn return_moduli(
+        &self,
+        total: &Tensor<D>,
+        step: f64,
+        past: &[f64],
+    ) -> ReturnModuli<D> {
+        let trial = self.trial(total, past);
+        let before = past[past.len() - 1];
+        let flow = (self.hardening).flow(trial.equivalent, trial.stiffness, before, step);
+        let elastic = match D {
+            1 => trial.stiffness,
+            _ => 2.0 * self.shear,
+        };
+        if flow.is_nan() || flow <= 0.0 {
+            return ReturnModuli {
+                deviatoric: elastic,
+                along: 0.0,
+                direction: Tensor::zeros(),
+            };
+        }
+        let (_, slope) = self.hardening.yield_stress(before + flow, flow, step);
+        // of the flow: over the equivalent stress, and by that stress
+        let mean = trial.stiffness * flow / trial.equivalent;
+        let local = trial.stiffness / (trial.stiffness + slope);
+        match D {
+            1 => ReturnModuli {
+                deviatoric: elastic * (1.0 - local),
+                along: 0.0,
+                direction: Tensor::zeros(),
+            },
+            _ => ReturnModuli {
+                deviatoric: elastic * (1.0 - mean),
+                along: elastic * (local - mean),
+                direction: trial.deviator / trial.norm,
+            },
+        }
+    }
+}
+
+/// The plastic strain out of the plane makes up for that within it, and the elastic one for it; in a solid both are zero.
+fn out_of_plane<const D: usize>(plastic: &Tensor<D>) -> f64 {
+    if D == 2 { plastic.trace() } else { 0.0 }
+}
+
 /// Independent components of a symmetric tensor, row by row.
 fn components<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     (0..D).flat_map(|i| (i..D).map(move |j| (i, j)))
@@ -97,6 +191,23 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         }
     }
 
+    fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
+        let moduli = self.return_moduli(&strain(gradient), step, past);
+        let (m, n) = (moduli.deviatoric, moduli.direction);
+        if D == 1 {
+            return Tensor4::from_fn(|_, _, _, _| m);
+        }
+        let mut tangent = Tensor4::isotropic(self.bulk() - m / 3.0, 0.5 * m);
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            tangent.0[i][j] -= n * (moduli.along * n[(i, j)]);
+        }
+        tangent
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        true
+    }
+
     fn respond(
         &self,
         gradient: &Tensor<D>,
@@ -104,27 +215,19 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         past: &[f64],
         present: &mut [f64],
     ) -> LocalResponse<D> {
-        let mut plastic = Tensor::<D>::zeros();
-        for ((i, j), p) in components::<D>().zip(past) {
-            plastic[(i, j)] = *p;
-            plastic[(j, i)] = *p;
-        }
         let before = past[past.len() - 1];
-        // out of the plane the plastic strain makes up for that within it, and the elastic one for it; in a solid both are zero
-        let out = |plastic: &Tensor<D>| if D == 2 { plastic.trace() } else { 0.0 };
         let total = strain(gradient);
-        let elastic = total - plastic;
-        let (dev, dev_out) = self.deviator(&elastic, out(&plastic));
-        let norm = (dev.norm_squared() + dev_out * dev_out).sqrt();
-        // what a unit of α takes from the equivalent stress
-        let (equivalent, stiffness) = match D {
-            1 => (norm, self.elastic.get(0, 0, 0, 0)),
-            _ => (1.5f64.sqrt() * norm, 3.0 * self.shear),
-        };
+        let Trial {
+            mut plastic,
+            deviator,
+            norm,
+            equivalent,
+            stiffness,
+        } = self.trial(&total, past);
         let flow = self.hardening.flow(equivalent, stiffness, before, step);
         if flow > 0.0 {
             let along = if D == 1 { 1.0 } else { 1.5f64.sqrt() };
-            plastic += dev * (flow * along / norm);
+            plastic += deviator * (flow * along / norm);
         }
         let alpha = before + flow;
         for ((i, j), p) in components::<D>().zip(present.iter_mut()) {
@@ -132,7 +235,7 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         }
         present[past.len() - 1] = alpha;
         let elastic = total - plastic;
-        let out = out(&plastic);
+        let out = out_of_plane(&plastic);
         let mut stress = self.elastic.contract(&elastic);
         let lambda = self.elastic.get(0, 0, 0, 0) - 2.0 * self.shear;
         let mut stored = 0.5 * stress.dot(&elastic);

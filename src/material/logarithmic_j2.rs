@@ -83,6 +83,55 @@ fn exponential_less_one(x: &Tensor<3>) -> Tensor<3> {
     found
 }
 
+/// The state that a step would end in without flow.
+struct Trial {
+    deformation: Tensor<3>,
+    /// `F⁻¹`, and `det F`.
+    reverse: Tensor<3>,
+    volume_ratio: f64,
+    /// `C_p⁻¹ − I`.
+    plastic: Tensor<3>,
+    /// `b_e − I`.
+    strain: Tensor<3>,
+}
+
+impl Trial {
+    /// None where the body is turned inside out.
+    fn new(gradient: &Tensor<3>, past: &[f64]) -> Option<Self> {
+        let mut plastic = Tensor::<3>::zeros();
+        for ((i, j), p) in COMPONENTS.into_iter().zip(past) {
+            plastic[(i, j)] = *p;
+            plastic[(j, i)] = *p;
+        }
+        let deformation = Tensor::identity() + gradient;
+        let (reverse, volume_ratio) = inverse(&deformation).filter(|(_, j)| *j > 0.0)?;
+        // without the difference of two ones, which would lose small strains
+        let strain = gradient
+            + gradient.transpose()
+            + gradient * gradient.transpose()
+            + deformation * plastic * deformation.transpose();
+        Some(Self {
+            deformation,
+            reverse,
+            volume_ratio,
+            plastic,
+            strain,
+        })
+    }
+}
+
+/// `(ln a − ln b)/(a − b)`, also where both are near each other.
+fn divided_logarithm(a: f64, b: f64) -> f64 {
+    let z = (a - b) / (a + b);
+    let square = z * z;
+    // artanh z/z
+    let ratio = match z.abs() < 1e-2 {
+        true => 1.0 + square * (1.0 / 3.0 + square * (0.2 + square / 7.0)),
+        false => z.atanh() / z,
+    };
+    2.0 * ratio / (a + b)
+}
+
 impl LocalLaw<3> for LogarithmicJ2 {
     fn tangent(&self) -> &Tensor4<3> {
         self.law.tangent()
@@ -112,6 +161,51 @@ impl LocalLaw<3> for LogarithmicJ2 {
         ]
     }
 
+    // dP = dτ F⁻ᵀ − τ F⁻ᵀ dFᵀ F⁻ᵀ; dτ of the return of small strains ([Simo1992]) by the logarithm of b_e = F C_p⁻¹ Fᵀ, whose derivative divides its differences in the principal directions
+    fn algorithmic_tangent(&self, gradient: &Tensor<3>, step: f64, past: &[f64]) -> Tensor4<3> {
+        let Some(trial) = Trial::new(gradient, past) else {
+            return Tensor4::from_fn(|_, _, _, _| f64::NAN);
+        };
+        let eigen = trial.strain.symmetric_eigen();
+        let (q, x) = (eigen.eigenvectors, eigen.eigenvalues);
+        let slopes = Tensor::<3>::from_fn(|a, b| 0.5 * divided_logarithm(1.0 + x[a], 1.0 + x[b]));
+        let total = spectral(&q, &x.map(|x| 0.5 * x.ln_1p()));
+        let mut at_start = [0.0; 7];
+        at_start[6] = past[6];
+        let moduli = self.law.return_moduli(&total, step, &at_start);
+        let kirchhoff = self
+            .law
+            .respond(&total, step, &at_start, &mut [0.0; 7])
+            .stress;
+        let (m, n) = (moduli.deviatoric, moduli.direction);
+        let spherical = self.law.bulk() - m / 3.0;
+        let right = (Tensor::identity() + trial.plastic) * trial.deformation.transpose();
+        let a = trial.reverse.transpose();
+        let stress = kirchhoff * a;
+        let mut tangent = Tensor4::zeros();
+        for (k, l) in (0..3).flat_map(|k| (0..3).map(move |l| (k, l))) {
+            // db_e of a unit of F_kl
+            let mut change = Tensor::<3>::zeros();
+            for j in 0..3 {
+                change[(k, j)] += right[(l, j)];
+                change[(j, k)] += right[(l, j)];
+            }
+            let principal = (q.transpose() * change * q).component_mul(&slopes);
+            let strain = q * principal * q.transpose();
+            let stressed = Tensor::identity() * (spherical * strain.trace()) + strain * m
+                - n * (moduli.along * n.dot(&strain));
+            let turned = stressed * a;
+            for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+                tangent.0[i][j][(k, l)] = turned[(i, j)] - stress[(i, l)] * a[(k, j)];
+            }
+        }
+        tangent
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        true
+    }
+
     fn respond(
         &self,
         gradient: &Tensor<3>,
@@ -119,14 +213,15 @@ impl LocalLaw<3> for LogarithmicJ2 {
         past: &[f64],
         present: &mut [f64],
     ) -> LocalResponse<3> {
-        let mut plastic = Tensor::<3>::zeros();
-        for ((i, j), p) in COMPONENTS.into_iter().zip(past) {
-            plastic[(i, j)] = *p;
-            plastic[(j, i)] = *p;
-        }
-        let deformation = Tensor::identity() + gradient;
         // turned inside out: there is no stress, and solvers see that by the number
-        let Some((reverse, volume_ratio)) = inverse(&deformation).filter(|(_, j)| *j > 0.0) else {
+        let Some(Trial {
+            deformation: _,
+            reverse,
+            volume_ratio,
+            plastic,
+            strain: trial,
+        }) = Trial::new(gradient, past)
+        else {
             return LocalResponse {
                 stress: Tensor::repeat(f64::NAN),
                 across: 0.0,
@@ -135,11 +230,6 @@ impl LocalLaw<3> for LogarithmicJ2 {
                 dissipated: f64::NAN,
             };
         };
-        // b_e − I without the difference of two ones, which would lose small strains
-        let trial = gradient
-            + gradient.transpose()
-            + gradient * gradient.transpose()
-            + deformation * plastic * deformation.transpose();
         let total = half_logarithm_series(&trial).unwrap_or_else(|| half_logarithm(&trial));
         let before = past[6];
         let mut at_start = [0.0; 7];

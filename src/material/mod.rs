@@ -9,6 +9,7 @@
 //! | `logarithmic_j2.rs` | the same for strains of any size |
 //! | `scalar_damage.rs`, `softening.rs` | isotropic scalar damage with a tensile strength and a fracture energy, and how it softens |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
+//! | `algorithmic_tangent.rs` | differences of any law, for its algorithmic tangent |
 //! | `umat.rs`, `umat/` | a user's routine with the calling convention of Abaqus' UMAT (feature `umat`) |
 //!
 //! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] at the end of a step and what it remembers, and gives the first Piola–Kirchhoff stress `P` \[Pa\] (for small strains there is but one stress),
@@ -16,6 +17,7 @@
 //! A new law is one file and one line in the table of the conformance tests, which check for every law that these belong together, that nothing is stressed at rest, and that a rotation
 //! (linearised, where the law is for small strains) stresses nothing.
 
+mod algorithmic_tangent;
 mod elastic;
 mod hardening;
 mod hyperelastic;
@@ -26,9 +28,12 @@ mod path_tests;
 mod reduction;
 mod scalar_damage;
 mod softening;
+#[cfg(test)]
+mod tangent_tests;
 #[cfg(feature = "umat")]
 mod umat;
 
+pub(crate) use algorithmic_tangent::central_differences;
 pub use elastic::{Elastic, LinearElastic};
 pub use hardening::{Hardening, JohnsonCook};
 pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
@@ -222,6 +227,19 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
         None
     }
 
+    /// The algorithmic tangent `C_ijkl = ∂P_ij/∂G_kl` of [`LocalLaw::respond`] \[Pa\], with which Newton's method converges quadratically; where it has a kink, at the onset of flow, that of either side.
+    /// Not a number where there is no response. A law that says nothing has the central differences of its response, `2 D²` of them.
+    fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
+        central_differences(gradient, past.len(), |gradient, present| {
+            self.respond(gradient, step, past, present).stress
+        })
+    }
+
+    /// Whether `C_ijkl = C_klij` holds for [`LocalLaw::algorithmic_tangent`], so that solvers may take a stiffness made of it for a symmetric one.
+    fn has_symmetric_tangent(&self) -> bool {
+        false
+    }
+
     /// What failed last within the law, with its remedy; none of a law that computes what it is given. What fails has a response that is not a number.
     fn failure(&self) -> Option<String> {
         None
@@ -237,7 +255,9 @@ mod tests {
     }
 
     /// Every law in every dimension it has: the one line a new law adds.
-    fn laws<const D: usize>(kinematics: &[Kinematics]) -> Vec<(String, Box<dyn LocalLaw<D>>)> {
+    pub(super) fn laws<const D: usize>(
+        kinematics: &[Kinematics],
+    ) -> Vec<(String, Box<dyn LocalLaw<D>>)> {
         let mut laws: Vec<(String, Box<dyn LocalLaw<D>>)> = Vec::new();
         for &k in kinematics {
             let law = LinearElastic::<D>::new(&elastic(), k).unwrap();

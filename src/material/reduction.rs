@@ -28,21 +28,18 @@ impl<const D: usize> Reduced<D> {
             Kinematics::Bar | Kinematics::PlaneStress => D,
             Kinematics::PlaneStrain | Kinematics::Solid => 3,
         };
-        let solid = law.tangent();
-        // the free strains of a unit gradient: those of two sides are alike
-        let resistance: f64 = (free..3).map(|g| solid.get(2, 2, g, g)).sum();
-        let mut tangent = Tensor4::zeros();
-        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
-            let across: f64 = (free..3).map(|f| solid.get(i, j, f, f)).sum();
-            tangent.0[i][j] = Tensor::from_fn(|k, l| {
-                let yielded = match free {
-                    3 => 0.0,
-                    _ => across * solid.get(2, 2, k, l) / resistance,
-                };
-                solid.get(i, j, k, l) - yielded
-            });
-        }
+        let tangent = condensed(law.tangent(), free);
         Self { law, free, tangent }
+    }
+
+    /// The gradient of the solid.
+    fn whole(&self, gradient: &Tensor<D>, out: f64) -> Tensor<3> {
+        let mut whole = Tensor::<3>::zeros();
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            whole[(i, j)] = gradient[(i, j)];
+        }
+        (self.free..3).for_each(|f| whole[(f, f)] = out);
+        whole
     }
 
     fn at(
@@ -53,12 +50,17 @@ impl<const D: usize> Reduced<D> {
         past: &[f64],
         present: &mut [f64],
     ) -> LocalResponse<3> {
-        let mut whole = Tensor::<3>::zeros();
-        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
-            whole[(i, j)] = gradient[(i, j)];
-        }
-        (self.free..3).for_each(|f| whole[(f, f)] = out);
+        let whole = self.whole(gradient, out);
         self.law.respond(&whole, step, past, present)
+    }
+
+    /// The strain out of the body; not a number where none is found.
+    fn out(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> f64 {
+        match self.free {
+            3 => 0.0,
+            _ if gradient.amax() == 0.0 && past.iter().all(|x| *x == 0.0) => 0.0,
+            _ => self.strain_out(gradient, step, past),
+        }
     }
 
     /// The strain out of the body at which no stress acts there; not a number where none is found.
@@ -93,6 +95,19 @@ impl<const D: usize> Reduced<D> {
             false => f64::NAN,
         }
     }
+}
+
+/// The tangent of a solid, from which the directions from `free` on are condensed: they give way such that no stress acts there, those of two sides alike.
+fn condensed<const D: usize>(solid: &Tensor4<3>, free: usize) -> Tensor4<D> {
+    let resistance: f64 = (free..3).map(|g| solid.get(2, 2, g, g)).sum();
+    Tensor4::from_fn(|i, j, k, l| {
+        let across: f64 = (free..3).map(|f| solid.get(i, j, f, f)).sum();
+        let yielded = match free {
+            3 => 0.0,
+            _ => across * solid.get(2, 2, k, l) / resistance,
+        };
+        solid.get(i, j, k, l) - yielded
+    })
 }
 
 impl<const D: usize> LocalLaw<D> for Reduced<D> {
@@ -135,6 +150,15 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         self.law.failure()
     }
 
+    fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
+        let whole = self.whole(gradient, self.out(gradient, step, past));
+        condensed(&self.law.algorithmic_tangent(&whole, step, past), self.free)
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        self.law.has_symmetric_tangent()
+    }
+
     fn respond(
         &self,
         gradient: &Tensor<D>,
@@ -142,11 +166,7 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         past: &[f64],
         present: &mut [f64],
     ) -> LocalResponse<D> {
-        let out = match self.free {
-            3 => 0.0,
-            _ if gradient.amax() == 0.0 && past.iter().all(|x| *x == 0.0) => 0.0,
-            _ => self.strain_out(gradient, step, past),
-        };
+        let out = self.out(gradient, step, past);
         let found = self.at(gradient, out, step, past, present);
         LocalResponse {
             stress: Tensor::from_fn(|i, j| found.stress[(i, j)]),

@@ -59,7 +59,7 @@ pub struct UmatSettings {
 /// For strains of any size it is the rate form of \[HughesWinget1980\]: with `L = ΔF F⁻¹` of the middle of the step, `DSTRAN = sym L`, `ω = skew L`, `DROT = (I − ½ ω)⁻¹ (I + ½ ω)`. `STRESS` and `STRAN`
 /// are turned by `DROT` before the call, as Abaqus does, which makes it of second order in the length of a step where the principal directions stay, and of first order where they turn; tensors among `STATEV` are the routine's own (`ROTSIG`); `P = J σ F⁻ᵀ`. A rotation stresses nothing, whatever its size below half a turn within a step.
 ///
-/// `DDSDDE` is not used: solvers difference forces. `COORDS` is not a number, `NOEL`, `NPT`, `LAYER`, `KSPT` are 1: a law does not know its place. `KINC` counts the increments of a point. Without time (`step` of zero) and at the deformation
+/// `DDSDDE` is not used: the algorithmic tangent is that of central differences. `COORDS` is not a number, `NOEL`, `NPT`, `LAYER`, `KSPT` are 1: a law does not know its place. `KINC` counts the increments of a point. Without time (`step` of zero) and at the deformation
 /// that is remembered the routine is not called.
 #[derive(Debug)]
 pub struct Umat {

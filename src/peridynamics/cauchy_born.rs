@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use super::bond_force::{Kinematics, stretch::psi};
 use crate::{
-    material::{LocalLaw, LocalResponse},
+    material::{LocalLaw, LocalResponse, central_differences},
     peridynamics::{Accelerator, DeformedFamily, EnergyDensity, Law, Past, Present, StatePart},
     tensor::{Tensor, Tensor4, Vector, determinant},
 };
@@ -137,6 +137,37 @@ impl<const D: usize> CauchyBorn<D> {
         (stress, 0.5 * (stored + modulus * theta * theta))
     }
 
+    /// `∂S/∂E` of [`CauchyBorn::fast`], and S: with the stretches λ of the bonds and their dyads A it is `Σ A ⊗ A (p − κ θ ω)/λ³ + κ B ⊗ B`, `B = Σ A ω/λ`.
+    fn fast_moduli(
+        bonds: &[FastBond<D>],
+        modulus: f64,
+        gradient: &Tensor<D>,
+    ) -> (Tensor4<D>, Tensor<D>) {
+        let strain = gradient + gradient.transpose() + gradient.transpose() * gradient;
+        let reversed: Vec<f64> = (bonds.iter())
+            .map(|bond| {
+                let t = strain.dot(&bond.dyad);
+                1.0 - t * psi(t)
+            })
+            .collect();
+        let (mut pairs, mut isotropic, mut theta) = (Tensor::zeros(), Tensor::zeros(), 0.0);
+        for (bond, over) in bonds.iter().zip(&reversed) {
+            pairs += bond.dyad * (bond.pair * (1.0 - over));
+            isotropic += bond.dyad * (bond.omega * over);
+            theta += bond.omega * (1.0 / over - 1.0);
+        }
+        let mut moduli = Tensor4::zeros();
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            let sum = &mut moduli.0[i][j];
+            *sum += isotropic * (modulus * isotropic[(i, j)]);
+            for (bond, over) in bonds.iter().zip(&reversed) {
+                let slope = (bond.pair - modulus * theta * bond.omega) * over.powi(3);
+                *sum += bond.dyad * (slope * bond.dyad[(i, j)]);
+            }
+        }
+        (moduli, pairs + isotropic * (modulus * theta))
+    }
+
     /// The dilatation `θ = D/m Σ ω |ξ| e V` of an LPS with exact bonds, [SAND2015-7998] eq. (5.17), and `∂θ/∂F`; zero of other laws.
     ///
     /// At rest it is the trace of the gradient, and a rotation changes nothing of it.
@@ -239,6 +270,35 @@ impl<const D: usize> LocalLaw<D> for CauchyBorn<D> {
 
     fn flows_at_constant_volume(&self) -> bool {
         false
+    }
+
+    // δ_ik S_lj + F_im (∂S/∂E)_mjpl F_kp, and differences for laws without an accelerator
+    fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
+        let Some((bonds, modulus)) = &self.fast else {
+            return central_differences(gradient, 0, |gradient, present| {
+                self.respond(gradient, step, past, present).stress
+            });
+        };
+        let (moduli, second) = Self::fast_moduli(bonds, *modulus, gradient);
+        let f = Tensor::identity() + gradient;
+        let mut tangent = Tensor4::zeros();
+        for (m, j) in (0..D).flat_map(|m| (0..D).map(move |j| (m, j))) {
+            let turned = f * moduli.0[m][j];
+            for i in 0..D {
+                tangent.0[i][j] += turned * f[(i, m)];
+            }
+        }
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            for l in 0..D {
+                tangent.0[i][j][(i, l)] += second[(l, j)];
+            }
+        }
+        tangent
+    }
+
+    fn has_symmetric_tangent(&self) -> bool {
+        // without memory, the stress follows from the energy of the family
+        true
     }
 
     fn respond(

@@ -103,6 +103,19 @@ fn conforms<const D: usize>() {
                 let tangent = Tensor::<D>::from_fn(|i, j| own.tangent.get(i, j, k, l));
                 let off = (change - tangent).amax() / scale;
                 assert!(off < 1e-9, "{name}: tangent {k}{l} off by {off:e}");
+                let change = (respond(&own, &(g + e)).stress - respond(&own, &(g - e)).stress)
+                    / (2.0 * step);
+                let algorithmic = own.algorithmic_tangent(&g, 0.0, &[]);
+                for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+                    let found = algorithmic.get(i, j, k, l);
+                    let off = (change[(i, j)] - found).abs() / scale;
+                    assert!(
+                        off < 1e-6,
+                        "{name}: tangent far from rest {i}{j}{k}{l} off by {off:e}"
+                    );
+                    let skew = (found - algorithmic.get(k, l, i, j)).abs() / scale;
+                    assert!(skew < 1e-6, "{name}: not symmetric, {skew:e}");
+                }
             }
             if kinematics == Kinematics::Exact {
                 let (f, q) = (Tensor::identity() + g, rotation::<D>());

@@ -15,7 +15,9 @@ use crate::scene::conditions::Condition;
 use crate::scene::validated::Solver;
 use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
-use crate::solve::quasi_static::{self, Aids, LoadState, QuasiStaticError, QuasiStaticParams};
+use crate::solve::quasi_static::{
+    self, Aids, LoadState, QuasiStaticError, QuasiStaticParams, Refactor, TangentFactors,
+};
 use crate::solve::statics::{
     self, Method, MethodUsed, SpreadProblem, SpreadRows, StaticError, StaticInfo, StaticParams,
     StaticProblem, StaticSolution,
@@ -261,6 +263,7 @@ fn nonlinear<const D: usize>(
         true => statics::factors(problem, params, progress)?,
         false => None,
     };
+    let refactor = (factors.as_ref()).map(|(_, info)| TangentFactors::new(*problem, *params, info));
     let factor_seconds = clock.elapsed().as_secs_f64();
     progress.stage("Newton's method", None);
     let held = |value: &Option<f64>| value.is_some();
@@ -282,6 +285,7 @@ fn nonlinear<const D: usize>(
             ..QuasiStaticParams::default()
         },
         Aids {
+            refactor: refactor.as_ref().map(|made| made as &dyn Refactor),
             near: factors.as_ref().map(|(factor, _)| factor as &dyn LinearMap),
             progress,
         },

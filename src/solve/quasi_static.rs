@@ -14,6 +14,7 @@
 
 use std::ops::ControlFlow;
 
+use lead::Lead;
 use residual::{MOVED, Residual, Run, Tangent};
 
 use crate::{
@@ -25,13 +26,17 @@ use crate::{
     system::{FailureUpdate, Halfway, Interval, SemiDiscrete},
 };
 
+mod consistent;
 mod error;
+mod factors;
+mod lead;
 mod newton;
 mod params;
 mod residual;
 
 pub use error::QuasiStaticError;
-pub use params::{Aids, Equilibrium, QuasiStaticParams};
+pub use factors::TangentFactors;
+pub use params::{Aids, Equilibrium, QuasiStaticParams, Refactor};
 pub use residual::TIGHTEST;
 
 /// All that a run carries from load step to load step, but for the damage, which the system keeps.
@@ -74,8 +79,12 @@ pub struct LoadStep<'a> {
     pub rounds: usize,
     /// Products with the stiffness, or passes over the bonds.
     pub iterations: usize,
+    /// Factorisations of the tangent.
+    pub factorisations: usize,
     /// Relative residual reached.
     pub residual: f64,
+    /// Relative residuals on the way to the last equilibrium of Newton's method, from the prediction on.
+    pub residuals: &'a [f64],
     /// What is deformed.
     pub system: &'a dyn SemiDiscrete,
 }
@@ -89,6 +98,8 @@ pub struct QuasiStaticInfo {
     pub broken: u64,
     /// Products with the stiffness, or passes over the bonds.
     pub iterations: usize,
+    /// Factorisations of the tangent.
+    pub factorisations: usize,
 }
 
 /// A relaxation whose residual grows by so much will not come back.
@@ -181,6 +192,9 @@ pub fn run(
         time: 0.0,
         interval: Interval::AT_ONCE,
         tangent: Tangent::AtRest,
+        is_whole: false,
+        lead: Lead::default(),
+        residuals: Vec::new(),
         is_torn: false,
     };
     let mut values = vec![0.0; prescribed.len()];
@@ -203,6 +217,7 @@ pub fn run(
         info.steps += 1;
         info.broken += broken;
         info.iterations += iterations;
+        info.factorisations += work.lead.factorisations;
         let seen = LoadStep {
             time,
             state,
@@ -212,7 +227,9 @@ pub fn run(
             broken,
             rounds,
             iterations,
+            factorisations: work.lead.factorisations,
             residual,
+            residuals: &work.residuals,
             system: &*work.system,
         };
         if observe(&seen).is_break() {

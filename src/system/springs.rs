@@ -102,7 +102,7 @@ impl SpringRows {
             let added = self.sites.binary_search(site).ok();
             let first = sum.values.len() / size;
             match added.map(|place| self.rows.row(place)) {
-                Some(springs) => merge((columns, blocks), springs, size, &mut sum),
+                Some(springs) => sum.merge_row((columns, blocks), springs, size),
                 None => {
                     sum.columns.extend(columns);
                     if matrix.shared.is_none() {
@@ -136,30 +136,6 @@ impl SpringRows {
                 }
             }
         });
-    }
-}
-
-/// Appends the sum of two rows, columns ascending in each.
-fn merge(a: (&[u32], &[f64]), b: (&[u32], &[f64]), size: usize, sum: &mut BlockCsr) {
-    let (mut i, mut j) = (0, 0);
-    while i < a.0.len() || j < b.0.len() {
-        let column = match (a.0.get(i), b.0.get(j)) {
-            (Some(&p), Some(&q)) => p.min(q),
-            (Some(&p), None) => p,
-            (None, Some(&q)) => q,
-            (None, None) => return,
-        };
-        let first = sum.values.len();
-        sum.columns.push(column);
-        sum.values.resize(first + size, 0.0);
-        for ((columns, blocks), place) in [(a, &mut i), (b, &mut j)] {
-            if columns.get(*place) == Some(&column) {
-                let own = &blocks[*place * size..][..size];
-                let to = sum.values[first..].iter_mut();
-                to.zip(own).for_each(|(to, own)| *to += own);
-                *place += 1;
-            }
-        }
     }
 }
 
@@ -202,6 +178,11 @@ where
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.system.tangent_into(x, y);
         self.springs.add_product(x, y);
+    }
+
+    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
+        self.system.force_beside_elements_into(u, force, interval);
+        self.springs.add_product(u, force);
     }
 
     fn row_sums(&self) -> Vec<f64> {

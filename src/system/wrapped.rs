@@ -67,6 +67,14 @@ macro_rules! fields_of {
             self.$system.account_for_breaks(at);
         }
 
+        fn element_tangent(
+            &self,
+            u: &[f64],
+            interval: $crate::system::Interval,
+        ) -> Option<$crate::system::ElementTangent> {
+            self.$system.element_tangent(u, interval)
+        }
+
         fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
             self.$system.stresses(u)
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Impact;
 use crate::system::wrapped::state_of;
-use crate::system::{BlockCsr, FailureUpdate, Halfway, Interval, SemiDiscrete};
+use crate::system::{BlockCsr, ElementTangent, FailureUpdate, Halfway, Interval, SemiDiscrete};
 
 /// A system whose sites rigid impactors push: the sites of the body first, one for each impactor after them.
 ///
@@ -76,6 +76,23 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
     fn difference_length(&self) -> Option<f64> {
         let own = DIFFERENCED * self.impact.smallest;
         Some((self.body.difference_length()).map_or(own, |length| length.min(own)))
+    }
+
+    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
+        let mut found = self.body.element_tangent(self.own(u), interval)?;
+        // impactors are no nodes; contact is differenced
+        let end = found.excess.columns.len();
+        found.excess.row_offsets.resize(self.mass.len() + 1, end);
+        found.is_whole = false;
+        Some(found)
+    }
+
+    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
+        let dofs = self.dofs();
+        let (own, rest) = force.split_at_mut(dofs);
+        rest.fill(0.0);
+        (self.body).force_beside_elements_into(&u[..dofs], own, interval);
+        self.impact.add_force(u, force);
     }
 
     fn row_sums(&self) -> Vec<f64> {

@@ -1,20 +1,24 @@
 //! Finite elements of a coupled model whose laws are not linear.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
 use super::behaviour::CHUNK;
+use super::tangent_pattern::TangentPattern;
 use crate::{
     coupling::{CellRole, Model, SiteKind},
     fem::{CellBandError, NonlinearElements},
     material::LocalLaw,
+    system::{ElementTangent, Symmetry},
     tensor::{Tensor, Vector},
 };
 
 /// The elements around the nodes that are sites, as their rows have them.
 pub(super) struct LocalElements<const D: usize> {
     elements: NonlinearElements<D>,
+    /// Where their tangent has blocks; computed with the first one.
+    pattern: OnceLock<TangentPattern>,
 }
 
 impl<const D: usize> LocalElements<D> {
@@ -40,7 +44,10 @@ impl<const D: usize> LocalElements<D> {
         let cells = cells.map(|c| (c, model.is_element(c)));
         let law = |c| laws[model.material_of_cell(c) as usize].clone();
         let elements = NonlinearElements::new(&model.mesh, cells, law)?;
-        Ok(elements.map(|elements| Self { elements }))
+        Ok(elements.map(|elements| Self {
+            elements,
+            pattern: OnceLock::new(),
+        }))
     }
 
     /// Adds to the force of each site what its elements have beyond the linear ones.
@@ -59,6 +66,37 @@ impl<const D: usize> LocalElements<D> {
                 }
             }
         });
+    }
+
+    /// What the elements have beyond the linear ones in the tangent, in the rows and columns of the sites; with `is_whole` all else is linear.
+    pub fn tangent(
+        &self,
+        model: &Model<D>,
+        u: &[f64],
+        step: f64,
+        is_whole: bool,
+    ) -> ElementTangent {
+        let pattern = (self.pattern).get_or_init(|| TangentPattern::new(model, &self.elements));
+        let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
+        let mut excess = pattern.zeros::<D>();
+        (self.elements).tangents(&model.mesh, nodes, step, |cell, blocks| {
+            pattern.add(model, cell, blocks, &mut excess);
+        });
+        if let Some(scale) = model.row_scale() {
+            let rows = excess.row_offsets.windows(2).zip(scale);
+            for (ends, factor) in rows.filter(|(_, factor)| **factor != 1.0) {
+                let own = &mut excess.values[ends[0] * D * D..ends[1] * D * D];
+                own.iter_mut().for_each(|k| *k *= factor);
+            }
+        }
+        ElementTangent {
+            excess,
+            symmetry: match self.elements.has_symmetric_tangent() {
+                true => Symmetry::Symmetric,
+                false => Symmetry::Unsymmetric,
+            },
+            is_whole,
+        }
     }
 
     /// Whether a site is a node of such an element, so that its tangent changes.

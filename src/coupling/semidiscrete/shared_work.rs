@@ -7,7 +7,7 @@
 use super::behaviour::NONE;
 use super::split::Split;
 use super::{CoupledSystem, scale_rows};
-use crate::system::{Partition, Ranks, Spread};
+use crate::system::{FailureUpdate, Interval, Partition, Ranks, Spread};
 use crate::tensor::padded;
 
 impl<'a, const D: usize> CoupledSystem<'a, D> {
@@ -37,6 +37,33 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             breaks,
         });
         self
+    }
+
+    /// Overwrites `force` with that of the linear rows and of the bonds, before [`CoupledSystem::finish`]; how many bonds broke.
+    pub(super) fn linear_rows_and_bonds_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        interval: Interval,
+        update: FailureUpdate,
+    ) -> u64 {
+        let mut broken = 0;
+        match &mut self.body {
+            None => (self.linear).multiply_into::<D>(u, None, &mut self.products, force),
+            Some(body) => {
+                broken = body.respond(u, interval, update, self.split.as_ref());
+                let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
+                (self.linear).multiply_into::<D>(u, bonds, &mut self.products, force);
+                if let Some(seam) = &mut self.seam {
+                    seam.begin_pass();
+                    if broken > 0 {
+                        seam.follow(body.pass.as_ref());
+                    }
+                    broken += seam.add_force(u, force, update);
+                }
+            }
+        }
+        broken
     }
 
     /// Scales rows where those of the model are scaled; of processes, each then has the numbers of all.

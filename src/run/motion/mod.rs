@@ -32,6 +32,7 @@ pub(crate) mod impact;
 pub(crate) mod impact_record;
 pub(crate) mod initial_state;
 mod material_stretches;
+mod newton_factors;
 mod probe_rows;
 pub mod quasi_static;
 pub(crate) mod rezoning;

@@ -11,11 +11,12 @@ use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
+use super::newton_factors::NewtonFactors;
 use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{EdgeReached, Moment, Recorder, Saved, StepChoice};
-use crate::coupling::{Impact, Model, Operator, Sampler};
+use crate::coupling::{Impact, Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
@@ -23,26 +24,22 @@ use crate::observe::summary::{
     Decision, Ended, MotionSummary, Rotation, RunSummary, Timings, peak_memory_bytes,
 };
 use crate::progress::Progress;
-use crate::run::equilibrium;
 use crate::run::error::{RunError, explained};
 use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
-use crate::run::springs::Springs;
 use crate::run::warnings::{locking, unusual_stretch, warnings, without_response};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
 use crate::scene::validated::Scene;
-use crate::solve::direct::Factor;
 use crate::solve::explicit::{Drive, State};
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{
-    self, Aids, Equilibrium, LoadState, LoadStep, QuasiStaticError, QuasiStaticParams,
+    self, Aids, Equilibrium, LoadState, LoadStep, QuasiStaticError, QuasiStaticParams, Refactor,
+    TangentFactors,
 };
-use crate::solve::statics::{self, StaticProblem};
-use crate::system::{SemiDiscrete, Symmetry};
-use crate::tensor::padded;
+use crate::system::SemiDiscrete;
 
 /// Runs a scene under a load that grows.
 pub(crate) fn run<const D: usize>(
@@ -80,7 +77,7 @@ fn load_steps<const D: usize>(
     let mut near = None;
     if params.equilibrium == Equilibrium::Newton {
         let body = (model, operator, laid_out.springs.as_ref());
-        near = factors(body, system.symmetry(), rest, &mut choices, progress)?;
+        near = NewtonFactors::new(body, system.symmetry(), rest, &mut choices, progress)?;
         watch.lap(&mut timings, "factorisation");
     }
     let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
@@ -111,19 +108,18 @@ fn load_steps<const D: usize>(
         last_damage: system.damage_state(),
         state,
         iterations: 0,
+        factorisations: 0,
         edge,
         ended: Ended::Finished,
         rotation: None,
         failed: None,
     };
     watch.lap(&mut timings, "start");
-    let near = near.as_ref().map(|f| BodyOnly::new(f, model));
-    let near = near.as_ref().map(|f| f as &dyn LinearMap);
+    let refactor = (near.as_ref()).and_then(NewtonFactors::of_present_tangents);
+    let near = near.as_ref().map(|f| BodyOnly::new(&f.factor, model));
+    let near = (near.as_ref(), refactor.as_ref());
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
-    choices.push(Decision {
-        choice: format!("{} products or passes", observer.iterations),
-        why: "of all load steps of this run".to_owned(),
-    });
+    choices.push(observer.spent());
     let summary = observer.summary(system.as_ref(), first, taken?)?;
     let mut told = warnings(model, laid_out.joining, &laid_out.proof);
     told.extend(locking(model, &model.local_laws(&rest.local_laws)));
@@ -239,6 +235,7 @@ struct LoadStepObserver<'a, const D: usize> {
     last_damage: Vec<u64>,
     /// Products or passes of the load steps so far.
     iterations: usize,
+    factorisations: usize,
     edge: Option<EdgeReached>,
     ended: Ended,
     rotation: Option<Rotation>,
@@ -246,6 +243,21 @@ struct LoadStepObserver<'a, const D: usize> {
 }
 
 impl<const D: usize> LoadStepObserver<'_, D> {
+    /// What the load steps took.
+    fn spent(&self) -> Decision {
+        Decision {
+            choice: format!("{} products or passes", self.iterations),
+            why: match self.factorisations {
+                0 => "of all load steps of this run".to_owned(),
+                made => {
+                    format!(
+                        "of all load steps of this run, {made} of whose tangents were factorised"
+                    )
+                }
+            },
+        }
+    }
+
     /// Takes the load steps to the end, or to where the run stops; adds the seconds of the stages to `timings`, and returns those of all.
     ///
     /// # Errors
@@ -254,7 +266,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         &mut self,
         system: &mut dyn SemiDiscrete,
         params: QuasiStaticParams,
-        near: Option<&dyn LinearMap>,
+        (near, refactor): (Option<&BodyOnly<'_>>, Option<&TangentFactors<'_>>),
         loaded: &mut LoadState,
         timings: &mut Timings,
     ) -> Result<f64, RunError> {
@@ -274,7 +286,8 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             interrupt: self.options.interrupt,
         };
         let aids = Aids {
-            near,
+            near: near.map(|f| f as &dyn LinearMap),
+            refactor: refactor.map(|f| f as &dyn Refactor),
             progress: &inside,
         };
         let model = self.model;
@@ -352,6 +365,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         state.u.copy_from_slice(&seen.state.u);
         state.broken = seen.state.broken;
         self.iterations += seen.iterations;
+        self.factorisations += seen.factorisations;
         if self.options.interrupt.is_some() {
             self.last_damage = seen.system.damage_state();
         }
@@ -548,46 +562,4 @@ fn created_energy<const D: usize>(
             number(100.0 * created / work)
         )
     })
-}
-
-/// What is added to the stiffness, as a part of its diagonal, so that pieces that nothing holds have factors too: far above round-off, and too little to
-/// cost an iteration.
-const RAISED: f64 = 1e-10;
-
-/// Factors of the stiffness before bonds break, which lead Newton's method; none where `[solver]` asks for an iteration, or `"auto"` finds factors dear.
-fn factors<const D: usize>(
-    (model, operator, springs): (&Model<D>, &dyn Operator<D>, &Springs),
-    symmetry: Symmetry,
-    rest: &RunSettings<D>,
-    choices: &mut Vec<Decision>,
-    progress: &dyn Progress,
-) -> Result<Option<Factor>, RunError> {
-    let params = equilibrium::params(&rest.solver);
-    if !equilibrium::may_factorise(model, params.method, symmetry) {
-        return Ok(None);
-    }
-    let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
-    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let mut stiffness = model.assemble(operator, progress);
-    springs.all.add_to(&mut stiffness);
-    stiffness.raise_diagonal(RAISED);
-    let problem = StaticProblem {
-        stiffness: &stiffness,
-        symmetry,
-        positions: &positions,
-        load: &[],
-        prescribed: &prescribed,
-    };
-    let Some((factor, info)) = statics::factors(&problem, &params, progress)? else {
-        return Ok(None);
-    };
-    choices.push(Decision {
-        choice: "factors of the stiffness before bonds break lead the iteration".to_owned(),
-        why: format!(
-            "{:.1} MB, {:.1e} operations once; solver.method = \"krylov\" does without",
-            factor.bytes() as f64 * 1e-6,
-            info.cost.flops
-        ),
-    });
-    Ok(Some(factor))
 }

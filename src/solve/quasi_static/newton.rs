@@ -4,19 +4,12 @@
 //! Each correction costs a linear solve, as far as it pays, and is halved until the residual falls. A load step sets out along the linear prediction, which
 //! moves all of the body: supports that move alone would strain the bonds beside them far beyond what the body ever sees.
 
-use std::sync::{Mutex, PoisonError};
-
+use super::consistent::add_product;
 use super::error::QuasiStaticError;
+use super::lead::Lead;
 use super::residual::{Residual, Run, Tangent};
-use crate::{
-    solve::{
-        FreeDofs,
-        krylov::{
-            KrylovError, KrylovParams, LinearMap, add_scaled, conjugate_gradients, gmres, norm,
-        },
-    },
-    system::{FailureUpdate, Interval, SemiDiscrete, Symmetry},
-};
+use crate::solve::krylov::{KrylovError, KrylovParams, add_scaled, norm};
+use crate::system::ElementTangent;
 
 /// The residual over that before, beyond which the tangent at rest leads too slowly.
 const SLOW: f64 = 0.1;
@@ -40,63 +33,6 @@ fn leading(dofs: usize) -> usize {
     500 + 5 * dofs.isqrt()
 }
 
-/// The tangent at rest on free dofs.
-struct AtRest<'a> {
-    system: &'a dyn SemiDiscrete,
-    free: &'a FreeDofs,
-}
-
-impl LinearMap for AtRest<'_> {
-    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
-        self.system.tangent_into(x, y);
-        self.free.clear_prescribed(y);
-    }
-}
-
-/// The tangent at a displacement on free dofs.
-struct Present<'a> {
-    /// The system, and room for displacements.
-    system: Mutex<(&'a mut dyn SemiDiscrete, Vec<f64>)>,
-    free: &'a FreeDofs,
-    u: &'a [f64],
-    /// `F(u)`.
-    force: &'a [f64],
-    interval: Interval,
-    /// Largest change of a displacement.
-    length: f64,
-}
-
-impl LinearMap for Present<'_> {
-    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
-        let largest = x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        if largest == 0.0 {
-            y.fill(0.0);
-            return;
-        }
-        let part = self.length / largest;
-        let mut held = self.system.lock().unwrap_or_else(PoisonError::into_inner);
-        let (system, moved) = &mut *held;
-        moved.clear();
-        moved.extend(self.u.iter().zip(x).map(|(u, x)| u + part * x));
-        system.internal_force_into(moved, y, self.interval, FailureUpdate::Frozen);
-        for (y, f) in y.iter_mut().zip(self.force) {
-            *y = (*y - f) / part;
-        }
-        self.free.clear_prescribed(y);
-    }
-}
-
-/// The inverse of the row sums.
-struct Diagonal<'a>(&'a [f64]);
-
-impl LinearMap for Diagonal<'_> {
-    fn apply_into(&self, x: &[f64], y: &mut [f64]) {
-        for ((y, x), s) in y.iter_mut().zip(x).zip(self.0) {
-            *y = x * s;
-        }
-    }
-}
-
 impl Run<'_> {
     /// Gives prescribed dofs the `values` of a load step, and with Newton's method all others what the tangent at rest predicts; returns iterations.
     pub(super) fn set_out(
@@ -106,6 +42,8 @@ impl Run<'_> {
         values: &[f64],
     ) -> Result<usize, QuasiStaticError> {
         self.tangent = Tangent::AtRest;
+        self.is_whole = false;
+        self.lead = Lead::default();
         let mut change = vec![0.0; u.len()];
         for (&k, v) in prescribed.iter().zip(values) {
             change[k as usize] = v - u[k as usize];
@@ -116,13 +54,18 @@ impl Run<'_> {
             let mut residual = self.evaluate(u)?;
             let mut resisted = vec![0.0; u.len()];
             self.system.tangent_into(&change, &mut resisted);
-            for (r, k) in self.residual.iter_mut().zip(&resisted) {
-                *r -= k;
-            }
-            self.free.clear_prescribed(&mut self.residual);
-            residual.size = norm(&self.residual);
+            residual = self.resist(residual, &resisted);
             if !residual.is_enough() {
-                match self.correction(u, residual, 0) {
+                let known = self.system.element_tangent(u, self.interval);
+                let known = known.filter(|elements| elements.is_whole);
+                if let Some(elements) = &known {
+                    self.is_whole = true;
+                    self.tangent = Tangent::Present;
+                    let mut excess = vec![0.0; u.len()];
+                    add_product(elements, &change, &mut excess);
+                    residual = self.resist(residual, &excess);
+                }
+                match self.correction(u, residual, 0.0, 0, known) {
                     Ok((correction, count)) => {
                         add_scaled(1.0, &correction, &mut change);
                         iterations = count;
@@ -141,20 +84,39 @@ impl Run<'_> {
         Ok(iterations)
     }
 
-    /// What the tangent makes of the residual at `u`, and iterations; `spent` are those so far.
+    /// Takes what a change is resisted by from the residual.
+    fn resist(&mut self, residual: Residual, resisted: &[f64]) -> Residual {
+        for (r, k) in self.residual.iter_mut().zip(resisted) {
+            *r -= k;
+        }
+        self.free.clear_prescribed(&mut self.residual);
+        Residual {
+            size: norm(&self.residual),
+            ..residual
+        }
+    }
+
+    /// What the tangent makes of the residual at `u`, and iterations; `before` is the size of the residual at the correction before, zero at the first, `spent` are the iterations so far, `known` is what elements have of the tangent if that is computed.
     fn correction(
         &mut self,
         u: &[f64],
         residual: Residual,
+        before: f64,
         spent: usize,
+        known: Option<ElementTangent>,
     ) -> Result<(Vec<f64>, usize), QuasiStaticError> {
         let wanted = (0.1 * residual.enough / residual.size).clamp(1e-13, 1e-2);
         let length = self.system.difference_length();
         let left = self.params.max_iterations - spent;
+        // what is solved further than the tangent holds is lost: quadratic convergence asks for the square of what the correction before left [EisenstatWalker1996]
+        let forcing = match self.is_whole {
+            true => FORCING.min((residual.size / before).powi(2)),
+            false => FORCING,
+        };
         let params = KrylovParams {
             tolerance: match length {
                 None => wanted,
-                Some(_) => wanted.max(FORCING),
+                Some(_) => wanted.max(forcing),
             },
             max_iterations: match length {
                 None => left,
@@ -171,32 +133,18 @@ impl Run<'_> {
             }
             _ => "take smaller load steps",
         };
-        let diagonal = Diagonal(&self.inverse);
-        let near = self.aids.near.unwrap_or(&diagonal);
-        let progress = self.aids.progress;
-        let symmetry = self.system.symmetry();
-        let solve = |tangent: &dyn LinearMap| match symmetry {
-            Symmetry::Symmetric => {
-                conjugate_gradients(tangent, near, &self.residual, &params, progress)
-            }
-            Symmetry::Unsymmetric => gmres(tangent, near, &self.residual, &params, progress),
-        };
         let solved = match (self.tangent, length) {
-            (Tangent::Present, Some(length)) => solve(&Present {
-                system: Mutex::new((&mut *self.system, Vec::new())),
-                free: &self.free,
-                u,
-                force: &self.force,
-                interval: self.interval,
-                length,
-            }),
-            _ => solve(&AtRest {
-                system: &*self.system,
-                free: &self.free,
-            }),
+            (Tangent::Present, Some(length)) => {
+                let known = known.or_else(|| self.system.element_tangent(u, self.interval));
+                self.solve_at_present(u, length, known.as_ref(), &params)
+            }
+            _ => {
+                let solved = self.solve_at_rest(&params);
+                solved.map(|(solution, info)| (solution, info.iterations))
+            }
         };
         let (step, time) = (self.step, self.time);
-        let (correction, info) = solved.map_err(|source| match source {
+        let (correction, iterations) = solved.map_err(|source| match source {
             KrylovError::Interrupted { .. } => self.interrupted(),
             source => QuasiStaticError::Linear {
                 step,
@@ -205,7 +153,22 @@ impl Run<'_> {
                 remedy,
             },
         })?;
-        Ok((correction, info.iterations.max(1)))
+        Ok((correction, iterations.max(1)))
+    }
+
+    /// Whether there is another tangent to try where this one leads nowhere: that at the present displacement after that at rest, and the other way round where elements know the present one and it leads from the start.
+    fn has_other_tangent(&self) -> bool {
+        match self.tangent {
+            Tangent::AtRest => !self.is_whole,
+            Tangent::Present => self.is_whole,
+        }
+    }
+
+    fn take_other_tangent(&mut self) {
+        self.tangent = match self.tangent {
+            Tangent::AtRest => Tangent::Present,
+            Tangent::Present => Tangent::AtRest,
+        };
     }
 
     /// Finds equilibrium from `u`; returns iterations and the residual.
@@ -216,22 +179,24 @@ impl Run<'_> {
         let is_linear = self.system.difference_length().is_none();
         let mut iterations = 0;
         let mut residual = self.evaluate(u)?;
-        let mut slow = 0;
+        let (mut slow, mut before) = (0, 0.0);
+        self.residuals = vec![residual.relative()];
         while !residual.is_enough() {
             if iterations >= self.params.max_iterations || slow == MOST_SLOW {
                 return Err(self.no_equilibrium(residual, iterations));
             }
             self.go_on()?;
-            let (correction, count) = match self.correction(u, residual, iterations) {
+            let (correction, count) = match self.correction(u, residual, before, iterations, None) {
                 Err(end @ QuasiStaticError::Interrupted { .. }) => return Err(end),
-                Err(_) if self.tangent == Tangent::AtRest && !is_linear => {
-                    self.tangent = Tangent::Present;
+                Err(_) if self.has_other_tangent() && !is_linear => {
+                    self.take_other_tangent();
                     continue;
                 }
                 found => found?,
             };
             iterations += count;
             let start = u.to_vec();
+            let is_tried_once = is_linear || (self.tangent == Tangent::AtRest && !self.is_whole);
             let mut part = 1.0;
             let fallen = loop {
                 for ((u, s), c) in u.iter_mut().zip(&start).zip(&correction) {
@@ -240,32 +205,35 @@ impl Run<'_> {
                 let least = (1.0 - LEAST_FALL * part) * residual.size;
                 match self.evaluate(u) {
                     Ok(now) if now.is_enough() || now.size <= least => break Some(now),
-                    _ if is_linear || self.tangent == Tangent::AtRest || part <= SHORTEST => {
-                        break None;
-                    }
+                    _ if is_tried_once || part <= SHORTEST => break None,
                     _ => part *= 0.5,
                 }
             };
-            let is_last = is_linear || self.tangent == Tangent::Present;
             let Some(now) = fallen else {
                 u.copy_from_slice(&start);
                 residual = self.evaluate(u)?;
-                if is_last {
+                if is_linear || !self.has_other_tangent() {
                     return Err(self.no_equilibrium(residual, iterations));
                 }
-                self.tangent = Tangent::Present;
+                self.take_other_tangent();
                 continue;
             };
-            let is_slow = self.tangent == Tangent::Present && now.size > 0.5 * residual.size;
-            slow = if is_slow && self.is_torn && !is_linear {
+            let is_slow = now.size > 0.5 * residual.size;
+            let counts = match self.tangent {
+                Tangent::Present => self.is_torn,
+                Tangent::AtRest => self.is_whole,
+            };
+            slow = if is_slow && counts && !is_linear {
                 slow + 1
             } else {
                 0
             };
-            if now.size > SLOW * residual.size {
+            if self.is_whole || now.size > SLOW * residual.size {
                 self.tangent = Tangent::Present;
             }
+            before = residual.size;
             residual = now;
+            self.residuals.push(residual.relative());
         }
         Ok((iterations, residual))
     }

@@ -2,6 +2,7 @@
 
 use crate::progress::{Progress, Silent};
 use crate::solve::krylov::LinearMap;
+use crate::system::{ElementTangent, Symmetry};
 
 /// How equilibrium is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -39,11 +40,22 @@ impl Default for QuasiStaticParams {
     }
 }
 
+/// Makes factors of the tangent within a load step.
+pub trait Refactor: Sync {
+    /// Factors of the tangent of [`Aids::near`] with what `elements` have beyond it; none where a tangent that is to be symmetric has directions of no or negative stiffness.
+    fn factors(&self, elements: &ElementTangent, symmetry: Symmetry) -> Option<Box<dyn LinearMap>>;
+
+    /// How many iterations take as long as a factorisation.
+    fn worth(&self) -> usize;
+}
+
 /// What leads a run, and who hears of it.
 #[derive(Clone, Copy)]
 pub struct Aids<'a> {
     /// An inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves Newton's method iterations.
     pub near: Option<&'a dyn LinearMap>,
+    /// Makes factors of the tangent at a displacement where elements know it; without, those of `near` serve throughout.
+    pub refactor: Option<&'a dyn Refactor>,
     /// Hears of iterations within a load step, where it may end the run.
     pub progress: &'a dyn Progress,
 }
@@ -52,6 +64,7 @@ impl Default for Aids<'_> {
     fn default() -> Self {
         Self {
             near: None,
+            refactor: None,
             progress: &Silent,
         }
     }

@@ -1,6 +1,7 @@
 //! The residual of a load step, and the forces that it is measured by.
 
 use super::error::QuasiStaticError;
+use super::lead::Lead;
 use super::params::{Aids, Equilibrium, QuasiStaticParams};
 use crate::{
     solve::{FreeDofs, krylov::norm},
@@ -50,6 +51,11 @@ pub(super) struct Run<'a> {
     pub interval: Interval,
     /// Which tangent leads to equilibrium in this load step.
     pub tangent: Tangent,
+    /// Whether elements know the whole tangent, so that the present one leads from the start.
+    pub is_whole: bool,
+    pub lead: Lead,
+    /// Relative residuals on the way to the last equilibrium.
+    pub residuals: Vec<f64>,
     /// Whether bonds are broken.
     pub is_torn: bool,
 }

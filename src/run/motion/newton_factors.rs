@@ -1,0 +1,99 @@
+//! The factors that lead Newton's method in load steps.
+
+use crate::coupling::{Model, Operator};
+use crate::observe::summary::Decision;
+use crate::progress::Progress;
+use crate::run::error::RunError;
+use crate::run::setup::RunSettings;
+use crate::run::springs::Springs;
+use crate::run::{equilibrium, loads};
+use crate::solve::direct::{DirectInfo, Factor};
+use crate::solve::quasi_static::TangentFactors;
+use crate::solve::statics::{self, StaticParams, StaticProblem};
+use crate::system::{BlockCsr, Symmetry};
+use crate::tensor::padded;
+
+/// What is added to the stiffness, as a part of its diagonal, so that pieces that nothing holds have factors too: far above round-off, and too little to
+/// cost an iteration.
+const RAISED: f64 = 1e-10;
+
+/// Factors of the stiffness before bonds break.
+pub(super) struct NewtonFactors {
+    pub factor: Factor,
+    info: DirectInfo,
+    /// The stiffness, if elements know their tangent at a displacement, which is then factorised too.
+    stiffness: Option<BlockCsr>,
+    symmetry: Symmetry,
+    positions: Vec<[f64; 3]>,
+    prescribed: Vec<Option<f64>>,
+    params: StaticParams,
+}
+
+impl NewtonFactors {
+    /// None where `[solver]` asks for an iteration, or `"auto"` finds factors dear.
+    ///
+    /// # Errors
+    /// [`RunError`] for supports that meet no site, and for factors that are asked for and do not fit.
+    pub fn new<const D: usize>(
+        (model, operator, springs): (&Model<D>, &dyn Operator<D>, &Springs),
+        symmetry: Symmetry,
+        rest: &RunSettings<D>,
+        choices: &mut Vec<Decision>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Self>, RunError> {
+        let params = equilibrium::params(&rest.solver);
+        if !equilibrium::may_factorise(model, params.method, symmetry) {
+            return Ok(None);
+        }
+        let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
+        let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+        let mut stiffness = model.assemble(operator, progress);
+        springs.all.add_to(&mut stiffness);
+        stiffness.raise_diagonal(RAISED);
+        let problem = StaticProblem {
+            stiffness: &stiffness,
+            symmetry,
+            positions: &positions,
+            load: &[],
+            prescribed: &prescribed,
+        };
+        let Some((factor, info)) = statics::factors(&problem, &params, progress)? else {
+            return Ok(None);
+        };
+        choices.push(Decision {
+            choice: "factors of the stiffness before bonds break lead the iteration".to_owned(),
+            why: format!(
+                "{:.1} MB, {:.1e} operations once; solver.method = \"krylov\" does without",
+                factor.bytes() as f64 * 1e-6,
+                info.cost.flops
+            ),
+        });
+        // impactors are no sites of the stiffness
+        let is_kept = rest.has_nonlinear_elements(model) && rest.impactors.is_empty();
+        Ok(Some(Self {
+            stiffness: is_kept.then_some(stiffness),
+            factor,
+            info,
+            symmetry,
+            positions,
+            prescribed,
+            params,
+        }))
+    }
+
+    /// What makes factors of the tangent at a displacement; none where no element knows it.
+    pub fn of_present_tangents(&self) -> Option<TangentFactors<'_>> {
+        let problem = StaticProblem {
+            stiffness: self.stiffness.as_ref()?,
+            symmetry: self.symmetry,
+            positions: &self.positions,
+            load: &[],
+            prescribed: &self.prescribed,
+        };
+        Some(TangentFactors::new(problem, self.params, &self.info))
+    }
+}
+
+#[cfg(test)]
+#[path = "newton_factors_tests.rs"]
+mod tests;

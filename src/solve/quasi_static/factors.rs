@@ -1,0 +1,65 @@
+//! Factors of the tangent within a load step.
+
+use std::sync::OnceLock;
+
+use super::params::Refactor;
+use crate::{
+    progress::Silent,
+    solve::{
+        FreeDofs,
+        direct::{Analysis, DirectInfo, DirectParams, Factor},
+        krylov::LinearMap,
+        ordering::SiteGraph,
+        statics::{StaticParams, StaticProblem},
+    },
+    system::{ElementTangent, Symmetry},
+};
+
+/// Operations of a factorisation that take as long as one scalar of the factors takes in an iteration: dense kernels have 3e-11 s for each, and a substitution reads each scalar twice from memory.
+const OPERATIONS: f64 = 60.0;
+
+/// Factors of the sum of a stiffness and of what elements have beyond it at a displacement; all have one pattern, which is analysed once.
+#[derive(Debug)]
+pub struct TangentFactors<'a> {
+    problem: StaticProblem<'a>,
+    free: FreeDofs,
+    params: StaticParams,
+    analysis: OnceLock<Option<Analysis>>,
+    worth: usize,
+}
+
+impl<'a> TangentFactors<'a> {
+    /// Of the stiffness of a problem, whose own factors are there: what they cost, `info` knows.
+    pub fn new(problem: StaticProblem<'a>, params: StaticParams, info: &DirectInfo) -> Self {
+        let scalars = (info.cost.factor_nnz as f64).max(1.0);
+        Self {
+            free: FreeDofs::from_prescribed(problem.prescribed, problem.stiffness.block.max(1)),
+            problem,
+            params,
+            analysis: OnceLock::new(),
+            worth: (info.cost.flops / (OPERATIONS * scalars)).round().max(1.0) as usize,
+        }
+    }
+}
+
+impl Refactor for TangentFactors<'_> {
+    fn factors(&self, elements: &ElementTangent, symmetry: Symmetry) -> Option<Box<dyn LinearMap>> {
+        let matrix = elements.added_to(self.problem.stiffness);
+        let analysis = self.analysis.get_or_init(|| {
+            let graph = SiteGraph::from_pattern(&matrix.row_offsets, &matrix.columns, &self.free);
+            Analysis::of_graph(graph, self.problem.positions, self.params.ordering).ok()
+        });
+        let params = DirectParams {
+            symmetry,
+            smallest_pivot: 0.0,
+            memory_limit: self.params.memory_limit,
+        };
+        let done = Factor::new(&matrix, &self.free, analysis.clone()?, &params, &Silent);
+        done.ok()
+            .map(|(factor, _)| Box::new(factor) as Box<dyn LinearMap>)
+    }
+
+    fn worth(&self) -> usize {
+        self.worth
+    }
+}

@@ -1,0 +1,18 @@
+//! What leads the corrections of a load step.
+
+use crate::solve::krylov::LinearMap;
+
+/// What precedes a correction within a load step.
+#[derive(Default)]
+pub(super) struct Lead {
+    /// Factors of a tangent of this load step.
+    pub factors: Option<Box<dyn LinearMap>>,
+    /// Iterations beyond the first of each correction since the factors at hand came to hand.
+    pub spent: usize,
+    /// Iterations of the correction before.
+    pub last: usize,
+    /// Whether new factors have led hardly better than those before: what elements do not have decides.
+    pub is_useless: bool,
+    /// Factorisations within the load step.
+    pub factorisations: usize,
+}
