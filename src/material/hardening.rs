@@ -89,7 +89,8 @@ impl Hardening {
 
     /// The flow Δα of a step: `equivalent − stiffness Δα = σ_y(before + Δα)`, zero within the yield surface. Nothing flows at once where flow takes time.
     pub fn flow(&self, equivalent: f64, stiffness: f64, before: f64, step: f64) -> f64 {
-        let excess = equivalent - self.yield_stress(before, 0.0, step).0;
+        let (bound, steep) = self.yield_stress(before, 0.0, step);
+        let excess = equivalent - bound;
         if excess <= 0.0 {
             return 0.0;
         }
@@ -102,9 +103,12 @@ impl Hardening {
             Self::JohnsonCook(_) if step <= 0.0 => return 0.0,
             _ => {}
         }
-        // the residual falls with the flow: Newton's method between bounds
+        // the residual falls with the flow: Newton's method between bounds, from the slope at the start, if there is one
         let (mut low, mut high) = (0.0, excess / stiffness);
-        let mut flow = 0.5 * high;
+        let mut flow = match steep > 0.0 {
+            true => excess / (stiffness + steep),
+            false => 0.5 * high,
+        };
         for _ in 0..ITERATIONS {
             let (bound, slope) = self.yield_stress(before + flow, flow, step);
             let residual = equivalent - stiffness * flow - bound;
@@ -113,6 +117,10 @@ impl Hardening {
                 false => high = flow,
             }
             let by_slope = flow + residual / (stiffness + slope);
+            // the residual is a difference of stresses that are rounded
+            if residual.abs() <= 2.0 * f64::EPSILON * equivalent {
+                return by_slope;
+            }
             let next = match by_slope > low && by_slope < high {
                 true => by_slope,
                 false => 0.5 * (low + high),

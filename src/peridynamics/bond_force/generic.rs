@@ -11,6 +11,7 @@ use super::{
     bond_failure::BondFailure,
     carried_deformation::CarriedDeformation,
     list::{extension, ratio, stretched},
+    point_loops::Sites,
     point_state::PointForces,
 };
 use crate::{
@@ -440,9 +441,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             }
         }
         if let Some(mut points) = self.points.take() {
-            self.respond_points(&mut points, u, interval.length);
+            self.respond_points(&mut points, u, interval);
             self.gather_points(&points, u, force);
-            self.add_drag(&mut points, u, interval, force);
             self.points = Some(points);
             return self.last.len() as u64;
         }
@@ -484,12 +484,16 @@ impl<const D: usize> BondPass<D> for Generic<D> {
     }
 
     fn stored_energy(&self, u: &[f64]) -> f64 {
+        let mut sites = Sites::default();
+        if self.points.is_some() {
+            sites.set(&self.position, u, None);
+        }
         let of_point = |s: &mut Scratch<D>, i: usize| {
             if !self.row[i] {
                 return 0.0;
             }
             if let Some(points) = &self.points {
-                return self.point_energy(points, i, u, &self.past, &mut s.point);
+                return self.point_energy(points, i, (u, &sites), &self.past, &mut s.point);
             }
             s.carried = self.carried_of(i).copied();
             self.energy_of(i, &|j| at(u, j), |bond| self.intact[bond], &self.past, s)

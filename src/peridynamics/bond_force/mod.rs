@@ -7,6 +7,7 @@
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
 //! | `point_forces.rs`, `point_state.rs`, `drag.rs` | the same of correspondence, by a stress per point; what it keeps; its drag |
+//! | `point_loops.rs` | its loops over the bonds |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
 //! | `generic_states.rs` | what it tells of single points |
 //! | `generic_damage.rs` | damage that laws keep of their bonds |
@@ -52,6 +53,7 @@ mod own_points;
 mod point_forces;
 #[cfg(test)]
 mod point_forces_tests;
+mod point_loops;
 mod point_state;
 #[cfg(test)]
 mod reference_force;

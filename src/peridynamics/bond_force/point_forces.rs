@@ -1,7 +1,8 @@
 //! The force of laws whose points have a stress: correspondence without a force state per bond.
 //!
 //! `T_i⟨ξ⟩ = ω (B_i ξ + q_i η)` with one tensor `B` and one number `q` per point, so that two loops over the bonds are enough: one adds up the deformation gradient of each family, after which the local law
-//! is asked once per point; the other adds up what the points around give. The own part of a force, `B_i Σ ω ξ V + q_i Σ ω η V`, needs no second loop.
+//! is asked once per point; the other adds up what the points around give (`point_loops.rs`). The own part of a force, `B_i Σ ω ξ V + q_i Σ ω η V`, needs no second loop. A drag (`drag.rs`) is
+//! part of the same loops.
 //! What this computes is what [`crate::peridynamics::ForceState::respond`] says of such laws, bond by bond (`point_forces_tests.rs`).
 
 use rayon::prelude::*;
@@ -11,7 +12,8 @@ use super::{
     bond_failure::BondFailure,
     carried_deformation::{conjugate, felt},
     generic::{Generic, History, NONE, Outcome},
-    point_state::{Intact, PointForces, PointTensor},
+    point_loops::{self, Bonds, Moments, Sites, give},
+    point_state::{Intact, PointForces},
 };
 use crate::{
     material::LocalResponse,
@@ -23,6 +25,7 @@ use crate::{
         tearing_parameter::{Flow, tension},
         zero_energy::{ZeroEnergyControl, control_left, excess_length},
     },
+    system::Interval,
     tensor::{Tensor, Vector},
 };
 
@@ -136,37 +139,47 @@ impl<const D: usize> Generic<D> {
     }
 
     /// Stress and history of all points at the end of a step.
-    pub(super) fn respond_points(&mut self, points: &mut PointForces<D>, u: &[f64], step: f64) {
+    pub(super) fn respond_points(
+        &mut self,
+        points: &mut PointForces<D>,
+        u: &[f64],
+        interval: Interval,
+    ) {
         let mut present = std::mem::take(&mut self.present);
         let mut outcome = std::mem::take(&mut self.outcome);
         let kept = self.layout.point.len();
         let offsets: Vec<usize> = (0..=outcome.len()).map(|i| i * kept).collect();
         let histories = split_rows(&mut present.point, &offsets);
+        let velocity = points.drag.as_mut().map(|drag| drag.moved(u, interval));
+        points.sites.set(&self.position, u, velocity);
         let PointForces {
             weight,
             intact,
-            tensor,
+            given,
+            strength,
             gradient,
             own,
+            sites,
             ..
         } = points;
         let flows = self.layout.point.iter().position(|n| *n == PLASTIC_STRAIN);
         let flows = flows.filter(|_| matches!(self.failure, BondFailure::Tearing(_)));
-        let all = tensor.par_iter_mut().zip(gradient).zip(own);
+        let all = given.by_points(D).zip(strength).zip(gradient).zip(own);
         let all = all.zip(histories).zip(&mut outcome).enumerate();
         all.with_min_len(16).for_each(|(i, point)| {
-            let ((((tensor, gradient), own), present), outcome) = point;
-            (*tensor, *own, *outcome) = (PointTensor::NONE, Vector::zeros(), Outcome::default());
+            let (((((given, strength), gradient), own), present), outcome) = point;
+            given.fill(0.0);
+            (*strength, *own, *outcome) = (0.0, Vector::zeros(), Outcome::default());
             let past = &self.past.point[i * kept..(i + 1) * kept];
             present.copy_from_slice(past);
             let (Some(inverse), Some(state)) = (intact[i].inverse, &self.state[i]) else {
                 return;
             };
-            let (sum, first) = self.moments(i, weight, u);
-            *gradient = sum * inverse;
+            let moments = self.moments(i, weight, sites);
+            *gradient = moments.displacement * inverse;
             let damage = intact[i].damage;
             let Some((found, felt, objective)) =
-                self.local_response(i, gradient, damage, step, past, present)
+                self.local_response(i, gradient, damage, interval.length, past, present)
             else {
                 return;
             };
@@ -190,35 +203,50 @@ impl<const D: usize> Generic<D> {
                     },
                 };
             }
-            tensor.through =
+            let mut through =
                 conjugate(&found.stress, self.carried_of(i), objective) * inverse * left;
-            tensor.strength = fade * state.stabilisation;
             match points.control {
                 ZeroEnergyControl::BondForce => {
-                    tensor.through -= *gradient * tensor.strength;
-                    *own = first * tensor.strength;
+                    *strength = fade * state.stabilisation;
+                    through -= *gradient * *strength;
+                    give(given, &through, None, *strength);
+                    *own = moments.first * *strength;
                 }
-                _ => tensor.strength = fade * state.control,
+                ZeroEnergyControl::Length => {
+                    *strength = fade * state.control;
+                    give(given, &through, None, 0.0);
+                }
+                ZeroEnergyControl::Drag => {
+                    let drag = self.drag_of(&moments, &intact[i].first, fade * state.control);
+                    outcome.dissipated += drag.power * interval.length * self.volume[i];
+                    give(
+                        given,
+                        &(through + drag.of_bond),
+                        Some(&drag.of_difference),
+                        drag.strength,
+                    );
+                    *own = drag.own;
+                }
             }
-            *own += tensor.through * intact[i].first;
+            *own += through * intact[i].first;
         });
         self.present = present;
         self.outcome = outcome;
     }
 
-    /// `Σ w η ⊗ ξ` and `Σ w η` of a family.
-    fn moments(&self, i: usize, weights: &[f64], u: &[f64]) -> (Tensor<D>, Vector<D>) {
-        let (mut sum, mut first) = ([[0.0; D]; D], [0.0; D]);
-        self.each_bond(i, weights, u, |_, w, xi, eta| {
-            for a in 0..D {
-                let of = w * eta[a];
-                first[a] += of;
-                for b in 0..D {
-                    sum[a][b] += of * xi[b];
-                }
-            }
-        });
-        (Tensor::from_fn(|a, b| sum[a][b]), first.into())
+    /// The sums over a family.
+    fn moments(&self, i: usize, weights: &[f64], sites: &Sites) -> Moments<D> {
+        let is_small = self.kinematics == Kinematics::Linear;
+        point_loops::moments(self.bonds_of(i, weights), sites, is_small)
+    }
+
+    fn bonds_of<'a>(&'a self, i: usize, weights: &'a [f64]) -> Bonds<'a> {
+        let range = self.range(i);
+        Bonds {
+            point: i,
+            far: &self.families.neighbours[range.clone()],
+            weights: &weights[range],
+        }
     }
 
     /// Goes over a family's bonds: far point, weight, ξ and η of each.
@@ -252,20 +280,11 @@ impl<const D: usize> Generic<D> {
                 return;
             }
             let mut sum: [f64; D] = points.own[i].into();
-            self.each_bond(i, points.back(), u, |j, w, xi, eta| {
-                let PointTensor { through, strength } = &points.tensor[j];
-                let strength = match points.control {
-                    ZeroEnergyControl::BondForce => *strength,
-                    _ => 0.0,
-                };
-                for a in 0..D {
-                    let mut t = strength * eta[a];
-                    for b in 0..D {
-                        t += through[(a, b)] * xi[b];
-                    }
-                    sum[a] += w * t;
-                }
-            });
+            let far = self.bonds_of(i, points.back());
+            let given = point_loops::taken::<D>(far, &points.sites, &points.given);
+            sum.iter_mut()
+                .zip(given)
+                .for_each(|(sum, given)| *sum += given);
             if points.control == ZeroEnergyControl::Length {
                 self.add_lengths(points, i, u, &mut sum);
             }
@@ -283,7 +302,7 @@ impl<const D: usize> Generic<D> {
         self.each_bond(i, &points.weight, u, |j, own, xi, eta| {
             let (xi, eta) = (Vector::from(*xi), Vector::from(*eta));
             let of = |p: usize| {
-                let strength = points.tensor[p].strength;
+                let strength = points.strength[p];
                 strength * excess_length(&xi, &eta, &points.gradient[p], self.kinematics)
             };
             let along = match self.kinematics {
@@ -298,12 +317,12 @@ impl<const D: usize> Generic<D> {
         });
     }
 
-    /// Energy that a point stores \[J\], with the history `past` and without letting time pass.
+    /// Energy that a point stores \[J\], with the history `past` and without letting time pass; `sites` have the displacements `u`.
     pub(super) fn point_energy(
         &self,
         points: &PointForces<D>,
         i: usize,
-        u: &[f64],
+        (u, sites): (&[f64], &Sites),
         past: &History,
         present: &mut Vec<f64>,
     ) -> f64 {
@@ -317,7 +336,7 @@ impl<const D: usize> Generic<D> {
         let past = &past.point[i * kept..(i + 1) * kept];
         present.clear();
         present.extend(past);
-        let gradient = self.moments(i, &points.weight, u).0 * inverse;
+        let gradient = self.moments(i, &points.weight, sites).displacement * inverse;
         let Some((found, ..)) = self.local_response(i, &gradient, *damage, 0.0, past, present)
         else {
             return 0.0;

@@ -460,3 +460,69 @@ fn a_resumed_drag_has_the_same_bits() {
         step(&mut second, &there, STEP)
     );
 }
+
+#[test]
+fn a_drag_is_that_of_its_definition_bond_by_bond() {
+    let case = case([9, 7, 8], 0.2, false);
+    let n = case.position.len() * 3;
+    for kinematics in [Kinematics::Exact, Kinematics::Linear] {
+        let forces = [0.7, 0.0].map(|strength| {
+            let [_, law] = laws(ZeroEnergyControl::Drag, strength);
+            let mut pass = pass(&case, &law, kinematics, Some(0.25));
+            let before = noise(n, 0.1 * H, 3);
+            let mut force = vec![0.0; n];
+            let broken = pass.force_into(
+                &before,
+                &mut force,
+                Interval::AT_ONCE,
+                FailureUpdate::Update,
+            );
+            assert!(broken > 20, "{broken}");
+            pass.commit();
+            let now = noise(n, 0.1 * H, 13);
+            let force = step(&mut pass, &now, STEP);
+            (pass, before, now, force)
+        });
+        let [(pass, before, now, force), (.., bare)] = &forces;
+        let of = |all: &[f64], i: usize| Vector::<3>::from_column_slice(&all[3 * i..3 * i + 3]);
+        let bond = |i: usize, bond: usize| {
+            let j = pass.neighbour(bond);
+            let [now, before] = [now, before].map(|u| of(u, j) - of(u, i));
+            let y = match kinematics {
+                Kinematics::Exact => pass.xi(i, j) + now,
+                Kinematics::Linear => pass.xi(i, j),
+            };
+            (y, (now - before) / STEP)
+        };
+        let intact = |i: usize| pass.range(i).filter(|&b| pass.intact[b]);
+        let gradient = |i: usize| {
+            let (mut rate, mut shape) = (Tensor::<3>::zeros(), Tensor::<3>::zeros());
+            for b in intact(i) {
+                let (y, velocity) = bond(i, b);
+                let w = pass.omega[b] * pass.volume[pass.neighbour(b)];
+                rate += velocity * y.transpose() * w;
+                shape += y * y.transpose() * w;
+            }
+            rate * shape.try_inverse().unwrap()
+        };
+        let all: Vec<_> = (0..case.position.len()).map(gradient).collect();
+        let mut expected = vec![Vector::<3>::zeros(); all.len()];
+        for (i, gradient) in all.iter().enumerate() {
+            for b in intact(i) {
+                let (y, velocity) = bond(i, b);
+                let control = pass.state[i].as_ref().unwrap().control;
+                let state = (velocity - gradient * y) * (pass.omega[b] * control);
+                let j = pass.neighbour(b);
+                let both = state * pass.volume[i] * pass.volume[j];
+                expected[i] -= both;
+                expected[j] += both;
+            }
+        }
+        let largest = expected.iter().map(|f| f.amax()).fold(0.0, f64::max);
+        for (i, expected) in expected.iter().enumerate().filter(|(i, _)| pass.row[*i]) {
+            let drag = of(force, i) - of(bare, i);
+            let off = (drag - expected).amax() / largest;
+            assert!(off < 1e-12, "{kinematics:?} point {i}: {off:e}");
+        }
+    }
+}

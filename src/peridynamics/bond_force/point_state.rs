@@ -1,7 +1,9 @@
 //! What the pass over points that have a stress keeps, and what a drag remembers.
 
+use super::point_loops::{Given, Sites};
 use crate::{
     peridynamics::{ForceState, zero_energy::ZeroEnergyControl},
+    system::Interval,
     tensor::{Tensor, Vector},
 };
 
@@ -16,20 +18,6 @@ pub(super) struct Intact<const D: usize> {
     pub(super) damage: f64,
 }
 
-/// What the bonds of a family take from their centre: `ω (B ξ + q η)`.
-#[derive(Clone, Copy)]
-pub(super) struct PointTensor<const D: usize> {
-    pub(super) through: Tensor<D>,
-    pub(super) strength: f64,
-}
-
-impl<const D: usize> PointTensor<D> {
-    pub(super) const NONE: Self = Self {
-        through: Tensor::<D>::from_array_storage(nalgebra::ArrayStorage([[0.0; D]; D])),
-        strength: 0.0,
-    };
-}
-
 /// What the pass keeps for it.
 pub(super) struct PointForces<const D: usize> {
     pub(super) control: ZeroEnergyControl,
@@ -38,28 +26,34 @@ pub(super) struct PointForces<const D: usize> {
     /// The same with the ω that the far family gives to the bond, 0 if there is none; empty if all are equal.
     pub(super) back: Vec<f64>,
     pub(super) intact: Vec<Intact<D>>,
-    /// Of the last force.
-    pub(super) tensor: Vec<PointTensor<D>>,
+    /// Positions and displacements, and what bonds take from their far points, of the last force.
+    pub(super) sites: Sites,
+    pub(super) given: Given,
+    /// The strength of the control of each point, but for a drag.
+    pub(super) strength: Vec<f64>,
     /// `F̄ − I` of the last force.
     pub(super) gradient: Vec<Tensor<D>>,
     /// The own part of the force per volume.
     pub(super) own: Vec<Vector<D>>,
-    pub(super) drag: Option<Drag<D>>,
+    pub(super) drag: Option<Drag>,
 }
 
 impl<const D: usize> PointForces<D> {
     /// For laws that have such points; the bonds as they stand are found by `Generic::recall_intact`.
     pub(super) fn new(states: &dyn ForceState<D>, points: usize) -> Option<Self> {
         let control = states.correspondence(None)?.control;
+        let drags = control == ZeroEnergyControl::Drag;
         Some(Self {
             control,
             weight: Vec::new(),
             back: Vec::new(),
             intact: Vec::new(),
-            tensor: vec![PointTensor::NONE; points],
+            sites: Sites::default(),
+            given: Given::new::<D>(points, drags),
+            strength: vec![0.0; points],
             gradient: vec![Tensor::zeros(); points],
             own: vec![Vector::zeros(); points],
-            drag: (control == ZeroEnergyControl::Drag).then(|| Drag::new(points)),
+            drag: drags.then(|| Drag::new(points * D)),
         })
     }
 
@@ -71,15 +65,12 @@ impl<const D: usize> PointForces<D> {
         }
     }
 
-    /// The strength of a control that the tensors of the points do not hold.
-    pub(super) fn strength(&self, i: usize) -> f64 {
-        self.tensor[i].strength
-    }
-
     pub(super) fn memory_bytes(&self) -> usize {
         (self.weight.len() + self.back.len()) * 8
             + self.intact.len() * std::mem::size_of::<Intact<D>>()
-            + self.tensor.len() * std::mem::size_of::<PointTensor<D>>()
+            + self.sites.memory_bytes()
+            + self.given.memory_bytes()
+            + self.strength.len() * 8
             + self.gradient.len() * std::mem::size_of::<Tensor<D>>()
             + self.own.len() * D * 8
             + self.drag.as_ref().map_or(0, Drag::memory_bytes)
@@ -87,27 +78,39 @@ impl<const D: usize> PointForces<D> {
 }
 
 /// What a drag remembers, and what it finds.
-pub(super) struct Drag<const D: usize> {
+pub(super) struct Drag {
     /// Displacement and velocity that were committed last.
-    pub(super) before: Vec<f64>,
-    pub(super) velocity: Vec<f64>,
+    before: Vec<f64>,
+    velocity: Vec<f64>,
     /// Those of the last force.
-    pub(super) present: Vec<f64>,
-    pub(super) present_velocity: Vec<f64>,
-    /// The velocity gradient of each family, and its strength c, 0 where there is none.
-    pub(super) rate: Vec<(Tensor<D>, f64)>,
+    present: Vec<f64>,
+    present_velocity: Vec<f64>,
 }
 
-impl<const D: usize> Drag<D> {
-    pub(super) fn new(points: usize) -> Self {
-        let nothing = vec![0.0; points * D];
+impl Drag {
+    pub(super) fn new(unknowns: usize) -> Self {
+        let nothing = vec![0.0; unknowns];
         Self {
             before: nothing.clone(),
             velocity: nothing.clone(),
             present: nothing.clone(),
             present_velocity: nothing,
-            rate: vec![(Tensor::zeros(), 0.0); points],
         }
+    }
+
+    /// Goes to the end of an interval; the velocities there.
+    pub(super) fn moved(&mut self, u: &[f64], interval: Interval) -> &[f64] {
+        self.present.copy_from_slice(u);
+        match interval.length > 0.0 {
+            true => {
+                let moved = u.iter().zip(&self.before);
+                for (v, (now, before)) in self.present_velocity.iter_mut().zip(moved) {
+                    *v = (now - before) / interval.length;
+                }
+            }
+            false => self.present_velocity.clone_from(&self.velocity),
+        }
+        &self.present_velocity
     }
 
     pub(super) fn commit(&mut self) {
@@ -126,6 +129,6 @@ impl<const D: usize> Drag<D> {
     }
 
     pub(super) fn memory_bytes(&self) -> usize {
-        self.before.len() * 32 + self.rate.len() * std::mem::size_of::<(Tensor<D>, f64)>()
+        self.before.len() * 32
     }
 }
