@@ -984,3 +984,22 @@ fn wrong_outputs() {
         "[0.1, 0.2]",
     );
 }
+
+#[test]
+fn a_law_that_a_seam_does_not_balance_is_told_a_coupling_that_takes_it() {
+    let laws = [
+        ("neo-hooke]\npoisson-ratio = 0.3", "splice"),
+        ("hardening]\nhardening = 20", "truncated"),
+    ];
+    for (law, takes) in laws {
+        let text = RIGHT.replacen("bond-based]", law, 1);
+        let refused = build(&text, &[]).expect_err("a law that is not linear");
+        let remedy = refused.remedy().unwrap_or_default();
+        let told = format!("coupling = \"{takes}\"");
+        assert!(remedy.contains(&told), "{refused}");
+        let seam = "[coupling.blending]\nbeta = \"constant\"";
+        let text = text.replacen(seam, &format!("[coupling.{takes}]"), 1);
+        let text = text.replacen("[zones.transition]\naround = 0.3\n", "", 1);
+        build(&text, &[]).unwrap_or_else(|e| panic!("{law}: {e}"));
+    }
+}

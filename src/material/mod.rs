@@ -49,7 +49,7 @@ pub use umat::{Routine, RoutineError, Umat, UmatEnergies, UmatSettings};
 
 use std::sync::Arc;
 
-use crate::tensor::{Tensor, Tensor4};
+use crate::tensor::{Tensor, Tensor4, principal_values};
 
 /// How a body of `D` dimensions stands for a solid of three.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -187,7 +187,7 @@ impl<const D: usize> LocalResponse<D> {
         if D < 3 {
             whole[(2, 2)] = self.across;
         }
-        whole.symmetric_eigenvalues().into()
+        principal_values(&whole)
     }
 }
 

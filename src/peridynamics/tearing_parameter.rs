@@ -37,6 +37,20 @@ pub(crate) struct Flow {
     pub tension: f64,
 }
 
+impl Flow {
+    /// Of the plastic strains before and after a step; `tension` is asked for of points that have flowed alone.
+    pub fn new([before, strain]: [f64; 2], tension: impl FnOnce() -> f64) -> Self {
+        Self {
+            strain,
+            growth: strain - before,
+            tension: match strain > 0.0 {
+                true => tension(),
+                false => 0.0,
+            },
+        }
+    }
+}
+
 /// `max{0, 2 σ₁/(3 (σ₁ − σ̄))}`: 1 in uniaxial tension, 0 where no principal stress is tensile.
 pub(crate) fn tension(principal: &[f64; 3]) -> f64 {
     let largest = principal.iter().copied().fold(f64::NEG_INFINITY, f64::max);

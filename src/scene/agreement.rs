@@ -37,6 +37,19 @@ pub(crate) fn balanced_seam<const D: usize>(
     if balances || agrees || material.law.is_linear_until_damaged() {
         return Ok(());
     }
+    let linear = material.law.linearised();
+    let truncates = linear.is_ordinary() && !linear.has_deviators();
+    let remedy = match (truncates, material.law.local_law()) {
+        (_, Some(_)) => {
+            "use coupling = \"splice\" with this material in all cells, or coupling = \"nonlocal\""
+        }
+        (true, None) => {
+            "use coupling = \"truncated\", whose seam is in equilibrium at any stretch, or \"nonlocal\"; or, of a law without memory, coupling = \"splice\" with peridynamics.elements = \"cauchy-born\""
+        }
+        (false, None) => {
+            "use coupling = \"nonlocal\"; or, of a law without memory, coupling = \"splice\" with peridynamics.elements = \"cauchy-born\""
+        }
+    };
     let name = spec.materials.get_key_value(material.name.as_str());
     Err(SceneError::new(
         SceneErrorKind::Conflict,
@@ -48,7 +61,7 @@ pub(crate) fn balanced_seam<const D: usize>(
         ),
     )
     .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
-    .help("use coupling = \"truncated\", whose seam is in equilibrium at any stretch, or \"nonlocal\"; or, of a law without memory, coupling = \"splice\" with peridynamics.elements = \"cauchy-born\""))
+    .help(remedy))
 }
 
 /// Refuses finite elements of a law whose classical stress is not linear: they would stay elastic where the points yield.

@@ -61,12 +61,8 @@ impl<const D: usize> Generic<D> {
         let (Some(place), BondFailure::Tearing(_)) = (place, &self.failure) else {
             return Flow::default();
         };
-        let strain = s.point[place];
-        Flow {
-            strain,
-            growth: strain - self.past.point[i * names.len() + place],
-            tension: tension(&s.principal_stress),
-        }
+        let before = self.past.point[i * names.len() + place];
+        Flow::new([before, s.point[place]], || tension(&s.principal_stress))
     }
 
     /// Energy that the points with rows would store less at these displacements, for the bonds that the last pass broke.

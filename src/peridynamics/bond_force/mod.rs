@@ -6,7 +6,7 @@
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
-//! | `point_forces.rs`, `point_state.rs`, `drag.rs` | the same of correspondence, by a stress per point; what it keeps; its drag |
+//! | `point_forces.rs`, `point_state.rs`, `family_control.rs` | the same of correspondence, by a stress per point; what it keeps; its zero-energy control |
 //! | `point_loops.rs` | its loops over the bonds |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
 //! | `generic_states.rs` | what it tells of single points |
@@ -31,7 +31,7 @@ pub(crate) mod bond_list;
 mod breaks;
 mod carried_deformation;
 mod compressed_list;
-mod drag;
+mod family_control;
 mod force_problem;
 mod generic;
 mod generic_carried;

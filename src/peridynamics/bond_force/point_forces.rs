@@ -1,8 +1,8 @@
 //! The force of laws whose points have a stress: correspondence without a force state per bond.
 //!
 //! `T_i⟨ξ⟩ = ω (B_i ξ + q_i η)` with one tensor `B` and one number `q` per point, so that two loops over the bonds are enough: one adds up the deformation gradient of each family, after which the local law
-//! is asked once per point; the other adds up what the points around give (`point_loops.rs`). The own part of a force, `B_i Σ ω ξ V + q_i Σ ω η V`, needs no second loop. A drag (`drag.rs`) is
-//! part of the same loops.
+//! is asked once per point; the other adds up what the points around give (`point_loops.rs`). The own part of a force, `B_i Σ ω ξ V + q_i Σ ω η V`, needs no second loop. A drag is part of the same loops
+//! (`family_control.rs`).
 //! What this computes is what [`crate::peridynamics::ForceState::respond`] says of such laws, bond by bond (`point_forces_tests.rs`).
 
 use rayon::prelude::*;
@@ -11,8 +11,9 @@ use super::{
     Kinematics,
     bond_failure::BondFailure,
     carried_deformation::{conjugate, felt},
+    family_control::FamilyControl,
     generic::{Generic, History, NONE, Outcome},
-    point_loops::{self, Bonds, Moments, Sites, give},
+    point_loops::{self, Bonds, Moments, Sites},
     point_state::{Intact, PointForces},
 };
 use crate::{
@@ -192,43 +193,24 @@ impl<const D: usize> Generic<D> {
                 outcome.dissipated += 0.5 * (fade - faded) * squares * self.volume[i];
             }
             if let Some(place) = flows {
-                let strain = present[place];
-                outcome.flow = Flow {
-                    strain,
-                    growth: strain - past[place],
-                    // asked for of points that have flowed alone
-                    tension: match strain > 0.0 {
-                        true => tension(&found.principal_stresses(&felt, objective)),
-                        false => 0.0,
-                    },
-                };
+                let tension = || tension(&found.principal_stresses(&felt, objective));
+                outcome.flow = Flow::new([past[place], present[place]], tension);
             }
-            let mut through =
-                conjugate(&found.stress, self.carried_of(i), objective) * inverse * left;
-            match points.control {
+            let through = conjugate(&found.stress, self.carried_of(i), objective) * inverse * left;
+            let first = &intact[i].first;
+            let control = match points.control {
                 ZeroEnergyControl::BondForce => {
-                    *strength = fade * state.stabilisation;
-                    through -= *gradient * *strength;
-                    give(given, &through, None, *strength);
-                    *own = moments.first * *strength;
+                    FamilyControl::bond_force(&moments, first, gradient, fade * state.stabilisation)
                 }
-                ZeroEnergyControl::Length => {
-                    *strength = fade * state.control;
-                    give(given, &through, None, 0.0);
-                }
+                ZeroEnergyControl::Length => FamilyControl::by_pairs(fade * state.control),
                 ZeroEnergyControl::Drag => {
-                    let drag = self.drag_of(&moments, &intact[i].first, fade * state.control);
-                    outcome.dissipated += drag.power * interval.length * self.volume[i];
-                    give(
-                        given,
-                        &(through + drag.of_bond),
-                        Some(&drag.of_difference),
-                        drag.strength,
-                    );
-                    *own = drag.own;
+                    FamilyControl::drag(&moments, first, self.kinematics, fade * state.control)
                 }
-            }
-            *own += through * intact[i].first;
+            };
+            outcome.dissipated += control.power * interval.length * self.volume[i];
+            *strength = control.strength;
+            *own = through * first + control.own;
+            control.give(&through, given);
         });
         self.present = present;
         self.outcome = outcome;

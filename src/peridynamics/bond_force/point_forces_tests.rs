@@ -468,8 +468,8 @@ fn a_drag_is_that_of_its_definition_bond_by_bond() {
     for kinematics in [Kinematics::Exact, Kinematics::Linear] {
         let forces = [0.7, 0.0].map(|strength| {
             let [_, law] = laws(ZeroEnergyControl::Drag, strength);
-            let mut pass = pass(&case, &law, kinematics, Some(0.25));
-            let before = noise(n, 0.1 * H, 3);
+            let mut pass = pass(&case, &law, kinematics, Some(0.2));
+            let before = noise(n, 0.14 * H, 7);
             let mut force = vec![0.0; n];
             let broken = pass.force_into(
                 &before,

@@ -86,8 +86,7 @@ pub(super) fn moments<const D: usize>(
     sites: &Sites,
     is_small: bool,
 ) -> Moments<D> {
-    // the widths that D does not have are not compiled for it
-    match width(D) {
+    match const { width(D) } {
         1 => moments_by_width::<D, 1>(bonds, sites, is_small),
         2 => moments_by_width::<D, 2>(bonds, sites, is_small),
         _ => moments_by_width::<D, 4>(bonds, sites, is_small),
@@ -166,7 +165,7 @@ impl<const W: usize, const RATE: bool> Work for Add<'_, W, RATE> {
             let xi = less(&there[0], &here[0]);
             let eta = less(&there[1], &here[1]);
             add(&mut first, w, &eta);
-            for b in 0..components(W) {
+            for b in 0..const { components(W) } {
                 add(&mut displacement[b], w * xi[b], &eta);
             }
             if RATE {
@@ -174,7 +173,7 @@ impl<const W: usize, const RATE: bool> Work for Add<'_, W, RATE> {
                 let mut y = xi;
                 add(&mut y, moved, &eta);
                 add(&mut rate_first, w, &velocity);
-                for b in 0..components(W) {
+                for b in 0..const { components(W) } {
                     add(&mut rate[b], w * y[b], &velocity);
                     add(&mut shape[b], w * y[b], &y);
                 }
@@ -253,7 +252,7 @@ pub(super) fn give<const D: usize>(
 
 /// What the far points give to the bonds of a point: `Σ w T`.
 pub(super) fn taken<const D: usize>(bonds: Bonds<'_>, sites: &Sites, given: &Given) -> [f64; D] {
-    match width(D) {
+    match const { width(D) } {
         1 => taken_by_width::<D, 1>(bonds, sites, given),
         2 => taken_by_width::<D, 2>(bonds, sites, given),
         _ => taken_by_width::<D, 4>(bonds, sites, given),
@@ -284,7 +283,7 @@ impl<const W: usize, const RATE: bool> Work for Take<'_, W, RATE> {
     fn run<L: Lanes>(self, _: L) -> [f64; W] {
         let Self(bonds, sites, given) = self;
         let each = if RATE { 3 } else { 2 };
-        let tensor = components(W);
+        let tensor = const { components(W) };
         let columns = if RATE { 2 * tensor } else { tensor };
         let here = &sites[bonds.point * each..][..each];
         let mut sum = [0.0; W];

@@ -1,5 +1,7 @@
 //! What the pass over points that have a stress keeps, and what a drag remembers.
 
+use rayon::prelude::*;
+
 use super::point_loops::{Given, Sites};
 use crate::{
     peridynamics::{ForceState, zero_energy::ZeroEnergyControl},
@@ -103,10 +105,11 @@ impl Drag {
         self.present.copy_from_slice(u);
         match interval.length > 0.0 {
             true => {
-                let moved = u.iter().zip(&self.before);
-                for (v, (now, before)) in self.present_velocity.iter_mut().zip(moved) {
-                    *v = (now - before) / interval.length;
-                }
+                let moved = u.par_iter().zip(&self.before);
+                let velocities = self.present_velocity.par_iter_mut().with_min_len(4096);
+                velocities
+                    .zip(moved)
+                    .for_each(|(v, (now, before))| *v = (now - before) / interval.length);
             }
             false => self.present_velocity.clone_from(&self.velocity),
         }
