@@ -122,7 +122,7 @@
 //! A [`Problem`] says what the model is, a [`Model`] lays out its sites and bonds, an [`Operator`] gives the rows of the stiffness, a [`StaticProblem`] is solved.
 //!
 //! ```
-//! use bondline::coupling::{PointSource, Surfaces};
+//! use bondline::coupling::{HorizonField, PointSource, Surfaces};
 //! use bondline::mesh::{CellShape, Mesh};
 //! use bondline::peridynamics::{BondBased, BondWeights, PartialVolume};
 //! use bondline::solve::statics::{StaticParams, solve};
@@ -142,7 +142,7 @@
 //!     peridynamic_material: 0,
 //!     peridynamics: Some(Peridynamics {
 //!         law: Arc::new(BondBased::new(Micromodulus::Constant, 1.0)),
-//!         horizon: Arc::new(|_| 3.0),
+//!         horizon: HorizonField::Uniform(3.0),
 //!         points: PointSource::Cells,
 //!         weights: BondWeights::Isotropic,
 //!         volumes: PartialVolume::Full,

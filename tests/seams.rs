@@ -65,24 +65,30 @@ fn without_a_skin_it_does_not() {
 }
 
 #[test]
-fn two_horizons_with_a_layer_stretch_as_one() {
+fn two_lattices_with_a_layer_stretch_as_one() {
     // plane strain: E' = E/(1 − ν²), ν' = ν/(1 − ν)
     let stretch = STRESS * (1.0 - 0.3 * 0.3) / MODULUS;
-    let rows = line("layer.toml", "axis", &[]);
-    for row in &rows {
-        let exact = [stretch * row[0], -0.3 / 0.7 * stretch * row[1]];
-        for a in 0..2 {
-            let error = (row[2 + a] - exact[a]).abs() / (2.0 * stretch);
-            assert!(error < 1e-9, "{a} {row:?}");
+    let of_one_horizon = [
+        "zones.bodies.fine.horizon=0.3",
+        "zones.bodies.fine.spacing=0.05",
+    ];
+    for overrides in [&[][..], &of_one_horizon] {
+        let rows = line("layer.toml", "axis", overrides);
+        for row in &rows {
+            let exact = [stretch * row[0], -0.3 / 0.7 * stretch * row[1]];
+            for a in 0..2 {
+                let error = (row[2 + a] - exact[a]).abs() / (2.0 * stretch);
+                assert!(error < 1e-9, "{overrides:?} {a} {row:?}");
+            }
         }
+        // points on both sides, elements between 0.9 and 1.0 and at the ends
+        assert!(rows.iter().any(|r| r[0] < 0.85 && r[7] == 2.0));
+        assert!(rows.iter().any(|r| r[0] > 1.05 && r[7] == 2.0));
+        assert!(
+            rows.iter()
+                .any(|r| (r[0] - 0.95).abs() < 1e-9 && r[7] == 0.0)
+        );
     }
-    // points on both sides, elements between 0.9 and 1.0 and at the ends
-    assert!(rows.iter().any(|r| r[0] < 0.85 && r[7] == 2.0));
-    assert!(rows.iter().any(|r| r[0] > 1.05 && r[7] == 2.0));
-    assert!(
-        rows.iter()
-            .any(|r| (r[0] - 0.95).abs() < 1e-9 && r[7] == 0.0)
-    );
 }
 
 #[test]

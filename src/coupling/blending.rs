@@ -176,13 +176,7 @@ impl<'a, const D: usize> Blended<'a, D> {
         beta: Vec<f64>,
         share: SpliceShare,
     ) -> Result<Self, ModelError> {
-        let horizon = body.cloud.horizon.first().copied().unwrap_or(0.0);
-        if body
-            .cloud
-            .horizon
-            .iter()
-            .any(|&d| (d - horizon).abs() > 1e-9 * horizon)
-        {
+        if body.cloud.horizon.uniform().is_none() {
             return Err(ModelError::Unsupported {
                 what: "force-based blending with a horizon that varies",
                 remedy: "give one horizon, or use splice or partial-stress",

@@ -120,7 +120,7 @@ impl<const D: usize> LatticeFactors<D> {
         } else if cloud.axes.is_none() || !isotropic {
             return Ok(factors);
         }
-        let mut horizons: Vec<u64> = cloud.horizon.iter().map(|d| d.to_bits()).collect();
+        let mut horizons: Vec<u64> = cloud.horizon.values().iter().map(|d| d.to_bits()).collect();
         horizons.sort_unstable();
         horizons.dedup();
         for bits in horizons {
@@ -178,7 +178,7 @@ impl<const D: usize> LatticeFactors<D> {
         if self.has_partial_volumes() {
             let x = &cloud.position;
             families.retain(|i, j| {
-                self.factor(cloud.horizon[i], &(x[j as usize] - x[i]))
+                self.factor(cloud.horizon.of(i), &(x[j as usize] - x[i]))
                     .is_some_and(|factor| factor > 0.0)
             });
         }

@@ -29,7 +29,7 @@ impl<const D: usize> Model<D> {
         };
         let is_uniform = self
             .body()
-            .is_some_and(|body| body.cloud.horizon.iter().all(|h| h == horizon));
+            .is_some_and(|body| body.cloud.horizon.uniform().is_some());
         if !factors.is_lattice() || p.weights == BondWeights::Fitted || !is_uniform {
             return refused(
                 "elements with the Cauchy–Born law of points whose families differ",

@@ -101,7 +101,7 @@ pub(super) fn fit_nodes<const D: usize>(
         Interface::Overlap | Interface::Faces => (FitDegree::Quadratic, false),
         Interface::Constrained(degree) => (degree, true),
     };
-    let largest = cloud.horizon.iter().copied().fold(0.0, f64::max);
+    let largest = cloud.horizon.largest();
     let data: Vec<(u32, Vector<D>)> = (0..at.sites.len() as u32)
         .map(|s| (s, at.sites[s as usize].position))
         .filter(|&(s, _)| with_nodes || matches!(at.sites[s as usize].kind, SiteKind::Point(_)))

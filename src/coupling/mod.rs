@@ -65,7 +65,9 @@ pub use least_squares_gradient::FitDegree;
 pub use model::{Model, Site, SiteKind};
 pub use partial_stress::PartialStressMeshfree;
 pub use partial_stress_elements::PartialStressElements;
-pub use problem::{Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces};
+pub use problem::{
+    HorizonField, Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces,
+};
 pub use semidiscrete::CoupledSystem;
 pub use splice::Splice;
 pub use state_transfer::{BrokenBonds, Carried, CarryError, Carrying};

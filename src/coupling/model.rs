@@ -139,7 +139,7 @@ impl<const D: usize> Model<D> {
         takes_law(coupling.as_ref(), peridynamics.as_ref())?;
         let largest = peridynamics.as_ref().map_or(0.0, |p| {
             (0..mesh.cell_count())
-                .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))
+                .map(|c| p.reach(p.horizon.at(&mesh.centroid(c))))
                 .fold(0.0, f64::max)
         });
         let roles = coupling.roles(&mesh, &zones, largest);
@@ -341,9 +341,10 @@ impl<const D: usize> Model<D> {
         self.check_seam_on_border(p.law.as_ref())?;
         let materials = self.materials_of(p.law.as_ref(), &cloud);
         self.points_on_border = materials.on_border;
-        let shells = |horizon: f64, xi: &Vector<D>| {
-            let mut known = factors.iter().filter_map(|l| l.factor(horizon, xi));
-            known.next().unwrap_or(1.0)
+        let horizon = cloud.horizon.clone();
+        let shells = |i: usize, xi: &Vector<D>| {
+            let of_lattice = &factors[horizon.lattice_of(i)];
+            of_lattice.factor(horizon.of(i), xi).unwrap_or(1.0)
         };
         let is_regular = is_constant && p.weights != BondWeights::Fitted;
         let weighting = weighting(p, &factors[0], &shells);
@@ -466,7 +467,7 @@ impl<const D: usize> Model<D> {
     pub fn cut_bonds(&self, position: &[Vector<D>], families: &mut Families) {
         let Some(p) = &self.peridynamics else { return };
         let surface = (p.surfaces == Surfaces::Cut).then(|| self.mesh.outer_facets());
-        let longest = position.iter().map(|x| (p.horizon)(x)).fold(0.0, f64::max);
+        let longest = p.horizon.of_points(position).largest();
         bond_cutting::cut(p, &self.mesh, surface, longest, position, families);
     }
 
@@ -579,7 +580,7 @@ impl<const D: usize> Model<D> {
 fn weighting<'a, const D: usize>(
     p: &Peridynamics<D>,
     factors: &LatticeFactors<D>,
-    shells: &'a (dyn Fn(f64, &Vector<D>) -> f64 + Sync),
+    shells: &'a (dyn Fn(usize, &Vector<D>) -> f64 + Sync),
 ) -> Factors<'a, D> {
     match (p.weights, factors.is_lattice()) {
         (BondWeights::Isotropic, true) => Factors::Shells(shells),

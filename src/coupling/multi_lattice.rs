@@ -2,14 +2,13 @@
 
 use crate::{
     coupling::{
-        CellRole, Interface, Lattice, Model, ModelError, Peridynamics, PointSource, Reach,
-        Surfaces,
+        CellRole, Interface, Model, ModelError, Peridynamics, PointSource, Reach, Surfaces,
         bond_cutting::{self, LatticeFactors, WholeFamily},
         point_cloud::PointCloud,
     },
     mesh::boundary::BoundaryFacet,
     peridynamics::{
-        Families, Law, LinearForceState, PartialVolume, TIE_TOLERANCE,
+        Families, Horizon, Law, LinearForceState, PartialVolume, TIE_TOLERANCE,
         softening::{CalibrationError, RegularFamily},
     },
     tensor::{Tensor4, Vector},
@@ -74,16 +73,23 @@ impl<const D: usize> MergedLattices<D> {
         } = grown.next()?;
         let mut factors = vec![first];
         let mut of_point = vec![0u16; cloud.position.len()];
-        let mut horizons = vec![cloud.horizon.first().copied().unwrap_or(0.0)];
+        // a field has one lattice
+        let mut horizons = vec![cloud.horizon.largest()];
         for next in grown {
             families.append(&next.families);
             if let (Some(all), Some(more)) = (&mut passing, &next.passing) {
                 all.append(more);
             }
             of_point.extend(vec![factors.len() as u16; next.cloud.position.len()]);
-            horizons.extend(next.cloud.horizon.first());
+            horizons.push(next.cloud.horizon.largest());
             cloud.append(next.cloud);
             factors.push(next.factors);
+        }
+        if factors.len() > 1 {
+            cloud.horizon = Horizon::PerLattice {
+                horizons: horizons.clone(),
+                of_point: of_point.clone(),
+            };
         }
         Some(Self {
             cloud,
@@ -100,7 +106,8 @@ impl<const D: usize> MergedLattices<D> {
 
 /// Refuses horizons below the spacing, and a lattice without points of its own.
 fn check_cloud<const D: usize>(cloud: &PointCloud<D>) -> Result<(), ModelError> {
-    for (x, &horizon) in cloud.position.iter().zip(&cloud.horizon) {
+    for (i, x) in cloud.position.iter().enumerate() {
+        let horizon = cloud.horizon.of(i);
         if !(horizon.is_finite() && horizon >= cloud.spacing * (1.0 - 1e-9)) {
             return Err(ModelError::Horizon {
                 position: x.iter().copied().collect(),
@@ -127,11 +134,9 @@ impl<const D: usize> Model<D> {
         reach: Reach,
     ) -> Result<CompletedLattice<D>, ModelError> {
         check_cloud(&cloud)?;
-        let is_constant = cloud
-            .horizon
-            .iter()
-            .all(|&d| (d - cloud.horizon[0]).abs() <= 1e-12 * d);
-        let reaches: Vec<f64> = cloud.horizon.iter().map(|&d| p.reach(d)).collect();
+        let is_constant = cloud.horizon.uniform().is_some();
+        let points = 0..cloud.position.len();
+        let reaches: Vec<f64> = points.map(|i| p.reach(cloud.horizon.of(i))).collect();
         let one = reaches.first().filter(|d| reaches.iter().all(|r| r == *d));
         let known = one.filter(|_| cloud.is_axis_parallel()).and_then(|reach| {
             Families::search_lattice(&cloud.position, cloud.spacing, *reach, TIE_TOLERANCE)
@@ -174,7 +179,7 @@ impl<const D: usize> Model<D> {
         if let Some((wide, _)) = &wide {
             let near = self.near_stress_elements(wide);
             self.check_materials(p.law.as_ref(), wide, |i| {
-                near(&wide.position[i], wide.horizon[i])
+                near(&wide.position[i], wide.horizon.of(i))
             })?;
         }
         cloud.retain(&keep.renumbered);
@@ -258,7 +263,7 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
-    /// Refuses several lattices where bonds do not end on faces, where two meet, and where bonds of two could not be told apart.
+    /// Refuses several lattices where bonds do not end on faces, and where two meet.
     pub(super) fn check_lattices(&self, p: &Peridynamics<D>) -> Result<(), ModelError> {
         let PointSource::Lattices { lattices, .. } = &p.points else {
             return Ok(());
@@ -273,16 +278,6 @@ impl<const D: usize> Model<D> {
             return Err(ModelError::Unsupported {
                 what: "partial volumes on several lattices",
                 remedy: "use full volumes, or one lattice",
-            });
-        }
-        let twins = |a: &Lattice<D>| {
-            let mut rest = lattices.iter();
-            rest.any(|b| a.horizon == b.horizon && a.spacing != b.spacing)
-        };
-        if lattices.iter().any(twins) {
-            return Err(ModelError::Unsupported {
-                what: "two lattices of one horizon and two spacings",
-                remedy: "give them different horizons, or one spacing",
             });
         }
         let of: Vec<Option<usize>> = (0..self.mesh.cell_count())
@@ -344,7 +339,7 @@ impl<const D: usize> Model<D> {
         let [(factors, horizon)] = &self.factors[..] else {
             return Err(failed(CalibrationError::Varies));
         };
-        if body.cloud.horizon.iter().any(|of| of != horizon) {
+        if body.cloud.horizon.uniform().is_none() {
             return Err(failed(CalibrationError::Varies));
         }
         let whole = factors.regular_family(p.law.linearised(), *horizon)?;

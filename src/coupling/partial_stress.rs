@@ -100,7 +100,7 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
 
 impl<const D: usize> Meshfree<'_, D> {
     fn add_divergence_row(&self, body: &PdBody<D>, i: usize, row: &mut Row<D>) {
-        let horizon = body.cloud.horizon[i];
+        let horizon = body.cloud.horizon.of(i);
         let weigh = |j: usize, xi: &Vector<D>| {
             self.influence.value(xi.norm(), horizon) * body.cloud.volume[j]
         };

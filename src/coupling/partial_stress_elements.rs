@@ -95,6 +95,7 @@ impl<'a, const D: usize> Elements<'a, D> {
         let mut cloud = around.clone();
         let points = cloud.position.len();
         let mut first = vec![u32::MAX; mesh.cell_count()];
+        let mut horizon = Vec::new();
         let mut quadrature: Vec<QuadraturePoint<D>> = Vec::new();
         for (c, start) in first.iter_mut().enumerate() {
             if model.roles[c] != CellRole::StressElement {
@@ -105,7 +106,7 @@ impl<'a, const D: usize> Elements<'a, D> {
             for g in &quadrature {
                 cloud.position.push(g.position);
                 cloud.volume.push(g.weight);
-                cloud.horizon.push((peridynamics.horizon)(&g.position));
+                horizon.push(peridynamics.horizon.at(&g.position));
                 let shape = &g.shape[..g.nodes];
                 cloud
                     .transfer
@@ -113,9 +114,9 @@ impl<'a, const D: usize> Elements<'a, D> {
             }
         }
         let fit = FamilyFit::new(model, peridynamics.law.linearised());
-        let families = Self::families(model, &mut cloud, points, &fit)?;
+        let families = Self::families(model, &cloud, &mut horizon, &fit)?;
         let centres: Vec<usize> = (points..cloud.position.len()).collect();
-        let shapes = shapes(&cloud, &families, &centres);
+        let shapes = shapes(&cloud, &families, &centres, |i| horizon[i - points]);
         let first_alike = alike::first_alike(&shapes);
         let fitted: Vec<Result<Vec<f64>, PdError>> = shapes
             .par_iter()
@@ -126,6 +127,7 @@ impl<'a, const D: usize> Elements<'a, D> {
             })
             .collect();
         let factors = |i: usize| fitted[first_alike[i - points]].clone();
+        cloud.horizon = cloud.horizon.followed_by(points, &horizon);
         let body = PdBody::new(
             cloud,
             families,
@@ -137,17 +139,18 @@ impl<'a, const D: usize> Elements<'a, D> {
         Ok(Self { model, body, first })
     }
 
-    /// Families of the Gauss points, which follow the first `points` of the cloud.
+    /// Families of the Gauss points, which are the last of the cloud and have these horizons.
     ///
     /// At a free surface or edge a family lacks bonds. What is left may be too few for the moment conditions of the law, or may meet them only with negative
     /// weights, which soften the edge: on the coupled bar with free sides (3D, m = 2) sites there were off by 2.3 % (LPS) and 84 % (bond-based) of the largest
     /// displacement, against 0.3 % and 4.7 % now. Such a family is given a wider horizon, step by step, until weights that are not negative carry the law.
     fn families(
         model: &Model<D>,
-        cloud: &mut Cloud<D>,
-        points: usize,
+        cloud: &Cloud<D>,
+        horizon: &mut [f64],
         fit: &FamilyFit<'_, D>,
     ) -> Result<Families, ModelError> {
+        let points = cloud.position.len() - horizon.len();
         let centres: Vec<u32> = (points as u32..cloud.position.len() as u32).collect();
         let mut candidates: Vec<usize> = (points..cloud.position.len()).collect();
         let mut widened = 1.0;
@@ -155,13 +158,13 @@ impl<'a, const D: usize> Elements<'a, D> {
             let rows = Families::search_from(
                 &cloud.position[points..],
                 &vec![None; centres.len()],
-                &cloud.horizon[points..],
+                horizon,
                 &cloud.position[..points],
                 TIE_TOLERANCE,
             )?;
             let mut families = rows.spread(&centres, cloud.position.len());
             model.cut_bonds(&cloud.position, &mut families);
-            let shapes = shapes(cloud, &families, &candidates);
+            let shapes = shapes(cloud, &families, &candidates, |i| horizon[i - points]);
             let first_alike = alike::first_alike(&shapes);
             let lacks: Vec<bool> = (0..shapes.len())
                 .into_par_iter()
@@ -177,7 +180,7 @@ impl<'a, const D: usize> Elements<'a, D> {
             }
             widened *= WIDENING;
             for &i in &candidates {
-                cloud.horizon[i] *= WIDENING;
+                horizon[i - points] *= WIDENING;
             }
         }
     }
@@ -188,6 +191,7 @@ fn shapes<const D: usize>(
     cloud: &Cloud<D>,
     families: &Families,
     points: &[usize],
+    horizon: impl Fn(usize) -> f64 + Sync,
 ) -> Vec<Shape<D>> {
     points
         .par_iter()
@@ -200,7 +204,7 @@ fn shapes<const D: usize>(
                     (cloud.position[j] - cloud.position[i], cloud.volume[j])
                 })
                 .collect(),
-            horizon: cloud.horizon[i],
+            horizon: horizon(i),
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use rustc_hash::FxHashSet;
 
 use crate::{
     coupling::{Reach, Zone},
-    peridynamics::Families,
+    peridynamics::{Families, Horizon},
     tensor::{Tensor, Vector},
 };
 
@@ -24,7 +24,7 @@ pub struct Volumes {
 pub(super) struct PointCloud<const D: usize> {
     pub position: Vec<Vector<D>>,
     pub volume: Vec<f64>,
-    pub horizon: Vec<f64>,
+    pub horizon: Horizon,
     pub zone: Vec<Zone>,
     /// The finite element that interpolates a point (or extrapolates one that lies in none), with its shape values; none for a point that is a site.
     pub element: Vec<Option<(u32, Vec<f64>)>>,
@@ -89,7 +89,7 @@ impl<const D: usize> PointCloud<D> {
     /// Such a point lies within a horizon of the region, and some site within a cell's diagonal of it.
     pub fn prune_through(&self, families: &Families) -> (Kept, Vec<bool>) {
         let kept = self.prune(families, Reach::Own);
-        let largest = self.horizon.iter().copied().fold(0.0, f64::max);
+        let largest = self.horizon.largest();
         let size = largest + 2.0 * self.spacing * (D as f64).sqrt();
         let bin =
             |x: &Vector<D>| -> [i64; D] { std::array::from_fn(|i| (x[i] / size).floor() as i64) };
@@ -136,7 +136,8 @@ impl<const D: usize> PointCloud<D> {
         let mut keep = || flags.next().unwrap_or(false);
         self.position.retain(|_| keep());
         retain_by(&mut self.volume, renumbered);
-        retain_by(&mut self.horizon, renumbered);
+        let mut flags = renumbered.iter().map(|&r| r != DROPPED);
+        self.horizon.retain(|| flags.next().unwrap_or(false));
         retain_by(&mut self.zone, renumbered);
         retain_by(&mut self.element, renumbered);
     }
@@ -157,7 +158,7 @@ impl<const D: usize> PointCloud<D> {
         Self {
             position: Vec::new(),
             volume: Vec::new(),
-            horizon: Vec::new(),
+            horizon: Horizon::default(),
             zone: Vec::new(),
             element: Vec::new(),
             spacing,
@@ -169,11 +170,10 @@ impl<const D: usize> PointCloud<D> {
         }
     }
 
-    /// Appends the points of another cloud; the spacing becomes the larger one.
+    /// Appends the points of another cloud, but for their horizons; the spacing becomes the larger one.
     pub fn append(&mut self, other: Self) {
         self.position.extend(other.position);
         self.volume.extend(other.volume);
-        self.horizon.extend(other.horizon);
         self.zone.extend(other.zone);
         self.element.extend(other.element);
         self.spacing = self.spacing.max(other.spacing);
@@ -185,13 +185,11 @@ impl<const D: usize> PointCloud<D> {
         &mut self,
         x: Vector<D>,
         volume: f64,
-        horizon: f64,
         zone: Zone,
         element: Option<(u32, Vec<f64>)>,
     ) {
         self.position.push(x);
         self.volume.push(volume);
-        self.horizon.push(horizon);
         self.zone.push(zone);
         self.element.push(element);
     }

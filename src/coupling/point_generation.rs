@@ -12,6 +12,7 @@ use crate::{
     },
     fem::{self, Locator},
     mesh::Mesh,
+    peridynamics::Horizon,
     tensor::{Tensor, Vector},
 };
 
@@ -35,7 +36,7 @@ pub(super) fn place<const D: usize>(
 ) -> Result<Vec<PointCloud<D>>, ModelError> {
     let all: Vec<bool> = roles.iter().map(|&r| r == CellRole::Points).collect();
     let largest = (0..mesh.cell_count())
-        .map(|c| p.reach((p.horizon)(&mesh.centroid(c))))
+        .map(|c| p.reach(p.horizon.at(&mesh.centroid(c))))
         .fold(0.0, f64::max);
     let placement = |mine: Vec<bool>, horizon: Option<f64>| {
         let region = (0..mesh.cell_count())
@@ -116,7 +117,14 @@ const BLOCK: usize = 1024;
 
 impl<const D: usize> Placement<'_, D> {
     fn horizon(&self, x: &Vector<D>) -> f64 {
-        self.own_horizon.unwrap_or_else(|| (self.p.horizon)(x))
+        self.own_horizon.unwrap_or_else(|| self.p.horizon.at(x))
+    }
+
+    fn horizons(&self, position: &[Vector<D>]) -> Horizon {
+        match self.own_horizon {
+            Some(horizon) => Horizon::Uniform(horizon),
+            None => self.p.horizon.of_points(position),
+        }
     }
 
     fn in_void(&self, x: &Vector<D>) -> bool {
@@ -141,11 +149,12 @@ impl<const D: usize> Placement<'_, D> {
                 cloud.volumes.points += volume;
                 cloud.spacing += volume;
             }
-            cloud.push(x, volume, self.horizon(&x), zones[c], element);
+            cloud.push(x, volume, zones[c], element);
         }
         let sites = cloud.element.iter().filter(|e| e.is_none()).count().max(1);
         cloud.spacing = (cloud.spacing / sites as f64).powf(1.0 / D as f64);
         cloud.axes = lattice_axes(&cloud.position, &cloud.volume, cloud.spacing);
+        cloud.horizon = self.horizons(&cloud.position);
         cloud
     }
 
@@ -181,8 +190,9 @@ impl<const D: usize> Placement<'_, D> {
         for (x, volume, share, zone, element) in found {
             let factor = if volume < whole { scale } else { 1.0 };
             cloud.volumes.points += share * factor;
-            cloud.push(x, volume * factor, self.horizon(&x), zone, element);
+            cloud.push(x, volume * factor, zone, element);
         }
+        cloud.horizon = self.horizons(&cloud.position);
         cloud
     }
 }
@@ -402,7 +412,7 @@ impl<'a, const D: usize> Nearest<'a, D> {
 
 #[cfg(test)]
 mod tests {
-    use std::{path::Path, sync::Arc};
+    use std::path::Path;
 
     use super::*;
     use crate::{
@@ -438,7 +448,7 @@ mod tests {
             peridynamic_material: 0,
             peridynamics: Some(Peridynamics {
                 law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
-                horizon: Arc::new(move |_| horizon),
+                horizon: crate::coupling::HorizonField::Uniform(horizon),
                 points,
                 weights: BondWeights::Plain,
                 volumes: PartialVolume::Full,

@@ -7,13 +7,40 @@ use thiserror::Error;
 use crate::{
     coupling::{Coupling, Zone},
     mesh::{CellShape, Mesh},
-    peridynamics::{Accelerator, BondWeights, BoxCell, Law, PartialVolume, PointError},
+    peridynamics::{Accelerator, BondWeights, BoxCell, Horizon, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
     tensor::{Tensor4, Vector},
 };
 
 /// A scalar field of position.
 pub type ScalarField<const D: usize> = Arc<dyn Fn(&Vector<D>) -> f64 + Send + Sync>;
+
+/// The horizon of a problem \[m\].
+#[derive(Clone)]
+pub enum HorizonField<const D: usize> {
+    /// One everywhere.
+    Uniform(f64),
+    /// By position.
+    Field(ScalarField<D>),
+}
+
+impl<const D: usize> HorizonField<D> {
+    /// At a position.
+    pub fn at(&self, x: &Vector<D>) -> f64 {
+        match self {
+            Self::Uniform(horizon) => *horizon,
+            Self::Field(field) => field(x),
+        }
+    }
+
+    /// Of points at some positions.
+    pub fn of_points(&self, position: &[Vector<D>]) -> Horizon {
+        match self {
+            Self::Uniform(horizon) => Horizon::Uniform(*horizon),
+            Self::Field(field) => Horizon::of_field(position.iter().map(|x| field(x)).collect()),
+        }
+    }
+}
 
 /// Where peridynamic points come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,8 +78,8 @@ pub struct Lattice<const D: usize> {
 pub struct Peridynamics<const D: usize> {
     /// The law.
     pub law: Arc<dyn Law<D>>,
-    /// Horizon δ as a field \[m\].
-    pub horizon: ScalarField<D>,
+    /// Horizon δ \[m\].
+    pub horizon: HorizonField<D>,
     /// Where the points come from; a lattice of several has its own horizon instead.
     pub points: PointSource<D>,
     /// How bonds are weighted.

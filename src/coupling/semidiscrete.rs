@@ -102,7 +102,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                     Critical::ByMaterials(stretch) => {
                         stretch.at(cloud.material[i as usize], cloud.material[j as usize])
                     }
-                    of_horizon => of_horizon.at(cloud.horizon[i as usize]),
+                    of_lattice => of_lattice.at(cloud.horizon.lattice_of(i as usize)),
                 };
                 let never = |p: u32| (behaviour.no_fail)(&cloud.position[p as usize]);
                 seam.let_break(model, body, critical, never);

@@ -1,7 +1,5 @@
 //! Fields and motions carried from one layout of zones to another and back.
 
-use std::sync::Arc;
-
 use super::*;
 use crate::coupling::semidiscrete::behaviour::BondBehaviour;
 use crate::coupling::{
@@ -55,7 +53,7 @@ fn problem(mesh: Mesh<2>, within: [f64; 4], coupling: Box<dyn Coupling<2>>) -> P
         peridynamic_material: 0,
         peridynamics: Some(Peridynamics {
             law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
-            horizon: Arc::new(|_| H),
+            horizon: crate::coupling::HorizonField::Uniform(H),
             points: PointSource::Lattice {
                 spacing: 0.25 * H,
                 origin: Vector::<2>::repeat(0.125 * H),

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use crate::{
     assembly::{Row, Transfer},
     peridynamics::{
-        Bound, Families, Family, FamilyMaterials, LinearForceState, PdError, PointError, Reversed,
-        StatePart, collapsed_tensor, moment_fitted_weights,
+        Bound, Families, Family, FamilyMaterials, Horizon, LinearForceState, PdError, PointError,
+        Reversed, StatePart, collapsed_tensor, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -38,7 +38,7 @@ pub struct Cloud<const D: usize> {
     /// Volumes.
     pub volume: Vec<f64>,
     /// Horizons.
-    pub horizon: Vec<f64>,
+    pub horizon: Horizon,
     /// Displacement of each point through sites.
     pub transfer: Transfer,
     /// The number of each point's material; empty if all have one.
@@ -74,8 +74,8 @@ pub type FamilyFactors<'a> = dyn Fn(usize) -> Result<Vec<f64>, PdError> + Sync +
 pub enum Factors<'a, const D: usize> {
     /// All 1.
     Plain,
-    /// A function of the horizon and the bond vector.
-    Shells(&'a (dyn Fn(f64, &Vector<D>) -> f64 + Sync)),
+    /// A function of the point and the bond vector.
+    Shells(&'a (dyn Fn(usize, &Vector<D>) -> f64 + Sync)),
     /// Fitted to the fourth moments, family by family.
     Fitted,
     /// As a function of the point says.
@@ -95,8 +95,7 @@ impl<const D: usize> Scratch<D> {
         match factors {
             Factors::Plain => self.factors.resize(self.bonds.len(), 1.0),
             Factors::Shells(f) => {
-                self.factors
-                    .extend(self.bonds.iter().map(|xi| f(horizon, xi)));
+                self.factors.extend(self.bonds.iter().map(|xi| f(i, xi)));
             }
             Factors::Fitted => {
                 let bonds = self.bonds.iter().copied().zip(self.volumes.iter().copied());
@@ -148,7 +147,7 @@ impl<const D: usize> PdBody<D> {
                     bonds: families.of(i).len(),
                     source,
                 };
-                let horizon = cloud.horizon[i];
+                let horizon = cloud.horizon.of(i);
                 let family = families.of(i).iter().map(|&j| j as usize);
                 of.bonds.clear();
                 of.bonds.extend(
@@ -236,7 +235,7 @@ impl<const D: usize> PdBody<D> {
             bonds: &xi,
             volumes: &volumes,
             factors: &[],
-            horizon: self.cloud.horizon[i],
+            horizon: self.cloud.horizon.of(i),
             materials: None,
         };
         collapsed_tensor(&family, self.kernel(i).0, self.state(i))

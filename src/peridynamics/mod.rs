@@ -3,6 +3,7 @@
 //! | file | what | source |
 //! |---|---|---|
 //! | `influence.rs` | influence functions ω, micromoduli λ | [SAND2015-7998] eq. (5.8), (3.1) |
+//! | `horizon.rs` | the horizon of all points, of a lattice, or of each point | |
 //! | `families.rs` | neighbour search with a horizon per point | eq. (5.2) |
 //! | `lattice_families.rs` | the same for points of one lattice and one horizon, without a search | |
 //! | `offset_table.rs` | a value for each bond of a lattice | |
@@ -36,6 +37,7 @@ mod crack_area;
 pub mod critical_stretch;
 pub mod families;
 pub mod force_state;
+mod horizon;
 pub mod influence;
 mod lattice_families;
 pub mod law;
@@ -60,6 +62,7 @@ pub use force_state::{
     DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past, PointStress,
     Present,
 };
+pub use horizon::Horizon;
 pub use influence::{Influence, Micromodulus};
 pub use law::{Accelerator, Calibrate, Law, Mixture};
 pub use laws::{

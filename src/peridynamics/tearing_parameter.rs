@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::Families;
+use super::{Families, Horizon};
 
 /// The tearing parameter `P` of every point, averaged over families, and what of it breaks bonds.
 ///
@@ -95,19 +95,16 @@ impl Share {
 
 impl TearingParameter {
     /// Of points at rest, with the volumes of their whole families, centre included, and the horizon of each.
-    pub fn new(critical: f64, family_volume: &[f64], horizon: &[f64]) -> Self {
-        // the fullest family of each horizon: a body has few of them
-        let mut fullest: Vec<(f64, f64)> = Vec::new();
-        for (&volume, &horizon) in family_volume.iter().zip(horizon) {
-            match fullest.iter_mut().find(|(of, _)| *of == horizon) {
-                Some((_, most)) => *most = most.max(volume),
-                None => fullest.push((horizon, volume)),
-            }
+    pub fn new(critical: f64, family_volume: &[f64], horizon: &Horizon) -> Self {
+        // the fullest family of each lattice
+        let mut fullest: Vec<f64> = Vec::new();
+        for (i, volume) in family_volume.iter().enumerate() {
+            let lattice = horizon.lattice_of(i);
+            fullest.resize(fullest.len().max(lattice + 1), 0.0);
+            fullest[lattice] = volume.max(fullest[lattice]);
         }
-        let surface = family_volume.iter().zip(horizon).map(|(volume, horizon)| {
-            let most = fullest.iter().find(|(of, _)| of == horizon);
-            most.map_or(1.0, |(_, most)| volume / most)
-        });
+        let volumes = family_volume.iter().enumerate();
+        let surface = volumes.map(|(i, volume)| volume / fullest[horizon.lattice_of(i)]);
         Self {
             critical,
             surface: surface.collect(),
@@ -235,7 +232,7 @@ mod tests {
                 volume[i] + far.sum::<f64>()
             })
             .collect();
-        let mut tearing = TearingParameter::new(0.2, &whole, &[2.0; 7]);
+        let mut tearing = TearingParameter::new(0.2, &whole, &Horizon::Uniform(2.0));
         let flowing = |strain: f64, growth: f64, tension: f64| Flow {
             strain,
             growth,

@@ -350,12 +350,8 @@ pub(crate) fn warnings<const D: usize>(
         |p: &&crate::coupling::Peridynamics<D>| !matches!(p.points, PointSource::Lattices { .. });
     if let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref().filter(alone)) {
         let h = model.spacing();
-        let smallest = body
-            .cloud
-            .horizon
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
+        let horizons = body.cloud.horizon.values().iter();
+        let smallest = horizons.copied().fold(f64::INFINITY, f64::min);
         if smallest < 2.0 * h * (1.0 - 1e-9) {
             list.push(format!(
                 "the horizon {smallest} is {:.2} spacings: families are sparse and directions distorted; 3 to 6 are usual",
@@ -372,7 +368,7 @@ pub(crate) fn warnings<const D: usize>(
             ));
         }
         if let Some(width) = transition_width(&model.mesh, &model.zones) {
-            let largest = body.cloud.horizon.iter().copied().fold(0.0, f64::max);
+            let largest = body.cloud.horizon.largest();
             let (wanted, why) = match joining.zones {
                 ZonesNeeded::Transition { width, why } => (width, why),
                 _ => (0.0, ""),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::coupling::{self, Coupling, Model, PointSource, Problem, Surfaces};
+use crate::coupling::{self, Coupling, HorizonField, Model, PointSource, Problem, Surfaces};
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
@@ -13,6 +13,7 @@ use crate::run::error::RunError;
 use crate::run::stress_settings::StressSettings;
 use crate::scene::adaptive_zone::Follow;
 use crate::scene::conditions::Condition;
+use crate::scene::expression::Expression;
 use crate::scene::failure::Breaking;
 use crate::scene::impactors::Impactor;
 use crate::scene::initial::Initial;
@@ -20,7 +21,15 @@ use crate::scene::materials::{Material, Ratio};
 use crate::scene::points::Points;
 use crate::scene::spec::{BondsSpec, CouplingTraits, ElementsSpec, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
-use crate::tensor::{Vector, padded};
+use crate::tensor::padded;
+
+/// A typed horizon.
+fn horizon_field<const D: usize>(horizon: Expression) -> HorizonField<D> {
+    match horizon.as_constant() {
+        Some(horizon) => HorizonField::Uniform(horizon),
+        None => HorizonField::Field(Arc::new(move |x| horizon.eval(&padded(x)))),
+    }
+}
 
 /// What of a scene remains once its problem is built.
 pub struct RunSettings<const D: usize> {
@@ -146,10 +155,9 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
     let peridynamics = scene.peridynamics.map(|p| {
-        let horizon = p.horizon;
         coupling::Peridynamics {
             law,
-            horizon: Arc::new(move |x: &Vector<D>| horizon.eval(&padded(x))),
+            horizon: horizon_field(p.horizon),
             points: match p.points {
                 Points::Cells => PointSource::Cells,
                 Points::Lattice { spacing, origin } => PointSource::Lattice { spacing, origin },

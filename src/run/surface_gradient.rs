@@ -67,7 +67,7 @@ pub(super) fn missed_peak<const D: usize>(
     let beyond = |p: usize| {
         let volume: f64 = bonds(p).map(|(_, _, v)| v).sum();
         let centroid = bonds(p).map(|(_, xi, v)| xi * v).sum::<Vector<D>>() / volume;
-        if centroid.norm() < ONE_SIDED * cloud.horizon[p] || near_crack(model, p) {
+        if centroid.norm() < ONE_SIDED * cloud.horizon.of(p) || near_crack(model, p) {
             return None;
         }
         let slopes = bonds(p).map(|(j, xi, v)| xi * (v * (stresses[j] - stresses[p])));
@@ -92,7 +92,7 @@ fn near_crack<const D: usize>(model: &Model<D>, p: usize) -> bool {
     let (Some(body), Some(peridynamics)) = (model.body(), &model.peridynamics) else {
         return false;
     };
-    let (x, horizon) = (&body.cloud.position[p], body.cloud.horizon[p]);
+    let (x, horizon) = (&body.cloud.position[p], body.cloud.horizon.of(p));
     let cracks = peridynamics.barriers.iter();
     cracks
         .filter(|barrier| matches!(barrier, Barrier::Crack(_)))

@@ -155,7 +155,7 @@ fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: CouplingTraits) 
     let nearest = outside
         .filter(|(_, is_outside)| *is_outside)
         .flat_map(|(x, _)| {
-            let distance = |b: &Barrier<D>| b.shape().signed_distance(x).max(0.0) / (p.horizon)(x);
+            let distance = |b: &Barrier<D>| b.shape().signed_distance(x).max(0.0) / p.horizon.at(x);
             p.barriers.iter().map(move |b| (distance(b), x))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?;

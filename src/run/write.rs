@@ -298,7 +298,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         // a local site has none
         let horizon = |site: usize| match (&model.peridynamics, solved.zone_of_site[site]) {
             (None, _) | (_, Zone::Local) => 0.0,
-            (Some(p), _) => (p.horizon)(&model.sites[site].position),
+            (Some(p), _) => p.horizon.at(&model.sites[site].position),
         };
         let on_site =
             |s: usize, values: &[f64]| Vector::<D>::from_column_slice(&values[s * D..][..D]);

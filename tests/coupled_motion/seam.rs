@@ -273,14 +273,12 @@ fn linear_bonds_that_may_break_are_the_assembled_stiffness_until_they_do() {
 
 #[test]
 fn bodies_of_different_horizons_break_at_their_own_stretch() {
-    let coarse = 2.0 * SPACING;
-    let fine = coarse / f64::from(layers::HORIZONS);
     let laws = [breaking_at_the_seam(), breaking_states_at_the_seam()].map(|c| c.law);
     for law in laws {
         let e = layers::bodies::<2>(law, 2).unwrap();
         let operator = e.coupling.operator(&e.model).unwrap();
         let behaviour = BondBehaviour {
-            critical_stretch: Some(Critical::ByHorizon(vec![(coarse, 0.01), (fine, 0.015)])),
+            critical_stretch: Some(Critical::PerLattice(vec![0.01, 0.015])),
             ..behaviour(Kinematics::Exact, None)
         };
         let density = |_| DENSITY;

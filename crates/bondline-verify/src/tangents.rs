@@ -91,7 +91,7 @@ impl<const D: usize> RandomCloud<D> {
         let cloud = Cloud {
             position: self.position.clone(),
             volume: self.volume.clone(),
-            horizon: self.horizon.clone(),
+            horizon: bondline::peridynamics::Horizon::of_field(self.horizon.clone()),
             transfer: Transfer::from_rows((0..self.position.len() as u32).map(|s| vec![(s, 1.0)])),
             material: Vec::new(),
         };

@@ -198,7 +198,7 @@ pub fn profile<const D: usize>(
     let operator = laid.coupling.operator(bar).map_err(SceneFailure::from)?;
     let horizon = |x: f64| {
         let at = Vector::from_fn(|k, _| if k == 0 { x } else { 0.0 });
-        (bar.peridynamics.as_ref()).map_or(0.0, |p| (p.horizon)(&at))
+        (bar.peridynamics.as_ref()).map_or(0.0, |p| p.horizon.at(&at))
     };
     let field = |f: fn(f64) -> f64| -> Vec<f64> {
         bar.sites

@@ -1,7 +1,5 @@
 //! Sizes of sites, and how far their points lie below the surface.
 
-use rustc_hash::FxHashMap;
-
 use crate::coupling::{Bins, Model, PointSource};
 use crate::mesh::facet_corners;
 use crate::shape::{Shape, distance_to_segment};
@@ -12,7 +10,7 @@ pub(super) fn sizes<const D: usize>(model: &Model<D>) -> Vec<f64> {
     let whole = whole_cells(model);
     let of_site = |site: usize| match model.point_of(site) {
         Some((body, p)) => {
-            let of_lattice = whole.get(&body.cloud.horizon[p].to_bits());
+            let of_lattice = whole.get(body.cloud.horizon.lattice_of(p));
             let volume = of_lattice.unwrap_or(&body.cloud.volume[p]);
             volume.powf(1.0 / D as f64)
         }
@@ -21,14 +19,15 @@ pub(super) fn sizes<const D: usize>(model: &Model<D>) -> Vec<f64> {
     (0..model.sites.len()).map(of_site).collect()
 }
 
-/// The largest volume of a point of each horizon, where points lie on lattices: surfaces cut the cells of some.
-fn whole_cells<const D: usize>(model: &Model<D>) -> FxHashMap<u64, f64> {
-    let mut whole = FxHashMap::default();
+/// The largest volume of a point of each lattice, where points lie on some: surfaces cut the cells of some.
+fn whole_cells<const D: usize>(model: &Model<D>) -> Vec<f64> {
+    let mut whole = Vec::new();
     let is_lattice = (model.peridynamics.as_ref()).is_some_and(|p| p.points != PointSource::Cells);
     if let (Some(body), true) = (model.body(), is_lattice) {
-        for (horizon, volume) in body.cloud.horizon.iter().zip(&body.cloud.volume) {
-            let largest = whole.entry(horizon.to_bits()).or_insert(0.0);
-            *largest = volume.max(*largest);
+        for (p, volume) in body.cloud.volume.iter().enumerate() {
+            let lattice = body.cloud.horizon.lattice_of(p);
+            whole.resize(whole.len().max(lattice + 1), 0.0);
+            whole[lattice] = volume.max(whole[lattice]);
         }
     }
     whole

@@ -35,8 +35,8 @@ pub struct BondBehaviour<'a, const D: usize> {
 pub enum Critical {
     /// The same everywhere.
     Uniform(f64),
-    /// One for each horizon of the model, \[m\] and \[1\]: the same fracture energy takes a larger stretch where the horizon is smaller.
-    ByHorizon(Vec<(f64, f64)>),
+    /// One for each lattice of the model: the same fracture energy takes a larger stretch where the horizon is smaller.
+    PerLattice(Vec<f64>),
     /// One for each pair of materials.
     ByMaterials(StretchOfMaterials),
     /// No stretch, but this tearing parameter.
@@ -71,15 +71,12 @@ impl StretchOfMaterials {
 }
 
 impl Critical {
-    /// The stretch that breaks bonds of a horizon; infinite for one that is not listed, where none does, and where materials say so.
-    pub fn at(&self, horizon: f64) -> f64 {
+    /// The stretch that breaks bonds of a lattice; infinite where none does, and where materials say so.
+    pub fn at(&self, lattice: usize) -> f64 {
         match self {
             Self::Uniform(s) => *s,
             Self::Tearing(_) | Self::ByMaterials(_) => f64::INFINITY,
-            Self::ByHorizon(list) => {
-                let found = list.iter().find(|(of, _)| *of == horizon);
-                found.map_or(f64::INFINITY, |(_, s)| *s)
-            }
+            Self::PerLattice(list) => list.get(lattice).copied().unwrap_or(f64::INFINITY),
         }
     }
 }

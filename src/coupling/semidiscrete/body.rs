@@ -61,7 +61,7 @@ fn contact_of<const D: usize>(
             spacing,
             approach: c.approach,
             stiffness: c.stiffness / 15.0
-                * contact_stiffness(bond_constant(body), body.cloud.horizon[0]),
+                * contact_stiffness(bond_constant(body), body.cloud.horizon.of(0)),
             skin: 0.25 * spacing,
         })?)),
         None => None,
@@ -122,7 +122,7 @@ impl<const D: usize> PassInput<'_, D> {
         };
         let by_bond = |i: usize, _: usize, _: &Vector<D>| {
             let critical = behaviour.critical_stretch.as_ref();
-            critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon[i]))
+            critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon.lattice_of(i)))
         };
         let material = &body.cloud.material;
         let by_materials = |i: usize, k: usize, _: &Vector<D>| match &behaviour.critical_stretch {
@@ -147,7 +147,7 @@ impl<const D: usize> PassInput<'_, D> {
                 None if law.damages() => Some(CriticalStretch::Uniform(f64::INFINITY)),
                 None => None,
                 Some(Critical::Uniform(s)) => Some(CriticalStretch::Uniform(*s)),
-                Some(Critical::ByHorizon(_)) => Some(CriticalStretch::PerBond(&by_bond)),
+                Some(Critical::PerLattice(_)) => Some(CriticalStretch::PerBond(&by_bond)),
                 Some(Critical::ByMaterials(_)) => Some(CriticalStretch::PerBond(&by_materials)),
                 Some(Critical::Tearing(p)) => Some(CriticalStretch::TearingParameter(*p)),
             }

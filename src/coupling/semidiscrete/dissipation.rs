@@ -31,7 +31,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         };
         let area_of = |[i, j]: [u32; 2]| {
             let spacing = self.model.spacing_at(i);
-            let area = CrackArea::<D>::new(spacing, cloud.horizon[i as usize]);
+            let area = CrackArea::<D>::new(spacing, cloud.horizon.of(i as usize));
             area.of(&body.bond(i as usize, j as usize))
         };
         let mut spent = Dissipation {

@@ -78,9 +78,9 @@ impl<'a, const D: usize> Segments<'a, D> {
         }
         let seams: Vec<Seam<'_, D>> = (0..passing.whole.len())
             .map(|l| {
-                let of = passing.of_point.iter().zip(&cloud.horizon);
-                let own = of.filter(|(of, _)| usize::from(**of) == l);
-                let horizon = own.map(|(_, d)| *d).fold(0.0, f64::max);
+                let points = 0..passing.of_point.len();
+                let own = points.filter(|&i| usize::from(passing.of_point[i]) == l);
+                let horizon = own.map(|i| cloud.horizon.of(i)).fold(0.0, f64::max);
                 let longest = model
                     .peridynamics
                     .as_ref()

@@ -39,7 +39,7 @@ pub(super) fn shifts<const D: usize>(
 ) -> Vec<Shift> {
     let cloud = &segments.body.cloud;
     let sites = &segments.model.sites;
-    let reach = cloud.horizon.iter().copied().fold(0.0, f64::max);
+    let reach = cloud.horizon.largest();
     let mut order: Vec<u32> = nodes.keys().copied().collect();
     order.sort_unstable();
     let place = |site: u32| sites[site as usize].position;

@@ -536,7 +536,7 @@ mod tests {
         let SceneModel { model, .. } = block.model::<D>();
         let model = &model;
         let (body, passing) = (model.body().unwrap(), model.passing().unwrap());
-        let horizon = body.cloud.horizon[0];
+        let horizon = body.cloud.horizon.largest();
         let seam = Seam::new(model, 0, horizon, horizon);
         // points on faces last
         for shift in [0.0, 0.137, 0.5] {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{reference_force::*, *};
 use crate::{
     assembly::Transfer,
-    peridynamics::{Cloud, Ends, Factors, Families, Law, PdBody, laws},
+    peridynamics::{Cloud, Ends, Factors, Families, Horizon, Law, PdBody, laws},
     tensor::{Tensor, Vector},
 };
 
@@ -24,7 +24,7 @@ fn with_law<const D: usize, T>(
     let cloud = Cloud {
         position: case.position.clone(),
         volume: case.volume.clone(),
-        horizon: vec![3.0 * H; points],
+        horizon: Horizon::Uniform(3.0 * H),
         transfer: Transfer::new(),
         // every third point is of the second material
         material: match law.several() {

@@ -6,7 +6,7 @@ use super::{generic::Generic, reference_force::*, *};
 use crate::{
     assembly::Transfer,
     peridynamics::{
-        Cloud, Ends, Factors, Influence, Law, PdBody, ZeroEnergyControl,
+        Cloud, Ends, Factors, Horizon, Influence, Law, PdBody, ZeroEnergyControl,
         laws::{Constants, Named},
         softening::RegularFamily,
     },
@@ -58,11 +58,10 @@ fn pass_beside(
     kinematics: Kinematics,
     (critical, no_fail): (Option<f64>, &[bool]),
 ) -> Generic<3> {
-    let points = case.position.len();
     let cloud = Cloud {
         position: case.position.clone(),
         volume: case.volume.clone(),
-        horizon: vec![3.0 * H; points],
+        horizon: Horizon::Uniform(3.0 * H),
         transfer: Transfer::new(),
         material: Vec::new(),
     };

@@ -145,8 +145,12 @@ fn failure_text<const D: usize>(
     }
     let stretches = critical.map(|critical| match critical {
         Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
-        Critical::ByHorizon(list) => {
-            let each = list.iter().map(|(d, s)| format!("{s:.3e} (horizon {d})"));
+        Critical::PerLattice(list) => {
+            let horizons = model.body().map_or(&[][..], |b| b.cloud.horizon.values());
+            let each = list
+                .iter()
+                .zip(horizons)
+                .map(|(s, d)| format!("{s:.3e} (horizon {d})"));
             let each: Vec<String> = each.collect();
             format!("bonds break at the stretch {}", each.join(", "))
         }
@@ -306,16 +310,13 @@ pub(crate) fn critical_stretch<const D: usize>(
             CalibrationSpec::Lattice => failure_stretch::critical_stretch(energy, per_square)?,
             CalibrationSpec::Continuum => bonds.critical_stretch::<D>(energy, horizon)?,
         };
-        list.push((
-            horizon,
-            failure_stretch::stretch_of_equal_energy(linear, |s| {
-                p.law.force_state().map_or(1.0, |law| law.energy_ratio(s))
-            })?,
-        ));
+        list.push(failure_stretch::stretch_of_equal_energy(linear, |s| {
+            p.law.force_state().map_or(1.0, |law| law.energy_ratio(s))
+        })?);
     }
     Ok(Some(match list[..] {
-        [(_, s)] => Critical::Uniform(s),
-        _ => Critical::ByHorizon(list),
+        [s] => Critical::Uniform(s),
+        _ => Critical::PerLattice(list),
     }))
 }
 
@@ -332,7 +333,7 @@ pub(crate) fn failing_stretch<const D: usize>(
         critical_stretch(model, rest)?.and_then(|critical| match critical {
             Critical::Uniform(s) => Some(s),
             Critical::ByMaterials(of) => Some(of.smallest()).filter(|s| s.is_finite()),
-            Critical::ByHorizon(list) => list.iter().map(|(_, s)| *s).reduce(f64::min),
+            Critical::PerLattice(list) => list.iter().copied().reduce(f64::min),
             Critical::Tearing(_) => None,
         }),
     )
@@ -353,10 +354,10 @@ pub(crate) fn plane_energy<const D: usize>(
         return Ok(None);
     }
     let planes = model.plane_energies()?;
-    let [(horizon, per_square)] = planes[..] else {
+    let [(_, per_square)] = planes[..] else {
         return Ok(None);
     };
-    let stretch = critical.at(horizon);
+    let stretch = critical.at(0);
     let law = model
         .peridynamics
         .as_ref()

@@ -478,8 +478,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             nonlocal_share: [0.0; 3],
         };
         let warnings = without_response(system, &state.u).into_iter();
-        let horizons = model.body().map(|body| body.cloud.horizon.iter().copied());
-        let horizon = horizons.into_iter().flatten().fold(0.0, f64::max);
+        let horizon = model
+            .body()
+            .map_or(0.0, |body| body.cloud.horizon.largest());
         let impacts = self.recorder.impact.iter();
         Ok(RunSummary {
             warnings: warnings

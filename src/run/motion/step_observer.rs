@@ -178,13 +178,11 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         let guard = Guard::new(rotations, balance, segment.spec, pace.steps, seen);
         let monitor = match &rest.follow {
             Some(follow) => {
-                critical_stretch(model, rest)?
-                    .zip(model.body())
-                    .map(|(critical, body)| {
-                        let critical = critical.at(body.cloud.horizon[0]);
-                        let speed = fastest_crack(model, |m| rest.density[m as usize]);
-                        ZoneMonitor::new(follow, model, critical, speed, pace.step)
-                    })
+                let critical = critical_stretch(model, rest)?.filter(|_| model.body().is_some());
+                critical.map(|critical| {
+                    let speed = fastest_crack(model, |m| rest.density[m as usize]);
+                    ZoneMonitor::new(follow, model, critical.at(0), speed, pace.step)
+                })
             }
             None => None,
         };

@@ -153,7 +153,7 @@ impl<'a, const D: usize> ZoneMonitor<'a, D> {
         let is_known = |p: u32| self.site_of_point[p as usize] != u32::MAX;
         let [shortest, longest] = LOOKED_AT;
         for i in (0..self.site_of_point.len() as u32).filter(|&i| is_known(i)) {
-            let horizon = body.cloud.horizon[i as usize] * (1.0 + 1e-6);
+            let horizon = body.cloud.horizon.of(i as usize) * (1.0 + 1e-6);
             let of = body.families.of(i as usize).iter().copied();
             let lengths = (shortest * horizon * (1.0 - 2e-6)).powi(2)..(longest * horizon).powi(2);
             self.bonds

@@ -193,8 +193,7 @@ fn prove<const D: usize>(
 
 /// How far from the boundary rows may lack bonds \[m\].
 fn reach<const D: usize>(model: &Model<D>) -> f64 {
-    let horizons = model.body().map(|b| b.cloud.horizon.iter().copied());
-    let largest = horizons.map_or(0.0, |h| h.fold(0.0, f64::max));
+    let largest = model.body().map_or(0.0, |b| b.cloud.horizon.largest());
     let alone = model
         .peridynamics
         .as_ref()

@@ -137,7 +137,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         mean,
         worst,
     } = Density::of(&moments, &seam, stiffness);
-    let horizon = body.cloud.horizon[first];
+    let horizon = body.cloud.horizon.of(first);
     let length = zone_size(subject);
     let by_points = mean * horizon / length;
     let by_elements = stress_error(subject, &tensor) / length;
