@@ -154,30 +154,26 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
     let local_laws = scene.materials.iter().map(local).collect();
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
-    let peridynamics = scene.peridynamics.map(|p| {
-        coupling::Peridynamics {
-            law,
-            horizon: horizon_field(p.horizon),
-            points: match p.points {
-                Points::Cells => PointSource::Cells,
-                Points::Lattice { spacing, origin } => PointSource::Lattice { spacing, origin },
-                Points::Lattices { lattices, of_cell } => {
-                    PointSource::Lattices { lattices, of_cell }
-                }
-            },
-            weights: match p.weights {
-                WeightsSpec::Isotropic => BondWeights::Isotropic,
-                WeightsSpec::Plain => BondWeights::Plain,
-                WeightsSpec::Fitted => BondWeights::Fitted,
-            },
-            volumes: p.volumes,
-            barriers,
-            voids,
-            surfaces: match p.surfaces {
-                SurfacesSpec::Cut => Surfaces::Cut,
-                SurfacesSpec::Uncut => Surfaces::Uncut,
-            },
-        }
+    let peridynamics = scene.peridynamics.map(|p| coupling::Peridynamics {
+        law,
+        horizon: horizon_field(p.horizon),
+        points: match p.points {
+            Points::Cells => PointSource::Cells,
+            Points::Lattice { spacing, origin } => PointSource::Lattice { spacing, origin },
+            Points::Lattices { lattices, of_cell } => PointSource::Lattices { lattices, of_cell },
+        },
+        weights: match p.weights {
+            WeightsSpec::Isotropic => BondWeights::Isotropic,
+            WeightsSpec::Plain => BondWeights::Plain,
+            WeightsSpec::Fitted => BondWeights::Fitted,
+        },
+        volumes: p.volumes,
+        barriers,
+        voids,
+        surfaces: match p.surfaces {
+            SurfacesSpec::Cut => Surfaces::Cut,
+            SurfacesSpec::Uncut => Surfaces::Uncut,
+        },
     });
     (
         Problem {

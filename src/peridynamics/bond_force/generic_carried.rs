@@ -22,7 +22,7 @@ impl<const D: usize> Generic<D> {
     }
 
     /// `F̄ − I` of the intact bonds.
-    fn intact_gradient(&self, i: usize, u: &[f64]) -> Option<Tensor<D>> {
+    pub(super) fn intact_gradient(&self, i: usize, u: &[f64]) -> Option<Tensor<D>> {
         let whole = &self.state[i].as_ref()?.shape;
         let (mut left, mut sum) = (Tensor::zeros(), Tensor::zeros());
         let here: Vector<D> = at(u, i);
@@ -36,7 +36,7 @@ impl<const D: usize> Generic<D> {
     }
 
     /// Whether the local law of a point holds for strains of any size.
-    fn is_finite_strain(&self, i: usize) -> bool {
+    pub(super) fn is_finite_strain(&self, i: usize) -> bool {
         let material = self.material.get(i).copied().unwrap_or(0);
         let states = self.law.force_state();
         let point = states.and_then(|states| states.correspondence(Some(material)));

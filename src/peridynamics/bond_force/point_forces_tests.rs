@@ -525,3 +525,48 @@ fn a_drag_is_that_of_its_definition_bond_by_bond() {
         }
     }
 }
+
+#[test]
+fn a_torn_family_that_is_flattened_loses_its_bonds_and_their_energy_is_told() {
+    let case = case([9, 7, 8], 0.2, false);
+    let n = case.position.len() * 3;
+    for law in &laws(ZeroEnergyControl::BondForce, 0.7) {
+        let mut pass = pass(&case, law, Kinematics::Exact, Some(0.2));
+        let tear = noise(n, 0.14 * H, 7);
+        let mut force = vec![0.0; n];
+        let mut step = |pass: &mut Generic<3>, u: &[f64]| {
+            pass.force_into(u, &mut force, Interval::AT_ONCE, FailureUpdate::Update)
+        };
+        assert!(step(&mut pass, &tear) > 20);
+        pass.commit();
+        let damage = |pass: &Generic<3>| -> Vec<f64> {
+            let points = 0..case.position.len();
+            points.map(|i| pass.damage_of_point(i)).collect()
+        };
+        let torn = damage(&pass);
+        for (stretch, is_flat) in [(0.3, false), (0.2, true)] {
+            let gradient = Tensor::from_diagonal(&Vector::from([0.0, 0.0, stretch - 1.0]));
+            let u = affine(&case, &gradient);
+            let stored = pass.stored_energy(&u);
+            let broken = step(&mut pass, &u);
+            assert_eq!(broken > 0, is_flat, "{stretch}");
+            for (i, (before, after)) in torn.iter().zip(damage(&pass)).enumerate() {
+                let expected = if is_flat && *before > 0.0 {
+                    1.0
+                } else {
+                    *before
+                };
+                assert!(
+                    (after - expected).abs() < 1e-12,
+                    "point {i}: {before} {after}"
+                );
+            }
+            let released = stored - pass.stored_energy(&u);
+            let told = pass.lost_energy(&|j| std::array::from_fn(|a| u[3 * j + a]));
+            assert!(
+                (told - released).abs() < 1e-12 * stored,
+                "{told} {released}"
+            );
+        }
+    }
+}

@@ -13,17 +13,52 @@ use crate::{
     tensor::Vector,
 };
 
-/// Most Maxwell arms.
-const ARMS: usize = 4;
+/// Most Maxwell arms: a Prony series has one to three for each decade of time.
+const ARMS: usize = 16;
 
-/// What a bond remembers: as much as there are arms, and one.
-const HISTORY: [&str; ARMS + 1] = [
-    "deviatoric extension",
-    "extension of the spring in arm 1",
-    "extension of the spring in arm 2",
-    "extension of the spring in arm 3",
-    "extension of the spring in arm 4",
-];
+/// What a bond remembers, as much as there are arms, and one; and the keys of the arms after the first.
+macro_rules! of_arms {
+    ($($arm:literal)*) => {
+        const HISTORY: [&str; ARMS + 1] = [
+            "deviatoric extension",
+            "extension of the spring in arm 1",
+            $(concat!("extension of the spring in arm ", $arm),)*
+        ];
+
+        const MORE_ARMS: [Parameter; 2 * (ARMS - 1)] = [
+            $(
+                share(
+                    concat!("relaxing-share-", $arm),
+                    concat!("The same of arm ", $arm, "."),
+                    Some(0.0),
+                ),
+                time(
+                    concat!("relaxation-time-", $arm),
+                    concat!("The relaxation time of arm ", $arm, "."),
+                    Some(1.0),
+                ),
+            )*
+        ];
+    };
+}
+of_arms!(2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
+
+/// The keys of all arms behind those of [`PositionAwareSolid`].
+const fn parameters(first: Parameter) -> [Parameter; 2 * ARMS + 1] {
+    let mut all = [first; 2 * ARMS + 1];
+    all[1] = share(
+        "relaxing-share",
+        "Part λ of the shear modulus that relaxes in the first arm.",
+        None,
+    );
+    all[2] = time("relaxation-time", "Relaxation time τ of that arm.", None);
+    let mut k = 0;
+    while k < MORE_ARMS.len() {
+        all[k + 3] = MORE_ARMS[k];
+        k += 1;
+    }
+    all
+}
 
 /// [`PositionAwareSolid`] whose deviatoric response relaxes, by Maxwell arms beside a spring.
 ///
@@ -69,24 +104,11 @@ const fn time(key: &'static str, about: &'static str, default: Option<f64>) -> P
 
 impl<const D: usize> NamedLaw<D> for PositionAwareViscoelasticSolid<D> {
     const KEY: &'static str = "pave";
-    const ABOUT: &'static str = "Position-aware viscoelastic solid: `pals` whose shear modulus relaxes by up to four Maxwell arms; the constants are those at once.";
+    const ABOUT: &'static str = "Position-aware viscoelastic solid: `pals` whose shear modulus relaxes by up to 16 Maxwell arms; the constants are those at once.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = <PositionAwareSolid<D> as NamedLaw<D>>::KINEMATICS;
-    const PARAMETERS: &'static [Parameter] = &[
-        <PositionAwareSolid<D> as NamedLaw<D>>::PARAMETERS[0],
-        share(
-            "relaxing-share",
-            "Part λ of the shear modulus that relaxes in the first arm.",
-            None,
-        ),
-        time("relaxation-time", "Relaxation time τ of that arm.", None),
-        share("relaxing-share-2", "The same of a second arm.", Some(0.0)),
-        time("relaxation-time-2", "Its relaxation time.", Some(1.0)),
-        share("relaxing-share-3", "The same of a third arm.", Some(0.0)),
-        time("relaxation-time-3", "Its relaxation time.", Some(1.0)),
-        share("relaxing-share-4", "The same of a fourth arm.", Some(0.0)),
-        time("relaxation-time-4", "Its relaxation time.", Some(1.0)),
-    ];
+    const PARAMETERS: &'static [Parameter] =
+        &parameters(<PositionAwareSolid<D> as NamedLaw<D>>::PARAMETERS[0]);
 
     fn conflict(values: &[f64]) -> Option<(&'static str, String)> {
         let shares: f64 = values[1..].iter().step_by(2).sum();
@@ -114,7 +136,7 @@ impl<const D: usize> NamedLaw<D> for PositionAwareViscoelasticSolid<D> {
 }
 
 impl<const D: usize> PositionAwareViscoelasticSolid<D> {
-    /// A solid that is `linear` at once, with at most four arms of a share λ \[1\] and a relaxation time τ \[s\].
+    /// A solid that is `linear` at once, with at most [`ARMS`] arms of a share λ \[1\] and a relaxation time τ \[s\].
     fn new(linear: PositionAwareSolid<D>, arms: Vec<(f64, f64)>) -> Self {
         let lasting = 1.0 - arms.iter().map(|(share, _)| share).sum::<f64>();
         Self {
