@@ -61,7 +61,7 @@ impl Look for Solve {
             refactor: Some(&refactor as &dyn Refactor),
             ..Aids::default()
         };
-        let times = |k: u64| (k <= STEPS).then(|| k as f64 * step);
+        let times = |k: u64| (k <= STEPS).then_some(k as f64 * step);
         quasi_static::run(
             system.as_mut(),
             &drive,
