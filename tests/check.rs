@@ -294,3 +294,51 @@ fn what_does_not_fit_is_refused_before_anything_is_laid_out() {
         assert!(seconds < 2.0, "{seconds} s");
     }
 }
+
+/// What each process has of a plate of 20 × 10 points.
+fn shares(law: &str, solve: &str, count: usize) -> Vec<[u64; 4]> {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        "kinematics = \"plane-stress\"\ncoupling = \"nonlocal\"\n[mesh.rectangle]\nmin = [0, 0]\nmax = [20, 10]\nx = {{ cells = 20 }}\ny = {{ cells = 10 }}\n[materials.m.{law}\nyoungs-modulus = 1\ndensity = 1\n[peridynamics]\nhorizon = 3\npoints.lattice = {{ spacing = 1, origin = [0.5, 0.5] }}\n[conditions.left.displacement]\ninside.box = {{ min = [0, 0], max = [3, 10] }}\nx = 0\ny = 0\n{solve}"
+    );
+    let path = folder.path().join("plate.toml");
+    std::fs::write(&path, text).unwrap();
+    let mut binary = Command::cargo_bin("bondline").unwrap();
+    binary.arg("check").arg(&path).arg("--json");
+    binary.args(["--processes", &count.to_string()]);
+    let output = binary.assert().success().get_output().stdout.clone();
+    let found: Value = serde_json::from_slice(&output).unwrap();
+    let all = found["processes"].as_array().unwrap().iter();
+    let number = |share: &Value, key: &str| share[key].as_u64().unwrap();
+    let keys = ["sites", "ghosts", "stiffness_bytes", "received_bytes"];
+    all.map(|share| keys.map(|key| number(share, key)))
+        .collect()
+}
+
+#[test]
+fn processes_are_told_their_sites_and_ghosts() {
+    let moves = "[solve.explicit]\nduration = 1\n";
+    let [one] = shares("bond-based]", "", 1)[..] else {
+        panic!("one process");
+    };
+    assert_eq!([one[0], one[1], one[3]], [200, 0, 0]);
+    // halves of the plate: bonds reach three columns of ten points; those of an LPS have no weight at the horizon and reach two, rows with dilatations twice as far
+    let lps = "lps]\npoisson-ratio = 0.3";
+    for (law, ghosts) in [("bond-based]", 30), (lps, 40)] {
+        for [sites, found, bytes, received] in shares(law, "", 2) {
+            assert_eq!(
+                [sites, found, received],
+                [100, ghosts, ghosts * 16],
+                "{law}"
+            );
+            assert!(bytes > 0);
+        }
+        // forces are gathered
+        for share in shares(law, moves, 2) {
+            assert_eq!(share, [100, ghosts, 0, 100 * 16], "{law}");
+        }
+    }
+    // more processes than sites
+    let many = shares("bond-based]", "", 300);
+    assert_eq!(many.iter().map(|share| share[0]).sum::<u64>(), 200);
+}

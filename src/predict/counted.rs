@@ -62,5 +62,6 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
         error: None,
         no_error: None,
         motion: None,
+        processes: Vec::new(),
     })
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::processes;
 use super::resource_estimate::Prediction;
 use crate::observe::report::{aligned, number};
 use crate::observe::summary::{bytes_text, grouped};
@@ -62,6 +63,9 @@ impl fmt::Display for Prediction {
             )?;
         }
         self.write_steps(f)?;
+        if !self.processes.is_empty() {
+            writeln!(f, "\n{}", aligned(&processes::table(&self.processes)))?;
+        }
         writeln!(
             f,
             "time                   about {:.1} s on {} threads",

@@ -125,6 +125,7 @@ fn prediction<const D: usize>(
         error: None,
         no_error: None,
         motion: None,
+        processes: Vec::new(),
     }
 }
 

@@ -36,6 +36,8 @@ use crate::solve::FreeDofs;
 use crate::solve::statics::MethodUsed;
 use crate::system::Symmetry;
 
+use super::ProcessShare;
+
 /// What a run will need.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Prediction {
@@ -83,6 +85,9 @@ pub struct Prediction {
     /// The steps of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionPrediction>,
+    /// What each of several processes will have, if that was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub processes: Vec<ProcessShare>,
 }
 
 /// The steps of a scene in time.
@@ -135,8 +140,7 @@ pub(crate) fn predict<const D: usize>(
         progress,
     )?;
     watch.lap(&mut timings, "proof");
-    let mut choices = rest.choices.clone();
-    choices.extend(rest.placed.iter().cloned());
+    let mut choices: Vec<_> = rest.choices.iter().chain(&rest.placed).cloned().collect();
     choices.push(rest.coupling(joining));
     let symmetry = equilibrium::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
@@ -181,6 +185,7 @@ pub(crate) fn predict<const D: usize>(
         error: None,
         no_error: None,
         motion: None,
+        processes: Vec::new(),
     };
     prediction.warnings = warnings(&model, &rest, joining, &prediction)?;
     holds(&prediction)?;

@@ -14,7 +14,7 @@ use bondline::run::{AnyScene, RunOptions, StartFrom};
 use bondline::scene::{self, Template};
 use bondline::system::Ranks;
 use bondline_study::pareto::{self, CostBy, Reference, TradeEnd, TradeParams};
-use bondline_study::{CheckError, ConvergeError, ConvergeParams, Refinement};
+use bondline_study::{CheckError, ConvergeError, ConvergeParams, Prediction, Refinement};
 use bondline_terminal::memory;
 use bondline_terminal::{TerminalProgress, print, report, tell};
 use clap::builder::PossibleValuesParser;
@@ -98,6 +98,9 @@ enum Command {
         /// Seconds that runs with other spacings may take, which the error is predicted from; by default a second, or 0.15 of the predicted time.
         #[arg(long, value_name = "SECONDS", value_parser = seconds)]
         pilots: Option<f64>,
+        /// Tell what each of so many processes would have.
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+        processes: Option<u32>,
         /// Print the prediction as JSON.
         #[arg(long)]
         json: bool,
@@ -360,6 +363,32 @@ fn run(
 }
 
 /// Runs a scene with finer and finer meshes, and prints, writes and plots the differences.
+/// Predicts a run, and what each of several processes would have of it.
+fn check(
+    scene: &SceneArguments,
+    pilots: Option<f64>,
+    processes: Option<u32>,
+) -> miette::Result<Prediction> {
+    let told = |e| match e {
+        CheckError::Scene(e) => report(*e),
+        CheckError::Run(e) => miette::miette!("{e}"),
+    };
+    let progress = TerminalProgress::on_stderr();
+    let found = bondline_study::check(&scene.scene, &scene.overrides, pilots, &progress);
+    let mut prediction = found.map_err(told)?;
+    if let Some(count) = processes {
+        if let Some(why) = &prediction.counted {
+            return Err(miette::miette!(
+                "what {count} processes would have is not known: {why}"
+            ));
+        }
+        let count = count as usize;
+        let found = bondline_study::processes(&scene.scene, &scene.overrides, count, &progress);
+        prediction.processes = found.map_err(told)?;
+    }
+    Ok(prediction)
+}
+
 fn converge(
     scene: &SceneArguments,
     refinement: Refinement,
@@ -429,14 +458,10 @@ fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Resul
         Command::Check {
             scene,
             pilots,
+            processes,
             json,
         } => {
-            let progress = TerminalProgress::on_stderr();
-            let found = bondline_study::check(&scene.scene, &scene.overrides, pilots, &progress);
-            let prediction = found.map_err(|e| match e {
-                CheckError::Scene(e) => report(*e),
-                CheckError::Run(e) => miette::miette!("{e}"),
-            })?;
+            let prediction = check(&scene, pilots, processes)?;
             if json {
                 let text = serde_json::to_string_pretty(&prediction);
                 print(text.map_err(|e| miette::miette!("{e}"))?)?;

@@ -35,8 +35,8 @@ pub use estimate::{SPREAD, difference};
 pub use sample_run::Bench;
 use scene_refinements::predicted_error;
 
-use bondline::predict::Prediction;
 use bondline::predict::counted::{ANSWERS, TENTH};
+use bondline::predict::{Prediction, ProcessShare};
 use bondline::progress::Progress;
 use bondline::run::AnyScene;
 use bondline::run::RunError;
@@ -83,6 +83,23 @@ pub fn check(
 ) -> Result<Prediction, CheckError> {
     let (source, directory, name) = read(path, overrides)?;
     check_source(&source, directory, &name, pilots, progress)
+}
+
+/// What each of `count` processes will have of a scene file.
+///
+/// # Errors
+/// [`CheckError`], each with place and remedy.
+pub fn processes(
+    path: &Path,
+    overrides: &[String],
+    count: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<ProcessShare>, CheckError> {
+    let (source, directory, name) = read(path, overrides)?;
+    let chosen = completed(&source, directory)?;
+    let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
+    let scene = AnyScene::complete(complete, directory, &name)?;
+    Ok(bondline::predict::processes(scene, count, progress)?)
 }
 
 /// As [`check`], of a scene whose relative paths start in `directory` and whose files are named `name` by default.

@@ -1,0 +1,127 @@
+//! What each of several processes will have of a scene.
+
+use rayon::prelude::*;
+use rustc_hash::FxHashSet;
+use serde::Serialize;
+
+use crate::observe::summary::{bytes_text, grouped};
+use crate::progress::Progress;
+use crate::run::chosen::with_choice;
+use crate::run::{AnyScene, RunError, setup};
+use crate::scene::{Scene, Solve};
+use crate::system::Partition;
+use crate::tensor::padded;
+
+/// Bytes of a scalar of a sparse matrix in memory: its value and its column.
+const SCALAR: u64 = 12;
+
+/// What one of several processes has.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProcessShare {
+    /// Sites whose rows it computes.
+    pub sites: usize,
+    /// Sites of other processes whose displacements these rows need.
+    pub ghosts: usize,
+    /// Blocks of these rows: bonds, and pairs of nodes of an element.
+    pub blocks: usize,
+    /// What its part of the stiffness takes \[bytes\], without factors or coarse levels; zero of a scene in time, which assembles none.
+    pub stiffness_bytes: u64,
+    /// What it receives for each product with the stiffness, or for each step in time \[bytes\].
+    pub received_bytes: u64,
+}
+
+/// What each of `count` processes will have of a scene, by their number.
+///
+/// # Errors
+/// [`RunError`] if the model cannot be built, as a run would.
+pub fn processes(
+    scene: AnyScene,
+    count: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<ProcessShare>, RunError> {
+    scene.fits()?;
+    match scene {
+        AnyScene::Bar(s) => with_choice(s.scene, |s| shares(s, count, progress)),
+        AnyScene::Plane(s) => with_choice(s.scene, |s| shares(s, count, progress)),
+        AnyScene::Solid(s) => with_choice(s.scene, |s| shares(s, count, progress)),
+    }
+}
+
+fn shares<const D: usize>(
+    scene: Scene<D>,
+    count: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<ProcessShare>, RunError> {
+    let is_static = scene.solve == Solve::Static;
+    let (problem, rest) = setup::problem(scene);
+    let (model, coupling) = setup::model(problem, &rest, progress)?;
+    let operator = coupling.operator(&model)?;
+    let pattern = model.pattern(operator.as_ref(), &[], progress);
+    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
+    let partition = Partition::by_bisection(&positions, &model.work_of_sites(), count);
+    let of_rank = |rank: usize| {
+        let own = partition.of(rank);
+        let row = |site: &u32| {
+            let site = *site as usize;
+            &pattern.columns[pattern.row_offsets[site]..pattern.row_offsets[site + 1]]
+        };
+        let blocks = own.iter().map(|site| row(site).len()).sum();
+        let columns = own.iter().flat_map(row).copied();
+        let ghosts: FxHashSet<u32> = columns.filter(|&c| partition.owner(c) != rank).collect();
+        let numbers = match is_static {
+            true => ghosts.len(),
+            // forces are gathered
+            false => model.sites.len() - own.len(),
+        };
+        ProcessShare {
+            sites: own.len(),
+            ghosts: ghosts.len(),
+            blocks,
+            stiffness_bytes: match is_static {
+                true => (blocks * D * D) as u64 * SCALAR,
+                false => 0,
+            },
+            received_bytes: (numbers * D * 8) as u64,
+        }
+    };
+    let all = (0..partition.ranks())
+        .into_par_iter()
+        .map(of_rank)
+        .collect();
+    progress.finish();
+    Ok(all)
+}
+
+/// The least, the mean and the most of what processes have, as a table.
+pub(super) fn table(shares: &[ProcessShare]) -> Vec<Vec<String>> {
+    let plain = |n: u64| grouped(n as usize);
+    let kibibytes = |n: u64| format!("{} KiB", grouped(n.div_ceil(1024) as usize));
+    let line = |name: &str, of: &dyn Fn(&ProcessShare) -> u64, text: &dyn Fn(u64) -> String| {
+        let all = shares.iter().map(of);
+        let mean = all.clone().sum::<u64>() / shares.len().max(1) as u64;
+        let ends = [all.clone().min(), Some(mean), all.max()];
+        let ends = ends.map(|n| text(n.unwrap_or(0)));
+        std::iter::once(name.to_owned()).chain(ends).collect()
+    };
+    let head = [
+        &*format!("of {} processes", shares.len()),
+        "least",
+        "mean",
+        "most",
+    ];
+    let mut grid = vec![head.map(str::to_owned).to_vec()];
+    grid.push(line("sites", &|s| s.sites as u64, &plain));
+    grid.push(line("ghosts", &|s| s.ghosts as u64, &plain));
+    grid.push(line("blocks", &|s| s.blocks as u64, &plain));
+    if shares.iter().any(|s| s.stiffness_bytes > 0) {
+        grid.push(line("stiffness", &|s| s.stiffness_bytes, &bytes_text));
+        grid.push(line(
+            "received per product",
+            &|s| s.received_bytes,
+            &kibibytes,
+        ));
+    } else {
+        grid.push(line("received per step", &|s| s.received_bytes, &kibibytes));
+    }
+    grid
+}
