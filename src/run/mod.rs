@@ -18,12 +18,13 @@
 //! | `stresses.rs`, `stress_settings.rs`, `stress_probes.rs` | stress as outputs show it, and with each row of a history |
 //! | `springs.rs` | springs between the body and the ground, on the sites of a model |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
-//! | `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | how far elements rotate; stresses that families do not resolve; what of a model makes its results doubtful |
+//! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | whether loads and reactions balance; how far elements rotate; stresses that families do not resolve; what of a model makes its results doubtful |
 //! | `write.rs` | the files of a run |
 //! | `error.rs` | what cannot be run, with place and remedy |
 //! | `block.rs`, `observed_tests.rs` | a block from a scene, for unit tests; what an observer sees |
 
 mod any_scene;
+mod balance;
 #[cfg(test)]
 pub(crate) mod block;
 pub mod budget;

@@ -22,6 +22,7 @@ use crate::observe::summary::{
     peak_memory_bytes,
 };
 use crate::progress::Progress;
+use crate::run::balance::Balance;
 use crate::run::definiteness;
 use crate::run::error::RunError;
 use crate::run::surface_gradient::missed_peak;
@@ -310,8 +311,9 @@ impl<const D: usize> StaticBody<'_, D> {
         let rotation = rotations
             .largest(&solution.displacement)
             .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
-        let balance = Balance::<D>::of(equilibrium);
-        let (force, relative) = (balance.force.as_slice(), balance.relative);
+        let reactions = &equilibrium.solution.reactions;
+        let balance = Balance::<D>::of(&equilibrium.internal, &equilibrium.load, reactions);
+        let (force, relative) = (balance.force.as_slice(), balance.relative());
         let mut told = warnings(self.model, joining, &proof);
         told.extend(indefinite(equilibrium.symmetry, info.method));
         told.extend(rotation.as_ref().map(Rotation::warning));
@@ -321,7 +323,14 @@ impl<const D: usize> StaticBody<'_, D> {
         if stresses.thermal.is_none() {
             let u = &solution.displacement;
             let uniform = proof.largest("stress error");
-            told.extend(missed_peak(self.model, stresses.kinematics, u, uniform));
+            let skin = "cover the surface (zones.skin = \"free-surfaces\")";
+            told.extend(missed_peak(
+                self.model,
+                stresses.kinematics,
+                u,
+                uniform,
+                skin,
+            ));
         }
         RunSummary {
             dimension: D,
@@ -394,38 +403,5 @@ impl<const D: usize> StaticBody<'_, D> {
                     .reactions::<D>(&equilibrium.solution.displacement),
             )
             .collect()
-    }
-}
-
-/// The sum of internal forces: zero but for round-off in a model that conserves momentum.
-struct Balance<const D: usize> {
-    force: Vector<D>,
-    /// Over the sizes of nodal loads and reactions.
-    relative: f64,
-}
-
-impl<const D: usize> Balance<D> {
-    /// Of a solution.
-    fn of(equilibrium: &Equilibrium) -> Self {
-        let mut force = Vector::<D>::zeros();
-        equilibrium
-            .internal
-            .iter()
-            .enumerate()
-            .for_each(|(dof, f)| force[dof % D] += f);
-        // the sizes of nodal forces: their sum vanishes where pressure or two faces pull against each other
-        let size = |forces: &[f64]| -> f64 {
-            let nodal = forces.chunks_exact(D);
-            nodal
-                .map(|f| Vector::<D>::from_column_slice(f).norm())
-                .sum()
-        };
-        let scale = size(&equilibrium.load) + size(&equilibrium.solution.reactions);
-        let relative = if scale > 0.0 {
-            force.norm() / scale
-        } else {
-            0.0
-        };
-        Self { force, relative }
     }
 }

@@ -300,15 +300,21 @@ conditions.pulled.traction = {{ on = 'right', x = 2e7 }}
 output.vtu = false"
         )
     };
-    let said = said_by(&scene("splice"));
-    for part in [
-        "loads and reactions are out of balance by 3.3",
-        "couple by truncated",
-    ] {
-        assert!(said.contains(part), "{said}");
+    // at rest, and under a load that grows and is taken off again
+    let steps = "\nsolve.quasi-static = { duration = 2, steps = 4 }";
+    let loaded =
+        |coupling: &str| scene(coupling).replace("x = 2e7", "x = '2e7 * min(t, 2 - t)'") + steps;
+    for said in [said_by(&scene("splice")), said_by(&loaded("splice"))] {
+        for part in [
+            "loads and reactions are out of balance by 3.3",
+            "couple by truncated",
+        ] {
+            assert!(said.contains(part), "{said}");
+        }
     }
-    let said = said_by(&scene("truncated"));
-    assert!(!said.contains("warning"), "{said}");
+    for said in [said_by(&scene("truncated")), said_by(&loaded("truncated"))] {
+        assert!(!said.contains("warning"), "{said}");
+    }
 }
 
 /// A block of 4 by 4 by 6 spacings with a horizon of 3, all of it peridynamic: five times as soft as the solid that is typed, since all bonds end at surfaces. The

@@ -9,7 +9,7 @@
 //! | `explicit.rs` | the run in time |
 //! | `initial_state.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
 //! | `step_observer.rs` | what follows each step: what is watched, what is written |
-//! | `quasi_static.rs` | the run under a load that grows |
+//! | `quasi_static.rs`, `doubtful_equilibria.rs` | the run under a load that grows; what makes its equilibria doubtful |
 //! | `time_step.rs` | the time step, with sub-cycling |
 //! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, what is told of them |
 //! | `way.rs` | the way of a prescribed velocity |
@@ -24,6 +24,7 @@
 pub(crate) mod bounding_boxes;
 pub mod breaks;
 mod crack_growth;
+mod doubtful_equilibria;
 pub(crate) mod driven_impactors;
 pub mod dynamic_system;
 pub mod explicit;

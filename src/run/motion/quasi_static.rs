@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::RunOptions;
 use super::breaks::{Breaks, breaks};
+use super::doubtful_equilibria::DoubtfulEquilibria;
 use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
 use super::impact::{BodyOnly, impacted};
@@ -105,6 +106,12 @@ fn load_steps<const D: usize>(
         fields: FieldOutput::new(model, operator, &rest.stresses, &rest.output),
         recorder,
         rotations,
+        doubts: DoubtfulEquilibria::new(
+            (model, rest),
+            laid_out.joining,
+            &laid_out.springs,
+            laid_out.proof.largest("stress error"),
+        ),
         last_damage: system.damage_state(),
         state,
         iterations: 0,
@@ -229,6 +236,7 @@ struct LoadStepObserver<'a, const D: usize> {
     fields: FieldOutput<'a, D>,
     recorder: Recorder<'a, D>,
     rotations: Rotations<'a, D>,
+    doubts: DoubtfulEquilibria<'a, D>,
     /// Fields, time, step, work, broken bonds of the last load step: what a checkpoint keeps.
     state: State,
     /// What the system kept of its damage then; nothing without an interrupt, which alone leads back there.
@@ -335,6 +343,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
     fn observe(&mut self, seen: &LoadStep<'_>) -> ControlFlow<()> {
         let begins = seen.state.step == 1;
         self.take_state(seen);
+        self.doubts.watch(seen);
         self.find_damage_at_edge(seen);
         self.find_reason_to_end();
         if let Err(error) = self.write(seen, begins) {
@@ -493,6 +502,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
                 )
                 .chain(unusual_stretch(model, self.rest)?)
                 .chain(self.rotation.as_ref().map(Rotation::warning))
+                .chain(self.doubts.told())
                 .collect(),
             dimension: D,
             applied,

@@ -1,0 +1,92 @@
+//! What makes the equilibria of load steps doubtful: forces out of balance, stresses that families do not resolve.
+
+use std::sync::Arc;
+
+use crate::coupling::Model;
+use crate::run::balance::Balance;
+use crate::run::setup::RunSettings;
+use crate::run::springs::Springs;
+use crate::run::surface_gradient::missed_peak;
+use crate::run::warnings::out_of_balance;
+use crate::scene::spec::CouplingTraits;
+use crate::solve::quasi_static::LoadStep;
+use crate::tensor::Vector;
+
+/// Watches load steps for what their equilibria do not show.
+pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
+    model: &'a Model<D>,
+    rest: &'a RunSettings<D>,
+    joining: CouplingTraits,
+    springs: Arc<Springs>,
+    /// The stress error of a uniform field at surfaces of points.
+    uniform: f64,
+    /// The largest sum of internal forces \[N\], and the largest scale of forces; not those of one load step, since little holds a body that is unloaded.
+    force: Vector<D>,
+    scale: f64,
+    /// Whether a load step has been asked for its peak of stress.
+    asked: bool,
+    peak: Option<String>,
+}
+
+impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
+    /// Of a run whose uniform fields have a stress error of `uniform` at surfaces.
+    pub fn new(
+        (model, rest): (&'a Model<D>, &'a RunSettings<D>),
+        joining: CouplingTraits,
+        springs: &Arc<Springs>,
+        uniform: f64,
+    ) -> Self {
+        Self {
+            model,
+            rest,
+            joining,
+            springs: Arc::clone(springs),
+            uniform,
+            force: Vector::zeros(),
+            scale: 0.0,
+            asked: false,
+            peak: None,
+        }
+    }
+
+    /// Looks at an equilibrium.
+    pub fn watch(&mut self, seen: &LoadStep<'_>) {
+        let u = &seen.state.u;
+        let mut internal = seen.force.to_vec();
+        self.springs.take_from(&mut internal, u);
+        let reactions: Vec<f64> = (seen.force.iter().zip(seen.load))
+            .map(|(f, load)| f - load)
+            .collect();
+        let balance = Balance::<D>::of(&internal, seen.load, &reactions);
+        if balance.force.norm() > self.force.norm() {
+            self.force = balance.force;
+        }
+        self.scale = self.scale.max(balance.scale);
+        self.ask_for_peak(seen);
+    }
+
+    /// Asks the first load step that deforms the body, as long as it is whole, for a peak of stress: beyond it, flow and cracks change what the elastic response tells.
+    fn ask_for_peak(&mut self, seen: &LoadStep<'_>) {
+        let stresses = &self.rest.stresses;
+        let u = &seen.state.u;
+        if self.asked || self.model.body().is_none() || u.iter().all(|u| *u == 0.0) {
+            return;
+        }
+        self.asked = true;
+        // strains of free expansion are no stress
+        if seen.state.broken == 0 && stresses.thermal.is_none() {
+            // a seam within a horizon of what flows or breaks balances no steep stress: no skin
+            let apart = "carry the surface and what lies within two horizons of it";
+            let kinematics = stresses.kinematics;
+            self.peak = missed_peak(self.model, kinematics, u, self.uniform, apart);
+        }
+    }
+
+    /// The warnings.
+    pub fn told(self) -> impl Iterator<Item = String> {
+        let Self { force, scale, .. } = self;
+        let relative = Balance { force, scale }.relative();
+        let balance = out_of_balance(force.as_slice(), relative, self.joining);
+        balance.into_iter().chain(self.peak)
+    }
+}
