@@ -176,7 +176,6 @@ fn partial_stress_throughout_a_body_needs_no_elements() {
     }
 }
 
-#[cfg(not(feature = "umat"))]
 #[test]
 fn a_user_material_needs_its_feature() {
     let material = "materials={ steel = { umat = { library = \"none.so\", youngs-modulus = 200e9, poisson-ratio = 0.3 } } }";

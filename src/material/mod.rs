@@ -30,8 +30,7 @@ mod scalar_damage;
 mod softening;
 #[cfg(test)]
 mod tangent_tests;
-#[cfg(feature = "umat")]
-mod umat;
+mod user_routine;
 
 pub(crate) use algorithmic_tangent::central_differences;
 pub use elastic::{Elastic, LinearElastic};
@@ -44,8 +43,10 @@ pub use scalar_damage::{
     EquivalentStrain, RESIDUAL, ScalarDamage, ScalarDamageSettings, SofteningCurve,
 };
 pub use softening::Envelope;
-#[cfg(feature = "umat")]
-pub use umat::{Routine, RoutineError, Umat, UmatEnergies, UmatSettings};
+pub(crate) use user_routine::routine_loader;
+pub use user_routine::{
+    RoutineError, RoutineLoader, UmatEnergies, UmatSettings, set_routine_loader,
+};
 
 use std::sync::Arc;
 

@@ -3,26 +3,30 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::bounds_checks::{not_negative, positive};
 use super::error::{SceneError, SceneErrorKind};
-use super::spec::UmatSpec;
+use super::spec::{EnergiesSpec, StrainsSpec, UmatSpec};
 use super::value::Text;
+use crate::material::{Reduced, RoutineError, UmatEnergies, UmatSettings, routine_loader};
 use crate::observe::checkpoint::Fingerprint;
 use crate::peridynamics::Law;
-use crate::peridynamics::laws::Constants;
+use crate::peridynamics::laws::{Constants, LocalCorrespondence};
 
 /// The law of a routine, whose library lies relative to `directory`.
-#[cfg(feature = "umat")]
 pub(crate) fn umat<const D: usize>(
     name: &Text,
     spec: &UmatSpec,
     constants: Constants,
     directory: &Path,
 ) -> Result<Arc<dyn Law<D>>, SceneError> {
-    use super::bounds_checks::{not_negative, positive};
-    use super::spec::{EnergiesSpec, StrainsSpec};
-    use crate::material::{Reduced, Routine, RoutineError, Umat, UmatEnergies, UmatSettings};
-    use crate::peridynamics::laws::LocalCorrespondence;
-
+    let Some(load) = routine_loader() else {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`materials.{name}.umat` names a routine, and this program was built without the feature `umat`"),
+        )
+        .label(spec.library.span.clone(), "cannot be loaded")
+        .help("build it with the feature: cargo build --release -p bondline-cli --features umat"));
+    };
     let place = |key: &str| format!("materials.{name}.umat.{key}");
     let stabilisation = match &spec.stabilisation {
         Some(s) => not_negative(&place("stabilisation"), s)?,
@@ -45,7 +49,22 @@ pub(crate) fn umat<const D: usize>(
     };
     let path = directory.join(&spec.library.value);
     let symbol = spec.symbol.as_ref();
-    let routine = Routine::load(&path, symbol.map(|s| s.value.as_str())).map_err(|error| {
+    let settings = UmatSettings {
+        name: name.value.clone(),
+        constants: spec.constants.iter().map(|c| c.value).collect(),
+        states,
+        lame: (constants.solid_lambda(), constants.shear),
+        is_large: spec.strains == StrainsSpec::Large,
+        is_thread_safe: spec.thread_safe,
+        temperature: spec.temperature.as_ref().map_or(0.0, |t| t.value),
+        length,
+        energies: match spec.energies {
+            EnergiesSpec::Stress => UmatEnergies::Stress,
+            EnergiesSpec::Routine => UmatEnergies::Routine,
+        },
+        flows_at_constant_volume: spec.mean_dilatation.unwrap_or(true),
+    };
+    let solid = load(&path, symbol.map(|s| s.value.as_str()), settings).map_err(|error| {
         let wrong = SceneError::new(
             SceneErrorKind::File,
             format!("`{}`: {error}", place("library")),
@@ -62,22 +81,6 @@ pub(crate) fn umat<const D: usize>(
                 .help("give the routine's name with `symbol`; `nm -D` of the library lists its names"),
         }
     })?;
-    let settings = UmatSettings {
-        name: name.value.clone(),
-        constants: spec.constants.iter().map(|c| c.value).collect(),
-        states,
-        lame: (constants.solid_lambda(), constants.shear),
-        is_large: spec.strains == StrainsSpec::Large,
-        is_thread_safe: spec.thread_safe,
-        temperature: spec.temperature.as_ref().map_or(0.0, |t| t.value),
-        length,
-        energies: match spec.energies {
-            EnergiesSpec::Stress => UmatEnergies::Stress,
-            EnergiesSpec::Routine => UmatEnergies::Routine,
-        },
-        flows_at_constant_volume: spec.mean_dilatation.unwrap_or(true),
-    };
-    let solid = Arc::new(Umat::new(routine, settings));
     let local = Arc::new(Reduced::new(solid, constants.kinematics));
     let control = spec.zero_energy_control as usize;
     let linear = constants.correspondence(stabilisation, control as f64);
@@ -86,24 +89,7 @@ pub(crate) fn umat<const D: usize>(
 }
 
 /// The most numbers that a routine may remember of a point.
-#[cfg(feature = "umat")]
 const MOST_STATES: usize = 10_000;
-
-/// Refuses a material whose routine this program cannot call.
-#[cfg(not(feature = "umat"))]
-pub(crate) fn umat<const D: usize>(
-    name: &Text,
-    spec: &UmatSpec,
-    _constants: Constants,
-    _directory: &Path,
-) -> Result<Arc<dyn Law<D>>, SceneError> {
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!("`materials.{name}.umat` names a routine, and this program was built without the feature `umat`"),
-    )
-    .label(spec.library.span.clone(), "cannot be loaded")
-    .help("build it with the feature: cargo build --release -p bondline-cli --features umat"))
-}
 
 /// Adds the library to the number that stands for all that determines the results: a routine that is compiled anew gives others.
 pub(crate) fn add_library(

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use bondline::material::{
-    J2, LocalLaw, LocalResponse, Routine, RoutineError, Umat, UmatEnergies, UmatSettings,
-};
+use bondline::material::{J2, LocalLaw, LocalResponse, RoutineError, UmatEnergies, UmatSettings};
 use bondline::tensor::Tensor;
+use bondline_umat::{Routine, Umat};
 
 use crate::{in_c, j2};
 

@@ -277,6 +277,8 @@ pub fn command(
     program: std::io::Result<PathBuf>,
     arguments: impl IntoIterator<Item = OsString>,
 ) -> u8 {
+    #[cfg(feature = "umat")]
+    bondline_umat::register();
     let parsed = match Arguments::try_parse_from(arguments) {
         Ok(parsed) => parsed,
         // help and the version are printed in the same way

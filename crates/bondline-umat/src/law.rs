@@ -1,9 +1,5 @@
 //! A user's routine with the calling convention of Abaqus' UMAT as a local law of solids.
 
-// calls of routines that other compilers made: the other modules of the folder have no unsafe code
-#[allow(unsafe_code)]
-mod library;
-
 use std::{
     collections::BTreeMap,
     sync::{
@@ -12,45 +8,10 @@ use std::{
     },
 };
 
-pub use library::{Routine, RoutineError};
+use bondline::material::{LocalLaw, LocalResponse, UmatEnergies, UmatSettings};
+use bondline::tensor::{Tensor, Tensor4, determinant, inverse, strain};
 
-use super::{LocalLaw, LocalResponse};
-use crate::tensor::{Tensor, Tensor4, determinant, inverse, strain};
-use library::Call;
-
-/// What a routine's energies are taken from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UmatEnergies {
-    /// Stored is the elastic energy of the stress, `½ σ : C⁻¹ : σ`; what else was worked is dissipated.
-    Stress,
-    /// Stored is `SSE`; dissipated is what `SPD` and `SCD` grow by.
-    Routine,
-}
-
-/// How a routine is called.
-#[derive(Clone, Debug, PartialEq)]
-pub struct UmatSettings {
-    /// `CMNAME`: the name of the material.
-    pub name: String,
-    /// `PROPS`.
-    pub constants: Vec<f64>,
-    /// `NSTATV`; all are zero at the start.
-    pub states: usize,
-    /// Lamé's λ and μ of the solid at rest \[Pa\].
-    pub lame: (f64, f64),
-    /// For strains and rotations of any size, by the rate form of [`Umat`].
-    pub is_large: bool,
-    /// Whether routines keep no common state, so that many may be called at a time.
-    pub is_thread_safe: bool,
-    /// `TEMP`.
-    pub temperature: f64,
-    /// `CELENT` \[m\]; not a number where it is not known.
-    pub length: f64,
-    /// What energies are taken from.
-    pub energies: UmatEnergies,
-    /// See [`LocalLaw::flows_at_constant_volume`].
-    pub flows_at_constant_volume: bool,
-}
+use crate::library::{Call, Routine};
 
 /// The law of a user's routine, called with `NDI = 3`, `NSHR = 3`, `NTENS = 6`.
 ///

@@ -11,6 +11,8 @@ use std::{
     },
 };
 
+use bondline::material::RoutineError;
+
 /// Names that compilers give to `SUBROUTINE UMAT`.
 const USUAL: [&str; 3] = ["umat_", "umat", "UMAT"];
 
@@ -67,27 +69,6 @@ type UserRoutine = unsafe extern "C" fn(
 /// Held by every call that is not known to keep no common state: routines of one library share their `COMMON` blocks, whatever material calls them.
 static CALLS: Mutex<()> = Mutex::new(());
 
-/// Why a routine cannot be had.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RoutineError {
-    /// The library cannot be loaded.
-    #[error("the library {} cannot be loaded: {message}", path.display())]
-    Library {
-        /// Its path.
-        path: PathBuf,
-        /// What the system says.
-        message: String,
-    },
-    /// It has no such routine.
-    #[error("the library {} has no routine `{}`", path.display(), tried.join("`, `"))]
-    Symbol {
-        /// Its path.
-        path: PathBuf,
-        /// The names looked for.
-        tried: Vec<String>,
-    },
-}
-
 /// A user's routine.
 #[derive(Clone, Debug)]
 pub struct Routine {
@@ -98,7 +79,7 @@ pub struct Routine {
 }
 
 /// What a call takes and gives; stresses and strains in the order 11, 22, 33, 12, 13, 23, shears those of engineering, tensors by columns.
-pub(super) struct Call<'a> {
+pub(crate) struct Call<'a> {
     /// `STRESS` \[Pa\], Cauchy.
     pub stress: [f64; 6],
     /// `STATEV`.
@@ -191,13 +172,13 @@ impl Routine {
     }
 
     /// Whether the routine has called `XIT`.
-    pub(super) fn has_given_up(&self) -> bool {
+    pub(crate) fn has_given_up(&self) -> bool {
         self.flag
             .is_some_and(|flag| flag.load(Ordering::Relaxed) != 0)
     }
 
     /// Calls the routine; `is_alone` keeps all others out meanwhile.
-    pub(super) fn call(&self, call: &mut Call<'_>, is_alone: bool) {
+    pub(crate) fn call(&self, call: &mut Call<'_>, is_alone: bool) {
         let mut name = [b' '; NAME];
         for (to, from) in name.iter_mut().zip(call.name.bytes()) {
             *to = from.to_ascii_uppercase();

@@ -1,0 +1,77 @@
+//! What a scene asks of a user's routine, and who loads it: crate `bondline-umat`, where a program has it. Without it no scene opens a library.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+use super::LocalLaw;
+
+/// What a routine's energies are taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UmatEnergies {
+    /// Stored is the elastic energy of the stress, `½ σ : C⁻¹ : σ`; what else was worked is dissipated.
+    Stress,
+    /// Stored is `SSE`; dissipated is what `SPD` and `SCD` grow by.
+    Routine,
+}
+
+/// How a routine is called.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UmatSettings {
+    /// `CMNAME`: the name of the material.
+    pub name: String,
+    /// `PROPS`.
+    pub constants: Vec<f64>,
+    /// `NSTATV`; all are zero at the start.
+    pub states: usize,
+    /// Lamé's λ and μ of the solid at rest \[Pa\].
+    pub lame: (f64, f64),
+    /// For strains and rotations of any size, by a rate form.
+    pub is_large: bool,
+    /// Whether routines keep no common state, so that many may be called at a time.
+    pub is_thread_safe: bool,
+    /// `TEMP`.
+    pub temperature: f64,
+    /// `CELENT` \[m\]; not a number where it is not known.
+    pub length: f64,
+    /// What energies are taken from.
+    pub energies: UmatEnergies,
+    /// See [`LocalLaw::flows_at_constant_volume`].
+    pub flows_at_constant_volume: bool,
+}
+
+/// Why a routine cannot be had.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RoutineError {
+    /// The library cannot be loaded.
+    #[error("the library {} cannot be loaded: {message}", path.display())]
+    Library {
+        /// Its path.
+        path: PathBuf,
+        /// What the system says.
+        message: String,
+    },
+    /// It has no such routine.
+    #[error("the library {} has no routine `{}`", path.display(), tried.join("`, `"))]
+    Symbol {
+        /// Its path.
+        path: PathBuf,
+        /// The names looked for.
+        tried: Vec<String>,
+    },
+}
+
+/// Loads the routine of a library, by its name or the usual ones, as the law of a solid.
+pub type RoutineLoader =
+    fn(&Path, Option<&str>, UmatSettings) -> Result<Arc<dyn LocalLaw<3>>, RoutineError>;
+
+static LOADER: OnceLock<RoutineLoader> = OnceLock::new();
+
+/// Takes what loads routines; the first one stays.
+pub fn set_routine_loader(loader: RoutineLoader) {
+    let _ = LOADER.set(loader);
+}
+
+/// What loads routines, if the program has it.
+pub(crate) fn routine_loader() -> Option<RoutineLoader> {
+    LOADER.get().copied()
+}
