@@ -1,4 +1,6 @@
 //! The additions of `docs/extending.md`, applied as they stand there to a copy of the sources, built and run.
+//!
+//! It compiles the library once more, and `cargo test` leaves it out: `cargo test --release --test worked_additions`, as `.ci/run` does.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -125,8 +127,10 @@ fn packages(root: &Path) -> Files {
     let members = members[1..].join(", ");
     let manifest = format!("[workspace]\nmembers = [\".\", {members}]\n\n{needed}{profiles}");
     files.insert("Cargo.toml".into(), manifest);
-    // an optional dependency, which has to lie where it is named
-    read(root, Path::new("crates/bondline-petsc"), &mut files);
+    // optional dependencies, which have to lie where they are named
+    for package in ["crates/bondline-petsc", "crates/bondline-umat"] {
+        read(root, Path::new(package), &mut files);
+    }
     for package in &PACKAGES[1..] {
         let folder = Path::new("crates").join(package);
         read(root, &folder, &mut files);
