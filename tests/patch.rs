@@ -23,7 +23,11 @@ fn shorts(tables: &[Table]) -> String {
 
 /// All methods and laws of a dimension in these cases.
 fn assert_complete<'a>(d: usize, cases: impl Iterator<Item = &'a str> + Clone) {
-    for law in Law::ALL {
+    let laws = match d {
+        1 => Law::all::<1>(),
+        _ => Law::all::<3>(),
+    };
+    for law in laws {
         for method in [
             "splice",
             "blending smooth",

@@ -274,9 +274,9 @@ pub enum ModelError {
         /// The most that it may take.
         most: f64,
     },
-    /// A law whose dilatation and deviator have influence functions of their own, in a coupling without a place for their products.
+    /// A law whose dilatation and deviator have influence functions of their own, in a coupling whose seam is laid out for one.
     #[error(
-        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, and the products of the two have no place in that seam; use coupling.splice or coupling.nonlocal, or the law lps"
+        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, which change from point to point at surfaces, and the pieces of bonds that this seam cuts share one dilatation of the whole lattice; use coupling.splice, coupling.balanced, coupling.blending, coupling.partial-stress or coupling.nonlocal, or the law lps"
     )]
     Deviators {
         /// The law.

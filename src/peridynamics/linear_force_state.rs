@@ -13,7 +13,7 @@
 //! density `W = ½ Σ [p (ξ · η)² + q ω η²] V + ½ Ḡ : 𝓜 : Ḡ`, so a body of such points alone has a symmetric stiffness.
 
 use crate::{
-    peridynamics::{Conditions, Influence, PdError, ShellTarget},
+    peridynamics::{Conditions, Influence, PdError, ShellTarget, StressFit},
     tensor::{Tensor, Tensor4, Vector},
 };
 
@@ -54,6 +54,8 @@ pub struct StatePart<const D: usize> {
     pub control: f64,
     /// `d`, of the products `−d tr Ḡ Σ p |ξ|² ξ·η V` in the energy density: `1/D` for a law whose deviatoric extensions `e − θ |ξ|/D` have another influence function than its dilatation θ, else 0.
     pub deviator: f64,
+    /// `P = Σ p |ξ|² ξ ⊗ ξ V` of such a law, `B = P : ∇u` under an affine field; else 0.
+    pub second: Tensor<D>,
     /// `K = Σ ω ξ ⊗ ξ V`, the shape tensor of the family.
     pub shape: Tensor<D>,
 }
@@ -69,6 +71,11 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
     /// Whether its state parts have a [`StatePart::deviator`], which not every coupling can represent.
     fn has_deviators(&self) -> bool {
         false
+    }
+
+    /// The law with coefficients that make the partial stress exact under affine fields on families that are no lattice's, where [`LinearForceState::coefficients`] does not, and no factors of [`LinearForceState::moment_conditions`] can.
+    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        None
     }
 
     /// ω of the divergence of a meshfree partial stress beside this law.
@@ -106,7 +113,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
 /// The classical tensor that a family really carries: `ν⁰ = C : G` under `u = G x`.
 ///
 /// Source: [SAND2015-7998] eq. (2.10), for the linear force state above:
-/// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl − d (K_ij P_kl + P_ij K_kl)` with `P = Σ p |ξ|² ξ ⊗ ξ V`.
+/// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl − d (K_ij P_kl + P_ij K_kl)`.
 pub fn collapsed_tensor<const D: usize>(
     family: &Family<'_, D>,
     pair: &[f64],
@@ -118,14 +125,10 @@ pub fn collapsed_tensor<const D: usize>(
     }
     if let Some(state) = state {
         if state.deviator != 0.0 {
-            let mut second = Tensor::<D>::zeros();
-            for (k, xi) in family.bonds.iter().enumerate() {
-                let s = pair[k] * xi.norm_squared() * family.volumes[k];
-                second += xi * xi.transpose() * s;
-            }
             for i in 0..D {
                 for j in 0..D {
-                    let products = second * state.shape[(i, j)] + state.shape * second[(i, j)];
+                    let products =
+                        state.second * state.shape[(i, j)] + state.shape * state.second[(i, j)];
                     c.0[i][j] -= products * state.deviator;
                 }
             }

@@ -74,7 +74,7 @@ pub use linear_force_state::{
 };
 pub use moment_fitted_weights::{Bound, Conditions, FitError};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
-pub use position_aware_influence::{CalibrationFields, NotPositionAware};
+pub use position_aware_influence::{CalibrationFields, NotPositionAware, StressFit};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shell_weights::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
 pub use zero_energy::ZeroEnergyControl;

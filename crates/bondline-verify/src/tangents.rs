@@ -10,7 +10,10 @@ use crate::{
 use bondline::{
     assembly::{self, Transfer},
     observe::report::{Columns, Row, Table},
-    peridynamics::{Cloud, Ends, Factors, Families, PdBody, TIE_TOLERANCE},
+    peridynamics::{
+        CalibrationFields, Cloud, Ends, Factors, Families, Family, PdBody, TIE_TOLERANCE,
+        position_aware_influence,
+    },
     progress::Progress,
     system::BlockCsr,
     tensor::{Tensor, Tensor4, Vector, inverse, strain},
@@ -173,6 +176,36 @@ impl<const D: usize> RandomCloud<D> {
                     .sum();
                 0.5 * stress.component_mul(&e).sum()
                     + 0.5 * d * (d + 2.0) * mu / shape.trace() * rest
+            }
+            Law::PositionAware(w) => {
+                let (vectors, volumes): (Vec<Vector<D>>, Vec<f64>) =
+                    bonds.iter().map(|(xi, _, v)| (*xi, *v)).unzip();
+                let base: Vec<f64> = vectors
+                    .iter()
+                    .map(|xi| w.value(xi.norm(), horizon))
+                    .collect();
+                let family = Family {
+                    bonds: &vectors,
+                    volumes: &volumes,
+                    factors: &base,
+                    horizon,
+                    materials: None,
+                };
+                let Ok(fit) =
+                    position_aware_influence::fit(&family, &base, CalibrationFields::Axes)
+                else {
+                    return f64::NAN;
+                };
+                let theta: f64 = (bonds.iter().zip(&fit.omega))
+                    .map(|((xi, eta, v), omega)| omega * xi.dot(eta) * v)
+                    .sum();
+                let deviatoric: f64 = (bonds.iter().zip(&fit.sigma))
+                    .map(|((xi, eta, v), sigma)| {
+                        let r = xi.norm();
+                        sigma * (xi.dot(eta) / r - theta * r / d).powi(2) * v
+                    })
+                    .sum();
+                0.5 * (lambda + 2.0 * mu / d) * theta * theta + mu * deviatoric
             }
         }
     }
@@ -362,7 +395,7 @@ fn local_rows<const D: usize>(cells: Cells) -> Result<Vec<Row>, String> {
             transition: 0,
             local: 6,
         },
-        ..small::<D>(Method::Splice, Law::ALL[0], cells)
+        ..small::<D>(Method::Splice, Law::all::<D>()[0], cells)
     };
     let name = format!("{D}D finite elements, {}", cells.name());
     let e = Enclosed::<D>::local(&case).map_err(|e| e.to_string())?;
@@ -411,8 +444,10 @@ pub fn tangents(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         Ok(rows) => rows.into_iter().for_each(|row| table.push(row)),
         Err(why) => table.push(Row::info(what, "model", f64::NAN).because(why)),
     };
-    for law in Law::ALL {
+    for law in Law::all::<1>() {
         add(&mut bodies, body_rows::<1>(law), law.name());
+    }
+    for law in Law::all::<2>() {
         add(&mut bodies, body_rows::<2>(law), law.name());
         add(&mut bodies, body_rows::<3>(law), law.name());
     }
