@@ -103,6 +103,15 @@ fn takes_law<const D: usize>(
     peridynamics: Option<&Peridynamics<D>>,
 ) -> Result<(), ModelError> {
     let law = peridynamics.map(|p| &p.law);
+    // what a seam of truncated bonds cuts follows the linearisation, two horizons deep
+    if coupling.interface() == Interface::Faces
+        && law.is_some_and(|law| law.linearised().has_deviators() && !law.is_linear())
+    {
+        return Err(ModelError::Unsupported {
+            what: "a position-aware solid that relaxes, with truncated bonds",
+            remedy: "use coupling.nonlocal, or the material pals",
+        });
+    }
     match law.filter(|law| law.linearised().has_deviators() && !coupling.takes_deviators()) {
         Some(law) => Err(ModelError::Deviators {
             law: law.name(),

@@ -274,9 +274,9 @@ pub enum ModelError {
         /// The most that it may take.
         most: f64,
     },
-    /// A law whose dilatation and deviator have influence functions of their own, in a coupling whose seam is laid out for one.
+    /// A law whose dilatation and deviator have influence functions of their own, in a coupling whose rows have no place for their products.
     #[error(
-        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, which change from point to point at surfaces, and the pieces of bonds that this seam cuts share one dilatation of the whole lattice; use coupling.splice, coupling.balanced, coupling.blending, coupling.partial-stress or coupling.nonlocal, or the law lps"
+        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, and its rows have no place for the products of the two; use coupling.splice, coupling.truncated or coupling.nonlocal, or the law lps"
     )]
     Deviators {
         /// The law.
@@ -284,6 +284,11 @@ pub enum ModelError {
         /// The coupling.
         coupling: &'static str,
     },
+    /// A seam that would have to be fitted, of a law with two dilatations.
+    #[error(
+        "the faces of the nonlocal zone cut the lattice, and truncated bonds are fitted to such faces for one dilatation, where a position-aware solid has two; let the faces follow the lattice (element edges a whole number of spacings long, on points or halfway between them), or use coupling.splice, coupling.balanced, coupling.blending or coupling.partial-stress, or the law lps"
+    )]
+    TwoDilatations,
     /// A combination that is not offered.
     #[error("{what} is not offered: {remedy}")]
     Unsupported {

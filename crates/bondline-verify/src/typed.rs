@@ -84,7 +84,7 @@ impl Method {
 
     /// Whether the method takes a law.
     pub fn is_offered(self, law: Law) -> bool {
-        self != Self::Truncated || !matches!(law, Law::Correspondence(_) | Law::PositionAware(_))
+        self != Self::Truncated || !matches!(law, Law::Correspondence(_))
     }
 }
 
