@@ -200,7 +200,6 @@ fn every_law_passes_every_coupling_or_is_told_one_that_takes_it() {
                 }
             }
         }
-        eprintln!("{key}: {taken:?}");
         taken_in_all += taken.len();
     }
     assert!(taken_in_all > 60, "{taken_in_all}");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use crate::{
-    coupling::{Coupling, Zone},
+    coupling::{Coupling, Interface, Zone},
     mesh::{CellShape, Mesh},
     peridynamics::{Accelerator, BondWeights, BoxCell, Horizon, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
@@ -143,6 +143,30 @@ pub struct Problem<const D: usize> {
     pub peridynamics: Option<Peridynamics<D>>,
     /// The method.
     pub coupling: Box<dyn Coupling<D>>,
+}
+
+/// Refuses a law whose rows a coupling cannot hold.
+pub(super) fn takes_law<const D: usize>(
+    coupling: &dyn Coupling<D>,
+    peridynamics: Option<&Peridynamics<D>>,
+) -> Result<(), ModelError> {
+    let law = peridynamics.map(|p| &p.law);
+    // what a seam of truncated bonds cuts follows the linearisation, two horizons deep
+    if coupling.interface() == Interface::Faces
+        && law.is_some_and(|law| law.linearised().has_deviators() && !law.is_linear())
+    {
+        return Err(ModelError::Unsupported {
+            what: "a position-aware solid that relaxes, with truncated bonds",
+            remedy: "use coupling.nonlocal, or the material pals",
+        });
+    }
+    match law.filter(|law| law.linearised().has_deviators() && !coupling.takes_deviators()) {
+        Some(law) => Err(ModelError::Deviators {
+            law: law.name(),
+            coupling: coupling.name(),
+        }),
+        None => Ok(()),
+    }
 }
 
 /// Why a model cannot be built.
@@ -286,7 +310,7 @@ pub enum ModelError {
     },
     /// A seam that would have to be fitted, of a law with two dilatations.
     #[error(
-        "the faces of the nonlocal zone cut the lattice, and truncated bonds are fitted to such faces for one dilatation, where a position-aware solid has two; let the faces follow the lattice (element edges a whole number of spacings long, on points or halfway between them), or use coupling.splice, coupling.balanced, coupling.blending or coupling.partial-stress, or the law lps"
+        "the faces of the nonlocal zone cut the lattice, and truncated bonds are fitted to such faces for one dilatation, where a position-aware solid has two; let the faces follow the lattice (element edges a whole number of spacings long, halfway between points), or use coupling.splice, coupling.balanced, coupling.blending or coupling.partial-stress, or the law lps"
     )]
     TwoDilatations,
     /// A combination that is not offered.

@@ -445,14 +445,8 @@ impl<const D: usize> PdBody<D> {
         if let Some(state) = state {
             self.add_weighted_gradient(j, &along(&state.modulus, &(state.shape * a), 1.0), row);
             if state.deviator != 0.0 {
-                let second = state.second * a;
-                let first = state.shape * a;
-                self.add_deviators(
-                    j,
-                    &(first * -state.deviator),
-                    &(second * -state.deviator),
-                    row,
-                );
+                let [first, second] = [state.shape, state.second].map(|t| t * a * -state.deviator);
+                self.add_deviators(j, &first, &second, row);
             }
         }
     }

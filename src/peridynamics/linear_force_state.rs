@@ -13,7 +13,7 @@
 //! density `W = ½ Σ [p (ξ · η)² + q ω η²] V + ½ Ḡ : 𝓜 : Ḡ`, so a body of such points alone has a symmetric stiffness.
 
 use crate::{
-    peridynamics::{Conditions, Influence, PdError, ShellTarget, StressFit},
+    peridynamics::{Conditions, Influence, PdError, ShellTarget},
     tensor::{Tensor, Tensor4, Vector},
 };
 
@@ -58,6 +58,17 @@ pub struct StatePart<const D: usize> {
     pub second: Tensor<D>,
     /// `K = Σ ω ξ ⊗ ξ V`, the shape tensor of the family.
     pub shape: Tensor<D>,
+}
+
+/// What the influence functions of a family that is no lattice's are to meet, beside the energy of all affine fields, so that its partial stress is that of elasticity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StressFit {
+    /// Nothing; σ is not negative.
+    Positive,
+    /// Nothing; σ of any sign where none else meets it.
+    Affine,
+    /// The partial stress of quadratic fields, where a σ that is not negative meets it; else as [`StressFit::Affine`].
+    Quadratic,
 }
 
 /// A law linearised at rest: seams, linear statics and preconditioners are made from it.

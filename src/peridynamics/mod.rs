@@ -70,11 +70,11 @@ pub use laws::{
     PositionAwareSolid, Several, StiffnessMean,
 };
 pub use linear_force_state::{
-    Family, FamilyMaterials, LinearForceState, StatePart, collapsed_tensor,
+    Family, FamilyMaterials, LinearForceState, StatePart, StressFit, collapsed_tensor,
 };
 pub use moment_fitted_weights::{Bound, Conditions, FitError};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
-pub use position_aware_influence::{CalibrationFields, NotPositionAware, StressFit};
+pub use position_aware_influence::{CalibrationFields, NotPositionAware};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shell_weights::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
 pub use zero_energy::ZeroEnergyControl;

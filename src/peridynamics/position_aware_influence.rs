@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bounded_least_norm::{Bound, least_change};
 use crate::{
-    peridynamics::Family,
+    peridynamics::{Family, StressFit},
     tensor::{Tensor, Vector},
 };
 
@@ -25,17 +25,6 @@ pub enum CalibrationFields {
     Axes,
     /// All affine fields: the products of all deviators, 15 conditions in 3D, 3 in 2D.
     Affine,
-}
-
-/// What the influence functions of a family that is no lattice's are to meet, beside the energy of all affine fields, so that its partial stress is that of elasticity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StressFit {
-    /// Nothing; σ is not negative.
-    Positive,
-    /// Nothing; σ of any sign where none else meets it.
-    Affine,
-    /// The partial stress of quadratic fields, where a σ that is not negative meets it; else as [`StressFit::Affine`].
-    Quadratic,
 }
 
 /// ω and σ of one family, one value per bond. Units: \[1/m^(D+2)\].
@@ -122,6 +111,14 @@ enum Odd {
     Vanishing,
 }
 
+/// Conditions on moments of even order.
+#[derive(Clone, Copy)]
+struct Even<'a, const D: usize> {
+    /// What a bond of this direction adds to a condition, over its share.
+    of_direction: &'a dyn Fn(usize, &Vector<D>) -> f64,
+    wanted: &'a [f64],
+}
+
 /// A family with the influence functions that it would have if it were complete.
 struct WholeFamily<'a, const D: usize> {
     family: &'a Family<'a, D>,
@@ -197,7 +194,10 @@ impl<'a, const D: usize> WholeFamily<'a, D> {
     fn changed(
         &self,
         scale: f64,
-        (of_direction, wanted): (&dyn Fn(usize, &Vector<D>) -> f64, &[f64]),
+        Even {
+            of_direction,
+            wanted,
+        }: Even<'_, D>,
         order: Option<usize>,
         bound: Bound,
     ) -> Result<Vec<f64>, (usize, bool)> {
@@ -235,7 +235,11 @@ impl<'a, const D: usize> WholeFamily<'a, D> {
         let wanted: Vec<f64> = strains.iter().map(|a| a.trace()).collect();
         let order = (odd == Odd::Vanishing).then_some(3);
         let scale = D as f64 / self.m;
-        self.changed(scale, (&of_direction, &wanted), order, Bound::Free)
+        let even = Even {
+            of_direction: &of_direction,
+            wanted: &wanted,
+        };
+        self.changed(scale, even, order, Bound::Free)
             .map_err(|(rank, _)| self.refused("dilatation", strains.len(), (rank, false)))
     }
 
@@ -249,7 +253,11 @@ impl<'a, const D: usize> WholeFamily<'a, D> {
         let order = (odd == Odd::Vanishing).then_some(5);
         let d = D as f64;
         let scale = d * (d + 2.0) / (2.0 * self.m);
-        self.changed(scale, (&of_direction, &wanted), order, bound)
+        let even = Even {
+            of_direction: &of_direction,
+            wanted: &wanted,
+        };
+        self.changed(scale, even, order, bound)
             .map_err(|why| self.refused(DEVIATOR, pairs.len(), why))
     }
 }

@@ -29,7 +29,7 @@ struct Enclosed<'a> {
 }
 
 impl Enclosed<'_> {
-    /// The spacing is 0.5.
+    /// The spacing is 0.5. In space the zone is so small that quadratic fields do not pass every seam.
     fn text(&self) -> String {
         let is_solid = self.kinematics == "solid";
         let (d, mesh, half, [zone, transition], horizon) = match is_solid {
@@ -50,8 +50,9 @@ impl Enclosed<'_> {
                 format!("{axis} = \"{}\"\n", terms.collect::<Vec<_>>().join("+"))
             })
             .collect();
+        let to = format!("{:?}", &[0.9 * half, 0.7 * half, 0.8 * half][..d]);
         format!(
-            "kinematics = \"{}\"\ncoupling = {}\n[mesh.{mesh}]\nmin = {}\nmax = {}\n{cells}[materials.m.pals]\nyoungs-modulus = 1000\npoisson-ratio = 0.3\ncalibration-fields = \"{}\"\n[peridynamics]\nhorizon = {horizon}\npoints.lattice = {{ spacing = 0.5, origin = {} }}\n[zones]\nnonlocal = {}\ntransition = {}\n[conditions.all.displacement]\ninside.without = {{ from = {}, removed = {} }}\n{field}[solver]\ntolerance = 1e-13\n[output]\nvtu = false\nlines.l = {{ from = {}, to = {}, samples = 41 }}\n",
+            "kinematics = \"{}\"\ncoupling = {}\n[mesh.{mesh}]\nmin = {}\nmax = {}\n{cells}[materials.m.pals]\nyoungs-modulus = 1000\npoisson-ratio = 0.3\ncalibration-fields = \"{}\"\n[peridynamics]\nhorizon = {horizon}\npoints.lattice = {{ spacing = 0.5, origin = {} }}\n[zones]\nnonlocal = {}\ntransition = {}\n[conditions.all.displacement]\ninside.without = {{ from = {}, removed = {} }}\n{field}[solver]\ntolerance = 1e-13\nunproven = \"warn\"\n[output]\nvtu = false\nlines.l = {{ from = {}, to = {}, samples = 41 }}\n",
             self.kinematics,
             self.coupling,
             list(-half),
@@ -63,7 +64,7 @@ impl Enclosed<'_> {
             boxed(half),
             boxed(half - 0.1),
             list(-0.97 * half),
-            format!("{:?}", &[0.9 * half, 0.7 * half, 0.8 * half][..d]),
+            to,
         )
     }
 }
@@ -104,7 +105,7 @@ fn every_coupling_passes_affine_fields_of_position_aware_points() {
             ("plane-strain", "affine", 2, 0.13),
             ("solid", "axes", 1, 0.0),
         ] {
-            // truncated bonds want faces that follow the lattice, here halfway between points
+            // truncated bonds want faces that follow the lattice, halfway between points
             let origin = match coupling {
                 "\"truncated\"" => 0.25,
                 _ => origin,
@@ -204,23 +205,12 @@ fn a_slit_opens_as_it_does_with_position_aware_points_everywhere() {
 }
 
 #[test]
-fn a_plate_that_is_blended_moves_slowly_as_it_rests_and_its_energies_balance() {
+fn a_coupled_plate_moves_slowly_as_it_rests_and_its_energies_balance() {
     let folder = tempfile::tempdir().unwrap();
     // a stretch that is never reached: the pass over bonds, not the rows
     let fracture = "critical-stretch = 10";
-    let blending = "{ blending = { beta = \"smooth\" } }";
-    let still = plate(
-        blending,
-        "pals",
-        "",
-        "0.06",
-        "[solver]\ntolerance = 1e-12\n",
-    );
-    let still = summary(folder.path(), &still);
-    let still = still["reactions"][2]["force"][0].as_f64().unwrap();
     let ramp = "0.06*(1 - cos(pi*min(t, 2)/2))/2";
     let solve = "[solve.explicit]\nduration = 2.2\noutputs = 1\nhistory-interval = 0.1\ngrowing-modes = \"warn\"\n";
-    let typed = plate(blending, "pals", fracture, ramp, solve);
     let columns = [
         "right_reaction_x",
         "kinetic_energy",
@@ -228,28 +218,46 @@ fn a_plate_that_is_blended_moves_slowly_as_it_rests_and_its_energies_balance() {
         "external_work",
         "broken_bonds",
     ];
-    let found = history(folder.path(), &typed, &columns);
-    let [force, kinetic, stored, work, broken] =
-        [0, 1, 2, 3, 4].map(|k: usize| *found[k].last().unwrap());
-    assert!((force / still - 1.0).abs() < 2e-2, "{force} {still}");
-    assert!(kinetic < 1e-2 * stored, "{kinetic} {stored}");
-    // rows of the transition zone have no energy of their own
-    let missing = (kinetic + stored - work) / work;
-    assert!(missing.abs() < 1e-3 && broken == 0.0, "{missing} {broken}");
-    // load steps go there too
-    let steps = "[solve.quasi-static]\nduration = 1\nsteps = 2\ntolerance = 1e-11\n";
-    let typed = plate(blending, "pals", fracture, "0.06*t", steps);
-    let stepped = *history(folder.path(), &typed, &["right_reaction_x"])[0]
-        .last()
-        .unwrap();
-    assert!((stepped / still - 1.0).abs() < 1e-8, "{stepped} {still}");
+    // rows of a transition zone have no energy of their own
+    for (coupling, balanced) in [
+        ("{ blending = { beta = \"smooth\" } }", 1e-3),
+        ("\"truncated\"", 1e-5),
+    ] {
+        let still = plate(
+            coupling,
+            "pals",
+            "",
+            "0.06",
+            "[solver]\ntolerance = 1e-12\n",
+        );
+        let still = summary(folder.path(), &still);
+        let still = still["reactions"][2]["force"][0].as_f64().unwrap();
+        let typed = plate(coupling, "pals", fracture, ramp, solve);
+        let found = history(folder.path(), &typed, &columns);
+        let [force, kinetic, stored, work, broken] =
+            [0, 1, 2, 3, 4].map(|k: usize| *found[k].last().unwrap());
+        assert!((force / still - 1.0).abs() < 2e-2, "{force} {still}");
+        assert!(kinetic < 1e-2 * stored, "{kinetic} {stored}");
+        let missing = (kinetic + stored - work) / work;
+        assert!(
+            missing.abs() < balanced && broken == 0.0,
+            "{coupling}: {missing} {broken}"
+        );
+        // load steps go there too
+        let steps = "[solve.quasi-static]\nduration = 1\nsteps = 2\ntolerance = 1e-11\n";
+        let typed = plate(coupling, "pals", fracture, "0.06*t", steps);
+        let stepped = *history(folder.path(), &typed, &["right_reaction_x"])[0]
+            .last()
+            .unwrap();
+        assert!((stepped / still - 1.0).abs() < 1e-8, "{stepped} {still}");
+    }
 }
 
 /// A longer test: waves go through the plate and back before bonds break, and the same plate of points alone has to break too.
 #[test]
 fn a_slit_grows_in_a_blended_zone_as_it_does_in_points_alone() {
     let folder = tempfile::tempdir().unwrap();
-    let solve = "[solve.explicit]\nduration = 0.6\noutputs = 1\nhistory-interval = 0.02\nstep-fraction = 0.4\ngrowing-modes = \"warn\"\n";
+    let solve = "[solve.explicit]\nduration = 0.7\noutputs = 1\nhistory-interval = 0.02\nstep-fraction = 0.4\ngrowing-modes = \"warn\"\n";
     let columns = [
         "broken_bonds",
         "dissipated_energy",
@@ -258,12 +266,18 @@ fn a_slit_grows_in_a_blended_zone_as_it_does_in_points_alone() {
         "time",
     ];
     let torn = |coupling: &str| {
-        let typed = plate(coupling, "pals", "critical-stretch = 0.009", "t", solve)
-            .replace("[-3, -3], max = [3, 3]", "[-4, -4], max = [4, 4]")
-            .replace(
-                "[-4.5, -4.5], max = [4.5, 4.5]",
-                "[-5.5, -5.5], max = [5.5, 5.5]",
-            );
+        let typed = plate(
+            coupling,
+            "pals",
+            "critical-stretch = 0.009",
+            "0.06*t",
+            solve,
+        )
+        .replace("[-3, -3], max = [3, 3]", "[-4, -4], max = [4, 4]")
+        .replace(
+            "[-4.5, -4.5], max = [4.5, 4.5]",
+            "[-5.5, -5.5], max = [5.5, 5.5]",
+        );
         // bonds of the rows that are blended do not break
         let around = "[no-fail.around]\nwithout = { from = { box = { min = [-10, -10], max = [10, 10] } }, removed = { box = { min = [-2.5, -2.5], max = [2.5, 2.5] } } }\n[cracks.slit]";
         let typed = match coupling {

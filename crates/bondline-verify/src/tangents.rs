@@ -11,8 +11,8 @@ use bondline::{
     assembly::{self, Transfer},
     observe::report::{Columns, Row, Table},
     peridynamics::{
-        CalibrationFields, Cloud, Ends, Factors, Families, Family, PdBody, TIE_TOLERANCE,
-        position_aware_influence,
+        CalibrationFields, Cloud, Ends, Factors, Families, Family, Influence, PdBody,
+        TIE_TOLERANCE, position_aware_influence,
     },
     progress::Progress,
     system::BlockCsr,
@@ -177,36 +177,7 @@ impl<const D: usize> RandomCloud<D> {
                 0.5 * stress.component_mul(&e).sum()
                     + 0.5 * d * (d + 2.0) * mu / shape.trace() * rest
             }
-            Law::PositionAware(w) => {
-                let (vectors, volumes): (Vec<Vector<D>>, Vec<f64>) =
-                    bonds.iter().map(|(xi, _, v)| (*xi, *v)).unzip();
-                let base: Vec<f64> = vectors
-                    .iter()
-                    .map(|xi| w.value(xi.norm(), horizon))
-                    .collect();
-                let family = Family {
-                    bonds: &vectors,
-                    volumes: &volumes,
-                    factors: &base,
-                    horizon,
-                    materials: None,
-                };
-                let Ok(fit) =
-                    position_aware_influence::fit(&family, &base, CalibrationFields::Axes)
-                else {
-                    return f64::NAN;
-                };
-                let theta: f64 = (bonds.iter().zip(&fit.omega))
-                    .map(|((xi, eta, v), omega)| omega * xi.dot(eta) * v)
-                    .sum();
-                let deviatoric: f64 = (bonds.iter().zip(&fit.sigma))
-                    .map(|((xi, eta, v), sigma)| {
-                        let r = xi.norm();
-                        sigma * (xi.dot(eta) / r - theta * r / d).powi(2) * v
-                    })
-                    .sum();
-                0.5 * (lambda + 2.0 * mu / d) * theta * theta + mu * deviatoric
-            }
+            Law::PositionAware(w) => position_aware_density(w, horizon, &bonds, (lambda, mu)),
         }
     }
 
@@ -216,6 +187,43 @@ impl<const D: usize> RandomCloud<D> {
             .map(|i| self.volume[i] * self.density(law, i, u))
             .sum()
     }
+}
+
+/// `½ κ θ² + μ Σ σ ε² V` of bonds `(ξ, η, V)`.
+fn position_aware_density<const D: usize>(
+    influence: Influence,
+    horizon: f64,
+    bonds: &[(Vector<D>, Vector<D>, f64)],
+    (lambda, mu): (f64, f64),
+) -> f64 {
+    let d = D as f64;
+    let (vectors, volumes): (Vec<Vector<D>>, Vec<f64>) =
+        bonds.iter().map(|(xi, _, v)| (*xi, *v)).unzip();
+    let base: Vec<f64> = vectors
+        .iter()
+        .map(|xi| influence.value(xi.norm(), horizon))
+        .collect();
+    let family = Family {
+        bonds: &vectors,
+        volumes: &volumes,
+        factors: &base,
+        horizon,
+        materials: None,
+    };
+    let fit = position_aware_influence::fit(&family, &base, CalibrationFields::Axes);
+    let Ok(fit) = fit else {
+        return f64::NAN;
+    };
+    let theta: f64 = (bonds.iter().zip(&fit.omega))
+        .map(|((xi, eta, v), omega)| omega * xi.dot(eta) * v)
+        .sum();
+    let deviatoric: f64 = (bonds.iter().zip(&fit.sigma))
+        .map(|((xi, eta, v), sigma)| {
+            let r = xi.norm();
+            sigma * (xi.dot(eta) / r - theta * r / d).powi(2) * v
+        })
+        .sum();
+    0.5 * (lambda + 2.0 * mu / d) * theta * theta + mu * deviatoric
 }
 
 /// The stiffness of a body alone.

@@ -237,7 +237,7 @@ impl<const D: usize> Dilatations<D> {
                             let state = segments.body.state(i as usize);
                             let c = state.and_then(deviatoric_of).unwrap_or(0.0)
                                 * segments.body.cloud.volume[i as usize];
-                            found.push_two(stiffness - c, c, &handed, other);
+                            found.push_two([stiffness - c, c], [(&handed, 1.0), (other, 1.0)]);
                         }
                     }
                 }
@@ -252,10 +252,12 @@ impl<const D: usize> Dilatations<D> {
                     match of_other {
                         None => found.push(common.bulk / size, &first, false),
                         Some((c, other, volumes)) => {
+                            // points on a face hand the two different volumes
                             let (other, other_size) = whole(other, volumes);
-                            // θ_σ over the same volume
-                            let other = combined(&Functional::new(), &other, size / other_size);
-                            found.push_two((common.bulk + c) / size, c / size, &first, &other);
+                            found.push_two(
+                                [common.bulk + c, c],
+                                [(&first, size), (&other, other_size)],
+                            );
                         }
                     }
                 }
@@ -274,11 +276,13 @@ impl<const D: usize> Dilatations<D> {
         found
     }
 
-    /// `½ κ θ² + ½ c (θ − θ_σ)² − ½ c θ_σ²` of the functionals θ and θ_σ.
-    fn push_two(&mut self, kappa: f64, c: f64, theta: &Functional<D>, sigma: &Functional<D>) {
-        self.push(kappa, theta, false);
-        self.push(c, &combined(theta, sigma, -1.0), false);
-        self.push(-c, sigma, false);
+    /// `½ κ θ² + ½ c (θ − θ_σ)² − ½ c θ_σ²` of the integrals of θ and θ_σ over these volumes.
+    fn push_two(&mut self, [kappa, c]: [f64; 2], [theta, sigma]: [(&Functional<D>, f64); 2]) {
+        let [size, other] = [theta.1, sigma.1];
+        self.push(kappa / size, theta.0, false);
+        let difference = combined(theta.0, sigma.0, -size / other);
+        self.push(c / size, &difference, false);
+        self.push(-c / other, sigma.0, false);
     }
 
     /// Whether no energy is negative but those that an element has already: a volume that pieces hand to an element may be less than none.

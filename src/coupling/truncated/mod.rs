@@ -275,7 +275,8 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     }
 
     fn seam_bonds(&self) -> Option<NonlinearSeam<D>> {
-        if self.cut_bonds == CutBonds::Linear {
+        // what follows the motion has one dilatation
+        if self.cut_bonds == CutBonds::Linear || self.pieces.has_two_dilatations {
             return None;
         }
         let states = self.states.as_ref();
