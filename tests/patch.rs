@@ -184,11 +184,12 @@ fn every_law_passes_every_coupling_or_is_told_one_that_takes_it() {
         // as a scene types it, without its keys
         let word = |method: &Method| {
             let typed = typed::coupling(*method);
-            let words = typed.split(|c: char| !c.is_ascii_lowercase() && c != '-');
-            words.filter(|w| !w.is_empty()).next().unwrap().to_owned()
+            let mut words = typed.split(|c: char| !c.is_ascii_lowercase() && c != '-');
+            words.find(|w| !w.is_empty()).unwrap().to_owned()
         };
         let taken: Vec<String> = (all.iter())
-            .filter_map(|(method, found)| found.is_ok().then(|| word(method)))
+            .filter(|(_, found)| found.is_ok())
+            .map(|(method, _)| word(method))
             .collect();
         for (method, found) in &all {
             let what = format!("{key}, {}", method.name());
