@@ -76,10 +76,10 @@ const FIELD: [[f64; 3]; 3] = [
     [6e-4, -2e-4, -1.5e-3],
 ];
 
-/// The largest error of the displacement along the line, over the largest displacement.
-fn error_of_line(folder: &std::path::Path, typed: &str) -> f64 {
+/// The largest error of the displacement along the line, over the largest displacement, and what the run printed.
+fn error_of_line(folder: &std::path::Path, typed: &str) -> (f64, String) {
     write(folder, "block.toml", typed);
-    run(folder, &["block.toml"]);
+    let said = run(folder, &["block.toml"]);
     let (header, rows) = table(&folder.join("out/block_l.csv"));
     let d = header
         .iter()
@@ -93,7 +93,7 @@ fn error_of_line(folder: &std::path::Path, typed: &str) -> f64 {
             largest = largest.max(exact.abs());
         }
     }
-    worst / largest
+    (worst / largest, said)
 }
 
 #[test]
@@ -117,8 +117,12 @@ fn every_coupling_passes_affine_fields_of_position_aware_points() {
                 cells,
                 origin,
             };
-            let off = error_of_line(folder.path(), &block.text());
+            let (off, said) = error_of_line(folder.path(), &block.text());
             assert!(off < 1e-11, "{kinematics}, {coupling}: {off:e}");
+            // whatever the stress is under a uniform strain, its divergence vanishes; under quadratic fields it shows
+            let passes = !said.contains("the seam errs");
+            let may_err = kinematics == "solid" || coupling.contains("interface = \"affine\"");
+            assert!(passes || may_err, "{kinematics}, {coupling}: {said}");
         }
     }
 }
