@@ -457,7 +457,10 @@ pub fn tangents(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     }
     for law in Law::all::<2>() {
         add(&mut bodies, body_rows::<2>(law), law.name());
-        add(&mut bodies, body_rows::<3>(law), law.name());
+        // a cloud at random in space has families without a position-aware solution
+        if !matches!(law, Law::PositionAware(_)) {
+            add(&mut bodies, body_rows::<3>(law), law.name());
+        }
     }
     for cells in [Cells::Matching, Cells::Jittered, Cells::Simplices] {
         if cells != Cells::Simplices {
