@@ -1,14 +1,21 @@
 //! The patch-test and ghost-force suite, in part; `bondline verify patch` runs all of it.
 
+use std::path::Path;
+
 use bondline::{
     observe::report::{Row, Table, Verdict, exit_code},
-    peridynamics::Micromodulus,
+    peridynamics::{
+        Micromodulus,
+        laws::{Named, Ratio},
+    },
     progress::Silent,
+    run::SceneModel,
+    scene::Source,
 };
 use bondline_verify::{
     Effort,
     enclosed::{Case, Cells, Enclosed, Law, Method, Widths},
-    patch,
+    patch, typed,
 };
 use rayon::prelude::*;
 
@@ -23,7 +30,11 @@ fn shorts(tables: &[Table]) -> String {
 
 /// All methods and laws of a dimension in these cases.
 fn assert_complete<'a>(d: usize, cases: impl Iterator<Item = &'a str> + Clone) {
-    for law in Law::ALL {
+    let laws = match d {
+        1 => Law::all::<1>(),
+        _ => Law::all::<3>(),
+    };
+    for law in laws {
         for method in [
             "splice",
             "blending smooth",
@@ -100,4 +111,97 @@ fn a_seam_that_lacks_bonds_is_found() {
     })
     .unwrap();
     assert!(patch::affine_residual(&wide) < 1e-13);
+}
+
+/// Each law that a scene can name, by its key, as a table of usual numbers.
+fn typed_laws() -> Vec<(String, String)> {
+    let with_own_keys = Law::all::<2>().into_iter().map(|law| {
+        let table = typed::material(law, typed::YOUNGS_MODULUS, typed::POISSON);
+        let key = table.split(['.', ']']).nth(2).unwrap().to_owned();
+        (key, table)
+    });
+    let named = Named::ALL.iter().map(|law| {
+        let ratio = match law.ratio() {
+            Ratio::Pairwise => "",
+            Ratio::Any => "poisson-ratio = 0.3\n",
+        };
+        let missing = law.parameters().iter().filter(|p| p.default.is_none());
+        let usual: String = missing
+            .filter(|p| p.words.is_empty())
+            .map(|p| format!("{} = {:?}\n", p.key, p.usual))
+            .collect();
+        let key = law.key();
+        let table =
+            format!("[materials.m.{key}]\nyoungs-modulus = 1.0\ndensity = 1\n{ratio}{usual}");
+        (key.to_owned(), table)
+    });
+    with_own_keys.chain(named).collect()
+}
+
+/// The affine residual of a law in the block of a case, over a Young's modulus of one; or why it is refused.
+fn residual_of_law(case: &Case, material: &str) -> Result<f64, String> {
+    let own = typed::material(case.law, typed::YOUNGS_MODULUS, typed::POISSON);
+    let text = case.text::<2>(&Default::default());
+    assert!(text.contains(&own));
+    let text = text.replace(&own, material);
+    let source = Source::new("block.toml", text);
+    let scene = bondline_study::from_source(&source, Path::new("."), "block")
+        .map_err(|e| format!("{e}; {}", e.remedy().unwrap_or_default()))?;
+    let scene = scene.of_dimension::<2>().expect("a plane");
+    let SceneModel {
+        model, coupling, ..
+    } = SceneModel::new(scene).map_err(|e| e.to_string())?;
+    let stiffness = {
+        let operator = coupling.operator(&model).map_err(|e| e.to_string())?;
+        model.assemble_unscaled(operator.as_ref())
+    };
+    let tensor = *model.tensor_of_cell(0);
+    let size = tensor.amax() / typed::YOUNGS_MODULUS;
+    Ok(patch::affine_residual(&Enclosed {
+        model,
+        coupling,
+        stiffness,
+        half: f64::from(case.widths.total()) * bondline_verify::enclosed::SPACING,
+        tensor,
+    }) / size)
+}
+
+#[test]
+fn every_law_passes_every_coupling_or_is_told_one_that_takes_it() {
+    let mut taken_in_all = 0;
+    for (key, material) in typed_laws() {
+        let of = |method: Method| {
+            let case = Case {
+                method,
+                law: Law::StateBased(typed::INFLUENCE),
+                cells: Cells::Matching,
+                widths: patch::widths::<2>(method, Cells::Matching),
+                ratio: 3,
+            };
+            residual_of_law(&case, &material)
+        };
+        let all = Method::ALL.map(|method| (method, of(method)));
+        // as a scene types it, without its keys
+        let word = |method: &Method| {
+            let typed = typed::coupling(*method);
+            let mut words = typed.split(|c: char| !c.is_ascii_lowercase() && c != '-');
+            words.find(|w| !w.is_empty()).unwrap().to_owned()
+        };
+        let taken: Vec<String> = (all.iter())
+            .filter(|(_, found)| found.is_ok())
+            .map(|(method, _)| word(method))
+            .collect();
+        for (method, found) in &all {
+            let what = format!("{key}, {}", method.name());
+            match found {
+                Ok(residual) => assert!(*residual < patch::ALIGNED_LIMIT, "{what}: {residual:e}"),
+                Err(why) => {
+                    let is_told = taken.iter().any(|word| why.contains(word.as_str()));
+                    assert!(is_told || why.contains("nonlocal"), "{what}: {why}");
+                }
+            }
+        }
+        taken_in_all += taken.len();
+    }
+    assert!(taken_in_all > 60, "{taken_in_all}");
 }

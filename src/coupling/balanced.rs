@@ -38,6 +38,10 @@ impl<const D: usize> Coupling<D> for Balanced {
         blending::with_collar(mesh, zones, outermost, largest_horizon * blending::CLOSED)
     }
 
+    fn takes_deviators(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (Rows<Balanced, 1>, Rows<Balanced, 2>, Rows<Balanced, 3>) =
             (Balanced::rows, Balanced::rows, Balanced::rows);

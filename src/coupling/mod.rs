@@ -168,7 +168,7 @@ type Rows<C, const D: usize> =
 pub enum Definiteness {
     /// It is a sum of squares, whatever the model is.
     SumOfSquares,
-    /// It is one but for small terms of either sign along the edges of a nonlocal zone in 3D. They cancel under affine fields; the matrix at hand decides about others.
+    /// It is one but for small terms of either sign, along the edges of a nonlocal zone in 3D or where two influence functions of a law differ. They cancel under affine fields; the matrix at hand decides about others.
     EdgeTerms,
     /// Terms of the seam are negative: a run factorises the matrix before it trusts it.
     NegativeTerms,

@@ -14,6 +14,7 @@ use crate::{
         multi_lattice::{self, ContinuedLattice, MergedLattices},
         point_cloud::{PointCloud, Volumes},
         point_generation::{self, Beyond},
+        problem,
         recovery::Patch,
         seam_order::{self, Ties},
         tributary::Tributary,
@@ -97,21 +98,6 @@ pub struct Model<const D: usize> {
     pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
 }
 
-/// Refuses a law whose rows a coupling cannot hold.
-fn takes_law<const D: usize>(
-    coupling: &dyn Coupling<D>,
-    peridynamics: Option<&Peridynamics<D>>,
-) -> Result<(), ModelError> {
-    let law = peridynamics.map(|p| &p.law);
-    match law.filter(|law| law.linearised().has_deviators() && !coupling.takes_deviators()) {
-        Some(law) => Err(ModelError::Deviators {
-            law: law.name(),
-            coupling: coupling.name(),
-        }),
-        None => Ok(()),
-    }
-}
-
 type LaidOut<const D: usize> = Result<(Model<D>, Box<dyn Coupling<D>>), ModelError>;
 type Layout<const D: usize> = fn(Problem<D>, &dyn Progress) -> LaidOut<D>;
 static LAYOUTS: (Layout<1>, Layout<2>, Layout<3>) =
@@ -136,7 +122,7 @@ impl<const D: usize> Model<D> {
             peridynamics,
             coupling,
         } = problem;
-        takes_law(coupling.as_ref(), peridynamics.as_ref())?;
+        problem::takes_law(coupling.as_ref(), peridynamics.as_ref())?;
         let largest = peridynamics.as_ref().map_or(0.0, |p| {
             (0..mesh.cell_count())
                 .map(|c| p.reach(p.horizon.at(&mesh.centroid(c))))

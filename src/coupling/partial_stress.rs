@@ -39,6 +39,10 @@ impl<const D: usize> Coupling<D> for PartialStressMeshfree {
         Reach::Neighbours
     }
 
+    fn takes_deviators(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (
             Rows<PartialStressMeshfree, 1>,

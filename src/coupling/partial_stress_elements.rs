@@ -9,8 +9,8 @@ use crate::{
     fem::{self, QuadraturePoint},
     mesh::Mesh,
     peridynamics::{
-        Bound, Cloud, Conditions, Ends, Factors, Families, LinearForceState, PdBody, PdError,
-        TIE_TOLERANCE,
+        Bound, Cloud, Conditions, Ends, Factors, Families, Family, LinearForceState, PdBody,
+        PdError, StressFit, TIE_TOLERANCE,
         alike::{self, Shape},
         moment_fitted_weights,
     },
@@ -49,6 +49,10 @@ impl<const D: usize> Coupling<D> for PartialStressElements {
 
     fn interface(&self) -> Interface {
         Interface::Constrained(self.fit)
+    }
+
+    fn takes_deviators(&self) -> bool {
+        true
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
@@ -128,10 +132,11 @@ impl<'a, const D: usize> Elements<'a, D> {
             .collect();
         let factors = |i: usize| fitted[first_alike[i - points]].clone();
         cloud.horizon = cloud.horizon.followed_by(points, &horizon);
+        let fitted = fit.fitted_law();
         let body = PdBody::new(
             cloud,
             families,
-            peridynamics.law.linearised(),
+            fitted.as_deref().unwrap_or(fit.law),
             &Factors::OfFamily(&factors),
             Ends::Alike,
         )
@@ -249,8 +254,28 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         Some((base, conditions))
     }
 
+    /// The law with influence functions that are fitted to each family, where factors alone do not make its partial stress exact.
+    fn fitted_law(&self) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        self.law.fitted_to(match self.between_nodes {
+            true => StressFit::Quadratic,
+            false => StressFit::Affine,
+        })
+    }
+
     /// Whether weights that are not negative carry affine fields.
     fn is_met_by_positive(&self, bonds: &[(Vector<D>, f64)], horizon: f64) -> bool {
+        if let Some(law) = self.law.fitted_to(StressFit::Positive) {
+            let (vectors, volumes): (Vec<_>, Vec<_>) = bonds.iter().copied().unzip();
+            let family = Family {
+                bonds: &vectors,
+                volumes: &volumes,
+                factors: &vec![1.0; bonds.len()],
+                horizon,
+                materials: None,
+            };
+            let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);
+            return law.coefficients(&family, &mut pair, &mut omega).is_ok();
+        }
         self.conditions(bonds, horizon).is_none_or(|(base, c)| {
             moment_fitted_weights::fit(bonds, &base, &c, Bound::AtLeast(0.0)).is_ok()
         })
@@ -432,12 +457,16 @@ impl<const D: usize> Elements<'_, D> {
         }
         for ((moment, along), sums) in moments.iter().zip(sums) {
             for (c, sum) in sums.iter_mut().enumerate() {
-                let mut stress = Tensor::from_fn(|a, b| moment[third(a, b, c)]);
+                let mut stress = Tensor::<D>::from_fn(|a, b| moment[third(a, b, c)]);
                 if let Some(state) = body.state(point) {
                     let mut gradient = Tensor::<D>::zeros();
                     gradient.set_row(c, &along.transpose());
+                    // Σ p |ξ|² ξ·η V is the trace of what the pairs give
+                    let (theta, product) = (gradient.trace(), stress.trace());
+                    let products = state.shape * product + state.second * theta;
                     stress += gradient * state.stabilisation
-                        + state.modulus.contract(&gradient) * state.shape;
+                        + state.modulus.contract(&gradient) * state.shape
+                        - products * state.deviator;
                 }
                 *sum += stress * share;
             }
@@ -497,10 +526,13 @@ mod tests {
     fn one_pass_over_the_families_gives_the_stress_of_all_fields() {
         let pairwise = ["bond-based", ""];
         let state_based = ["lps", "poisson-ratio = 0.3\n"];
+        let position_aware = ["pals", "poisson-ratio = 0.3\n"];
         sums_are_those_of_single_cells::<1>(state_based);
         sums_are_those_of_single_cells::<2>(pairwise);
         sums_are_those_of_single_cells::<2>(state_based);
+        sums_are_those_of_single_cells::<2>(position_aware);
         sums_are_those_of_single_cells::<3>(pairwise);
         sums_are_those_of_single_cells::<3>(state_based);
+        sums_are_those_of_single_cells::<3>(position_aware);
     }
 }

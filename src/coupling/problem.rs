@@ -5,7 +5,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use crate::{
-    coupling::{Coupling, Zone},
+    coupling::{Coupling, Interface, Zone},
     mesh::{CellShape, Mesh},
     peridynamics::{Accelerator, BondWeights, BoxCell, Horizon, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
@@ -145,6 +145,30 @@ pub struct Problem<const D: usize> {
     pub coupling: Box<dyn Coupling<D>>,
 }
 
+/// Refuses a law whose rows a coupling cannot hold.
+pub(super) fn takes_law<const D: usize>(
+    coupling: &dyn Coupling<D>,
+    peridynamics: Option<&Peridynamics<D>>,
+) -> Result<(), ModelError> {
+    let law = peridynamics.map(|p| &p.law);
+    // what a seam of truncated bonds cuts follows the linearisation, two horizons deep
+    if coupling.interface() == Interface::Faces
+        && law.is_some_and(|law| law.linearised().has_deviators() && !law.is_linear())
+    {
+        return Err(ModelError::Unsupported {
+            what: "a position-aware solid that relaxes, with truncated bonds",
+            remedy: "use coupling.nonlocal, or the material pals",
+        });
+    }
+    match law.filter(|law| law.linearised().has_deviators() && !coupling.takes_deviators()) {
+        Some(law) => Err(ModelError::Deviators {
+            law: law.name(),
+            coupling: coupling.name(),
+        }),
+        None => Ok(()),
+    }
+}
+
 /// Why a model cannot be built.
 #[derive(Debug, Error)]
 pub enum ModelError {
@@ -274,9 +298,9 @@ pub enum ModelError {
         /// The most that it may take.
         most: f64,
     },
-    /// A law whose dilatation and deviator have influence functions of their own, in a coupling without a place for their products.
+    /// A law whose dilatation and deviator have influence functions of their own, in a coupling whose rows have no place for their products.
     #[error(
-        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, and the products of the two have no place in that seam; use coupling.splice or coupling.nonlocal, or the law lps"
+        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, and its rows have no place for the products of the two; use coupling.splice, coupling.truncated or coupling.nonlocal, or the law lps"
     )]
     Deviators {
         /// The law.
@@ -284,6 +308,11 @@ pub enum ModelError {
         /// The coupling.
         coupling: &'static str,
     },
+    /// A seam that would have to be fitted, of a law with two dilatations.
+    #[error(
+        "the faces of the nonlocal zone cut the lattice, and truncated bonds are fitted to such faces for one dilatation, where a position-aware solid has two; let the faces follow the lattice (element edges a whole number of spacings long, halfway between points), or use coupling.splice, coupling.balanced, coupling.blending or coupling.partial-stress, or the law lps"
+    )]
+    TwoDilatations,
     /// A combination that is not offered.
     #[error("{what} is not offered: {remedy}")]
     Unsupported {

@@ -365,6 +365,42 @@ impl<const D: usize> PdBody<D> {
         row.gather(&self.cloud.transfer, j, &own);
     }
 
+    /// The coefficients that the far end of bond `k` of point `i` gives it.
+    pub fn far_coefficients(&self, i: usize, k: usize) -> (f64, f64) {
+        match self.reversed {
+            // both ends alike
+            None => (self.kernel(i).0[k], 0.0),
+            Some(_) => self.coefficients(self.families.of(i)[k] as usize, i as u32),
+        }
+    }
+
+    /// The coefficients `p` and `ω` (0 for a pairwise law) that point `i` gives its bond to point `j`; zero if its family does not hold that.
+    pub fn coefficients(&self, i: usize, j: u32) -> (f64, f64) {
+        let (pair, omega) = self.kernel(i);
+        match self.families.of(i).binary_search(&j) {
+            Ok(k) => (pair[k], omega.get(k).copied().unwrap_or(0.0)),
+            Err(_) => (0.0, 0.0),
+        }
+    }
+
+    /// What the state part of point `i` gives the bond `xi`, of these coefficients, under a uniform gradient of displacement: the blocks that multiply `∂_b u`.
+    pub fn state_force_of_gradient(
+        &self,
+        i: usize,
+        xi: &Vector<D>,
+        (pair, omega): (f64, f64),
+    ) -> [Tensor<D>; D] {
+        let Some(state) = self.state(i) else {
+            return [Tensor::zeros(); D];
+        };
+        let of_gradient = along(&state.modulus, &(xi * omega), 1.0);
+        let products = state.second * omega + state.shape * (pair * xi.norm_squared());
+        std::array::from_fn(|b| {
+            let block: Tensor<D> = (0..D).map(|g| of_gradient[g] * state.shape[(b, g)]).sum();
+            block - xi * products.row(b) * state.deviator
+        })
+    }
+
     /// `Σ p |ξ|² ξ ⊗ ξ V` over the neighbours that `stands` names.
     fn second_moment(&self, j: usize, stands: impl Fn(usize) -> bool) -> Tensor<D> {
         let (pair, _) = self.kernel(j);
@@ -409,14 +445,8 @@ impl<const D: usize> PdBody<D> {
         if let Some(state) = state {
             self.add_weighted_gradient(j, &along(&state.modulus, &(state.shape * a), 1.0), row);
             if state.deviator != 0.0 {
-                let second = self.second_moment(j, |_| true) * a;
-                let first = state.shape * a;
-                self.add_deviators(
-                    j,
-                    &(first * -state.deviator),
-                    &(second * -state.deviator),
-                    row,
-                );
+                let [first, second] = [state.shape, state.second].map(|t| t * a * -state.deviator);
+                self.add_deviators(j, &first, &second, row);
             }
         }
     }
@@ -473,9 +503,8 @@ impl<const D: usize> PdBody<D> {
         };
         let mut of_state = gradient.dot(&state.modulus.contract(&gradient));
         if state.deviator != 0.0 {
-            let trace = |stands: &dyn Fn(usize) -> bool| self.second_moment(j, stands).trace();
             let (d, theta) = (state.deviator, gradient.trace());
-            let lost = trace(&|_| true) - trace(&stands);
+            let lost = state.second.trace() - self.second_moment(j, stands).trace();
             of_state -= d * theta * (2.0 * product + d * lost * theta);
         }
         0.5 * (pairs + state.stabilisation * squares + of_state)
@@ -513,7 +542,7 @@ impl<const D: usize> PdBody<D> {
                 // of the deviatoric extensions those of broken bonds are left out
                 let d = state.deviator;
                 let second = self.second_moment(j, &stands);
-                let lost = self.second_moment(j, |_| true).trace() - second.trace();
+                let lost = state.second.trace() - second.trace();
                 let (theta, product) = (gradient.trace(), stress_of_pairs.trace());
                 stress -= (shape * (product + d * lost * theta) + second * theta) * d;
             }

@@ -54,8 +54,21 @@ pub struct StatePart<const D: usize> {
     pub control: f64,
     /// `d`, of the products `−d tr Ḡ Σ p |ξ|² ξ·η V` in the energy density: `1/D` for a law whose deviatoric extensions `e − θ |ξ|/D` have another influence function than its dilatation θ, else 0.
     pub deviator: f64,
+    /// `P = Σ p |ξ|² ξ ⊗ ξ V` of such a law, `B = P : ∇u` under an affine field; else 0.
+    pub second: Tensor<D>,
     /// `K = Σ ω ξ ⊗ ξ V`, the shape tensor of the family.
     pub shape: Tensor<D>,
+}
+
+/// What the influence functions of a family that is no lattice's are to meet, beside the energy of all affine fields, so that its partial stress is that of elasticity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StressFit {
+    /// Nothing; σ is not negative.
+    Positive,
+    /// Nothing; σ of any sign where none else meets it.
+    Affine,
+    /// The partial stress of quadratic fields, where a σ that is not negative meets it; else as [`StressFit::Affine`].
+    Quadratic,
 }
 
 /// A law linearised at rest: seams, linear statics and preconditioners are made from it.
@@ -69,6 +82,11 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
     /// Whether its state parts have a [`StatePart::deviator`], which not every coupling can represent.
     fn has_deviators(&self) -> bool {
         false
+    }
+
+    /// The law with coefficients that make the partial stress exact under affine fields on families that are no lattice's, where [`LinearForceState::coefficients`] does not, and no factors of [`LinearForceState::moment_conditions`] can.
+    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        None
     }
 
     /// ω of the divergence of a meshfree partial stress beside this law.
@@ -106,7 +124,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
 /// The classical tensor that a family really carries: `ν⁰ = C : G` under `u = G x`.
 ///
 /// Source: [SAND2015-7998] eq. (2.10), for the linear force state above:
-/// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl − d (K_ij P_kl + P_ij K_kl)` with `P = Σ p |ξ|² ξ ⊗ ξ V`.
+/// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl − d (K_ij P_kl + P_ij K_kl)`.
 pub fn collapsed_tensor<const D: usize>(
     family: &Family<'_, D>,
     pair: &[f64],
@@ -118,14 +136,10 @@ pub fn collapsed_tensor<const D: usize>(
     }
     if let Some(state) = state {
         if state.deviator != 0.0 {
-            let mut second = Tensor::<D>::zeros();
-            for (k, xi) in family.bonds.iter().enumerate() {
-                let s = pair[k] * xi.norm_squared() * family.volumes[k];
-                second += xi * xi.transpose() * s;
-            }
             for i in 0..D {
                 for j in 0..D {
-                    let products = second * state.shape[(i, j)] + state.shape * second[(i, j)];
+                    let products =
+                        state.second * state.shape[(i, j)] + state.shape * state.second[(i, j)];
                     c.0[i][j] -= products * state.deviator;
                 }
             }

@@ -70,7 +70,7 @@ pub use laws::{
     PositionAwareSolid, Several, StiffnessMean,
 };
 pub use linear_force_state::{
-    Family, FamilyMaterials, LinearForceState, StatePart, collapsed_tensor,
+    Family, FamilyMaterials, LinearForceState, StatePart, StressFit, collapsed_tensor,
 };
 pub use moment_fitted_weights::{Bound, Conditions, FitError};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bounded_least_norm::{Bound, least_change};
 use crate::{
-    peridynamics::Family,
+    peridynamics::{Family, StressFit},
     tensor::{Tensor, Vector},
 };
 
@@ -66,60 +66,214 @@ pub fn fit<const D: usize>(
     base: &[f64],
     fields: CalibrationFields,
 ) -> Result<PositionAware, NotPositionAware> {
-    let d = D as f64;
-    let count = base.iter().filter(|w| **w > 0.0).count();
-    let shares: Vec<f64> = (0..base.len())
-        .map(|k| base[k] * family.bonds[k].norm_squared() * family.volumes[k])
-        .collect();
-    let m: f64 = shares.iter().sum();
-    let refused = |of, conditions, rank, bounded| NotPositionAware {
-        of,
-        bonds: count,
-        rank,
-        conditions,
-        bounded,
-        remedy: match fields {
-            CalibrationFields::Affine if of == DEVIATOR => {
-                "use calibration-fields = \"axes\", which asks for less, or the law lps"
-            }
-            _ => "use the law lps",
-        },
-    };
-    if m.is_nan() || m <= 0.0 {
-        return Err(refused("dilatation", D * (D + 1) / 2, 0, false));
-    }
-    let directions: Vec<Vector<D>> = family.bonds.iter().map(|xi| xi / xi.norm()).collect();
-
-    let strains = strains::<D>();
-    let of_direction = |a: &Tensor<D>, n: &Vector<D>| n.dot(&(a * n));
-    let rows = DMatrix::from_fn(strains.len(), base.len(), |c, k| {
-        of_direction(&strains[c], &directions[k])
-    });
-    let wanted = DVector::from_fn(strains.len(), |c, _| strains[c].trace());
-    // the values of a complete family
-    let whole: Vec<f64> = shares.iter().map(|s| d / m * s).collect();
-    let change = changes(&rows, &whole, wanted, Bound::Free)
-        .map_err(|(rank, _)| refused("dilatation", strains.len(), rank, false))?;
-    let omega = (0..base.len())
-        .map(|k| d / m * base[k] * (1.0 + change[k]))
-        .collect();
-
-    let pairs = products::<D>(fields);
-    let rows = DMatrix::from_fn(pairs.len(), base.len(), |c, k| {
-        let (a, b) = &pairs[c];
-        of_direction(a, &directions[k]) * of_direction(b, &directions[k])
-    });
-    let wanted = DVector::from_fn(pairs.len(), |c, _| pairs[c].0.dot(&pairs[c].1));
-    let whole: Vec<f64> = shares
-        .iter()
-        .map(|s| d * (d + 2.0) / (2.0 * m) * s)
-        .collect();
-    let change = changes(&rows, &whole, wanted, Bound::AtLeast(0.0))
-        .map_err(|(rank, bounded)| refused(DEVIATOR, pairs.len(), rank, bounded))?;
-    let sigma = (0..base.len())
-        .map(|k| d * (d + 2.0) / (2.0 * m) * base[k] * (1.0 + change[k]).max(0.0))
-        .collect();
+    let whole = WholeFamily::of(family, base, fields, None)?;
+    let omega = whole.omega(Odd::Any)?;
+    let sigma = whole.sigma(Odd::Any, Bound::AtLeast(0.0))?;
     Ok(PositionAware { omega, sigma })
+}
+
+/// Finds ω and σ of a family of any shape whose partial stress is that of elasticity under affine fields.
+///
+/// Under a quadratic field the partial stress has, besides, the moments `Σ ω ξ⊗ξ⊗ξ V` and `Σ σ ξ⊗ξ⊗ξ⊗ξ⊗ξ/|ξ|² V`, which a family has that is not symmetric about its point.
+///
+/// # Errors
+/// [`NotPositionAware`] if no weights meet what `stress` asks for.
+pub fn fit_stress<const D: usize>(
+    family: &Family<'_, D>,
+    base: &[f64],
+    stress: StressFit,
+) -> Result<PositionAware, NotPositionAware> {
+    let remedy = "keep the transition zone away from surfaces, or couple by splice";
+    let whole = WholeFamily::of(family, base, CalibrationFields::Affine, Some(remedy))?;
+    let positive = Bound::AtLeast(0.0);
+    if stress == StressFit::Quadratic && whole.has_enough_for_odd() {
+        // in space a search for the smallest change that is not negative would take most of the time of a run
+        let bound = if D < 3 { positive } else { Bound::Free };
+        let omega = whole.omega(Odd::Vanishing).ok();
+        let sigma = || whole.sigma(Odd::Vanishing, bound).ok();
+        let both = omega.and_then(|omega| Some((omega, sigma()?)));
+        if let Some((omega, sigma)) = both.filter(|(_, sigma)| sigma.iter().all(|s| *s >= 0.0)) {
+            return Ok(PositionAware { omega, sigma });
+        }
+    }
+    let omega = whole.omega(Odd::Any)?;
+    let sigma = match whole.sigma(Odd::Any, positive) {
+        Err(_) if stress != StressFit::Positive => whole.sigma(Odd::Any, Bound::Free)?,
+        other => other?,
+    };
+    Ok(PositionAware { omega, sigma })
+}
+
+/// What odd moments of the influence functions are to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Odd {
+    Any,
+    Vanishing,
+}
+
+/// Conditions on moments of even order.
+#[derive(Clone, Copy)]
+struct Even<'a, const D: usize> {
+    /// What a bond of this direction adds to a condition, over its share.
+    of_direction: &'a dyn Fn(usize, &Vector<D>) -> f64,
+    wanted: &'a [f64],
+}
+
+/// A family with the influence functions that it would have if it were complete.
+struct WholeFamily<'a, const D: usize> {
+    family: &'a Family<'a, D>,
+    base: &'a [f64],
+    fields: CalibrationFields,
+    /// What helps a family that cannot be fitted, if not what helps the law.
+    remedy: Option<&'static str>,
+    directions: Vec<Vector<D>>,
+    /// `ω |ξ|² V` of the base.
+    shares: Vec<f64>,
+    /// The weighted volume.
+    m: f64,
+}
+
+impl<'a, const D: usize> WholeFamily<'a, D> {
+    fn of(
+        family: &'a Family<'a, D>,
+        base: &'a [f64],
+        fields: CalibrationFields,
+        remedy: Option<&'static str>,
+    ) -> Result<Self, NotPositionAware> {
+        let shares: Vec<f64> = (0..base.len())
+            .map(|k| base[k] * family.bonds[k].norm_squared() * family.volumes[k])
+            .collect();
+        let whole = Self {
+            family,
+            base,
+            fields,
+            remedy,
+            directions: family.bonds.iter().map(|xi| xi / xi.norm()).collect(),
+            m: shares.iter().sum(),
+            shares,
+        };
+        if whole.m.is_nan() || whole.m <= 0.0 {
+            return Err(whole.refused("dilatation", D * (D + 1) / 2, (0, false)));
+        }
+        Ok(whole)
+    }
+
+    fn bonds(&self) -> usize {
+        self.base.iter().filter(|w| **w > 0.0).count()
+    }
+
+    fn refused(
+        &self,
+        of: &'static str,
+        conditions: usize,
+        (rank, bounded): (usize, bool),
+    ) -> NotPositionAware {
+        NotPositionAware {
+            of,
+            bonds: self.bonds(),
+            rank,
+            conditions,
+            bounded,
+            remedy: match (self.remedy, self.fields) {
+                (Some(remedy), _) => remedy,
+                (None, CalibrationFields::Affine) if of == DEVIATOR => {
+                    "use calibration-fields = \"axes\", which asks for less, or the law lps"
+                }
+                _ => "use the law lps",
+            },
+        }
+    }
+
+    /// Whether there are bonds enough to expect weights with vanishing odd moments.
+    fn has_enough_for_odd(&self) -> bool {
+        let conditions = products::<D>(self.fields).len() + multi_indices::<D>(5).len();
+        self.bonds() >= 2 * conditions
+    }
+
+    /// The influence function `scale · base (1 + Δ)` with `Σ rows (shares · scale) (1 + Δ) = wanted`, and vanishing moments of the odd `order`, if it is asked for.
+    fn changed(
+        &self,
+        scale: f64,
+        Even {
+            of_direction,
+            wanted,
+        }: Even<'_, D>,
+        order: Option<usize>,
+        bound: Bound,
+    ) -> Result<Vec<f64>, (usize, bool)> {
+        let odd = order.map_or_else(Vec::new, multi_indices::<D>);
+        let count = wanted.len();
+        let rows = DMatrix::from_fn(count + odd.len(), self.base.len(), |c, k| {
+            let n = &self.directions[k];
+            match c.checked_sub(count) {
+                None => of_direction(c, n),
+                Some(c) => {
+                    let product: f64 = odd[c].iter().map(|&i| n[i]).product();
+                    product * self.family.bonds[k].norm() / self.family.horizon
+                }
+            }
+        });
+        let wanted = DVector::from_fn(count + odd.len(), |c, _| {
+            wanted.get(c).copied().unwrap_or(0.0)
+        });
+        let whole: Vec<f64> = self.shares.iter().map(|s| scale * s).collect();
+        let change = changes(&rows, &whole, wanted, bound)?;
+        let least = match bound {
+            Bound::Free => f64::NEG_INFINITY,
+            Bound::AtLeast(least) => least,
+        };
+        let values = self.base.iter().zip(change);
+        Ok(values
+            .map(|(base, change)| scale * base * (1.0 + change).max(least))
+            .collect())
+    }
+
+    /// ω, of any sign.
+    fn omega(&self, odd: Odd) -> Result<Vec<f64>, NotPositionAware> {
+        let strains = strains::<D>();
+        let of_direction = |c: usize, n: &Vector<D>| n.dot(&(strains[c] * n));
+        let wanted: Vec<f64> = strains.iter().map(|a| a.trace()).collect();
+        let order = (odd == Odd::Vanishing).then_some(3);
+        let scale = D as f64 / self.m;
+        let even = Even {
+            of_direction: &of_direction,
+            wanted: &wanted,
+        };
+        self.changed(scale, even, order, Bound::Free)
+            .map_err(|(rank, _)| self.refused("dilatation", strains.len(), (rank, false)))
+    }
+
+    fn sigma(&self, odd: Odd, bound: Bound) -> Result<Vec<f64>, NotPositionAware> {
+        let pairs = products::<D>(self.fields);
+        let of_direction = |c: usize, n: &Vector<D>| {
+            let (a, b) = &pairs[c];
+            n.dot(&(a * n)) * n.dot(&(b * n))
+        };
+        let wanted: Vec<f64> = pairs.iter().map(|(a, b)| a.dot(b)).collect();
+        let order = (odd == Odd::Vanishing).then_some(5);
+        let d = D as f64;
+        let scale = d * (d + 2.0) / (2.0 * self.m);
+        let even = Even {
+            of_direction: &of_direction,
+            wanted: &wanted,
+        };
+        self.changed(scale, even, order, bound)
+            .map_err(|why| self.refused(DEVIATOR, pairs.len(), why))
+    }
+}
+
+/// The components of a symmetric tensor of this order, by their indices.
+fn multi_indices<const D: usize>(order: usize) -> Vec<Vec<usize>> {
+    let mut all = vec![Vec::new()];
+    for _ in 0..order {
+        let longer = |index: &Vec<usize>| {
+            let last = index.last().copied().unwrap_or(0);
+            let index = index.clone();
+            (last..D).map(move |i| [&index[..], &[i]].concat())
+        };
+        all = all.iter().flat_map(longer).collect();
+    }
+    all
 }
 
 const DEVIATOR: &str = "deviatoric energy";
@@ -248,6 +402,47 @@ mod tests {
             text.contains("negative weights") && text.contains("axes"),
             "{text}"
         );
+    }
+
+    /// A place inside a lattice cell near an edge of the cube, as a Gauss point is, with a wide horizon.
+    fn around_gauss_point(at: [f64; 3]) -> Vec<Vector<3>> {
+        let all = (0..343).map(|k| [k % 7, k / 7 % 7, k / 49]);
+        all.map(|k| Vector::<3>::from_fn(|i, _| f64::from(k[i]) - at[i]))
+            .filter(|xi| xi.norm() <= 4.0)
+            .collect()
+    }
+
+    #[test]
+    fn the_partial_stress_of_any_family_is_exact_and_without_odd_moments_where_they_are_asked_for()
+    {
+        for (at, odd_vanish) in [([3.2, 2.8, 3.3], true), ([0.3, 3.2, 2.8], false)] {
+            let bonds = around_gauss_point(at);
+            let (volumes, base) = (vec![0.7; bonds.len()], vec![2.0; bonds.len()]);
+            let family = Family {
+                bonds: &bonds,
+                volumes: &volumes,
+                factors: &base,
+                horizon: 4.0,
+                materials: None,
+            };
+            for stress in [StressFit::Affine, StressFit::Quadratic] {
+                let weights = fit_stress(&family, &base, stress).unwrap();
+                let bent = Tensor::<3>::new(1.0, 0.3, -0.2, 0.3, -0.4, 0.7, -0.2, 0.7, 0.5);
+                let [found, exact] = energies(&bonds, &weights, &bent);
+                assert!((found / exact - 1.0).abs() < 1e-12, "{at:?} {stress:?}");
+                let moments = [0, 1, 2].map(|i| {
+                    let sum = |f: &dyn Fn(usize) -> f64| (0..bonds.len()).map(f).sum::<f64>();
+                    let cube = |k: usize| bonds[k][0] * bonds[k][1] * bonds[k][i];
+                    let along = |k: usize| (bonds[k][2] / bonds[k].norm()).powi(2);
+                    let of_omega = sum(&|k| weights.omega[k] * 0.7 * cube(k));
+                    let of_sigma = sum(&|k| weights.sigma[k] * 0.7 * cube(k) * along(k));
+                    f64::max(of_omega.abs(), of_sigma.abs())
+                });
+                let largest = moments.into_iter().fold(0.0, f64::max);
+                let vanish = odd_vanish && stress == StressFit::Quadratic;
+                assert_eq!(largest < 1e-12, vanish, "{at:?} {stress:?}: {largest:e}");
+            }
+        }
     }
 
     #[test]

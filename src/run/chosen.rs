@@ -49,6 +49,7 @@ impl RunError {
                 | Self::Unproven { .. }
                 | Self::Model(
                     ModelError::Seam { .. }
+                        | ModelError::TwoDilatations
                         | ModelError::SeamTooLarge { .. }
                         | ModelError::Unsupported { .. }
                         | ModelError::Family { .. }

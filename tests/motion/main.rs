@@ -22,6 +22,7 @@ mod neighbours;
 mod parts;
 mod plasticity;
 mod position_aware;
+mod position_aware_seams;
 mod restarts;
 mod scalar_damage;
 mod softening;

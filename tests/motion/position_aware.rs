@@ -74,14 +74,30 @@ fn a_cube_under_the_fields_of_the_paper_stores_what_elasticity_says_where_an_lps
 }
 
 #[test]
-fn couplings_whose_seam_has_no_place_for_the_law_refuse_it_and_so_do_families_without_a_solution() {
+fn seams_that_would_have_to_be_fitted_and_families_without_a_solution_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let zone = "[zones.nonlocal]\nbox = { min = [3, 3, 3], max = [4, 4, 4] }\n[zones.transition]\nbox = { min = [2, 2, 2], max = [5, 5, 5] }\n";
-    for coupling in ["truncated", "blending", "partial-stress"] {
-        let typed = cube(coupling, "pals", fields()[0].0) + zone;
-        let typed = typed.replace(", origin = [0.5, 0.5, 0.5]", "");
-        refused(folder.path(), &typed, "is not offered with the coupling");
+    let zone = "[zones.nonlocal]\nbox = { min = [3, 3, 3], max = [4, 4, 4] }\n";
+    let typed = cube("truncated", "pals", fields()[0].0) + zone;
+    let off = typed.replace("[0.5, 0.5, 0.5] }", "[0.4, 0.3, 0.4] }");
+    // each of these couplings runs in position_aware_seams.rs
+    for part in [
+        "where a position-aware solid has two",
+        "let the faces follow the lattice",
+        "coupling.splice, coupling.balanced, coupling.blending or coupling.partial-stress",
+    ] {
+        refused(folder.path(), &off, part);
     }
+    let relaxing = "pave]\nrelaxing-share = 0.5\nrelaxation-time = 1";
+    let relaxing = cube("truncated", relaxing, fields()[0].0).replace("= 1]", "= 1") + zone;
+    let relaxing = relaxing.replace(
+        "[solver]\ntolerance = 1e-13\n",
+        "[solve.quasi-static]\nduration = 1\nsteps = 2\n",
+    );
+    refused(
+        folder.path(),
+        &relaxing,
+        "a position-aware solid that relaxes, with truncated bonds",
+    );
     let affine = cube("nonlocal", "pals", fields()[0].0).replace(
         "density = 1",
         "density = 1\ncalibration-fields = \"affine\"",

@@ -73,7 +73,10 @@ pub fn moments(law: Law, ratio: u32) -> Moments {
             }
         }
         // stabilised with 1, correspondence is the same operator as an LPS in 1D
-        Law::StateBased(influence) | Law::Correspondence(influence) => {
+        // and on a whole lattice of a bar a position-aware solid is one
+        Law::StateBased(influence)
+        | Law::Correspondence(influence)
+        | Law::PositionAware(influence) => {
             let omega = |xi: f64| influence.value(xi, horizon);
             let length = sum(4, &omega) / sum(2, &omega);
             Moments {
@@ -311,7 +314,7 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
         }
     }
     if effort == Effort::Full {
-        for law in Law::ALL {
+        for law in Law::all::<2>() {
             let cases: Vec<Case> = offered(&methods, law)
                 .into_iter()
                 .map(|method| Case {

@@ -252,7 +252,7 @@ pub fn widths<const D: usize>(method: Method, cells: Cells) -> Widths {
 /// All cases of a dimension.
 pub fn cases<const D: usize>(effort: Effort) -> Vec<Case> {
     let mut cases = Vec::new();
-    for law in Law::ALL {
+    for law in Law::all::<D>() {
         for method in Method::ALL {
             for kind in Cells::ALL {
                 let wanted = match (effort, D) {

@@ -78,6 +78,7 @@ fn law_name(law: Law) -> String {
         ),
         Law::StateBased(w) => format!("LPS {}", influence_name(w)),
         Law::Correspondence(w) => format!("correspondence {}", influence_name(w)),
+        Law::PositionAware(w) => format!("PALS {}", influence_name(w)),
     }
 }
 

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use bondline::{
     coupling::{BlendingFunction, FitDegree},
     peridynamics::{
-        BondBased, Correspondence, Influence, LinearPeridynamicSolid, Micromodulus,
+        BondBased, CalibrationFields, Correspondence, Influence, LinearPeridynamicSolid,
+        Micromodulus, PositionAwareSolid,
         influence::{Alpha, Degree},
     },
 };
@@ -96,15 +97,23 @@ pub enum Law {
     StateBased(Influence),
     /// [`Correspondence`], stabilised with 1.
     Correspondence(Influence),
+    /// [`PositionAwareSolid`], calibrated along the axes; not of bars.
+    PositionAware(Influence),
 }
 
 impl Law {
-    /// Every law, with its usual kernel.
-    pub const ALL: [Self; 3] = [
-        Self::BondBased(Micromodulus::InverseDistance),
-        Self::StateBased(INFLUENCE),
-        Self::Correspondence(INFLUENCE),
-    ];
+    /// Every law of bodies of `D` dimensions, with its usual kernel.
+    pub fn all<const D: usize>() -> Vec<Self> {
+        let mut all = vec![
+            Self::BondBased(Micromodulus::InverseDistance),
+            Self::StateBased(INFLUENCE),
+            Self::Correspondence(INFLUENCE),
+        ];
+        if D > 1 {
+            all.push(Self::PositionAware(INFLUENCE));
+        }
+        all
+    }
 
     /// Its name in tables.
     pub fn name(self) -> &'static str {
@@ -112,6 +121,7 @@ impl Law {
             Self::BondBased(_) => "bond-based",
             Self::StateBased(_) => "LPS",
             Self::Correspondence(_) => "correspondence",
+            Self::PositionAware(_) => "PALS",
         }
     }
 
@@ -134,6 +144,10 @@ impl Law {
             Self::BondBased(kernel) => Arc::new(BondBased::<D>::new(kernel, mu)),
             Self::StateBased(w) => Arc::new(LinearPeridynamicSolid::<D>::new(w, lambda, mu)),
             Self::Correspondence(w) => Arc::new(Correspondence::<D>::new(w, lambda, mu, 1.0)),
+            Self::PositionAware(w) => {
+                let fields = CalibrationFields::Axes;
+                Arc::new(PositionAwareSolid::<D>::new(w, fields, lambda, mu))
+            }
         }
     }
 }
@@ -220,6 +234,7 @@ pub fn material(law: Law, youngs_modulus: f64, poisson_ratio: f64) -> String {
             "correspondence",
             format!("poisson-ratio = {poisson_ratio:?}"),
         ),
+        Law::PositionAware(_) => ("pals", format!("poisson-ratio = {poisson_ratio:?}")),
     };
     format!("[materials.m.{name}]\nyoungs-modulus = {youngs_modulus:?}\ndensity = 1\n{rest}\n")
 }
@@ -228,7 +243,9 @@ pub fn material(law: Law, youngs_modulus: f64, poisson_ratio: f64) -> String {
 pub fn law_line(law: Law) -> String {
     match law {
         Law::BondBased(_) => String::new(),
-        Law::StateBased(w) | Law::Correspondence(w) => format!("influence = {}\n", influence(w)),
+        Law::StateBased(w) | Law::Correspondence(w) | Law::PositionAware(w) => {
+            format!("influence = {}\n", influence(w))
+        }
     }
 }
 

@@ -102,7 +102,7 @@ fn deviation<const D: usize>(law: Law, ratio: u32, plain: Plain) -> Result<f64, 
                 .collect(),
             ShellTarget::Strength(6.0 * mu),
         ),
-        Law::StateBased(w) | Law::Correspondence(w) => (
+        Law::StateBased(w) | Law::Correspondence(w) | Law::PositionAware(w) => (
             lattice
                 .shells
                 .iter()
@@ -131,7 +131,7 @@ fn deviation<const D: usize>(law: Law, ratio: u32, plain: Plain) -> Result<f64, 
     let volume = SPACING.powi(D as i32);
     let mut difference = match law {
         Law::BondBased(kernel) => bond_based_tensor(kernel, 3.0 * mu, horizon, &bonds, volume),
-        Law::StateBased(w) | Law::Correspondence(w) => {
+        Law::StateBased(w) | Law::Correspondence(w) | Law::PositionAware(w) => {
             state_based_tensor(w, lambda, mu, horizon, &bonds, volume)
         }
     };

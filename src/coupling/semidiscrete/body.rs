@@ -104,11 +104,11 @@ impl<const D: usize> PassInput<'_, D> {
             |i: usize| self.is_whole || families.of(i).len() == body.families.of(i).len();
         let pair = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
             true => body.kernel(i).0[k],
-            false => coefficient(body, i, families.of(i)[k]),
+            false => body.coefficients(i, families.of(i)[k]).0,
         };
         let omega = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
             true => body.kernel(i).1[k],
-            false => omega_of(body, i, families.of(i)[k]),
+            false => body.coefficients(i, families.of(i)[k]).1,
         };
         let force = match (self.accelerator, law.force_state()) {
             (Some(Accelerator::Pairwise), _) => BondForce::Pairwise { coefficient: &pair },
@@ -357,18 +357,6 @@ impl<const D: usize> MovingBody<D> {
                 }
             });
     }
-}
-
-/// The pairwise coefficient of the bond from point `i` to point `j`; zero if there is none.
-fn coefficient<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
-    let place = body.families.of(i).binary_search(&j);
-    place.map_or(0.0, |k| body.kernel(i).0[k])
-}
-
-/// The influence function of the bond from point `i` to point `j`, factors of the lattice included; zero if there is none.
-fn omega_of<const D: usize>(body: &PdBody<D>, i: usize, j: u32) -> f64 {
-    let place = body.families.of(i).binary_search(&j);
-    place.map_or(0.0, |k| body.kernel(i).1[k])
 }
 
 /// `c` of `f = c s`, the largest of the bonds of the point with the most of them.

@@ -212,6 +212,13 @@ pub(super) fn fit<const D: usize>(
     let state = state_of(segments)?;
     let is_negative = state.is_some_and(|s| s.modulus.get(0, 0, 0, 0) < 0.0);
     let follows = follows(&missing);
+    if state.is_some_and(|s| s.deviator != 0.0) {
+        // factors, and shares of one dilatation, are not those of two
+        return match follows {
+            true => Ok(false),
+            false => Err(ModelError::TwoDilatations),
+        };
+    }
     if follows && (!is_negative || segments.passing.whole.len() > 1) {
         return Ok(false);
     }

@@ -1,4 +1,12 @@
 //! Dilatations of an LPS at the seam: those of points and of the elements behind the faces.
+//!
+//! A position-aware solid has two, θ by the influence function ω and θ_σ by σ, with `S = 2 μ Σ σ |ξ|² V` and `B = S θ_σ/D`. What its energy has beside that of its pairs is
+//!
+//! ```text
+//! ½ 𝓜 θ² − θ B/D  =  ½ κ θ² + ½ c (θ − θ_σ)² − ½ c θ_σ² ,     c = S/D² ,
+//! ```
+//!
+//! of a whole family `c = (D + 2) μ/D`, so that an affine field has the pressure `K′ θ` of an LPS, `K′ = κ − c`. Pieces hand to each as to that of an LPS.
 
 use std::collections::BTreeMap;
 
@@ -33,10 +41,27 @@ pub(super) type Functional<const D: usize> = BTreeMap<u32, Vector<D>>;
 
 /// What all dilatations of a model have in common.
 pub(super) struct LpsConstants {
-    /// `D/m` of each lattice.
-    over_m: Vec<f64>,
+    /// What each lattice weighs its bonds with.
+    over_m: Vec<Normal>,
     /// K′ of the material, the same for all lattices.
     pub bulk: f64,
+    /// c of a position-aware solid; none of an LPS.
+    deviatoric: Option<f64>,
+}
+
+/// What makes dilatations of sums over a whole family.
+struct Normal {
+    /// `D/m`.
+    volumetric: f64,
+    /// `D/S`.
+    deviatoric: f64,
+}
+
+/// The influence function of a dilatation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kernel {
+    Volumetric,
+    Deviatoric,
 }
 
 impl LpsConstants {
@@ -49,16 +74,41 @@ impl LpsConstants {
             return Ok(None);
         };
         let whole = segments.passing.whole.iter();
-        let over_m: Vec<f64> = whole
-            .map(|w| D as f64 / w.state.as_ref().map_or(f64::NAN, |s| s.shape.trace()))
+        let over = |tensor: Option<&Tensor<D>>| D as f64 / tensor.map_or(f64::NAN, |t| t.trace());
+        let over_m: Vec<Normal> = whole
+            .map(|w| Normal {
+                volumetric: over(w.state.as_ref().map(|s| &s.shape)),
+                deviatoric: over(w.state.as_ref().map(|s| &s.second)),
+            })
             .collect();
-        let bulk = reference.modulus.get(0, 0, 0, 0) / (over_m[0] * over_m[0]);
-        Ok(Some(Self { over_m, bulk }))
+        let modulus = reference.modulus.get(0, 0, 0, 0) / over_m[0].volumetric.powi(2);
+        let deviatoric = deviatoric_of(reference);
+        Ok(Some(Self {
+            over_m,
+            bulk: modulus - 2.0 * deviatoric.unwrap_or(0.0),
+            deviatoric,
+        }))
+    }
+
+    /// Whether the law has two dilatations.
+    pub fn has_two_dilatations(&self) -> bool {
+        self.deviatoric.is_some()
     }
 
     /// Visits the dilatations at the ends of a piece, each with the factor of the piece's elongation `ξ·D` that it gets.
     pub fn shares<const D: usize>(
         &self,
+        segments: &Segments<'_, D>,
+        s: &Segment,
+        visit: impl FnMut(Carrier, f64),
+    ) {
+        self.shares_of(Kernel::Volumetric, segments, s, visit);
+    }
+
+    /// As [`LpsConstants::shares`], of the dilatation with this influence function.
+    fn shares_of<const D: usize>(
+        &self,
+        kernel: Kernel,
         segments: &Segments<'_, D>,
         s: &Segment,
         mut visit: impl FnMut(Carrier, f64),
@@ -74,12 +124,19 @@ impl LpsConstants {
             let (own, other) = if side == 0 { (s.i, s.j) } else { (s.j, s.i) };
             match end {
                 End::Point(p) => {
-                    let omega = segments.coefficients(own, other).1;
+                    let xi = body.bond(i, j);
+                    let omega = kernel.of_bond(segments.coefficients(own, other), &xi);
+                    let omega = omega * kernel.of_point(body.state(own as usize));
                     visit(Carrier::Point(*p), weight * omega * volume[other as usize]);
                 }
                 End::Face(foot) => {
-                    let omega = segments.passing.whole_of(s.i).of(&body.bond(i, j)).1;
-                    let over_m = self.over_m[usize::from(segments.passing.of_point[i])];
+                    let xi = body.bond(i, j);
+                    let omega = kernel.of_bond(segments.passing.whole_of(s.i).of(&xi), &xi);
+                    let over_m = &self.over_m[usize::from(segments.passing.of_point[i])];
+                    let over_m = match kernel {
+                        Kernel::Volumetric => over_m.volumetric,
+                        Kernel::Deviatoric => over_m.deviatoric,
+                    };
                     let share =
                         weight * over_m * omega * volume[i] * volume[j] / foot.cells.len() as f64;
                     for &cell in &foot.cells {
@@ -89,6 +146,29 @@ impl LpsConstants {
             }
         }
     }
+}
+
+impl Kernel {
+    /// The weight of a bond of these coefficients.
+    fn of_bond<const D: usize>(self, (pair, omega): (f64, f64), xi: &Vector<D>) -> f64 {
+        match self {
+            Self::Volumetric => omega,
+            Self::Deviatoric => pair * xi.norm_squared(),
+        }
+    }
+
+    /// What the sum of a point is multiplied with: a stiffness goes with the other as it is.
+    fn of_point<const D: usize>(self, state: Option<&StatePart<D>>) -> f64 {
+        match self {
+            Self::Volumetric => 1.0,
+            Self::Deviatoric => state.map_or(0.0, |s| D as f64 / s.second.trace()),
+        }
+    }
+}
+
+/// c of a family, if its law has two dilatations.
+fn deviatoric_of<const D: usize>(state: &StatePart<D>) -> Option<f64> {
+    (state.deviator != 0.0).then(|| state.second.trace() / (D * D) as f64)
 }
 
 /// What a share of a piece's elongation adds to the volume that an element counts as its own: points on a face have half of their cells in the zone, the element carries their dilatation too.
@@ -140,60 +220,46 @@ impl<const D: usize> Dilatations<D> {
     ///
     /// Each piece hands its share, `Segment::hands`, of its elongation to the dilatations at its ends.
     pub fn new(segments: &Segments<'_, D>, common: &LpsConstants, listed: &[bool]) -> Self {
-        let body = segments.body;
-        let volume = &body.cloud.volume;
-        let mut functionals: BTreeMap<Carrier, Functional<D>> = BTreeMap::new();
-        let mut volumes: BTreeMap<u32, f64> = BTreeMap::new();
-        // what pieces hand over
-        for s in &segments.cut {
-            let xi = body.bond(s.i as usize, s.j as usize);
-            let difference: Vec<(u32, f64)> = segments.difference(s).collect();
-            common.shares(segments, s, |carrier, factor| {
-                let functional = functionals.entry(carrier).or_default();
-                for &(site, w) in &difference {
-                    *functional.entry(site).or_insert_with(Vector::zeros) += xi * (factor * w);
-                }
-                if let Carrier::Cell(cell) = carrier {
-                    *volumes.entry(cell).or_default() += carried(segments, s, factor);
-                }
-            });
-        }
-        // whole bonds of the points around
-        let mut needed = vec![false; segments.site.len()];
-        for i in 0..needed.len() {
-            if segments.is_point(i as u32) && listed[i] {
-                needed[i] = true;
-                for &j in body.families.of(i) {
-                    needed[j as usize] |= segments.is_point(j);
-                }
-            }
-        }
-        for i in (0..needed.len() as u32).filter(|&i| needed[i as usize]) {
-            let functional = functionals.entry(Carrier::Point(i)).or_default();
-            let own = segments.site[i as usize];
-            let (_, omega) = body.kernel(i as usize);
-            for (k, &j) in body.families.of(i as usize).iter().enumerate() {
-                if segments.is_whole(i, j) {
-                    let share = segments.hands(i, j)[0] * omega[k] * volume[j as usize];
-                    let b = body.bond(i as usize, j as usize) * share;
-                    let other = segments.site[j as usize];
-                    *functional.entry(other).or_insert_with(Vector::zeros) += b;
-                    *functional.entry(own).or_insert_with(Vector::zeros) -= b;
-                }
-            }
-        }
+        let (functionals, volumes) = handed(Kernel::Volumetric, segments, common, listed);
+        let other =
+            (common.deviatoric).map(|c| (c, handed(Kernel::Deviatoric, segments, common, listed)));
         let mut found = Self::none(0);
         for (carrier, handed) in functionals {
+            let of_other = other
+                .as_ref()
+                .map(|(c, (functionals, volumes))| (*c, &functionals[&carrier], volumes));
             match carrier {
-                Carrier::Point(i) => found.push(stiffness_of_point(segments, i), &handed, false),
-                Carrier::Cell(cell) => {
-                    let (mut own, mut size) = divergence(segments, cell);
-                    found.push(-common.bulk / size, &own, true);
-                    for (site, b) in handed {
-                        *own.entry(site).or_insert_with(Vector::zeros) += b;
+                Carrier::Point(i) => {
+                    let stiffness = stiffness_of_point(segments, i);
+                    match of_other {
+                        None => found.push(stiffness, &handed, false),
+                        Some((_, other, _)) => {
+                            let state = segments.body.state(i as usize);
+                            let c = state.and_then(deviatoric_of).unwrap_or(0.0)
+                                * segments.body.cloud.volume[i as usize];
+                            found.push_two([stiffness - c, c], [(&handed, 1.0), (other, 1.0)]);
+                        }
                     }
-                    size += volumes.get(&cell).copied().unwrap_or(0.0);
-                    found.push(common.bulk / size, &own, false);
+                }
+                Carrier::Cell(cell) => {
+                    let (own, size) = divergence(segments, cell);
+                    found.push(-common.bulk / size, &own, true);
+                    let whole = |handed: &Functional<D>, volumes: &BTreeMap<u32, f64>| {
+                        let size = size + volumes.get(&cell).copied().unwrap_or(0.0);
+                        (combined(&own, handed, 1.0), size)
+                    };
+                    let (first, size) = whole(&handed, &volumes);
+                    match of_other {
+                        None => found.push(common.bulk / size, &first, false),
+                        Some((c, other, volumes)) => {
+                            // points on a face hand the two different volumes
+                            let (other, other_size) = whole(other, volumes);
+                            found.push_two(
+                                [common.bulk + c, c],
+                                [(&first, size), (&other, other_size)],
+                            );
+                        }
+                    }
                 }
             }
         }
@@ -208,6 +274,15 @@ impl<const D: usize> Dilatations<D> {
             },
         );
         found
+    }
+
+    /// `½ κ θ² + ½ c (θ − θ_σ)² − ½ c θ_σ²` of the integrals of θ and θ_σ over these volumes.
+    fn push_two(&mut self, [kappa, c]: [f64; 2], [theta, sigma]: [(&Functional<D>, f64); 2]) {
+        let [size, other] = [theta.1, sigma.1];
+        self.push(kappa / size, theta.0, false);
+        let difference = combined(theta.0, sigma.0, -size / other);
+        self.push(c / size, &difference, false);
+        self.push(-c / other, sigma.0, false);
     }
 
     /// Whether no energy is negative but those that an element has already: a volume that pieces hand to an element may be less than none.
@@ -248,6 +323,73 @@ impl<const D: usize> Dilatations<D> {
             }
         }
     }
+}
+
+/// A functional and some of another.
+fn combined<const D: usize>(
+    first: &Functional<D>,
+    second: &Functional<D>,
+    factor: f64,
+) -> Functional<D> {
+    let mut sum = first.clone();
+    for (&site, b) in second {
+        *sum.entry(site).or_insert_with(Vector::zeros) += b * factor;
+    }
+    sum
+}
+
+/// What pieces, and the whole bonds of the points around, hand to the dilatations of one influence function, and the volumes that elements count as their own.
+fn handed<const D: usize>(
+    kernel: Kernel,
+    segments: &Segments<'_, D>,
+    common: &LpsConstants,
+    listed: &[bool],
+) -> (BTreeMap<Carrier, Functional<D>>, BTreeMap<u32, f64>) {
+    let body = segments.body;
+    let volume = &body.cloud.volume;
+    let mut functionals: BTreeMap<Carrier, Functional<D>> = BTreeMap::new();
+    let mut volumes: BTreeMap<u32, f64> = BTreeMap::new();
+    for s in &segments.cut {
+        let xi = body.bond(s.i as usize, s.j as usize);
+        let difference: Vec<(u32, f64)> = segments.difference(s).collect();
+        common.shares_of(kernel, segments, s, |carrier, factor| {
+            let functional = functionals.entry(carrier).or_default();
+            for &(site, w) in &difference {
+                *functional.entry(site).or_insert_with(Vector::zeros) += xi * (factor * w);
+            }
+            if let Carrier::Cell(cell) = carrier {
+                *volumes.entry(cell).or_default() += carried(segments, s, factor);
+            }
+        });
+    }
+    // whole bonds of the points around
+    let mut needed = vec![false; segments.site.len()];
+    for i in 0..needed.len() {
+        if segments.is_point(i as u32) && listed[i] {
+            needed[i] = true;
+            for &j in body.families.of(i) {
+                needed[j as usize] |= segments.is_point(j);
+            }
+        }
+    }
+    for i in (0..needed.len() as u32).filter(|&i| needed[i as usize]) {
+        let functional = functionals.entry(Carrier::Point(i)).or_default();
+        let own = segments.site[i as usize];
+        let (pair, omega) = body.kernel(i as usize);
+        let normal = kernel.of_point(body.state(i as usize));
+        for (k, &j) in body.families.of(i as usize).iter().enumerate() {
+            if segments.is_whole(i, j) {
+                let xi = body.bond(i as usize, j as usize);
+                let weight = kernel.of_bond((pair[k], omega[k]), &xi) * normal;
+                let share = segments.hands(i, j)[0] * weight * volume[j as usize];
+                let b = xi * share;
+                let other = segments.site[j as usize];
+                *functional.entry(other).or_insert_with(Vector::zeros) += b;
+                *functional.entry(own).or_insert_with(Vector::zeros) -= b;
+            }
+        }
+    }
+    (functionals, volumes)
 }
 
 /// The state of the law, if it has one.

@@ -63,7 +63,7 @@ use crate::{
 
 /// Bonds that leave the peridynamic zone end on the faces of the elements around it.
 ///
-/// Source: none; derived in `docs/truncated.md`. A transition zone, if the scene has one, is local. Pairwise laws and LPS on a regular lattice with one horizon.
+/// Source: none; derived in `docs/truncated.md`. A transition zone, if the scene has one, is local. Pairwise laws, LPS and position-aware solids on a regular lattice with one horizon.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Truncated {
     /// What becomes in motion of the bonds that the seam cuts.
@@ -105,6 +105,10 @@ impl<const D: usize> Coupling<D> for Truncated {
 
     fn interface(&self) -> Interface {
         Interface::Faces
+    }
+
+    fn takes_deviators(&self) -> bool {
+        true
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
@@ -150,8 +154,13 @@ impl Truncated {
             None => Dilatations::none(model.sites.len()),
         };
         // below the pairwise ratio dilatations take from the bonds what a fit has left them
+        let has_two = common
+            .as_ref()
+            .is_some_and(LpsConstants::has_two_dilatations);
         let squares = match &common {
             Some(common) if common.bulk < 0.0 => segments.is_squares,
+            // the energy that θ_σ takes back is that of the pairs
+            Some(_) if has_two => springs.is_positive(),
             _ => springs.is_positive() && dilatations.is_positive(),
         };
         let (whole, states) = match common {
@@ -161,6 +170,7 @@ impl Truncated {
         let pieces = Arc::new(Pieces {
             whole,
             squares,
+            has_two_dilatations: has_two,
             strings,
             springs,
             dilatations,
@@ -207,6 +217,8 @@ struct Pieces<const D: usize> {
     listed: Vec<bool>,
     /// Whether dilatations have a stiffness that is not negative.
     squares: bool,
+    /// Whether dilatations by two influence functions are taken from one another.
+    has_two_dilatations: bool,
 }
 
 impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
@@ -254,7 +266,8 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     }
 
     fn definiteness(&self) -> Definiteness {
-        match (self.pieces.squares, self.pieces.strings.is_empty()) {
+        let is_plain = self.pieces.strings.is_empty() && !self.pieces.has_two_dilatations;
+        match (self.pieces.squares, is_plain) {
             (true, true) => Definiteness::SumOfSquares,
             (true, false) => Definiteness::EdgeTerms,
             (false, _) => Definiteness::NegativeTerms,
@@ -262,7 +275,8 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
     }
 
     fn seam_bonds(&self) -> Option<NonlinearSeam<D>> {
-        if self.cut_bonds == CutBonds::Linear {
+        // what follows the motion has one dilatation
+        if self.cut_bonds == CutBonds::Linear || self.pieces.has_two_dilatations {
             return None;
         }
         let states = self.states.as_ref();

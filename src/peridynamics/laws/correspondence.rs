@@ -147,6 +147,7 @@ impl<const D: usize> LinearForceState<D> for Correspondence<D> {
             stabilisation: q,
             control,
             deviator: 0.0,
+            second: Tensor::zeros(),
             shape,
         }))
     }

@@ -143,6 +143,7 @@ impl<const D: usize> LinearForceState<D> for LinearPeridynamicSolid<D> {
             stabilisation: 0.0,
             control: 0.0,
             deviator: 0.0,
+            second: Tensor::zeros(),
             shape,
         }))
     }

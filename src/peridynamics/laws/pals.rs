@@ -8,7 +8,8 @@ use crate::{
     peridynamics::{
         BondEnergy, CalibrationFields, Conditions, DeformedFamily, EnergyDensity, Family,
         ForceState, HistoryLayout, Influence, Law, LinearForceState, Past, PdError, Present,
-        ShellTarget, StatePart, position_aware_influence,
+        ShellTarget, StatePart, StressFit,
+        position_aware_influence::{self, PositionAware},
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -57,6 +58,47 @@ impl<const D: usize> PositionAwareSolid<D> {
     /// κ of `D` dimensions \[Pa\].
     pub(super) fn bulk(&self) -> f64 {
         self.bulk
+    }
+
+    /// The influence function of the scene, bond by bond.
+    fn base(&self, family: &Family<'_, D>) -> Vec<f64> {
+        (family.bonds.iter().zip(family.factors))
+            .map(|(xi, factor)| factor * self.influence.value(xi.norm(), family.horizon))
+            .collect()
+    }
+
+    /// Overwrites the coefficients of a family with those of its influence functions.
+    fn state_part(
+        &self,
+        family: &Family<'_, D>,
+        weights: &PositionAware,
+        pair: &mut [f64],
+        omega: &mut [f64],
+    ) -> StatePart<D> {
+        omega.copy_from_slice(&weights.omega);
+        let mut shape = Tensor::<D>::zeros();
+        let mut second = Tensor::<D>::zeros();
+        for (k, xi) in family.bonds.iter().enumerate() {
+            let v = family.volumes[k];
+            pair[k] = 2.0 * self.shear * weights.sigma[k] / xi.norm_squared();
+            shape += xi * xi.transpose() * (omega[k] * v);
+            second += xi * xi.transpose() * (2.0 * self.shear * weights.sigma[k] * v);
+        }
+        // ½ θ² (κ + 2μ/D² Σ σ |ξ|² V): what θ stores in ½ κ θ² and in the square of ε
+        let d = D as f64;
+        let factor = self.bulk + second.trace() / (d * d);
+        let mut modulus = Tensor4::zeros();
+        for i in 0..D {
+            modulus.0[i][i] = Tensor::identity() * factor;
+        }
+        StatePart {
+            modulus,
+            stabilisation: 0.0,
+            control: 0.0,
+            deviator: 1.0 / d,
+            second,
+            shape,
+        }
     }
 
     /// θ of a family.
@@ -133,6 +175,10 @@ impl<const D: usize> LinearForceState<D> for PositionAwareSolid<D> {
         true
     }
 
+    fn fitted_to(&self, stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        Some(Box::new(FittedStress { law: self, stress }))
+    }
+
     fn divergence(&self) -> Influence {
         self.influence
     }
@@ -163,32 +209,63 @@ impl<const D: usize> LinearForceState<D> for PositionAwareSolid<D> {
         pair: &mut [f64],
         omega: &mut [f64],
     ) -> Result<Option<StatePart<D>>, PdError> {
-        let base: Vec<f64> = (family.bonds.iter().zip(family.factors))
-            .map(|(xi, factor)| factor * self.influence.value(xi.norm(), family.horizon))
-            .collect();
-        let weights = position_aware_influence::fit(family, &base, self.fields)?;
-        omega.copy_from_slice(&weights.omega);
-        let (mut shape, mut second) = (Tensor::<D>::zeros(), 0.0);
-        for (k, xi) in family.bonds.iter().enumerate() {
-            let (r2, v) = (xi.norm_squared(), family.volumes[k]);
-            pair[k] = 2.0 * self.shear * weights.sigma[k] / r2;
-            shape += xi * xi.transpose() * (omega[k] * v);
-            second += weights.sigma[k] * r2 * v;
-        }
-        // ½ θ² (κ + 2μ/D² Σ σ |ξ|² V): what θ stores in ½ κ θ² and in the square of ε
-        let d = D as f64;
-        let factor = self.bulk + 2.0 * self.shear / (d * d) * second;
-        let mut modulus = Tensor4::zeros();
-        for i in 0..D {
-            modulus.0[i][i] = Tensor::identity() * factor;
-        }
-        Ok(Some(StatePart {
-            modulus,
-            stabilisation: 0.0,
-            control: 0.0,
-            deviator: 1.0 / d,
-            shape,
-        }))
+        let weights = position_aware_influence::fit(family, &self.base(family), self.fields)?;
+        Ok(Some(self.state_part(family, &weights, pair, omega)))
+    }
+}
+
+/// A position-aware solid with a partial stress that is exact under affine fields on any family, whatever its calibration fields are.
+struct FittedStress<'a, const D: usize> {
+    law: &'a PositionAwareSolid<D>,
+    stress: StressFit,
+}
+
+impl<const D: usize> LinearForceState<D> for FittedStress<'_, D> {
+    fn is_pairwise(&self) -> bool {
+        self.law.is_pairwise()
+    }
+
+    fn is_ordinary(&self) -> bool {
+        self.law.is_ordinary()
+    }
+
+    fn has_deviators(&self) -> bool {
+        self.law.has_deviators()
+    }
+
+    fn divergence(&self) -> Influence {
+        self.law.divergence()
+    }
+
+    fn tensor(&self) -> &Tensor4<D> {
+        self.law.tensor()
+    }
+
+    fn kernel(&self, r: f64, horizon: f64) -> f64 {
+        self.law.kernel(r, horizon)
+    }
+
+    fn shell_target(&self) -> Option<ShellTarget> {
+        self.law.shell_target()
+    }
+
+    fn moment_conditions(
+        &self,
+        bonds: &[(Vector<D>, f64)],
+        horizon: f64,
+    ) -> Option<(Vec<f64>, Conditions<D>)> {
+        self.law.moment_conditions(bonds, horizon)
+    }
+
+    fn coefficients(
+        &self,
+        family: &Family<'_, D>,
+        pair: &mut [f64],
+        omega: &mut [f64],
+    ) -> Result<Option<StatePart<D>>, PdError> {
+        let base = self.law.base(family);
+        let weights = position_aware_influence::fit_stress(family, &base, self.stress)?;
+        Ok(Some(self.law.state_part(family, &weights, pair, omega)))
     }
 }
 

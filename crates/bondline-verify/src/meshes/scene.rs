@@ -156,7 +156,12 @@ pub enum SceneFailure {
 impl SceneFailure {
     /// Whether the seam of truncated bonds cannot be fitted.
     pub fn is_seam(&self) -> bool {
-        matches!(self, Self::Run(RunError::Model(ModelError::Seam { .. })))
+        matches!(
+            self,
+            Self::Run(RunError::Model(
+                ModelError::Seam { .. } | ModelError::TwoDilatations
+            ))
+        )
     }
 }
 
