@@ -1,0 +1,429 @@
+//! Viscoelastic solids of points and of finite elements, and what couples them, through scenes.
+
+use crate::laws::{STEPS, history, refused, scene};
+use crate::{column, run, same, write};
+
+/// A body whose boundary follows a field; in the middle of it is the zone of points, whose lattice cells fill it.
+const BODY: &str = r#"
+kinematics = "{kinematics}"
+coupling = "{coupling}"
+[mesh.{mesh}]
+min = {min}
+max = {max}
+{cells}
+[materials.m.{law}
+youngs-modulus = 1000
+poisson-ratio = 0.3
+density = 1
+[peridynamics]
+horizon = 1.5
+bonds = "linear"
+points.lattice = { spacing = {spacing}, origin = {origin} }
+[zones.nonlocal]
+box = { min = {from}, max = {to} }
+[conditions.strained.displacement]
+inside.without = { from = { box = { min = {below}, max = {above} } }, removed = { box = { min = {low}, max = {high} } } }
+{field}
+[output]
+vtu = false
+{stresses}
+[solve.quasi-static]
+duration = {duration}
+steps = {steps}
+tolerance = 1e-13
+"#;
+
+/// A side of the body, its bulk and its shear modulus at once.
+const SIDE: f64 = 6.0;
+const BULK: f64 = 1000.0 / 1.2;
+const SHEAR: f64 = 1000.0 / 2.6;
+
+/// The ramp ends here, and the run.
+const RAMP: f64 = 0.1;
+const END: f64 = 0.5;
+/// Steps of a twentieth.
+const STEP: f64 = 0.05;
+
+/// The gradient of the displacement that is reached, row by row; the part of a plane is that of its first two directions.
+type Gradient = [[f64; 3]; 3];
+const MIXED: Gradient = [[1e-3, 1.5e-3, 0.0], [-3e-4, -4e-4, 6e-4], [2e-4, 0.0, 7e-4]];
+/// Without a change of area.
+const DEVIATORIC: Gradient = [[1e-3, 1.5e-3, 0.0], [-3e-4, -1e-3, 0.0], [0.0; 3]];
+
+struct Case {
+    kinematics: &'static str,
+    coupling: &'static str,
+    gradient: Gradient,
+    /// The boundary over time, over its end.
+    course: &'static str,
+}
+
+impl Case {
+    fn dimension(&self) -> usize {
+        if self.kinematics == "solid" { 3 } else { 2 }
+    }
+
+    /// The scene with a law, whose table is not closed.
+    fn scene(&self, law: &str, (duration, steps): (f64, usize)) -> String {
+        let dimension = self.dimension();
+        let all = |x: f64| format!("{:?}", vec![x; dimension]);
+        let cells = if dimension == 3 { 6 } else { 12 };
+        let spacing = SIDE / f64::from(cells);
+        let axes = ["x", "y", "z"];
+        let cells = axes[..dimension]
+            .iter()
+            .map(|axis| format!("{axis} = {{ cells = {cells} }}\n"))
+            .collect::<String>();
+        let field = (0..dimension)
+            .map(|i| {
+                let sum: Vec<String> = (0..dimension)
+                    .map(|j| format!("({:e})*{}", self.gradient[i][j], axes[j]))
+                    .collect();
+                format!("{} = \"({})*{}\"\n", axes[i], sum.join("+"), self.course)
+            })
+            .collect::<String>();
+        // a stress across that a table of plane strain cannot have
+        let stresses = match self.kinematics {
+            "plane-strain" => String::new(),
+            _ => format!(
+                "stresses = [\"von-mises\"]\nlines.through = {{ from = {}, to = {}, samples = 23 }}",
+                all(0.3),
+                all(5.7)
+            ),
+        };
+        // the zone is as near to the boundary as points that complete its families allow
+        let (from, to) = if dimension == 3 {
+            (2.0, 4.0)
+        } else {
+            (2.0, 4.0)
+        };
+        BODY.replace("{kinematics}", self.kinematics)
+            .replace("{coupling}", self.coupling)
+            .replace("{mesh}", if dimension == 3 { "box" } else { "rectangle" })
+            .replace("{cells}", &cells)
+            .replace("{law}", law)
+            .replace("{spacing}", &spacing.to_string())
+            .replace("{origin}", &all(0.5 * spacing))
+            .replace("{min}", &all(0.0))
+            .replace("{max}", &all(SIDE))
+            .replace("{from}", &all(from))
+            .replace("{to}", &all(to))
+            .replace("{below}", &all(-1.0))
+            .replace("{above}", &all(SIDE + 1.0))
+            .replace("{low}", &all(0.6 * spacing))
+            .replace("{high}", &all(SIDE - 0.6 * spacing))
+            .replace("{field}", &field)
+            .replace("{stresses}", &stresses)
+            .replace("{duration}", &duration.to_string())
+            .replace("{steps}", &steps.to_string())
+    }
+
+    /// The strain that is reached, zero out of a plane.
+    fn strain(&self) -> Gradient {
+        let d = self.dimension();
+        let g = self.gradient;
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| match i < d && j < d {
+                true => 0.5 * (g[i][j] + g[j][i]),
+                false => 0.0,
+            })
+        })
+    }
+}
+
+/// A pave, or correspondence, material of three arms, one of them given.
+fn law(key: &str, share: f64, time: f64) -> String {
+    format!(
+        "{key}]\nrelaxing-share = {share}\nrelaxation-time = {time}\nrelaxing-share-2 = 0.1\nrelaxation-time-2 = 0.3\nrelaxing-share-16 = 0.05\nrelaxation-time-16 = 20"
+    )
+}
+
+/// The arms of [`law`], and what lasts.
+fn arms(share: f64, time: f64) -> ([(f64, f64); 3], f64) {
+    ([(share, time), (0.1, 0.3), (0.05, 20.0)], 0.85 - share)
+}
+
+/// Of a strain that grows to 1 until [`RAMP`] and is held: the spring in an arm of the time τ, and the work per stiffness, in closed form.
+fn arm(time: f64, t: f64) -> (f64, f64) {
+    let x = t.min(RAMP) / time;
+    let q = time / RAMP * -(-x).exp_m1() * (-(t - t.min(RAMP)) / time).exp();
+    let scale = time / RAMP;
+    (q, scale * scale * (x + (-x).exp_m1()))
+}
+
+/// `[stored, dissipated]` per volume, the stress over the elastic one of the deviator, at a time of the ramp or later.
+fn exact(strain: &Gradient, (share, time): (f64, f64), t: f64) -> ([f64; 2], f64) {
+    let (arms, lasting) = arms(share, time);
+    let theta = strain[0][0] + strain[1][1] + strain[2][2];
+    let square: f64 = (0..9)
+        .map(|k| {
+            let (i, j) = (k / 3, k % 3);
+            let mean = if i == j { theta / 3.0 } else { 0.0 };
+            (strain[i][j] - mean).powi(2)
+        })
+        .sum();
+    let grown = t.min(RAMP) / RAMP;
+    let mut carried = lasting * grown;
+    let (mut stored, mut work) = (0.5 * lasting * grown * grown, 0.5 * lasting * grown * grown);
+    for (share, time) in arms {
+        let (q, of_arm) = arm(time, t);
+        carried += share * q;
+        stored += 0.5 * share * q * q;
+        work += share * of_arm;
+    }
+    let volumetric = 0.5 * BULK * theta * theta * grown * grown;
+    let deviatoric = 2.0 * SHEAR * square;
+    (
+        [
+            volumetric + deviatoric * stored,
+            deviatoric * (work - stored),
+        ],
+        carried,
+    )
+}
+
+const COURSE: &str = "min(10*t, 1)";
+
+#[test]
+fn bodies_that_are_strained_and_held_relax_as_their_prony_series_through_every_seam() {
+    let cases = [
+        ("local", "plane-strain", MIXED),
+        ("local", "plane-stress", DEVIATORIC),
+        ("nonlocal", "plane-strain", MIXED),
+        ("nonlocal", "plane-stress", DEVIATORIC),
+        ("splice", "plane-strain", MIXED),
+        ("splice", "plane-stress", DEVIATORIC),
+        ("local", "solid", MIXED),
+        ("nonlocal", "solid", MIXED),
+        ("splice", "solid", MIXED),
+    ];
+    for (coupling, kinematics, gradient) in cases {
+        for key in ["pave", "viscoelastic-correspondence"] {
+            // Δt/τ of 0.01, 1 and 10
+            for (share, time) in [(0.5, 5.0), (0.8, 0.05), (0.3, 0.005)] {
+                if kinematics == "solid" && time == 0.05 {
+                    continue;
+                }
+                let case = Case {
+                    kinematics,
+                    coupling,
+                    gradient,
+                    course: COURSE,
+                };
+                relaxes(&case, key, (share, time));
+            }
+        }
+    }
+}
+
+fn relaxes(case: &Case, key: &str, (share, time): (f64, f64)) {
+    let folder = tempfile::tempdir().unwrap();
+    let steps = (END / STEP).round() as usize;
+    let typed = case.scene(&law(key, share, time), (END, steps));
+    let names = ["time", "stored_energy", "dissipated_energy"];
+    let found = history(folder.path(), &typed, &names);
+    let name = format!("{key} {} {} {time}", case.coupling, case.kinematics);
+    let strain = case.strain();
+    let volume = SIDE.powi(case.dimension() as i32);
+    assert_eq!(found[0].len(), steps + 1, "{name}");
+    for (k, &t) in found[0].iter().enumerate() {
+        assert!((t - STEP * k as f64).abs() < 1e-12);
+        let (energies, _) = exact(&strain, (share, time), t);
+        let ([largest, _], _) = exact(&strain, (share, time), RAMP);
+        for (column, expected) in found[1..].iter().zip(energies) {
+            let off = column[k] / volume - expected;
+            assert!(
+                off.abs() < 1e-10 * largest,
+                "{name}, step {k}: {off:e} {expected:e}"
+            );
+        }
+    }
+    if case.kinematics == "plane-strain" {
+        return;
+    }
+    stresses(folder.path(), case, &name, |t, i, j| {
+        let theta = strain[0][0] + strain[1][1] + strain[2][2];
+        let (_, carried) = exact(&strain, (share, time), t);
+        let (mean, pressure) = match i == j {
+            true => (theta / 3.0, BULK * theta * t.min(RAMP) / RAMP),
+            false => (0.0, 0.0),
+        };
+        pressure + 2.0 * SHEAR * (strain[i][j] - mean) * carried
+    });
+}
+
+/// Compares the stress along the line with what it should be at a time, to 1e-10 of the largest at the end of the ramp.
+fn stresses(
+    folder: &std::path::Path,
+    case: &Case,
+    name: &str,
+    expected: impl Fn(f64, usize, usize) -> f64,
+) {
+    let path = folder.join("out/bar_through.csv");
+    let d = case.dimension();
+    let axes = ["x", "y", "z"];
+    let times = column(&path, "time");
+    let scale = (0..d)
+        .map(|i| expected(RAMP, i, i).abs())
+        .fold(expected(RAMP, 0, 1).abs(), f64::max);
+    let is_point: Vec<bool> = column(&path, "model").iter().map(|m| *m > 0.0).collect();
+    let both = is_point.contains(&true) && is_point.contains(&false);
+    assert_eq!(both, case.coupling == "splice", "{name}");
+    for (i, j) in (0..d).flat_map(|i| (i..d).map(move |j| (i, j))) {
+        let found = column(&path, &format!("s{}{}", axes[i], axes[j]));
+        assert!(found.len() >= 4 * 23, "{name}: {}", found.len());
+        for (k, (&stress, &t)) in found.iter().zip(&times).enumerate() {
+            let off = stress - expected(t, i, j);
+            assert!(
+                off.abs() < 1e-10 * scale,
+                "{name}, s{}{} at {t}, sample {k} ({}): {off:e} of {scale}",
+                axes[i],
+                axes[j],
+                is_point[k]
+            );
+        }
+    }
+}
+
+/// What a plate in plane stress carries of its area's growth, by integrating `σ_z = 0` in time with far shorter steps than any that is taken, and extrapolating: `ε_z` along the course of [`COURSE`].
+///
+/// Newton's law of each dashpot with the implicit trapezoidal rule: nothing of the recurrence of the code.
+fn mean_stress(theta: f64, (share, time): (f64, f64), t: f64) -> f64 {
+    let (arms, lasting) = arms(share, time);
+    let integrated = |parts: usize| {
+        // α_i is the strain across of dashpot i, z that of the solid: σ_z = 3/2 K (z + θ) + 2 μ [z − Σ λ α]
+        let solve = |theta: f64, relaxed: f64| {
+            -(1.5 * BULK * theta - 2.0 * SHEAR * relaxed) / (1.5 * BULK + 2.0 * SHEAR)
+        };
+        let (mut alpha, mut z) = ([0.0; 3], 0.0);
+        let at = |s: f64| theta * s.min(RAMP) / RAMP;
+        // the ramp has its own steps, so that none of them has a kink within
+        let pieces = [(0.0, t.min(RAMP)), (t.min(RAMP), t)];
+        for (from, to) in pieces.into_iter().filter(|(from, to)| to > from) {
+            let h = (to - from) / parts as f64;
+            for n in 1..=parts {
+                let theta = at(from + h * n as f64);
+                // fixed-point iteration of the implicit rule
+                let (before, z_before) = (alpha, z);
+                for _ in 0..60 {
+                    let relaxed: f64 = arms.iter().zip(&alpha).map(|((l, _), a)| l * a).sum();
+                    z = solve(theta, relaxed);
+                    for (i, (_, time)) in arms.iter().enumerate() {
+                        let rate = 0.5 * h / time;
+                        alpha[i] =
+                            (before[i] + rate * (z_before - before[i]) + rate * z) / (1.0 + rate);
+                    }
+                }
+            }
+        }
+        let relaxed: f64 = arms.iter().zip(&alpha).map(|((l, _), a)| l * a).sum();
+        let grown = at(t);
+        let whole = 1.5 * (z + grown);
+        debug_assert!(lasting > 0.0);
+        BULK * whole - SHEAR * (z - relaxed)
+    };
+    let (coarse, fine) = (integrated(2000), integrated(4000));
+    fine + (fine - coarse) / 3.0
+}
+
+#[test]
+fn a_plate_in_plane_stress_relaxes_as_its_solid_to_second_order_and_alike_through_the_seam() {
+    let theta = MIXED[0][0] + MIXED[1][1];
+    let (share, time) = (0.6, 0.2);
+    for key in ["pave", "viscoelastic-correspondence"] {
+        for coupling in ["local", "nonlocal", "splice"] {
+            let case = Case {
+                kinematics: "plane-stress",
+                coupling,
+                gradient: MIXED,
+                course: COURSE,
+            };
+            let mut errors = Vec::new();
+            for steps in [5, 10, 20] {
+                let folder = tempfile::tempdir().unwrap();
+                let typed = case.scene(&law(key, share, time), (END, steps));
+                history(folder.path(), &typed, &["time"]);
+                let path = folder.path().join("out/bar_through.csv");
+                let [sxx, syy, times] = ["sxx", "syy", "time"].map(|name| column(&path, name));
+                // all samples of a state are alike
+                let mut least = (f64::INFINITY, f64::NEG_INFINITY);
+                for (k, t) in times.iter().enumerate() {
+                    if (t - END).abs() < 1e-12 {
+                        let mean = 0.5 * (sxx[k] + syy[k]);
+                        least = (least.0.min(mean), least.1.max(mean));
+                    }
+                }
+                let exact = mean_stress(theta, (share, time), END);
+                let name = format!("{key} {coupling} {steps}");
+                assert!(
+                    least.1 - least.0 < 1e-10 * exact.abs(),
+                    "{name}: {:e}",
+                    least.1 - least.0
+                );
+                errors.push((least.0 / exact - 1.0).abs());
+            }
+            for pair in errors.windows(2) {
+                let order = (pair[0] / pair[1]).log2();
+                assert!((1.7..2.4).contains(&order), "{key} {coupling}: {errors:?}");
+            }
+            assert!(errors[2] < 1e-3, "{key} {coupling}: {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn a_coupled_bar_that_is_held_relaxes_as_youngs_modulus_does() {
+    // one arm: E* = 9 K G*/(3 K + G*) has one as well, of the time τ (3 K + G)/(3 K + G_∞)
+    let (share, time) = (0.7, 0.4);
+    let law = format!(
+        "viscoelastic-correspondence]\npoisson-ratio = 0.3\nrelaxing-share = {share}\nrelaxation-time = {time}"
+    );
+    let lasting = SHEAR * (1.0 - share);
+    let end = 9.0 * BULK * lasting / (3.0 * BULK + lasting);
+    let slow = time * (3.0 * BULK + SHEAR) / (3.0 * BULK + lasting);
+    for coupling in ["local", "nonlocal", "splice"] {
+        let mut errors = Vec::new();
+        for steps in [10, 20] {
+            let folder = tempfile::tempdir().unwrap();
+            let rest = STEPS
+                .replace("steps = 5", &format!("steps = {steps}"))
+                .replace("1e-11", "1e-13");
+            let typed = scene(coupling, &law, &rest)
+                .replace("\"0.1*t\"", "\"0.1*min(10*t, 1)\"")
+                .replace("[output]", "[output]\nvtu = false\nstresses = [\"von-mises\"]\nlines.along = { from = 0.55, to = 9.45, samples = 20 }");
+            let found = history(folder.path(), &typed, &["time", "right_reaction_x"]);
+            let path = folder.path().join("out/bar_along.csv");
+            let [times, stress] = ["time", "sxx"].map(|name| column(&path, name));
+            let of_time = |t: f64| {
+                let all = times.iter().zip(&stress);
+                let at = all.filter(|(s, _)| (*s - t).abs() < 1e-9);
+                at.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, s)| {
+                    (low.min(*s), high.max(*s))
+                })
+            };
+            let t = 1.0;
+            let (low, high) = of_time(t);
+            assert!(
+                high - low < 1e-10 * high && low > 0.0,
+                "{coupling}: {:e} {high}",
+                high - low
+            );
+            let reaction = *found[1].last().unwrap();
+            assert!((reaction / high - 1.0).abs() < 1e-9, "{coupling}");
+            // the mean strain of the bar between its ends grows until 0.1 and is held
+            let kept = slow / 0.1 * -(-0.1 / slow).exp_m1() * (-(t - 0.1) / slow).exp();
+            let strain = match coupling {
+                // its ends have families of their own
+                "nonlocal" => continue,
+                _ => 0.01,
+            };
+            let exact = strain * (end + (1000.0 - end) * kept);
+            errors.push((high / exact - 1.0).abs());
+        }
+        if let [coarse, fine] = errors[..] {
+            let order = (coarse / fine).log2();
+            assert!((1.7..2.4).contains(&order), "{coupling}: {errors:?}");
+            assert!(fine < 2e-3, "{coupling}: {errors:?}");
+        }
+    }
+}
