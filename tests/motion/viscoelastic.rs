@@ -132,16 +132,16 @@ impl Case {
     }
 }
 
-/// A pave, or correspondence, material of three arms, one of them given.
+/// A pave, or correspondence, material of three arms, one of them given; of the others a step is once and ten times the relaxation time.
 fn law(key: &str, share: f64, time: f64) -> String {
     format!(
-        "{key}]\nrelaxing-share = {share}\nrelaxation-time = {time}\nrelaxing-share-2 = 0.1\nrelaxation-time-2 = 0.3\nrelaxing-share-16 = 0.05\nrelaxation-time-16 = 20"
+        "{key}]\nrelaxing-share = {share}\nrelaxation-time = {time}\nrelaxing-share-2 = 0.15\nrelaxation-time-2 = 0.05\nrelaxing-share-16 = 0.1\nrelaxation-time-16 = 0.005"
     )
 }
 
 /// The arms of [`law`], and what lasts.
 fn arms(share: f64, time: f64) -> ([(f64, f64); 3], f64) {
-    ([(share, time), (0.1, 0.3), (0.05, 20.0)], 0.85 - share)
+    ([(share, time), (0.15, 0.05), (0.1, 0.005)], 0.75 - share)
 }
 
 /// Of a strain that grows to 1 until [`RAMP`] and is held: the spring in an arm of the time τ, and the work per stiffness, in closed form.
@@ -200,30 +200,26 @@ fn bodies_that_are_strained_and_held_relax_as_their_prony_series_through_every_s
     ];
     for (coupling, kinematics, gradient) in cases {
         for key in ["pave", "viscoelastic-correspondence"] {
-            // Δt/τ of 0.01, 1 and 10
-            for (share, time) in [(0.5, 5.0), (0.8, 0.05), (0.3, 0.005)] {
-                if kinematics == "solid" && time == 0.05 {
-                    continue;
-                }
-                let case = Case {
-                    kinematics,
-                    coupling,
-                    gradient,
-                    course: COURSE,
-                };
-                relaxes(&case, key, (share, time));
-            }
+            let case = Case {
+                kinematics,
+                coupling,
+                gradient,
+                course: COURSE,
+            };
+            relaxes(&case, key);
         }
     }
 }
 
-fn relaxes(case: &Case, key: &str, (share, time): (f64, f64)) {
+fn relaxes(case: &Case, key: &str) {
+    // a hundredth of it
+    let (share, time) = (0.4, 5.0);
     let folder = tempfile::tempdir().unwrap();
     let steps = (END / STEP).round() as usize;
     let typed = case.scene(&law(key, share, time), (END, steps));
     let names = ["time", "stored_energy", "dissipated_energy"];
     let found = history(folder.path(), &typed, &names);
-    let name = format!("{key} {} {} {time}", case.coupling, case.kinematics);
+    let name = format!("{key} {} {}", case.coupling, case.kinematics);
     let strain = case.strain();
     let volume = SIDE.powi(case.dimension() as i32);
     assert_eq!(found[0].len(), steps + 1, "{name}");
@@ -286,51 +282,12 @@ fn stresses(
     }
 }
 
-/// What a plate in plane stress carries of its area's growth, by integrating `σ_z = 0` in time with far shorter steps than any that is taken, and extrapolating: `ε_z` along the course of [`COURSE`].
-///
-/// Newton's law of each dashpot with the implicit trapezoidal rule: nothing of the recurrence of the code.
-fn mean_stress(theta: f64, (share, time): (f64, f64), t: f64) -> f64 {
-    let (arms, lasting) = arms(share, time);
-    let integrated = |parts: usize| {
-        // α_i is the strain across of dashpot i, z that of the solid: σ_z = 3/2 K (z + θ) + 2 μ [z − Σ λ α]
-        let solve = |theta: f64, relaxed: f64| {
-            -(1.5 * BULK * theta - 2.0 * SHEAR * relaxed) / (1.5 * BULK + 2.0 * SHEAR)
-        };
-        let (mut alpha, mut z) = ([0.0; 3], 0.0);
-        let at = |s: f64| theta * s.min(RAMP) / RAMP;
-        // the ramp has its own steps, so that none of them has a kink within
-        let pieces = [(0.0, t.min(RAMP)), (t.min(RAMP), t)];
-        for (from, to) in pieces.into_iter().filter(|(from, to)| to > from) {
-            let h = (to - from) / parts as f64;
-            for n in 1..=parts {
-                let theta = at(from + h * n as f64);
-                // fixed-point iteration of the implicit rule
-                let (before, z_before) = (alpha, z);
-                for _ in 0..60 {
-                    let relaxed: f64 = arms.iter().zip(&alpha).map(|((l, _), a)| l * a).sum();
-                    z = solve(theta, relaxed);
-                    for (i, (_, time)) in arms.iter().enumerate() {
-                        let rate = 0.5 * h / time;
-                        alpha[i] =
-                            (before[i] + rate * (z_before - before[i]) + rate * z) / (1.0 + rate);
-                    }
-                }
-            }
-        }
-        let relaxed: f64 = arms.iter().zip(&alpha).map(|((l, _), a)| l * a).sum();
-        let grown = at(t);
-        let whole = 1.5 * (z + grown);
-        debug_assert!(lasting > 0.0);
-        BULK * whole - SHEAR * (z - relaxed)
-    };
-    let (coarse, fine) = (integrated(2000), integrated(4000));
-    fine + (fine - coarse) / 3.0
-}
-
 #[test]
 fn a_plate_in_plane_stress_relaxes_as_its_solid_to_second_order_and_alike_through_the_seam() {
     let theta = MIXED[0][0] + MIXED[1][1];
-    let (share, time) = (0.6, 0.2);
+    let (share, time) = ONE_ARM;
+    // that of plane stress is 9 K G/(3 K + 4 G)
+    let exact = theta * left_of_a_modulus(4.0, END);
     for key in ["pave", "viscoelastic-correspondence"] {
         for coupling in ["local", "nonlocal", "splice"] {
             let case = Case {
@@ -342,7 +299,8 @@ fn a_plate_in_plane_stress_relaxes_as_its_solid_to_second_order_and_alike_throug
             let mut errors = Vec::new();
             for steps in [5, 10, 20] {
                 let folder = tempfile::tempdir().unwrap();
-                let typed = case.scene(&law(key, share, time), (END, steps));
+                let law = format!("{key}]\nrelaxing-share = {share}\nrelaxation-time = {time}");
+                let typed = case.scene(&law, (END, steps));
                 history(folder.path(), &typed, &["time"]);
                 let path = folder.path().join("out/bar_through.csv");
                 let [sxx, syy, times] = ["sxx", "syy", "time"].map(|name| column(&path, name));
@@ -354,7 +312,6 @@ fn a_plate_in_plane_stress_relaxes_as_its_solid_to_second_order_and_alike_throug
                         least = (least.0.min(mean), least.1.max(mean));
                     }
                 }
-                let exact = mean_stress(theta, (share, time), END);
                 let name = format!("{key} {coupling} {steps}");
                 assert!(
                     least.1 - least.0 < 1e-10 * exact.abs(),
@@ -372,12 +329,13 @@ fn a_plate_in_plane_stress_relaxes_as_its_solid_to_second_order_and_alike_throug
     }
 }
 
-/// Young's modulus that is left at a time when the strain grew until [`RAMP`] and was held, of one arm: `E* = 9 K G*/(3 K + G*)` has one arm as well, of the time `τ (3 K + G)/(3 K + G_∞)`.
-fn left_of_youngs_modulus((share, time): (f64, f64), t: f64) -> f64 {
+/// The modulus `9 K G/(3 K + c G)` that is left at a time when the strain grew until [`RAMP`] and was held: with [`ONE_ARM`] in G it has one as well, of the time `τ (3 K + c G)/(3 K + c G_∞)`.
+fn left_of_a_modulus(c: f64, t: f64) -> f64 {
+    let (share, time) = ONE_ARM;
+    let modulus = |shear: f64| 9.0 * BULK * shear / (3.0 * BULK + c * shear);
     let lasting = SHEAR * (1.0 - share);
-    let end = 9.0 * BULK * lasting / (3.0 * BULK + lasting);
-    let slow = time * (3.0 * BULK + SHEAR) / (3.0 * BULK + lasting);
-    end + (1000.0 - end) * arm(slow, t).0
+    let slow = time * (3.0 * BULK + c * SHEAR) / (3.0 * BULK + c * lasting);
+    modulus(lasting) + (modulus(SHEAR) - modulus(lasting)) * arm(slow, t).0
 }
 
 /// A bar, or a plate whose sides are free, between two ends that are drawn apart by a hundredth of its length, in equal steps of one second in all.
@@ -441,7 +399,8 @@ fn bars_and_plates_that_are_drawn_and_held_relax_as_youngs_modulus_does() {
             let height = if kinematics == "bar" { 1.0 } else { SIDE };
             let reaction = *reaction[0].last().unwrap() / height;
             assert!((reaction / last - 1.0).abs() < 1e-9, "{name}: {reaction}");
-            let exact = 0.01 * left_of_youngs_modulus(ONE_ARM, 1.0);
+            // Young's modulus is 9 K G/(3 K + G)
+            let exact = 0.01 * left_of_a_modulus(1.0, 1.0);
             errors.push((last / exact - 1.0).abs());
         }
         let order = (errors[0] / errors[1]).log2();
@@ -542,17 +501,16 @@ fn a_struck_plate_accounts_for_its_energy_and_goes_on_from_its_checkpoint() {
             lost[last],
             kinetic[0]
         );
-        let off =
-            (kinetic[last] + stored[last] + lost[last] - work[last] - kinetic[0]) / kinetic[0];
+        let given = kinetic[0] + work[last];
+        let off = (kinetic[last] + stored[last] + lost[last] - given) / given;
         missing.push((name, off));
     }
-    if std::env::var("MX").is_ok() {
-        println!("{}", struck("splice", "pave"));
-        println!("{}", struck("nonlocal", "pave"));
-    }
-    println!("{missing:?}");
+    // that of the time step, which is of second order in it: a quarter at half of the step
+    let most = missing[0].1.abs();
+    assert!(most < 2e-3, "{missing:?}");
+    // and a splice, which has no energy of its own, no more
     assert!(
-        missing.iter().all(|(_, off)| off.abs() < 1e-3),
+        missing.iter().all(|(_, off)| off.abs() <= most),
         "{missing:?}"
     );
 }
@@ -612,7 +570,7 @@ fn what_has_no_time_or_no_like_on_the_other_side_is_refused() {
         "truncated",
     );
     for key in ["pave", "viscoelastic-correspondence"] {
-        refused(&of("splice", &law(key, 0.9, 1.0)), "add up to 1.05");
+        refused(&of("splice", &law(key, 0.9, 1.0)), "add up to 1.15");
         refused(&of("splice", &law(key, -0.1, 1.0)), "must lie between");
         refused(&of("splice", &law(key, 0.1, 0.0)), "must lie between");
         let lacks = format!("{key}]\nrelaxing-share = 0.5");
