@@ -297,7 +297,7 @@ fn a_plate_in_plane_stress_relaxes_as_its_solid_to_second_order_and_alike_throug
                 course: COURSE,
             };
             let mut errors = Vec::new();
-            for steps in [5, 10, 20] {
+            for steps in [5, 10] {
                 let folder = tempfile::tempdir().unwrap();
                 let law = format!("{key}]\nrelaxing-share = {share}\nrelaxation-time = {time}");
                 let typed = case.scene(&law, (END, steps));
@@ -320,11 +320,9 @@ fn a_plate_in_plane_stress_relaxes_as_its_solid_to_second_order_and_alike_throug
                 );
                 errors.push((least.0 / exact - 1.0).abs());
             }
-            for pair in errors.windows(2) {
-                let order = (pair[0] / pair[1]).log2();
-                assert!((1.7..2.4).contains(&order), "{key} {coupling}: {errors:?}");
-            }
-            assert!(errors[2] < 1e-3, "{key} {coupling}: {errors:?}");
+            let order = (errors[0] / errors[1]).log2();
+            assert!((1.7..2.4).contains(&order), "{key} {coupling}: {errors:?}");
+            assert!(errors[1] < 3e-4, "{key} {coupling}: {errors:?}");
         }
     }
 }
@@ -338,12 +336,15 @@ fn left_of_a_modulus(c: f64, t: f64) -> f64 {
     modulus(lasting) + (modulus(SHEAR) - modulus(lasting)) * arm(slow, t).0
 }
 
-/// A bar, or a plate whose sides are free, between two ends that are drawn apart by a hundredth of its length, in equal steps of one second in all.
+/// A bar, or a plate whose sides are free, between two ends that are drawn apart by a hundredth of its length, in equal steps over half a second.
 fn drawn(kinematics: &'static str, coupling: &'static str, key: &str, steps: usize) -> String {
     let (share, time) = ONE_ARM;
     let law = format!("{key}]\nrelaxing-share = {share}\nrelaxation-time = {time}");
     if kinematics == "bar" {
-        let rest = STEPS.replace("steps = 5", &format!("steps = {steps}"));
+        let rest = STEPS.replace(
+            "duration = 1\nsteps = 5",
+            &format!("duration = {END}\nsteps = {steps}"),
+        );
         return scene(coupling, &format!("{law}\npoisson-ratio = 0.3"), &rest)
             .replace("\"0.1*t\"", &format!("\"0.1*{COURSE}\""))
             .replace("1e-11", "1e-13")
@@ -355,7 +356,7 @@ fn drawn(kinematics: &'static str, coupling: &'static str, key: &str, steps: usi
         gradient: MIXED,
         course: COURSE,
     };
-    let typed = case.scene(&law, (1.0, steps));
+    let typed = case.scene(&law, (END, steps));
     let (begin, end) = (
         typed.find("[conditions").unwrap(),
         typed.find("[output").unwrap(),
@@ -381,13 +382,13 @@ fn bars_and_plates_that_are_drawn_and_held_relax_as_youngs_modulus_does() {
     ] {
         let name = format!("{kinematics} {coupling} {key}");
         let mut errors = Vec::new();
-        for steps in [10, 20] {
+        for steps in [5, 10] {
             let folder = tempfile::tempdir().unwrap();
             let typed = drawn(kinematics, coupling, key, steps);
             let reaction = history(folder.path(), &typed, &["right_reaction_x"]);
             let path = folder.path().join("out/bar_through.csv");
             let [times, stress] = ["time", "sxx"].map(|name| column(&path, name));
-            let at_end = times.iter().zip(&stress).filter(|(t, _)| **t == 1.0);
+            let at_end = times.iter().zip(&stress).filter(|(t, _)| **t == END);
             let last = *at_end.last().unwrap().1;
             for time in &times {
                 let alike = times.iter().zip(&stress).filter(|(t, _)| *t == time);
@@ -400,12 +401,12 @@ fn bars_and_plates_that_are_drawn_and_held_relax_as_youngs_modulus_does() {
             let reaction = *reaction[0].last().unwrap() / height;
             assert!((reaction / last - 1.0).abs() < 1e-9, "{name}: {reaction}");
             // Young's modulus is 9 K G/(3 K + G)
-            let exact = 0.01 * left_of_a_modulus(1.0, 1.0);
+            let exact = 0.01 * left_of_a_modulus(1.0, END);
             errors.push((last / exact - 1.0).abs());
         }
         let order = (errors[0] / errors[1]).log2();
         assert!((1.7..2.4).contains(&order), "{name}: {errors:?}");
-        assert!(errors[1] < 2e-3, "{name}: {errors:?}");
+        assert!(errors[1] < 3e-4, "{name}: {errors:?}");
     }
 }
 
@@ -465,7 +466,7 @@ fn struck(coupling: &'static str, key: &str) -> String {
     let solve = typed.find("[solve").unwrap();
     let moved = "[initial.u.velocity]\nx = \"0.02*sin(pi*x/6)\"\ny = \"0.01*cos(pi*y/6)\"\n[conditions.left.displacement]\ninside.box = { min = [-1, -1], max = [0.6, 7] }\nx = 0\n[conditions.right.displacement]\ninside.box = { min = [5.4, -1], max = [7, 7] }\nx = \"0.01*t\"\n";
     format!(
-        "{}{moved}{}[solve.explicit]\nduration = 1\noutputs = 4\nhistory-interval = 0.05\ncheckpoint-every = 30\ngrowing-modes = \"warn\"\n",
+        "{}{moved}{}[solve.explicit]\nduration = 0.2\nstep-fraction = 0.45\noutputs = 2\nhistory-interval = 0.02\ncheckpoint-every = 15\ngrowing-modes = \"warn\"\n",
         &typed[..begin],
         &typed[end..solve]
     )
@@ -517,7 +518,7 @@ fn a_struck_plate_accounts_for_its_energy_and_goes_on_from_its_checkpoint() {
 
 #[test]
 fn load_steps_of_a_coupled_plate_go_on_with_the_same_bits_on_any_threads() {
-    let typed = drawn("plane-stress", "splice", "pave", 10) + "checkpoint-every = 3\n";
+    let typed = drawn("plane-stress", "splice", "pave", 5) + "checkpoint-every = 2\n";
     let whole = crate::resumes_with_the_same_bytes(&typed);
     let folder = tempfile::tempdir().unwrap();
     for (name, typed) in [("steps", typed), ("struck", struck("splice", "pave"))] {
