@@ -137,3 +137,120 @@ impl LocalLaw<3> for GeneralisedMaxwell {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Kinematics, Reduced};
+    use std::sync::Arc;
+
+    const LAME: (f64, f64) = (600.0, 400.0);
+
+    fn solid(arms: &[(f64, f64)]) -> GeneralisedMaxwell {
+        GeneralisedMaxwell::new(LAME.0, LAME.1, PronySeries::new(arms.to_vec()))
+    }
+
+    /// Responses to gradients one after another, each after a step of its own length.
+    fn along<const D: usize>(
+        law: &dyn LocalLaw<D>,
+        path: &[(f64, Tensor<D>)],
+    ) -> Vec<LocalResponse<D>> {
+        let mut past = vec![0.0; law.history().len()];
+        let mut found = Vec::new();
+        for (step, gradient) in path {
+            let mut present = past.clone();
+            found.push(law.respond(gradient, *step, &past, &mut present));
+            past = present;
+        }
+        found
+    }
+
+    #[test]
+    fn a_solid_that_is_sheared_at_a_rate_has_its_closed_form_and_its_bulk_is_elastic() {
+        let (share, time, rate) = (0.6, 0.4, 0.02);
+        let law = solid(&[(share, time)]);
+        let grown = |t: f64| {
+            let mut g = Tensor::<3>::identity() * (0.01 * t);
+            g[(0, 2)] = rate * t;
+            g
+        };
+        // steps of 0.01 to 10 relaxation times
+        let steps = [0.004, 0.3, 4.0];
+        let mut t = 0.0;
+        let path: Vec<_> = steps
+            .iter()
+            .map(|step| {
+                t += step;
+                (*step, grown(t))
+            })
+            .collect();
+        let mut t = 0.0;
+        for (step, found) in steps.iter().zip(along(&law, &path)) {
+            t += step;
+            let shear =
+                LAME.1 * rate * ((1.0 - share) * t + share * time * (1.0 - (-t / time).exp()));
+            assert!((found.stress[(0, 2)] - shear).abs() < 1e-13 * LAME.1);
+            assert_eq!(found.stress[(0, 2)], found.stress[(2, 0)]);
+            let pressure = (LAME.0 + 2.0 / 3.0 * LAME.1) * 0.03 * t;
+            for i in 0..3 {
+                assert!((found.stress[(i, i)] - pressure).abs() < 1e-12 * LAME.0);
+            }
+        }
+    }
+
+    #[test]
+    fn work_is_stored_or_dissipated_in_any_body_and_nothing_is_gained() {
+        fn balances<const D: usize>(kinematics: Kinematics) {
+            let law = Reduced::<D>::new(Arc::new(solid(&[(0.3, 0.4), (0.5, 3.0)])), kinematics);
+            let at = |t: f64| {
+                Tensor::<D>::from_fn(|i, j| 0.01 * ((1.0 + i as f64) * t + 2.0 * j as f64).sin())
+            };
+            let missing = |parts: usize| {
+                let h = 6.0 / parts as f64;
+                let path: Vec<_> = (1..=parts)
+                    .map(|n| (h, at(h * n as f64) - at(0.0)))
+                    .collect();
+                let found = along(&law, &path);
+                let (mut work, mut lost) = (0.0, 0.0);
+                let (mut stress, mut gradient) = (Tensor::zeros(), Tensor::zeros());
+                for (answer, (_, next)) in found.iter().zip(&path) {
+                    work += 0.5 * (answer.stress + stress).dot(&(next - gradient));
+                    lost += answer.dissipated;
+                    assert!(answer.dissipated >= 0.0);
+                    (stress, gradient) = (answer.stress, *next);
+                }
+                (found[parts - 1].stored + lost) / work - 1.0
+            };
+            // the trapezoidal rule for the work
+            let (coarse, fine) = (missing(100), missing(200));
+            assert!(fine.abs() < 2e-4, "{kinematics:?}: {fine:e}");
+            assert!(
+                (coarse / fine - 4.0).abs() < 0.1,
+                "{kinematics:?}: {coarse:e} {fine:e}"
+            );
+        }
+        balances::<1>(Kinematics::Bar);
+        balances::<2>(Kinematics::PlaneStress);
+        balances::<2>(Kinematics::PlaneStrain);
+        balances::<3>(Kinematics::Solid);
+    }
+
+    #[test]
+    fn a_plate_that_is_back_where_it_began_is_stressed_by_what_it_remembers() {
+        let law = Reduced::<2>::new(Arc::new(solid(&[(0.5, 1.0)])), Kinematics::PlaneStress);
+        let drawn = Tensor::<2>::new(0.01, 0.0, 0.0, 0.0);
+        let path = [
+            (0.0, drawn),
+            (1.0, drawn),
+            (0.0, Tensor::zeros()),
+            (0.0, drawn * 1e-16),
+            (60.0, Tensor::zeros()),
+        ];
+        let found = along(&law, &path);
+        let [held, back, hardly, later] = [1, 2, 3, 4].map(|k: usize| found[k].stress[(0, 0)]);
+        assert!(held > 0.0 && back < -1e-3 * held, "{held} {back}");
+        assert!((hardly / back - 1.0).abs() < 1e-12, "{hardly} {back}");
+        // it forgets, up to what has come of the sides in one long step
+        assert!(later.abs() < 0.1 * back.abs(), "{later} {back}");
+    }
+}
