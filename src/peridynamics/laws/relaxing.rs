@@ -17,6 +17,8 @@ macro_rules! of_arms {
                     concat!("relaxing-share-", $arm),
                     concat!("The same of arm ", $arm, "."),
                     Some(0.0),
+                    // two arms are enough for the tests of every law
+                    if $arm == 2 { 0.3 } else { 0.0 },
                 ),
                 time(
                     concat!("relaxation-time-", $arm),
@@ -35,6 +37,7 @@ pub(super) const PARAMETERS: [Parameter; NUMBERS] = {
         "relaxing-share",
         "Part λ of the shear modulus that relaxes in the first arm.",
         None,
+        0.2,
     ); NUMBERS];
     all[1] = time("relaxation-time", "Relaxation time τ of that arm.", None);
     let mut k = 0;
@@ -45,15 +48,19 @@ pub(super) const PARAMETERS: [Parameter; NUMBERS] = {
     all
 };
 
-const fn share(key: &'static str, about: &'static str, default: Option<f64>) -> Parameter {
+const fn share(
+    key: &'static str,
+    about: &'static str,
+    default: Option<f64>,
+    usual: f64,
+) -> Parameter {
     Parameter {
         key,
         about,
         default,
         least: 0.0,
         most: 1.0,
-        // all of them together leave a part that lasts
-        usual: if default.is_none() { 0.2 } else { 0.02 },
+        usual,
         words: &[],
     }
 }
