@@ -132,7 +132,7 @@ impl Arm {
         }
     }
 
-    /// q at the end of a step in which e grows by `growth`, from q `before`; and what is dissipated by a unit stiffness, [`Arm::spent`]: a sum of squares, so that round-off does not make it negative.
+    /// q at the end of a step in which e grows by `growth`, from q `before`; and what is dissipated by a unit stiffness, `∫ q²/τ dt`: a sum of squares, so that round-off does not make it negative.
     pub fn follow(self, before: f64, growth: f64) -> (f64, f64) {
         let q = self.decay * before + self.driven * growth;
         let [first, mixed, last] = self.spent;

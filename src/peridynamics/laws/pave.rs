@@ -44,7 +44,7 @@ const fn parameters(first: Parameter) -> [Parameter; 1 + relaxing::NUMBERS] {
 /// ```
 ///
 /// `q_i` is updated exactly for an ε that is linear over the step. At once the law is [`PositionAwareSolid`].
-/// Differs from the source by: plates and long bodies, where the strain out of the body is part of the deviator of the solid, so that the stress that goes with θ relaxes too ([`Dilatation`]).
+/// Differs from the source by: plates and long bodies, where the strain out of the body is part of the deviator of the solid, so that the stress that goes with θ relaxes too (`pave_dilatation.rs`).
 ///
 /// Finite elements of the material follow [`crate::material::GeneralisedMaxwell`], which has the same stress under a uniform strain.
 #[derive(Clone, Debug)]
