@@ -8,6 +8,7 @@
 //! | `hyperelastic.rs` | St Venant–Kirchhoff and Neo-Hooke, for strains of any size |
 //! | `logarithmic_j2.rs` | the same for strains of any size |
 //! | `scalar_damage.rs`, `softening.rs` | isotropic scalar damage with a tensile strength and a fracture energy, and how it softens |
+//! | `generalised_maxwell.rs`, `prony.rs` | linear viscoelasticity: a Prony series of the shear modulus, for small strains |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
 //! | `algorithmic_tangent.rs` | differences of any law, for its algorithmic tangent |
 //! | `umat.rs`, `umat/` | a user's routine with the calling convention of Abaqus' UMAT (feature `umat`) |
@@ -19,12 +20,14 @@
 
 mod algorithmic_tangent;
 mod elastic;
+mod generalised_maxwell;
 mod hardening;
 mod hyperelastic;
 mod j2;
 mod logarithmic_j2;
 #[cfg(test)]
 mod path_tests;
+mod prony;
 mod reduction;
 mod scalar_damage;
 mod softening;
@@ -34,10 +37,12 @@ mod user_routine;
 
 pub(crate) use algorithmic_tangent::central_differences;
 pub use elastic::{Elastic, LinearElastic};
+pub use generalised_maxwell::GeneralisedMaxwell;
 pub use hardening::{Hardening, JohnsonCook};
 pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
 pub use j2::J2;
 pub use logarithmic_j2::LogarithmicJ2;
+pub use prony::{Arm, Carried, PronySeries, PronyStep};
 pub use reduction::Reduced;
 pub use scalar_damage::{
     EquivalentStrain, RESIDUAL, ScalarDamage, ScalarDamageSettings, SofteningCurve,
@@ -288,7 +293,12 @@ mod tests {
             measure: EquivalentStrain::Mazars,
             curve: SofteningCurve::Exponential,
         });
-        let solids: [(&str, Arc<dyn LocalLaw<3>>); 5] = [
+        let series = PronySeries::new(vec![(0.3, 0.4), (0.65, 2.5)]);
+        let solids: [(&str, Arc<dyn LocalLaw<3>>); 6] = [
+            (
+                "generalised Maxwell",
+                Arc::new(GeneralisedMaxwell::new(lambda, shear, series)),
+            ),
             (
                 "scalar damage",
                 Arc::new(damage.banded(1.0).expect("14 at most")),
@@ -319,7 +329,8 @@ mod tests {
     fn conform<const D: usize>(kinematics: &[Kinematics]) {
         for (name, law) in laws::<D>(kinematics) {
             let past = vec![0.0; law.history().len()];
-            let respond = |g: &Tensor<D>| law.respond(g, 1.0, &past, &mut past.clone());
+            // at once: what takes time has no energy whose derivative the stress is
+            let respond = |g: &Tensor<D>| law.respond(g, 0.0, &past, &mut past.clone());
             let energy = |g: &Tensor<D>| respond(g).stored;
             let stress_of = |g: &Tensor<D>| respond(g).stress;
             let scale = law.tangent().amax();

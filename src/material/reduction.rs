@@ -73,9 +73,11 @@ impl<const D: usize> Reduced<D> {
             .map(|k| solid.get(2, 2, k, k) * gradient[(k, k)])
             .sum();
         let mut out = (-along / resistance).max(-0.9);
-        let size = gradient.amax().max(f64::MIN_POSITIVE);
+        let mut here = stress(out);
+        // a body that is back where it began may be stressed by what it remembers alone
+        let size = (gradient.amax()).max(here.abs() / resistance);
+        let size = size.max(f64::MIN_POSITIVE);
         for _ in 0..ITERATIONS {
-            let here = stress(out);
             let by = 1e-7 * size.max(out.abs());
             let slope = (stress(out + by) - stress(out - by)) / (2.0 * by);
             let mut change = -here / slope;
@@ -84,13 +86,13 @@ impl<const D: usize> Reduced<D> {
                 change = change.max(-0.5 * (1.0 + out));
             }
             out += change;
+            here = stress(out);
             if change.abs() <= 1e-15 * size.max(out.abs()) || !change.is_finite() {
                 break;
             }
         }
         // the last change may go to and fro by round-off; a stress that stays is none
-        let left = stress(out).abs();
-        match left <= 1e-11 * resistance * size.max(out.abs()) {
+        match here.abs() <= 1e-11 * resistance * size.max(out.abs()) {
             true => out,
             false => f64::NAN,
         }

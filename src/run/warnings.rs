@@ -111,7 +111,7 @@ pub(crate) fn locking<const D: usize>(
         .count();
     (count > 0).then(|| {
         format!(
-            "{count} tri3 or tet4 elements flow at constant volume, which such cells resist: beyond yield they are too stiff; mesh them with quad4 or hex8 cells"
+            "{count} tri3 or tet4 elements flow at constant volume, which such cells resist: where they flow they are too stiff; mesh them with quad4 or hex8 cells"
         )
     })
 }

@@ -27,6 +27,7 @@ mod restarts;
 mod scalar_damage;
 mod softening;
 mod sub_steps;
+mod viscoelastic;
 
 /// A bar that breaks: peridynamics in the middle, struck at its left end.
 const BREAKING: &str = r#"

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Arm, Kinematics},
     peridynamics::{
         BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Micromodulus, Past, Present,
@@ -79,52 +79,6 @@ impl<const D: usize> Law<D> for Maxwell<D> {
 
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
         self.linear.bond_energy(horizon)
-    }
-}
-
-/// A Maxwell arm over a step: its spring's extension `q̇ = ė − q/τ` for an extension e that is linear in time.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Arm {
-    /// `e^−x`, with x the length of the step over τ.
-    decay: f64,
-    /// The mean of `e^−xθ`, θ from 0 to 1: what of the growth of e is left in q at the end.
-    driven: f64,
-    /// The mean of what is left at θ.
-    rise: f64,
-}
-
-impl Arm {
-    /// The arm of the relaxation time `time` over a step of the length `step` \[s\].
-    pub(super) fn over(step: f64, time: f64) -> Self {
-        let x = step / time;
-        Self {
-            decay: (-x).exp(),
-            driven: mean_decay(x),
-            rise: mean_rise(x),
-        }
-    }
-
-    /// q at the end of a step in which e grows by `growth`, from q `before`; and what is dissipated by a unit stiffness: the work `growth · (mean of q)` less what the spring stores.
-    pub(super) fn follow(self, before: f64, growth: f64) -> (f64, f64) {
-        let q = self.decay * before + self.driven * growth;
-        let mean = self.driven * before + self.rise * growth;
-        (q, growth * mean - 0.5 * (q * q - before * before))
-    }
-}
-
-/// `(1 − e^−x)/x`, `1` at zero.
-fn mean_decay(x: f64) -> f64 {
-    if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x }
-}
-
-/// `∫₀¹ (1 − e^−xθ)/x dθ = (1 − (1 − e^−x)/x)/x`, `1/2` at zero.
-fn mean_rise(x: f64) -> f64 {
-    // below this the difference loses what the series leaves out
-    const SERIES: f64 = 1e-3;
-    if x < SERIES {
-        0.5 - x / 6.0 + x * x / 24.0
-    } else {
-        (1.0 - mean_decay(x)) / x
     }
 }
 

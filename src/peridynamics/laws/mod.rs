@@ -8,11 +8,13 @@
 //! | `continuum_damage.rs` | bonds that lose their stiffness by damage | section 6.2 |
 //! | `softening_bond.rs` | bonds that soften: strength and fracture energy | |
 //! | `hardening.rs` | bonds that stiffen with their stretch | |
-//! | `pals.rs`, `pave.rs` | position-aware solid, linear (PALS) and viscoelastic (PAVE) | sections 4.2, 4.3 |
+//! | `pals.rs`, `pave.rs`, `pave_dilatation.rs` | position-aware solid, linear (PALS) and viscoelastic (PAVE) | sections 4.2, 4.3 |
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
 //! | `several.rs` | several materials of one law in one body | |
 //! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
+//! | `viscoelastic.rs` | its stress that of linear viscoelasticity | section 4.3 |
+//! | `relaxing.rs` | keys of a shear modulus that relaxes | |
 //! | `damage.rs` | its stress that of scalar damage | section 6.2.6 |
 //! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | its stress hyperelastic, for large deformations | |
 //!
@@ -30,10 +32,13 @@ mod maxwell;
 mod neo_hooke;
 mod pals;
 mod pave;
+mod pave_dilatation;
 mod plastic;
+mod relaxing;
 mod several;
 mod softening_bond;
 mod st_venant_kirchhoff;
+mod viscoelastic;
 
 use std::sync::Arc;
 
@@ -56,6 +61,7 @@ pub use plastic::PlasticCorrespondence;
 pub use several::{NoMixture, Several, StiffnessMean};
 pub use softening_bond::SofteningBond;
 pub use st_venant_kirchhoff::StVenantKirchhoffSolid;
+pub use viscoelastic::ViscoelasticCorrespondence;
 
 /// A number, or a word, that a law takes beside the elastic constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -371,6 +377,7 @@ named_laws! {
     PlasticCorrespondence,
     JohnsonCookCorrespondence,
     DamageCorrespondence,
+    ViscoelasticCorrespondence,
     NeoHookeSolid,
     StVenantKirchhoffSolid,
 }
