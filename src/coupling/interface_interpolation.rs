@@ -1,14 +1,12 @@
 //! Nodes at the seam that are no sites, expressed through the sites around them.
 
-use rustc_hash::FxHashMap;
-
 use rayon::prelude::*;
 
 use crate::{
     assembly::Transfer,
     coupling::{
-        CellRole, FitDegree, Interface, ModelError, Site, SiteKind, least_squares_gradient,
-        point_cloud::PointCloud, seam_order::Ties,
+        CellRole, FitDegree, Interface, ModelError, Site, SiteKind, bins::Bins,
+        least_squares_gradient, point_cloud::PointCloud, seam_order::Ties,
     },
     mesh::Mesh,
     shape::Barriers,
@@ -30,52 +28,11 @@ pub(super) struct Sites<'a, const D: usize> {
     pub barriers: &'a Barriers<D>,
 }
 
-/// Positions sorted into bins, to find those near a node without looking at all of them.
-pub struct Bins<const D: usize> {
-    size: f64,
-    bins: FxHashMap<[i64; D], Vec<u32>>,
-}
-
-impl<const D: usize> Bins<D> {
-    /// Sorts positions \[m\] into cubes of that edge \[m\].
-    pub fn new(positions: &[Vector<D>], size: f64) -> Self {
-        let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
-        for (k, x) in positions.iter().enumerate() {
-            bins.entry(Self::bin(x, size)).or_default().push(k as u32);
-        }
-        Self { size, bins }
-    }
-
-    fn bin(x: &Vector<D>, size: f64) -> [i64; D] {
-        std::array::from_fn(|i| (x[i] / size).floor() as i64)
-    }
-
-    /// The numbers of all positions in bins that a ball meets, and of no others.
-    pub fn around(&self, x: &Vector<D>, radius: f64) -> impl Iterator<Item = usize> + '_ {
-        let reach = radius * (1.0 + 1e-9);
-        let low = Self::bin(&x.add_scalar(-reach), self.size);
-        let high = Self::bin(&x.add_scalar(reach), self.size);
-        let counts: [usize; D] = std::array::from_fn(|i| (high[i] - low[i] + 1) as usize);
-        (0..counts.iter().product::<usize>())
-            .map(move |index| {
-                let mut rest = index;
-                std::array::from_fn(|i| {
-                    let k = rest % counts[i];
-                    rest /= counts[i];
-                    low[i] + k as i64
-                })
-            })
-            .filter_map(|bin| self.bins.get(&bin))
-            .flatten()
-            .map(|&k| k as usize)
-    }
-}
-
 /// Nodes of the cells at the seam that are no sites.
 fn nodes_to_fit<const D: usize>(at: &Sites<'_, D>, interface: Interface) -> Vec<bool> {
     let mut wanted = vec![false; at.mesh.nodes.len()];
     let cells = match interface {
-        Interface::Faces => 0,
+        Interface::Faces | Interface::Feet => 0,
         _ => at.mesh.cell_count(),
     };
     for c in 0..cells {
@@ -98,7 +55,7 @@ pub(super) fn fit_nodes<const D: usize>(
 ) -> Result<Transfer, ModelError> {
     let wanted = nodes_to_fit(at, interface);
     let (degree, with_nodes) = match interface {
-        Interface::Overlap | Interface::Faces => (FitDegree::Quadratic, false),
+        Interface::Overlap | Interface::Faces | Interface::Feet => (FitDegree::Quadratic, false),
         Interface::Constrained(degree) => (degree, true),
     };
     let largest = cloud.horizon.largest();

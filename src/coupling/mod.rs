@@ -7,13 +7,14 @@
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
 //! | `balanced.rs` | half of a splice's rows, half of a blending's: no force out of balance under quartic fields | `docs/methods.md` |
 //! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
+//! | `truncated_families/` | the same of laws whose points have a stress: symmetric, patch-exact at any strain, in equilibrium | `docs/truncated.md` |
 //! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
-//! | `multi_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
+//! | `multi_lattice.rs`, `completed_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
 //! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
-//! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
+//! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs`, `bins.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
 //! | `semidiscrete.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
@@ -27,9 +28,11 @@
 //! A method is one file with a [`Coupling`], one line here and its entry in the scene.
 
 pub mod balanced;
+mod bins;
 pub mod blending;
 mod bond_cutting;
 mod cauchy_born;
+mod completed_lattice;
 pub mod error_indicator;
 pub mod field_evaluation;
 pub mod impact;
@@ -53,14 +56,15 @@ pub mod splice;
 pub mod state_transfer;
 pub mod tributary;
 pub mod truncated;
+pub mod truncated_families;
 pub mod uncoupled;
 pub mod zone_distance;
 
 pub use balanced::Balanced;
+pub use bins::Bins;
 pub use blending::{Blending, BlendingFunction};
 pub use field_evaluation::{Carrier, Sampler};
 pub use impact::{ContactPatch, Impact, ImpactedSystem, ImpactorShape, RigidImpactor};
-pub use interface_interpolation::Bins;
 pub use least_squares_gradient::FitDegree;
 pub use model::{Model, Site, SiteKind};
 pub use partial_stress::PartialStressMeshfree;
@@ -73,6 +77,7 @@ pub use splice::Splice;
 pub use state_transfer::{BrokenBonds, Carried, CarryError, Carrying};
 pub use tributary::Tributary;
 pub use truncated::{NonlinearSeam, Truncated};
+pub use truncated_families::TruncatedFamilies;
 pub use uncoupled::{Local, Nonlocal};
 
 use crate::{assembly::Row, mesh::Mesh, peridynamics::LinearForceState, system::Symmetry};
@@ -118,6 +123,8 @@ pub enum Interface {
     Constrained(FitDegree),
     /// Nodes of the seam are sites with the rows of their own elements only: nothing overlaps, and bonds end on the faces of elements.
     Faces,
+    /// As [`Interface::Faces`], where families end at places on the faces.
+    Feet,
 }
 
 /// A method that couples both regions.

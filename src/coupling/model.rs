@@ -10,19 +10,21 @@ use crate::{
     coupling::{
         CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Reach, Surfaces, Zone,
         bond_cutting::{self, LatticeFactors, WholeFamily},
+        completed_lattice::CompletedLattice,
         interface_interpolation::{self, Sites},
-        multi_lattice::{self, ContinuedLattice, MergedLattices},
+        multi_lattice::{self, ContinuedLattice, MergedLattices, reach, weighting},
         point_cloud::{PointCloud, Volumes},
         point_generation::{self, Beyond},
         problem,
         recovery::Patch,
         seam_order::{self, Ties},
         tributary::Tributary,
+        truncated_families::{self, Feet},
     },
     dimension, fem,
     material::LocalLaw,
     mesh::{CellShape, Mesh},
-    peridynamics::{BondWeights, CauchyBorn, Cloud, Ends, Factors, Families, PdBody},
+    peridynamics::{BondWeights, CauchyBorn, Cloud, Ends, Families, PdBody},
     progress::Progress,
     shape::Barriers,
     system::Symmetry,
@@ -92,6 +94,9 @@ pub struct Model<const D: usize> {
     pub(super) factors: Vec<(LatticeFactors<D>, f64)>,
     /// The laws of elements that follow the bonds, by the number of a material; empty where elements are linear.
     pub(super) cauchy_born: Vec<Option<Arc<dyn LocalLaw<D>>>>,
+    /// Points of the cloud that are feet of families, on the faces of elements.
+    pub(super) feet: Vec<u32>,
+    pub(super) left_out: Vec<Vector<D>>,
     /// The dilatation of elements that follow the bonds of an LPS.
     pub(super) dilatation: Option<Arc<CauchyBorn<D>>>,
     /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
@@ -158,6 +163,8 @@ impl<const D: usize> Model<D> {
             row_scale: None,
             factors: Vec::new(),
             cauchy_born: Vec::new(),
+            feet: Vec::new(),
+            left_out: Vec::new(),
             dilatation: None,
             operator_cache: OnceLock::new(),
         };
@@ -199,7 +206,11 @@ impl<const D: usize> Model<D> {
                     _ => Beyond::Empty,
                 };
                 self.check_lattices(p)?;
-                let reach = reach(coupling, p);
+                // feet stand for what the whole lattice has beyond a face
+                let reach = match self.interface {
+                    Interface::Feet => Reach::Neighbours,
+                    _ => reach(coupling, p),
+                };
                 let (mesh, zones) = (&self.mesh, &self.zones);
                 point_generation::place(mesh, zones, &self.roles, p, reach, beyond)
             }
@@ -287,6 +298,29 @@ impl<const D: usize> Model<D> {
         self.calibrate_law()
     }
 
+    /// The lattices with their families, and where these end on faces, if they do.
+    fn grown(
+        &self,
+        p: &Peridynamics<D>,
+        clouds: Vec<PointCloud<D>>,
+        coupling: &dyn Coupling<D>,
+    ) -> Result<(Vec<CompletedLattice<D>>, Option<Feet<D>>), ModelError> {
+        let mut feet = None;
+        let reach = reach(coupling, p);
+        let grow = |(l, cloud): (usize, PointCloud<D>)| match self.interface {
+            Interface::Feet => {
+                let whole = self.grow(p, cloud, l, Reach::Neighbours)?;
+                let (lattice, ends) =
+                    truncated_families::place((&self.mesh, &self.roles), p, whole)?;
+                feet = Some(ends);
+                Ok(lattice)
+            }
+            _ => self.grow(p, cloud, l, reach),
+        };
+        let grown: Result<Vec<_>, ModelError> = clouds.into_iter().enumerate().map(grow).collect();
+        Ok((grown?, feet))
+    }
+
     fn place_points_of(
         &mut self,
         p: &Peridynamics<D>,
@@ -297,12 +331,7 @@ impl<const D: usize> Model<D> {
         progress: &dyn Progress,
     ) -> Result<(), ModelError> {
         progress.stage("families", None);
-        let reach = reach(coupling, p);
-        let grown = clouds
-            .into_iter()
-            .enumerate()
-            .map(|(l, cloud)| self.grow(p, cloud, l, reach))
-            .collect::<Result<Vec<_>, _>>()?;
+        let (grown, feet) = self.grown(p, clouds, coupling)?;
         let Some(merged) = MergedLattices::of(grown) else {
             return Ok(());
         };
@@ -334,10 +363,9 @@ impl<const D: usize> Model<D> {
         };
         let is_regular = is_constant && p.weights != BondWeights::Fitted;
         let weighting = weighting(p, &factors[0], &shells);
-        let ends = if is_regular {
-            Ends::Alike
-        } else {
-            Ends::Differ
+        let ends = match is_regular && feet.is_none() {
+            true => Ends::Alike,
+            false => Ends::Differ,
         };
         if p.weights == BondWeights::Plain {
             self.carry_plain_stiffness(p, &factors[0], horizons[0], peridynamic_material)?;
@@ -358,8 +386,14 @@ impl<const D: usize> Model<D> {
             transfer,
             material: materials.of_point,
         };
-        let body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
+        let mut body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
             .map_err(|e| ModelError::family("the point", e))?;
+        if let Some(feet) = feet {
+            let at = (&self.mesh, &self.node_transfer, self.spacing);
+            truncated_families::balance(at, &feet, p.law.linearised(), &mut body)?;
+            self.feet = (feet.points as u32..body.cloud.position.len() as u32).collect();
+            self.left_out = feet.left_out;
+        }
         self.body = Some(body);
         self.factors = factors.into_iter().zip(horizons).collect();
         Ok(())
@@ -543,12 +577,12 @@ impl<const D: usize> Model<D> {
 
     /// Whether the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.
     pub fn node_takes(&self, cell: usize) -> bool {
-        self.interface != Interface::Faces || self.is_element(cell)
+        !self.faces_cut_bonds() || self.is_element(cell)
     }
 
     /// Whether bonds end on the faces of elements, so that no place beyond acts on a point.
     pub fn faces_cut_bonds(&self) -> bool {
-        self.interface == Interface::Faces
+        matches!(self.interface, Interface::Faces | Interface::Feet)
     }
 
     /// The lattice behind the faces at which bonds end, if they do.
@@ -559,27 +593,5 @@ impl<const D: usize> Model<D> {
     /// Whether a cell belongs to the finite elements of the model (as opposed to holding points).
     pub fn is_element(&self, cell: usize) -> bool {
         self.roles[cell] != CellRole::Points && self.mesh.shapes[cell] != CellShape::Vertex
-    }
-}
-
-/// How the bonds of a body are weighted.
-fn weighting<'a, const D: usize>(
-    p: &Peridynamics<D>,
-    factors: &LatticeFactors<D>,
-    shells: &'a (dyn Fn(usize, &Vector<D>) -> f64 + Sync),
-) -> Factors<'a, D> {
-    match (p.weights, factors.is_lattice()) {
-        (BondWeights::Isotropic, true) => Factors::Shells(shells),
-        (BondWeights::Plain, true) if factors.has_partial_volumes() => Factors::Shells(shells),
-        (BondWeights::Fitted, _) => Factors::Fitted,
-        _ => Factors::Plain,
-    }
-}
-
-/// How far families have to be complete: weights that are fitted family by family differ at both ends of a bond, so that those of the neighbours count too.
-fn reach<const D: usize>(coupling: &dyn Coupling<D>, p: &Peridynamics<D>) -> Reach {
-    match p.weights {
-        BondWeights::Fitted => Reach::Neighbours,
-        BondWeights::Plain | BondWeights::Isotropic => coupling.reach(p.law.linearised()),
     }
 }

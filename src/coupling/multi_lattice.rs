@@ -2,13 +2,16 @@
 
 use crate::{
     coupling::{
-        CellRole, Interface, Model, ModelError, Peridynamics, PointSource, Reach, Surfaces,
+        CellRole, Coupling, Interface, Model, ModelError, Peridynamics, PointSource, Reach,
+        Surfaces,
         bond_cutting::{self, LatticeFactors, WholeFamily},
+        completed_lattice::CompletedLattice,
         point_cloud::PointCloud,
     },
     mesh::boundary::BoundaryFacet,
     peridynamics::{
-        Families, Horizon, Law, LinearForceState, PartialVolume, TIE_TOLERANCE,
+        BondWeights, Factors, Families, Horizon, Law, LinearForceState, PartialVolume,
+        TIE_TOLERANCE,
         softening::{CalibrationError, RegularFamily},
     },
     tensor::{Tensor4, Vector},
@@ -29,17 +32,6 @@ impl<const D: usize> ContinuedLattice<D> {
     pub fn whole_of(&self, point: u32) -> &WholeFamily<D> {
         &self.whole[usize::from(self.of_point[point as usize])]
     }
-}
-
-/// One lattice on its way into the body.
-pub(super) struct CompletedLattice<const D: usize> {
-    pub cloud: PointCloud<D>,
-    pub families: Families,
-    pub passing: Option<Families>,
-    pub factors: LatticeFactors<D>,
-    /// All points before any is dropped, with their new numbers, where elements need them.
-    pub wide: Option<(PointCloud<D>, Vec<u32>)>,
-    pub is_constant: bool,
 }
 
 /// All lattices of a body as one cloud.
@@ -184,7 +176,7 @@ impl<const D: usize> Model<D> {
         }
         cloud.retain(&keep.renumbered);
         // bonds that are cut where elements begin see nothing of what lies beyond
-        if self.interface != Interface::Faces {
+        if !self.faces_cut_bonds() {
             self.check_materials(p.law.as_ref(), &cloud, |_| true)?;
         }
         Ok(CompletedLattice {
@@ -201,7 +193,7 @@ impl<const D: usize> Model<D> {
     fn cutting_surface(&self, p: &Peridynamics<D>, lattice: usize) -> Option<Vec<BoundaryFacet>> {
         match (self.interface, p.surfaces) {
             // a bond may leave the body through the elements around, but not through a free surface of the points
-            (Interface::Faces, _) => {
+            (Interface::Faces | Interface::Feet, _) => {
                 let mut facets = self.mesh.outer_facets();
                 facets.retain(|f| self.lattice_in(&p.points, f.cell as usize) == Some(lattice));
                 Some(facets)
@@ -419,4 +411,26 @@ pub(super) fn whole_families<const D: usize>(
 fn same_tensor<const D: usize>(a: &Tensor4<D>, b: &Tensor4<D>) -> bool {
     let size = a.get(0, 0, 0, 0).abs();
     (0..D).all(|i| (0..D).all(|j| (a.0[i][j] - b.0[i][j]).amax() <= 1e-9 * size))
+}
+
+/// How the bonds of a body are weighted.
+pub(super) fn weighting<'a, const D: usize>(
+    p: &Peridynamics<D>,
+    factors: &LatticeFactors<D>,
+    shells: &'a (dyn Fn(usize, &Vector<D>) -> f64 + Sync),
+) -> Factors<'a, D> {
+    match (p.weights, factors.is_lattice()) {
+        (BondWeights::Isotropic, true) => Factors::Shells(shells),
+        (BondWeights::Plain, true) if factors.has_partial_volumes() => Factors::Shells(shells),
+        (BondWeights::Fitted, _) => Factors::Fitted,
+        _ => Factors::Plain,
+    }
+}
+
+/// How far families have to be complete: weights that are fitted family by family differ at both ends of a bond, so that those of the neighbours count too.
+pub(super) fn reach<const D: usize>(coupling: &dyn Coupling<D>, p: &Peridynamics<D>) -> Reach {
+    match p.weights {
+        BondWeights::Fitted => Reach::Neighbours,
+        BondWeights::Plain | BondWeights::Isotropic => coupling.reach(p.law.linearised()),
+    }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::{
     coupling::{
         CellRole, ModelError, Peridynamics, PointSource, Reach, Zone,
-        interface_interpolation::Bins,
+        bins::Bins,
         lattice_axes::lattice_axes,
         lattice_box::{LatticeBox, samples_of},
         point_cloud::PointCloud,

@@ -3,10 +3,7 @@
 use rayon::prelude::*;
 
 use crate::{
-    coupling::{
-        CellRole, Interface, Model, ModelError, interface_interpolation::Bins,
-        point_cloud::PointCloud,
-    },
+    coupling::{CellRole, Interface, Model, ModelError, bins::Bins, point_cloud::PointCloud},
     fem::Locator,
     peridynamics::{Law, Mixture},
     tensor::Vector,

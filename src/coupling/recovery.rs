@@ -12,10 +12,8 @@ use rayon::prelude::*;
 use crate::{
     assembly::Transfer,
     coupling::{
-        CellRole, Interface, Model, SiteKind,
-        interface_interpolation::{Bins, Sites},
-        least_squares_gradient,
-        point_cloud::PointCloud,
+        CellRole, Interface, Model, SiteKind, bins::Bins, interface_interpolation::Sites,
+        least_squares_gradient, point_cloud::PointCloud,
     },
     mesh::Mesh,
     peridynamics::alike::{Shape, first_alike},
@@ -44,7 +42,7 @@ impl<const D: usize> Model<D> {
         site: impl Fn(usize) -> u32 + Sync,
     ) -> (Transfer, FxHashMap<u32, Patch<D>>) {
         let patches = match self.interface {
-            Interface::Faces => FxHashMap::default(),
+            Interface::Faces | Interface::Feet => FxHashMap::default(),
             // families of other clouds carry no affine field, and no better ghost would mend that
             _ if !self.is_lattice() => FxHashMap::default(),
             _ => patches(

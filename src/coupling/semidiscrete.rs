@@ -9,15 +9,17 @@ use std::sync::{Arc, PoisonError};
 
 use rayon::prelude::*;
 
-use self::{body::MovingBody, elements::LocalElements, energy::ElementEnergy, rows::SiteRows};
+use self::{
+    body::{MovingBody, reached},
+    elements::LocalElements,
+    energy::ElementEnergy,
+    rows::SiteRows,
+};
 use crate::{
     assembly,
     coupling::{Model, NonlinearSeam, Operator},
     material::LocalLaw,
-    peridynamics::{
-        Families, PdBody,
-        bond_force::{BondPass, Kinematics},
-    },
+    peridynamics::bond_force::{BondPass, Kinematics},
     system::{
         BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, SemiDiscrete,
         Symmetry,
@@ -246,12 +248,6 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     }
 }
 
-/// Volume that the bonds of a point reach.
-fn reached<const D: usize>(body: &PdBody<D>, families: &Families, point: u32) -> f64 {
-    let family = families.of(point as usize).iter();
-    family.map(|&j| body.cloud.volume[j as usize]).sum()
-}
-
 /// Lumped mass of every site \[kg\]: that of its part of the body. All masses add up to that of the body, their first moment too.
 pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) -> Vec<f64> {
     let own = model.peridynamic_material();
@@ -314,6 +310,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         body.pass.tangent_into(&points, &mut force);
         let bonds = Some((&body.bonds_of_site[..], &force[..]));
         self.linear.multiply_into::<D>(x, bonds, &mut Vec::new(), y);
+        body.add_feet(&force, y);
         if let Some(seam) = &self.seam {
             seam.add_tangent(x, y);
         }
@@ -349,6 +346,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
                 *sum += of_bonds * spread + touching;
             }
         }
+        body.add_row_sums_of_feet(&points, spread, &mut sums);
         if let Some(seam) = &self.seam {
             seam.add_row_sums(&mut sums);
         }
@@ -426,6 +424,9 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
                             row,
                         );
                     }
+                }
+                if let (Some(moving), Some(body)) = (&self.body, self.model.body()) {
+                    moving.add_rows_of_feet(body, sites[r], row);
                 }
                 if let Some(seam) = &self.seam {
                     seam.add_row(site, row);

@@ -13,7 +13,7 @@
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{FitDegree, Model, SiteKind, interface_interpolation::Bins, least_squares_gradient};
+use super::{FitDegree, Model, SiteKind, bins::Bins, least_squares_gradient};
 use crate::{assembly::Transfer, fem::Locator, tensor::Vector};
 
 #[cfg(test)]

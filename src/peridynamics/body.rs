@@ -3,6 +3,8 @@
 //! A body may contain points that are no sites (points interpolated from finite elements that complete a family, or Gauss points); its [`Transfer`]
 //! expresses all of them through sites.
 
+mod reweigh;
+
 use rayon::prelude::*;
 
 use crate::{

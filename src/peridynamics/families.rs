@@ -256,6 +256,21 @@ impl Families {
         result
     }
 
+    /// The same, and for each of some points without a family (ascending) the points in whose families it is.
+    pub(crate) fn mirrored(&self, points: &[u32]) -> Self {
+        if points.is_empty() {
+            return self.clone();
+        }
+        let reversed = self.reversed(self.len());
+        let seen = |i: usize| match points.binary_search(&(i as u32)) {
+            Ok(_) => &reversed.rows[reversed.offsets[i]..reversed.offsets[i + 1]],
+            Err(_) => self.of(i),
+        };
+        Self::filled((0..self.len()).map(|i| seen(i).len()), |i, row| {
+            row.copy_from_slice(seen(i));
+        })
+    }
+
     /// Appends the families of another cloud, whose points are numbered on from those of this one.
     pub fn append(&mut self, other: &Self) {
         let (points, bonds) = (self.len() as u32, self.neighbours.len());

@@ -10,7 +10,7 @@ use crate::coupling::{CellRole, Interface, Reach, Zone};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
-use crate::peridynamics::{Influence, TIE_TOLERANCE};
+use crate::peridynamics::TIE_TOLERANCE;
 use crate::run::error::RunError;
 use crate::scene::Peridynamics;
 use crate::scene::points::Points;
@@ -125,7 +125,7 @@ impl Counts {
             .find(|(zone, _)| **zone != Zone::Local)
             .map_or(0, |(_, m)| usize::from(*m));
         let law = scene.materials[material].law.linearised();
-        let coupling = scene.coupling.build::<D>(Influence::Gaussian);
+        let coupling = scene.coupling.build_for(law);
         let horizon: Vec<f64> = (0..mesh.cell_count())
             .map(|c| p.horizon_at(&mesh.centroid(c)))
             .collect();

@@ -1,8 +1,11 @@
 //! The model of a scene about rest: what studies of stiffness, eigenvalues and waves look at.
 
+use std::sync::Arc;
+
 use super::setup::{self, problem};
 use crate::coupling::semidiscrete::masses;
 use crate::coupling::{Coupling, Model, Operator};
+use crate::material::LocalLaw;
 use crate::progress::Silent;
 use crate::run::AnyScene;
 use crate::run::error::RunError;
@@ -18,6 +21,8 @@ pub struct SceneModel<const D: usize> {
     pub coupling: Box<dyn Coupling<D>>,
     /// Density of each material [kg/m³]; zero where the scene types none.
     pub density: Vec<f64>,
+    /// The laws of elements that are not linear, by the number of a material.
+    pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
 }
 
 impl<const D: usize> SceneModel<D> {
@@ -32,6 +37,7 @@ impl<const D: usize> SceneModel<D> {
             model,
             coupling,
             density: rest.density,
+            local_laws: rest.local_laws,
         })
     }
 

@@ -71,6 +71,10 @@ pub(super) fn missed_peak<const D: usize>(
     let largest = shown.clone().map(|p| stresses[p]).fold(0.0, f64::max);
     // stress at the surface beyond that of the point, for a stress that is linear over the family
     let beyond = |p: usize| {
+        // a face of elements is no surface of the body
+        if bonds(p).any(|(j, _, _)| model.is_foot(j as u32)) {
+            return None;
+        }
         let volume: f64 = bonds(p).map(|(_, _, v)| v).sum();
         let centroid = bonds(p).map(|(_, xi, v)| xi * v).sum::<Vector<D>>() / volume;
         if centroid.norm() < ONE_SIDED * cloud.horizon.of(p) || near_crack(model, p) {

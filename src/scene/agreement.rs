@@ -40,6 +40,9 @@ pub(crate) fn balanced_seam<const D: usize>(
     let linear = material.law.linearised();
     let truncates = linear.is_ordinary() && !linear.has_deviators();
     let remedy = match (truncates, material.law.local_law()) {
+        (_, Some(_)) if !linear.is_ordinary() => {
+            "use coupling = \"truncated\", or coupling = \"splice\" with this material in all cells, or \"nonlocal\""
+        }
         (_, Some(_)) => {
             "use coupling = \"splice\" with this material in all cells, or coupling = \"nonlocal\""
         }

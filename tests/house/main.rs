@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use imports::{Imports, ItemPath};
 
 /// Modules of the library and, above them, the other crates, the lowest first.
-const FLOORS: [&str; 23] = [
+const FLOORS: [&str; 24] = [
     "dimension",
     "tensor",
     "progress",
@@ -28,6 +28,7 @@ const FLOORS: [&str; 23] = [
     "run",
     "predict",
     "petsc",
+    "umat",
     "terminal",
     "study",
     "verify",
@@ -36,7 +37,9 @@ const FLOORS: [&str; 23] = [
 ];
 
 /// Crates that stand on the library.
-const CRATES: [&str; 6] = ["petsc", "terminal", "study", "verify", "cli", "python"];
+const CRATES: [&str; 7] = [
+    "petsc", "umat", "terminal", "study", "verify", "cli", "python",
+];
 
 /// Crates that may not take from each other.
 const APART: [[&str; 2]; 2] = [["verify", "cli"], ["verify", "python"]];
@@ -74,7 +77,6 @@ const CIRCLES: [&[&str]; 3] = [
         "coupling/interface_interpolation",
         "coupling/model",
         "coupling/multi_lattice",
-        "coupling/point_generation",
         "coupling/recovery",
         "coupling/tributary",
     ],

@@ -27,6 +27,7 @@ mod restarts;
 mod scalar_damage;
 mod softening;
 mod sub_steps;
+mod truncated_families;
 mod viscoelastic;
 
 /// A bar that breaks: peridynamics in the middle, struck at its left end.

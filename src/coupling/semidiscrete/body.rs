@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::split::Split;
 use crate::coupling::semidiscrete::behaviour::{BondBehaviour, CHUNK, Critical, NONE, SystemError};
 use crate::{
-    assembly::Transfer,
+    assembly::{Row, Transfer},
     coupling::{Model, NonlinearSeam, Operator, SiteKind},
     peridynamics::{
         Accelerator, Families, Law, PdBody,
@@ -38,6 +38,8 @@ pub(super) struct MovingBody<const D: usize> {
     pub bonds_of_site: Vec<u32>,
     /// The families that are passed over, where rows keep some bonds of their points to themselves; none if all are.
     passed: Option<Families>,
+    /// Points whose force the sites take that they follow: the feet of families.
+    pub feet: Vec<u32>,
     /// Sites whose row is that of the body alone.
     pub alone: usize,
     /// Points at the edge of the region where bonds can break, none if nothing can.
@@ -78,7 +80,7 @@ struct PassInput<'a, const D: usize> {
     families: &'a Families,
     /// Whether the families are those of the body.
     is_whole: bool,
-    /// Whether each point is a site.
+    /// Whether the force on each point counts.
     rows: &'a [bool],
     no_fail: &'a [bool],
     seam: Option<&'a NonlinearSeam<D>>,
@@ -166,6 +168,17 @@ impl<const D: usize> PassInput<'_, D> {
     }
 }
 
+/// Points with a row of the body whose families reach beyond those.
+fn edge_of<const D: usize>(body: &PdBody<D>, own_row: &[bool]) -> Vec<u32> {
+    let leaves = |i: usize| {
+        let mut family = body.families.of(i).iter();
+        family.any(|&j| !own_row[j as usize])
+    };
+    let all = 0..own_row.len() as u32;
+    all.filter(|&i| own_row[i as usize] && leaves(i as usize))
+        .collect()
+}
+
 /// By how many sites all points are later, if they all are.
 fn shift_of(site_of_point: &[u32]) -> Option<usize> {
     let first = site_of_point.first().copied().unwrap_or(0);
@@ -230,6 +243,10 @@ impl<const D: usize> MovingBody<D> {
             own_row,
         } = PointSites::of(model, operator, points, seam.is_some());
         let is_site: Vec<bool> = site_of_point.iter().map(|&s| s != NONE).collect();
+        let mut has_force = is_site.clone();
+        for &foot in &model.feet {
+            has_force[foot as usize] = true;
+        }
         let no_fail: Vec<bool> = (0..points)
             .into_par_iter()
             .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
@@ -238,7 +255,7 @@ impl<const D: usize> MovingBody<D> {
         let passed = (seam.is_none() && (0..model.sites.len()).any(shares)).then(|| {
             let mut passed = body.families.clone();
             passed.retain_of(|i| !own_row[i], |i, j| operator.is_body_bond(i, j as usize));
-            passed
+            passed.mirrored(&model.feet)
         });
         let families = match (seam, &passed) {
             (Some(seam), _) => seam.families(),
@@ -248,16 +265,7 @@ impl<const D: usize> MovingBody<D> {
         let all_pass = seam.is_none() && passed.is_none();
         let may_break = behaviour.critical_stretch.is_some() || p.law.damages();
         let edge = if may_break && seam.is_none() {
-            (0..points as u32)
-                .filter(|&i| {
-                    own_row[i as usize]
-                        && body
-                            .families
-                            .of(i as usize)
-                            .iter()
-                            .any(|&j| !own_row[j as usize])
-                })
-                .collect()
+            edge_of(body, &own_row)
         } else {
             Vec::new()
         };
@@ -267,7 +275,7 @@ impl<const D: usize> MovingBody<D> {
             accelerator: p.accelerator(),
             families,
             is_whole: all_pass,
-            rows: &is_site,
+            rows: &has_force,
             no_fail: &no_fail,
             seam,
             behaviour,
@@ -286,6 +294,7 @@ impl<const D: usize> MovingBody<D> {
             shift,
             transfer: is_asked.then(|| body.cloud.transfer.clone()),
             bonds_of_site,
+            feet: model.feet.clone(),
             passed,
             alone: own_row.iter().filter(|own| **own).count(),
             edge,
@@ -333,6 +342,41 @@ impl<const D: usize> MovingBody<D> {
         broken
     }
 
+    /// Adds the forces of feet to the sites that they follow, of `points` with `D` numbers each.
+    pub fn add_feet(&self, points: &[f64], force: &mut [f64]) {
+        let Some(transfer) = &self.transfer else {
+            return;
+        };
+        for &foot in &self.feet {
+            let of_foot = &points[foot as usize * D..][..D];
+            for (site, weight) in transfer.row(foot as usize) {
+                let to = &mut force[site as usize * D..][..D];
+                to.iter_mut()
+                    .zip(of_foot)
+                    .for_each(|(f, x)| *f += weight * x);
+            }
+        }
+    }
+
+    /// Adds row sums of feet to the sites that they follow, each times `spread`.
+    pub fn add_row_sums_of_feet(&self, points: &[f64], spread: f64, sums: &mut [f64]) {
+        let sized: Vec<f64> = points.iter().map(|s| s * spread).collect();
+        self.add_feet(&sized, sums);
+    }
+
+    /// Adds the tangent rows of the feet that follow a site.
+    pub fn add_rows_of_feet(&self, body: &PdBody<D>, site: u32, row: &mut Row<D>) {
+        let Some(transfer) = &self.transfer else {
+            return;
+        };
+        for &foot in &self.feet {
+            let mut of_foot = transfer.row(foot as usize);
+            if let Some((_, weight)) = of_foot.find(|(s, _)| *s == site) {
+                body.add_force_row(foot as usize, |_| weight, row);
+            }
+        }
+    }
+
     /// The displacement of every point, from those of the sites.
     pub fn spread(&self, u: &[f64], points: &mut [f64]) {
         if let Some(shift) = self.shift {
@@ -374,4 +418,10 @@ fn bond_constant<const D: usize>(body: &PdBody<D>) -> f64 {
     }
     let fullest = points.max_by_key(|&i| body.families.of(i).len());
     fullest.map_or(0.0, of_point)
+}
+
+/// Volume that the bonds of a point reach.
+pub(super) fn reached<const D: usize>(body: &PdBody<D>, families: &Families, point: u32) -> f64 {
+    let family = families.of(point as usize).iter();
+    family.map(|&j| body.cloud.volume[j as usize]).sum()
 }

@@ -54,6 +54,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                 broken = body.respond(u, interval, update, self.split.as_ref());
                 let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
                 (self.linear).multiply_into::<D>(u, bonds, &mut self.products, force);
+                body.add_feet(&body.force, force);
                 if let Some(seam) = &mut self.seam {
                     seam.begin_pass();
                     if broken > 0 {

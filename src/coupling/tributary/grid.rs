@@ -3,11 +3,11 @@
 use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::simplex::Cells;
 use crate::{
-    coupling::{FitDegree, Model, SiteKind, interface_interpolation::Bins, least_squares_gradient},
+    coupling::{Bins, FitDegree, Model, SiteKind, least_squares_gradient},
     fem::Locator,
     shape::Barriers,
     tensor::{Tensor, Vector},
@@ -25,6 +25,9 @@ const FARTHEST: f64 = 1.6;
 /// How far from a place points are sought where no cube of the lattice is there, in spacings.
 const AROUND: [f64; 3] = [1.8, 2.8, 4.0];
 
+/// How far outside of an element a point may lie, over the extent of the element: hardly, or some way where it was left out.
+const BESIDE: [f64; 5] = [1e-9, 0.05, 0.1, 0.2, 0.4];
+
 /// What a lattice point in an element is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Beyond {
@@ -39,6 +42,8 @@ pub(super) struct Grid<'a, const D: usize> {
     model: &'a Model<D>,
     pub cells: Cells<D>,
     sites: FxHashMap<[i32; D], u32>,
+    /// Points beside faces that the zone was left without.
+    left_out: FxHashSet<[i32; D]>,
     elements: OnceLock<Locator<D>>,
     barriers: Barriers<D>,
     shifts: Vec<[i32; D]>,
@@ -74,6 +79,7 @@ impl<'a, const D: usize> Grid<'a, D> {
         shifts.sort_by_key(|s| s.iter().map(|k| k * k).sum::<i32>());
         Self {
             model,
+            left_out: model.left_out.iter().map(|x| cells.index(x)).collect(),
             cells,
             sites: sites.collect(),
             elements: OnceLock::new(),
@@ -99,7 +105,15 @@ impl<'a, const D: usize> Grid<'a, D> {
             let cells = 0..mesh.cell_count();
             Locator::new(mesh, cells.filter(|&c| self.model.is_element(c)))
         });
-        let found = elements.locate(mesh, &self.cells.centre(index), 1e-9)?;
+        // one that was left out follows the element behind its face
+        let tolerances = match self.left_out.contains(index) {
+            true => &BESIDE[..],
+            false => &BESIDE[..1],
+        };
+        let centre = self.cells.centre(index);
+        let found = tolerances
+            .iter()
+            .find_map(|t| elements.locate(mesh, &centre, *t))?;
         if self.beyond == Beyond::IsPoint {
             return Some(Vec::new());
         }

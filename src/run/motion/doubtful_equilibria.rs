@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::setup::ModelSetup;
 use crate::coupling::Model;
 use crate::run::balance::Balance;
 use crate::run::setup::RunSettings;
@@ -12,38 +13,47 @@ use crate::scene::spec::CouplingTraits;
 use crate::solve::quasi_static::LoadStep;
 use crate::tensor::Vector;
 
+/// Forces that are none, over those that would displace the body as far by strains.
+const ROUND_OFF: f64 = 1e-9;
+
 /// Watches load steps for what their equilibria do not show.
 pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     model: &'a Model<D>,
     rest: &'a RunSettings<D>,
     joining: CouplingTraits,
     springs: Arc<Springs>,
+    /// Force over displacement of the whole body \[N/m\].
+    stiffness: f64,
     /// The stress error of a uniform field at surfaces of points.
     uniform: f64,
     /// The largest sum of internal forces \[N\], and the largest scale of forces; not those of one load step, since little holds a body that is unloaded.
     force: Vector<D>,
     scale: f64,
+    /// Forces that equilibria found to a tolerance leave in a body without stress that moves \[N\].
+    round_off: f64,
     /// Whether a load step has been asked for its peak of stress.
     asked: bool,
     peak: Option<String>,
 }
 
 impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
-    /// Of a run whose uniform fields have a stress error of `uniform` at surfaces.
-    pub fn new(
-        (model, rest): (&'a Model<D>, &'a RunSettings<D>),
-        joining: CouplingTraits,
-        springs: &Arc<Springs>,
-        uniform: f64,
-    ) -> Self {
+    /// Of a run.
+    pub fn new(setup: &ModelSetup<'a, D>) -> Self {
+        let model = setup.model;
+        let cells = 0..model.mesh.cell_count();
+        let volume: f64 = cells.map(|c| model.mesh.cell_volume(c).abs()).sum();
+        let size = volume.powf(1.0 / D as f64);
+        let stiffness = model.tensor_of_cell(0).get(0, 0, 0, 0) * volume / (size * size);
         Self {
             model,
-            rest,
-            joining,
-            springs: Arc::clone(springs),
-            uniform,
+            rest: setup.rest,
+            joining: setup.joining,
+            springs: Arc::clone(&setup.springs),
+            uniform: setup.proof.largest("stress error"),
+            stiffness,
             force: Vector::zeros(),
             scale: 0.0,
+            round_off: 0.0,
             asked: false,
             peak: None,
         }
@@ -62,6 +72,8 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
             self.force = balance.force;
         }
         self.scale = self.scale.max(balance.scale);
+        let furthest = u.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+        self.round_off = self.round_off.max(ROUND_OFF * self.stiffness * furthest);
         self.ask_for_peak(seen);
     }
 
@@ -86,7 +98,9 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
     pub fn told(self) -> impl Iterator<Item = String> {
         let Self { force, scale, .. } = self;
         let relative = Balance { force, scale }.relative();
+        let is_loaded = scale > self.round_off;
         let balance = out_of_balance(force.as_slice(), relative, self.joining);
+        let balance = balance.filter(|_| is_loaded);
         balance.into_iter().chain(self.peak)
     }
 }

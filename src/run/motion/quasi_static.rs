@@ -68,6 +68,7 @@ fn load_steps<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
     let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
+    let doubts = DoubtfulEquilibria::new(&laid_out);
     let (mut timings, mut watch, mut choices) =
         (laid_out.timings, laid_out.watch, laid_out.choices);
     let begin = start(model, rest);
@@ -106,12 +107,7 @@ fn load_steps<const D: usize>(
         fields: FieldOutput::new(model, operator, &rest.stresses, &rest.output),
         recorder,
         rotations,
-        doubts: DoubtfulEquilibria::new(
-            (model, rest),
-            laid_out.joining,
-            &laid_out.springs,
-            laid_out.proof.largest("stress error"),
-        ),
+        doubts,
         last_damage: system.damage_state(),
         state,
         iterations: 0,
@@ -128,9 +124,8 @@ fn load_steps<const D: usize>(
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
     choices.push(observer.spent());
     let summary = observer.summary(system.as_ref(), first, taken?)?;
-    let mut told = warnings(model, laid_out.joining, &laid_out.proof);
-    told.extend(locking(model, &model.local_laws(&rest.local_laws)));
-    told.extend(summary.warnings.iter().cloned());
+    let of_model = warnings(model, laid_out.joining, &laid_out.proof).into_iter();
+    let of_model = of_model.chain(locking(model, &model.local_laws(&rest.local_laws)));
     Ok(RunSummary {
         scene: laid_out.title,
         coupling: laid_out.joining.name.to_owned(),
@@ -139,7 +134,7 @@ fn load_steps<const D: usize>(
         total_seconds: timings.total(),
         timings,
         peak_memory_bytes: peak_memory_bytes(),
-        warnings: told,
+        warnings: of_model.chain(summary.warnings.clone()).collect(),
         proof: laid_out.proof,
         ..summary
     })

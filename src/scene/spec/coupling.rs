@@ -10,9 +10,10 @@ use serde::Deserialize;
 
 use crate::coupling::{
     Balanced, Blending, BlendingFunction, Coupling, FitDegree, Local, Nonlocal,
-    PartialStressElements, PartialStressMeshfree, Splice, Truncated, Zone, truncated::CutBonds,
+    PartialStressElements, PartialStressMeshfree, Splice, Truncated, TruncatedFamilies, Zone,
+    truncated::CutBonds,
 };
-use crate::peridynamics::Influence;
+use crate::peridynamics::{Influence, LinearForceState};
 
 /// How finite elements and peridynamics are joined.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -137,6 +138,14 @@ impl CouplingSpec {
                 zones: ZonesNeeded::Everywhere(Zone::Nonlocal),
                 lattice: LatticeStart::OnCorner,
             },
+        }
+    }
+
+    /// The method for the law of the points.
+    pub fn build_for<const D: usize>(&self, law: &dyn LinearForceState<D>) -> Box<dyn Coupling<D>> {
+        match self {
+            Self::Truncated(_) if !law.is_ordinary() => Box::new(TruncatedFamilies),
+            _ => self.build(law.divergence()),
         }
     }
 

@@ -1,0 +1,16 @@
+//! One lattice of points with its families, before it is part of a body.
+
+use super::bond_cutting::LatticeFactors;
+use super::point_cloud::PointCloud;
+use crate::peridynamics::Families;
+
+/// One lattice on its way into the body.
+pub(super) struct CompletedLattice<const D: usize> {
+    pub cloud: PointCloud<D>,
+    pub families: Families,
+    pub passing: Option<Families>,
+    pub factors: LatticeFactors<D>,
+    /// All points before any is dropped, with their new numbers, where elements need them.
+    pub wide: Option<(PointCloud<D>, Vec<u32>)>,
+    pub is_constant: bool,
+}
