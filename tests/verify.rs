@@ -5,8 +5,8 @@ use bondline::{
     progress::Silent,
 };
 use bondline_verify::{
-    Effort, balance, extremes, layers, partial_volumes, plasticity, quadratic, surface_layer,
-    tangents, weights,
+    Effort, balance, extremes, large_deformation, layers, partial_volumes, plasticity, quadratic,
+    surface_layer, tangents, weights,
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -81,6 +81,16 @@ fn plastic_elements_are_near_calculix_and_hill() {
     // two meshes of either kind of cell, two ratios of Poisson with either
     assert_eq!(count(&tables, "tip", Verdict::Pass), 2 * 4);
     assert_eq!(count(&tables, "largest", Verdict::Pass), 2 * 4);
+}
+
+#[test]
+fn large_deformations_pass_every_seam_that_takes_their_law() {
+    let tables = large_deformation::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    // by a splice and by truncated families: four meshes, of which a bar cannot turn
+    let passed = tables.iter().flat_map(|table| &table.rows);
+    let passed = passed.filter(|r| r.case.contains("neo-Hooke") && r.verdict == Verdict::Pass);
+    assert_eq!(passed.count(), 2 * (3 * 3 + 1));
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub(in crate::coupling) struct Feet<const D: usize> {
     pub points: usize,
     /// For each point of the zone, the first weights ω of its bonds to feet, the last ones of its family.
     pub omega: Vec<Vec<f64>>,
-    /// `Σ_p V_p b_pq` \[m^(D−1)\] of the whole lattice, for each point q of the zone: zero but near surfaces of the body.
+    /// What `Σ_p V_p b_pq` \[m^(D−1)\] is to be, for each point q of the zone: zero, or near surfaces of the body what it is in the whole lattice.
     pub wanted: Vec<Vector<D>>,
     /// Whether the whole family of each point is complete.
     pub is_whole: Vec<bool>,
@@ -74,10 +74,19 @@ pub(in crate::coupling) fn place<const D: usize>(
         in_zone.partition(|&i| close.holds(&whole.cloud.position[i as usize]));
     let left_out = left_out.iter().map(|&i| whole.cloud.position[i as usize]);
     let (sums, is_whole) = sums(&body);
+    // what surfaces of the body do to families in elements is nothing to the points
+    let is_inside = |j: usize| is_whole[j] || whole.cloud.element[j].is_some();
+    let wanted = |i: usize| {
+        let mut family = body.families.of(i).iter();
+        match is_whole[i] && family.all(|&j| is_inside(j as usize)) {
+            true => Vector::zeros(),
+            false => sums[i],
+        }
+    };
     let mut feet = Feet {
         points: own.len(),
         omega: Vec::new(),
-        wanted: own.iter().map(|&i| sums[i as usize]).collect(),
+        wanted: own.iter().map(|&i| wanted(i as usize)).collect(),
         is_whole: own.iter().map(|&i| is_whole[i as usize]).collect(),
         faces,
         left_out: left_out.collect(),
