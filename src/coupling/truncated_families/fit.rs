@@ -82,13 +82,18 @@ fn first_factors<const D: usize>(feet: &Feet<D>, body: &PdBody<D>, i: usize) -> 
 const DAMPED: usize = 3;
 const STRICT: usize = 20;
 
-/// How far the equations of a step are solved.
+/// How far the equations of a step are solved: the next one takes what is left.
 const ROUGH: f64 = 1e-3;
-const FINE: f64 = 1e-8;
+
+/// Conditions of which a step leaves more than this cannot be met by positive weights.
+const STALLED: f64 = 0.9;
 
 /// What is left of a weight in a step at least, and after all steps.
 const SMALLEST: f64 = 0.1;
 const LEAST: f64 = 0.01;
+
+/// Rows of conditions are made of one length, but for those that are shorter than this, over the damping.
+const SMALL_ROW: f64 = 0.5;
 
 /// What a condition may lack, over the damping.
 const ENOUGH: f64 = 1e-13;
@@ -175,6 +180,7 @@ impl Fit {
             fit.conditions.end();
             fit.volumes.push(i as u32);
         }
+        fit.conditions.finish();
         rows.relax(feet, body, &mut fit.is_strict);
         fit
     }
@@ -186,11 +192,13 @@ impl Fit {
         for _ in 0..DAMPED {
             self.step(&all, (self.damping, ROUGH), &mut factors);
         }
+        let mut before = f64::INFINITY;
         for _ in 0..STRICT {
-            let lacks = self.step(&self.is_strict, (0.0, FINE), &mut factors);
-            if lacks < ENOUGH * self.damping {
+            let lacks = self.step(&self.is_strict, (0.0, ROUGH), &mut factors);
+            if lacks < ENOUGH * self.damping || lacks > STALLED * before {
                 break;
             }
+            before = lacks;
         }
         factors
     }
@@ -199,16 +207,21 @@ impl Fit {
     fn step(&self, counts: &[bool], how: (f64, f64), factors: &mut [f64]) -> f64 {
         let mut lacks = self.lacks.clone();
         let minus: Vec<f64> = factors.iter().map(|f| 1.0 - f).collect();
-        self.conditions.add_product(&minus, counts, &mut lacks);
-        for (lacks, counts) in lacks.iter_mut().zip(counts) {
-            if !counts {
-                *lacks = 0.0;
-            }
+        let changed = self.conditions.product(&minus, counts);
+        for ((lacks, changed), counts) in lacks.iter_mut().zip(&changed).zip(counts) {
+            *lacks = if *counts { *lacks + changed } else { 0.0 };
         }
         // one that became too small stays where it is
         let root = |f: &f64| if *f > LEAST { f.sqrt() } else { 0.0 };
         let roots: Vec<f64> = factors.iter().map(root).collect();
-        let changes = least_squares(&self.conditions, &roots, lacks.clone(), counts, how);
+        let smallest = SMALL_ROW * self.damping;
+        let changes = least_squares(
+            (&self.conditions, smallest),
+            &roots,
+            lacks.clone(),
+            counts,
+            how,
+        );
         for ((factor, root), change) in factors.iter_mut().zip(&roots).zip(&changes) {
             if *root > 0.0 {
                 *factor *= (1.0 + change / root).max(SMALLEST);
