@@ -393,6 +393,7 @@ impl<const D: usize> Model<D> {
             truncated_families::balance(at, &feet, p.law.linearised(), &mut body)?;
             self.feet = (feet.points as u32..body.cloud.position.len() as u32).collect();
             self.left_out = feet.left_out;
+            body.set_ends(feet.ends);
         }
         self.body = Some(body);
         self.factors = factors.into_iter().zip(horizons).collect();

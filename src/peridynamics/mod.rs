@@ -53,6 +53,7 @@ pub mod softening;
 mod tearing_parameter;
 pub mod zero_energy;
 
+pub(crate) use body::FamilyEnds;
 pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use cauchy_born::{CauchyBorn, LatticeBonds};
 pub use crack_area::CrackArea;

@@ -94,7 +94,7 @@ impl Share {
 }
 
 impl TearingParameter {
-    /// Of points at rest, with the volumes of their whole families, centre included, and the horizon of each.
+    /// Of points at rest, with the volumes of their whole families, centre included and none of places that are no part of the body, and the horizon of each.
     pub fn new(critical: f64, family_volume: &[f64], horizon: &Horizon) -> Self {
         // the fullest family of each lattice
         let mut fullest: Vec<f64> = Vec::new();
@@ -146,9 +146,10 @@ impl TearingParameter {
         // what each point adds to the sums of the families that it is in; a point without a family has no flow of its own
         let surface = &self.surface;
         let share_of = |(j, share): (usize, &mut Share)| {
-            *share = match families.of(j).is_empty() {
-                true => Share::default(),
-                false => Share::of(flow(j), volume[j], surface[j]),
+            let flows = surface[j] > 0.0 && !families.of(j).is_empty();
+            *share = match flows {
+                true => Share::of(flow(j), volume[j], surface[j]),
+                false => Share::default(),
             };
         };
         let shares = self.share.par_iter_mut().enumerate();

@@ -111,24 +111,45 @@ fn a_struck_square_keeps_its_energy_and_goes_on_from_a_checkpoint() {
     resumes_with_the_same_bytes(&typed.replace("mesh.file.path = \"square.msh\"", grid));
 }
 
+/// A square that stretches evenly tears at the same strain whether it is all points or has a zone of them, and all over at once: what lies behind the faces
+/// belongs to the families that end there, and feet are no volume.
+#[test]
+fn a_zone_tears_as_points_alone_do() {
+    let even = "[initial.u.velocity]\nx = \"0.2*(x - 10)\"\ny = \"0.05*(y - 10)\"\n[conditions.around.velocity]\ninside.without = { from = { everywhere = true }, removed = { box = { min = [3.01, 3.01], max = [16.99, 16.99] } } }\nx = \"0.2*(x - 10)\"\ny = \"0.05*(y - 10)\"\n[solve.explicit]\nduration = 0.6\nstep = 0.004\nhistory-interval = 0.004\n[output]\nvtu = false\n";
+    let torn = |coupling: &str| {
+        let folder = folder_with_mesh();
+        let typed = plastic(even)
+            .replace("yield-stress", "tearing-parameter = 0.1\nyield-stress")
+            .replace("\"truncated\"", &format!("\"{coupling}\""));
+        let warns = "coupling = \"truncated\"\nzones.damage-at-edge = \"warn\"";
+        let zone = typed.find("[zones").unwrap()..typed.find("[initial").unwrap();
+        let typed = match coupling {
+            "nonlocal" => typed.replace(&typed[zone], ""),
+            _ => typed.replace("coupling = \"truncated\"", warns),
+        };
+        let said = ran(folder.path(), &typed);
+        let history = folder.path().join("out/s_history.csv");
+        let [time, broken] = ["time", "broken_bonds"].map(|name| column(&history, name));
+        let first = broken.iter().position(|b| *b > 0.0).expect("nothing tore");
+        (time[first], said)
+    };
+    let (alone, _) = torn("nonlocal");
+    let (coupled, said) = torn("truncated");
+    assert!((coupled - alone).abs() < 0.0041, "{coupled} {alone}");
+    // in the same step
+    let reached = "damage reached the edge of the nonlocal zone at t = 0.1280";
+    assert!(said.contains(reached), "{said}");
+}
+
 #[test]
 fn what_families_cannot_end_at_is_refused() {
     let folder = folder_with_mesh();
     let held = "[conditions.left.displacement]\ninside.box = { min = [-1, -1], max = [0.01, 21] }\nx = 0\ny = 0\n";
-    let typed =
-        square("correspondence", held).replace("horizon = 1.5", "horizon = \"1.5 + 0.01*x\"");
-    write(folder.path(), "s.toml", &typed);
-    let output = super::bondline(folder.path())
-        .args(["run", "s.toml"])
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr)
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ");
-    assert!(!output.status.success());
-    assert!(
-        said.contains("horizon that varies") && said.contains("splice"),
-        "{said}"
-    );
+    let typed = square("correspondence", held);
+    let varies = typed.replace("horizon = 1.5", "horizon = \"1.5 + 0.01*x\"");
+    let why = "a horizon that varies is not offered: use a constant horizon, or coupling.splice";
+    crate::laws::refused(folder.path(), &varies, why);
+    let cut = "coupling.truncated.cut-bonds = \"breaking\"";
+    let cut = typed.replace("coupling = \"truncated\"", cut);
+    crate::laws::refused(folder.path(), &cut, "no bonds that a seam could cut");
 }

@@ -5,7 +5,7 @@ use crate::coupling::{
     point_cloud::PointCloud,
 };
 use crate::mesh::{Mesh, boundary::BoundaryFacet};
-use crate::peridynamics::{Cloud, Ends, Factors, Families, PdBody};
+use crate::peridynamics::{Cloud, Ends, Factors, Families, FamilyEnds, PdBody};
 use crate::tensor::{Vector, inverse};
 
 /// Feet farther from a point than this of its horizon are none of its own: the influence function may vanish there.
@@ -34,6 +34,8 @@ pub(in crate::coupling) struct Feet<const D: usize> {
     pub faces: Vec<BoundaryFacet>,
     /// Points of the lattice in the zone that are none, since they lie too close to a face.
     pub left_out: Vec<Vector<D>>,
+    /// What families have behind the faces.
+    pub ends: FamilyEnds,
 }
 
 /// Ends the families of the points of a lattice at feet; `whole` is the lattice with the points in elements that complete them.
@@ -90,6 +92,7 @@ pub(in crate::coupling) fn place<const D: usize>(
         is_whole: own.iter().map(|&i| is_whole[i as usize]).collect(),
         faces,
         left_out: left_out.collect(),
+        ends: ends_of(&body, &own),
     };
     let mut cloud = own_points(&whole.cloud, &own);
     let first = own.len();
@@ -114,6 +117,23 @@ pub(in crate::coupling) fn place<const D: usize>(
         is_constant: true,
     };
     Ok((lattice, feet))
+}
+
+/// The volumes of whole families, and what of them is cut.
+fn ends_of<const D: usize>(body: &PdBody<D>, own: &[u32]) -> FamilyEnds {
+    let volume = |j: &u32| body.cloud.volume[*j as usize];
+    let behind = |i: &u32| {
+        let cut = body.families.of(*i as usize).iter();
+        cut.filter(|j| own.binary_search(j).is_err())
+            .map(volume)
+            .sum()
+    };
+    let whole = |i: &u32| body.volume_of_family(*i as usize, &body.cloud.volume);
+    FamilyEnds {
+        feet: own.len() as u32,
+        whole: own.iter().map(whole).collect(),
+        behind: own.iter().map(behind).collect(),
+    }
 }
 
 /// The families of the points of the zone among themselves and with the feet, which come behind them, and for each point the weights ω of its bonds to feet.

@@ -22,9 +22,9 @@ impl BondFailure {
         let points = setup.position.len();
         if let CriticalStretch::TearingParameter(critical) = failure.critical {
             // of whole families: those of the pass may lack bonds that a seam has of its own
-            let whole = (0..points).map(|i| {
-                let far = body.families.of(i).iter();
-                setup.volume[i] + far.map(|j| setup.volume[*j as usize]).sum::<f64>()
+            let whole = (0..points).map(|i| match body.is_foot(i) {
+                true => 0.0,
+                false => body.volume_of_family(i, setup.volume),
             });
             let whole: Vec<f64> = whole.collect();
             let horizon = &body.cloud.horizon;

@@ -63,7 +63,7 @@ pub(super) struct Generic<const D: usize> {
     pub(super) intact: Vec<bool>,
     /// Bonds that were told to be broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
     pub(super) damaged_through: Vec<bool>,
-    /// Volume of the far points of each family; empty where no bond can be broken.
+    /// Volume of the far points of each family, with what lies behind faces at which it ends; empty where no bond can be broken.
     pub(super) family_volume: Vec<f64>,
     /// Committed, and at the end of the last force.
     pub(super) past: History,
@@ -202,15 +202,7 @@ impl<const D: usize> Generic<D> {
             failure,
             kinematics: setup.kinematics,
             family_volume: match setup.failure.is_some() || setup.precracked.is_some() {
-                true => (0..points)
-                    .map(|i| {
-                        families
-                            .of(i)
-                            .iter()
-                            .map(|j| setup.volume[*j as usize])
-                            .sum()
-                    })
-                    .collect(),
+                true => Self::family_volumes(setup, body),
                 false => Vec::new(),
             },
             intact,
@@ -276,7 +268,6 @@ impl<const D: usize> Generic<D> {
         s.kinematics = self.kinematics;
         s.material = self.material.get(i).copied().unwrap_or(0);
         let kept = self.layout.bond.len();
-        let mut intact_volume = 0.0;
         for bond in self.range(i).filter(|&bond| counts(bond)) {
             let j = self.neighbour(bond);
             let eta = displaced(j) - here;
@@ -289,7 +280,6 @@ impl<const D: usize> Generic<D> {
             s.of.push(bond);
             s.bonds.push(self.xi(i, j));
             s.volumes.push(self.volume[j]);
-            intact_volume += self.volume[j];
             s.pair.push(self.pair[bond]);
             s.omega.extend(self.omega.get(bond));
             s.difference.push(eta);
@@ -302,7 +292,7 @@ impl<const D: usize> Generic<D> {
         s.is_whole = s.of.len() == self.range(i).len();
         s.damage = match s.is_whole {
             true => 0.0,
-            false => 1.0 - intact_volume / self.family_volume[i],
+            false => self.lost_share(i, &counts),
         };
         s.force.clear();
         s.force.resize(s.of.len(), Vector::zeros());

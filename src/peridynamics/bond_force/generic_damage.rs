@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::BondSetup;
 use super::generic::{Generic, NONE};
-use crate::peridynamics::KeptDamage;
+use crate::peridynamics::{KeptDamage, PdBody};
 
 impl<const D: usize> Generic<D> {
     /// The damage φ of a bond at its own end, 1 of a broken one, as committed; without what is kept of the point.
@@ -70,17 +71,36 @@ impl<const D: usize> Generic<D> {
 
     /// `1 − (1 − D) Σ (1 − φ) V / Σ V` of a point; D where there is no family.
     pub(super) fn damage_of_point(&self, i: usize) -> f64 {
-        let (mut all, mut lost) = (0.0, 0.0);
-        for bond in self.range(i) {
-            let v = self.volume[self.neighbour(bond)];
-            all += v;
-            lost += v * self.damage_of(bond);
-        }
+        let volume = |bond: usize| self.volume[self.neighbour(bond)];
+        let lost = self.range(i).map(|b| volume(b) * self.damage_of(b));
+        let lost: f64 = lost.sum();
         let kept = self.kept_of_point(i);
         if lost > 0.0 {
+            let all = self.family_volume.get(i).copied();
+            let all = all.unwrap_or_else(|| self.range(i).map(volume).sum());
             kept + (1.0 - kept) * (lost / all)
         } else {
             kept
         }
+    }
+
+    /// The share of its volume that a family has lost with the bonds that do not stand.
+    pub(super) fn lost_share(&self, i: usize, stands: impl Fn(usize) -> bool) -> f64 {
+        let lost = self.range(i).filter(|&bond| !stands(bond));
+        let volume = |bond: usize| self.volume[self.neighbour(bond)];
+        match lost.map(volume).sum::<f64>() {
+            0.0 => 0.0,
+            lost => lost / self.family_volume[i],
+        }
+    }
+
+    /// The volume of the far points of each family, with what it has behind faces at which it ends.
+    pub(super) fn family_volumes(setup: &BondSetup<'_, D>, body: &PdBody<D>) -> Vec<f64> {
+        let of_family = |i: usize| {
+            let far = setup.families.of(i).iter().map(|&j| j as usize);
+            let far = far.filter(|&j| !body.is_foot(j));
+            far.map(|j| setup.volume[j]).sum::<f64>() + body.volume_behind(i)
+        };
+        (0..setup.position.len()).map(of_family).collect()
     }
 }

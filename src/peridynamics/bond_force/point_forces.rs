@@ -92,13 +92,12 @@ impl<const D: usize> Generic<D> {
     fn intact_of(&self, i: usize, weights: &[f64]) -> Intact<D> {
         let range = self.range(i);
         let is_whole = range.clone().all(|bond| self.intact[bond]);
-        let (mut left, mut first, mut volume) = (Tensor::zeros(), Vector::zeros(), 0.0);
+        let (mut left, mut first) = (Tensor::zeros(), Vector::zeros());
         for bond in range.filter(|&bond| self.intact[bond]) {
             let j = self.neighbour(bond);
             let xi = self.xi(i, j);
             left += xi * xi.transpose() * weights[bond];
             first += xi * weights[bond];
-            volume += self.volume[j];
         }
         let whole = self.state[i].as_ref().map(|state| &state.shape);
         Intact {
@@ -106,7 +105,7 @@ impl<const D: usize> Generic<D> {
             first,
             damage: match is_whole {
                 true => 0.0,
-                false => 1.0 - volume / self.family_volume[i],
+                false => self.lost_share(i, |bond| self.intact[bond]),
             },
         }
     }

@@ -1,0 +1,116 @@
+//! What the bonds of a point give at a displacement: its partial stress and its energy density.
+
+use super::PdBody;
+use crate::tensor::{Tensor, Vector};
+
+impl<const D: usize> PdBody<D> {
+    /// `Σ p |ξ|² ξ ⊗ ξ V` over the neighbours that `stands` names.
+    fn second_moment(&self, j: usize, stands: impl Fn(usize) -> bool) -> Tensor<D> {
+        let (pair, _) = self.kernel(j);
+        let family = self.families.of(j).iter().map(|&l| l as usize).zip(pair);
+        let standing = family.filter(|(l, _)| stands(*l));
+        standing.fold(Tensor::zeros(), |sum, (l, pair)| {
+            let xi = self.bond(j, l);
+            sum + xi * xi.transpose() * (pair * xi.norm_squared() * self.cloud.volume[l])
+        })
+    }
+
+    /// The partial stress of point `j` under displacements `u` of the sites.
+    pub fn partial_stress(&self, j: usize, u: &[f64]) -> Tensor<D> {
+        let state = self.state(j).map(|s| s.shape);
+        self.stress_of(j, u, |_| true, state)
+    }
+
+    /// The partial stress of point `j` by the bonds to neighbours that `stands` names, zero without any: force states keep the weights of the whole family, as in motion.
+    pub fn partial_stress_of(
+        &self,
+        j: usize,
+        u: &[f64],
+        is_intact: impl Fn(usize) -> bool,
+    ) -> Tensor<D> {
+        let (_, omega) = self.kernel(j);
+        let shape = (!self.pairwise).then(|| {
+            let family = self.families.of(j).iter().map(|&l| l as usize);
+            let standing = family.zip(omega).filter(|(l, _)| is_intact(*l));
+            standing.fold(Tensor::zeros(), |shape, (l, omega)| {
+                let xi = self.bond(j, l);
+                shape + xi * xi.transpose() * (omega * self.cloud.volume[l])
+            })
+        });
+        self.stress_of(j, u, is_intact, shape)
+    }
+
+    /// The energy density of point `j` under displacements `u` of the sites, by the bonds to neighbours that `stands` names: that whose derivative the linear force state is \[J/m^D\].
+    pub fn energy_density(&self, j: usize, u: &[f64], stands: impl Fn(usize) -> bool) -> f64 {
+        let transfer = &self.cloud.transfer;
+        let (pair, omega) = self.kernel(j);
+        let here: Vector<D> = transfer.displacement(j, u);
+        let (mut pairs, mut squares, mut product) = (0.0, 0.0, 0.0);
+        let mut gradient = Tensor::zeros();
+        for (k, &l) in self.families.of(j).iter().enumerate() {
+            let l = l as usize;
+            if !stands(l) {
+                continue;
+            }
+            let xi = self.bond(j, l);
+            let eta = transfer.displacement::<D>(l, u) - here;
+            let (along, v) = (xi.dot(&eta), self.cloud.volume[l]);
+            pairs += pair[k] * along * along * v;
+            if !self.pairwise {
+                squares += omega[k] * eta.norm_squared() * v;
+                gradient += eta * xi.transpose() * (omega[k] * v);
+                product += pair[k] * xi.norm_squared() * along * v;
+            }
+        }
+        let Some(state) = self.state(j) else {
+            return 0.5 * pairs;
+        };
+        let mut of_state = gradient.dot(&state.modulus.contract(&gradient));
+        if state.deviator != 0.0 {
+            let (d, theta) = (state.deviator, gradient.trace());
+            let lost = state.second.trace() - self.second_moment(j, stands).trace();
+            of_state -= d * theta * (2.0 * product + d * lost * theta);
+        }
+        0.5 * (pairs + state.stabilisation * squares + of_state)
+    }
+
+    fn stress_of(
+        &self,
+        j: usize,
+        u: &[f64],
+        stands: impl Fn(usize) -> bool,
+        shape: Option<Tensor<D>>,
+    ) -> Tensor<D> {
+        let transfer = &self.cloud.transfer;
+        let (pair, omega) = self.kernel(j);
+        let here: Vector<D> = transfer.displacement(j, u);
+        let mut stress = Tensor::zeros();
+        let mut gradient = Tensor::zeros();
+        for (k, &l) in self.families.of(j).iter().enumerate() {
+            let l = l as usize;
+            if !stands(l) {
+                continue;
+            }
+            let xi = self.bond(j, l);
+            let eta = transfer.displacement::<D>(l, u) - here;
+            let v = self.cloud.volume[l];
+            stress += xi * xi.transpose() * (pair[k] * xi.dot(&eta) * v);
+            if !self.pairwise {
+                gradient += eta * xi.transpose() * (omega[k] * v);
+            }
+        }
+        let stress_of_pairs = stress;
+        if let (Some(state), Some(shape)) = (self.state(j), shape) {
+            stress += gradient * state.stabilisation + state.modulus.contract(&gradient) * shape;
+            if state.deviator != 0.0 {
+                // of the deviatoric extensions those of broken bonds are left out
+                let d = state.deviator;
+                let second = self.second_moment(j, &stands);
+                let lost = state.second.trace() - second.trace();
+                let (theta, product) = (gradient.trace(), stress_of_pairs.trace());
+                stress -= (shape * (product + d * lost * theta) + second * theta) * d;
+            }
+        }
+        stress
+    }
+}
