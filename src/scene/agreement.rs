@@ -67,6 +67,30 @@ pub(crate) fn balanced_seam<const D: usize>(
     .help(remedy))
 }
 
+/// Refuses an option of cut bonds where there are none: families of a law whose points have a stress end on faces.
+pub(crate) fn cut_bonds<const D: usize>(
+    spec: &SceneSpec,
+    coupling: &CouplingSpec,
+    material: &Material<D>,
+) -> Result<(), SceneError> {
+    let (CouplingSpec::Truncated(typed), Some(named)) = (coupling, &spec.coupling) else {
+        return Ok(());
+    };
+    if typed.cut_bonds.is_none() || material.law.linearised().is_ordinary() {
+        return Ok(());
+    }
+    Err(SceneError::new(
+        SceneErrorKind::Conflict,
+        format!(
+            "`coupling.truncated.cut-bonds` is set, and the law of the material `{}`, {}, has no bonds that a seam could cut",
+            material.name,
+            material.law.name()
+        ),
+    )
+    .label(named.span(), "families end on the faces of elements")
+    .help("remove cut-bonds"))
+}
+
 /// Refuses finite elements of a law whose classical stress is not linear: they would stay elastic where the points yield.
 pub(crate) fn elastic_elements<const D: usize>(
     spec: &SceneSpec,

@@ -1,8 +1,8 @@
 //! The coupling of a scene: the one that is typed, or the one that suits it.
 //!
 //! Left to the program, it is `truncated` wherever that holds, for it alone is symmetric, in exact equilibrium and bounded in time. Where the scene shows that it
-//! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere or an LPS has a low
-//! Poisson's ratio, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
+//! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere, an LPS has a low
+//! Poisson's ratio, or points have a stress, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
 
 use super::error::{SceneError, SceneErrorKind};
 use super::material_interfaces;
@@ -140,18 +140,24 @@ fn obstacle<const D: usize>(
     if p.elements.as_ref().is_some_and(follows_bonds) && found.iter().any(is_slow) {
         return certain("elements that follow the bonds of such a law at any stretch");
     }
-    let mut negative = None;
+    // what the seam or the proof has to tell
+    let mut doubt = None;
     for m in found {
         let (lambda, mu) = m.lame;
         let law = m.law.linearised();
-        if !law.is_ordinary() {
-            return certain(&format!("the {} material `{}`", m.law.name(), m.name));
-        }
         if law.has_deviators() {
             return certain(&format!("the {} material `{}`", m.law.name(), m.name));
         }
-        if !law.is_pairwise() && lambda < mu * (1.0 - 1e-9) {
-            negative = Some(&m.name);
+        if !law.is_ordinary() {
+            doubt = Some(
+                "it meets uniform stresses by least squares where its faces meet a free surface"
+                    .to_owned(),
+            );
+        } else if !law.is_pairwise() && lambda < mu * (1.0 - 1e-9) {
+            doubt = Some(format!(
+                "the lps material `{}` has a Poisson's ratio below that of a bond-based one",
+                m.name
+            ));
         }
     }
     if matches!(p.points, Some(PointsSpec::Cells)) {
@@ -172,10 +178,8 @@ fn obstacle<const D: usize>(
     let Points::Lattice { spacing, origin } = lattice.points else {
         return certain("points that are no lattice");
     };
-    if let Some(name) = negative {
-        return Ok(Some(Obstacle::Possible(format!(
-            "the lps material `{name}` has a Poisson's ratio below that of a bond-based one"
-        ))));
+    if let Some(reason) = doubt {
+        return Ok(Some(Obstacle::Possible(reason)));
     }
     Ok((!follows(mesh, &zones, spacing, &origin))
         .then(|| Obstacle::Possible("the faces of the zone do not follow the lattice".to_owned())))
@@ -237,7 +241,11 @@ y = 0
 
     /// The coupling of the plate with overrides, and why.
     fn coupling(overrides: &[&str]) -> (&'static str, Option<String>) {
-        let mut source = Source::new("plate.toml", PLATE);
+        coupling_of(PLATE, overrides)
+    }
+
+    fn coupling_of(plate: &str, overrides: &[&str]) -> (&'static str, Option<String>) {
+        let mut source = Source::new("plate.toml", plate);
         for o in overrides {
             source.push_override(o).expect("an override");
         }
@@ -278,5 +286,11 @@ y = 0
             assert_eq!(name, first, "{change}");
             assert!(why.is_some_and(|w| w.contains(reason)), "{change}");
         }
+        let (name, why) = coupling_of(&PLATE.replace("lps]", "correspondence]"), &[]);
+        assert_eq!(name, "truncated");
+        assert!(why.is_some_and(|w| w.contains("least squares")));
+        let (name, why) = coupling_of(&PLATE.replace("lps]", "pals]"), &[]);
+        assert_eq!(name, "splice");
+        assert!(why.is_some_and(|w| w.contains("`plate`")));
     }
 }

@@ -202,6 +202,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         let (spec, materials, cells) = (self.spec, &self.materials, &self.cell_material);
         for &material in used {
             agreement::balanced_seam(spec, coupling, materials, cells, material)?;
+            agreement::cut_bonds(spec, coupling, &materials[usize::from(material)])?;
         }
         agreement::elastic_elements(spec, materials, cells, zones)?;
         agreement::crack_bands(spec, materials, cells, (&self.mesh, zones))?;

@@ -145,6 +145,7 @@ fn a_routine_gives_our_own_plasticity_in_elements_and_at_points() {
         ("a bar of elements", pulled.replace("{coupling}", "local")),
         ("points", pulled.replace("{coupling}", "nonlocal")),
         ("splice", pulled.replace("{coupling}", "splice")),
+        ("truncated", pulled.replace("{coupling}", "truncated")),
     ];
     for library in j2(folder.path()) {
         for (name, scene) in &scenes {
