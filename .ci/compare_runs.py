@@ -17,7 +17,9 @@ FORMATS = {"Float64": "d", "Float32": "f", "Int32": "i", "Int64": "q", "UInt8": 
 
 
 def array(element, header):
-    """The numbers of an inline array, compressed by zlib in blocks or not at all."""
+    """The numbers of an inline array: as text, or compressed by zlib in blocks or not at all."""
+    if element.get("format") == "ascii":
+        return tuple(float(word) for word in element.text.split())
     text = "".join(element.text.split())
     size = struct.calcsize(header)
     count = struct.unpack("<" + header, base64.b64decode(text[: 4 * -(-size // 3)])[:size])[0]

@@ -488,7 +488,7 @@ mod tests {
             influence: "influence = \"gaussian\"\n",
             size: 3,
             has_triangles: false,
-            widths: [6, 6, 12],
+            widths: if D == 3 { [3, 3, 6] } else { [6, 6, 12] },
             ratio: 2,
             origin: 0.0,
         };

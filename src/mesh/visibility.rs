@@ -402,7 +402,7 @@ mod tests {
         }
     }
 
-    /// Every bond of a lattice that fits the mesh, and of one shifted off it, against the same hole as a void.
+    /// Every bond of a lattice that fits the mesh, and of one shifted off it, against the same hole as a void; in a solid two of seven.
     fn agrees_with_void<const D: usize>(
         cells: usize,
         min: Vector<D>,
@@ -428,10 +428,14 @@ mod tests {
             .collect();
         let mut cuts = 0;
         for points in [&mesh.nodes, &shifted] {
-            for a in points {
-                for b in points {
+            for (i, a) in points.iter().enumerate() {
+                for (j, b) in points.iter().enumerate() {
                     let length = (b - a).norm();
                     if length == 0.0 || length > 3.1 * h {
+                        continue;
+                    }
+                    // the many segments of a solid by turns, those of a pair from one end and the other
+                    if D == 3 && (i + 5 * j) % 7 > 1 {
                         continue;
                     }
                     let wanted = hole.cuts(a, b);

@@ -1,6 +1,24 @@
 use super::*;
 use crate::solve::stable_step::{stable_step, tests::springs};
 
+/// Stores no zeros, of which most of a row of springs consists.
+fn leave_out_zeros(system: &mut crate::system::LinearMotion) {
+    let dense = std::mem::take(&mut system.stiffness);
+    let kept = &mut system.stiffness;
+    kept.block = dense.block;
+    kept.row_offsets.push(0);
+    for row in 0..dense.rows() {
+        let (columns, values) = dense.row(row);
+        for (&column, &value) in columns.iter().zip(values) {
+            if value != 0.0 || column as usize == row {
+                kept.columns.push(column);
+                kept.values.push(value);
+            }
+        }
+        kept.row_offsets.push(kept.columns.len());
+    }
+}
+
 #[test]
 fn growth_is_that_of_the_eigenvalues() {
     // two uncoupled chains, then a pair [[2, w], [−w, 2]] with eigenvalues 2 ± i w, or one site of negative stiffness
@@ -35,6 +53,7 @@ fn growth_is_that_of_the_eigenvalues() {
                 }
             }
             system.symmetry = Symmetry::Unsymmetric;
+            leave_out_zeros(&mut system);
             let step = stable_step(&system, &[]).expect("masses").stable;
             let found = growth(&system, &[], step, 20_000).expect("eigenvalues");
             let [re, im]: [f64; 2] = expected;
@@ -50,7 +69,8 @@ fn growth_is_that_of_the_eigenvalues() {
             );
             assert_eq!(found.admit(1e-3, ""), Ok(()));
         }
-        let stable = springs(n);
+        let mut stable = springs(n);
+        leave_out_zeros(&mut stable);
         let step = stable_step(&stable, &[]).expect("masses").stable;
         let found = growth(&stable, &[], step, 20_000).expect("eigenvalues");
         assert!(found.rate == 0.0 && found.resolution < 0.02, "{found:?}");
@@ -127,6 +147,7 @@ fn growth_that_noise_cannot_show_is_found_near_the_seam() {
         system.stiffness.values[a * n + b] = v;
     }
     system.symmetry = Symmetry::Unsymmetric;
+    leave_out_zeros(&mut system);
     let step = stable_step(&system, &[]).expect("masses").stable;
     let seen = growth_from_noise(&mut Scaled::new(&system, &[]).expect("masses"), step, 2000);
     assert_eq!(seen.expect("products").0.rate, 0.0);

@@ -107,8 +107,9 @@ fn from_environment(key: &str, plain: u64) -> u64 {
 /// `BONDLINE_RANDOM_SCENES` and `BONDLINE_RANDOM_FROM` say how many and from which number on; scene `n` is the same wherever it is made.
 #[test]
 fn random_scenes_solve_or_are_refused_by_name() {
-    let count = from_environment("BONDLINE_RANDOM_SCENES", 60);
-    let from = from_environment("BONDLINE_RANDOM_FROM", 0);
+    // of the first fourteen, which `.ci/run` runs with fifty more, three take ten times as long as all of these
+    let count = from_environment("BONDLINE_RANDOM_SCENES", 46);
+    let from = from_environment("BONDLINE_RANDOM_FROM", 14);
     let mut tally = Tally::new(from, entry::random_text);
     for number in from..from + count {
         let Some(outcome) = tally.run(number, entry::random_scene) else {

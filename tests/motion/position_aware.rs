@@ -113,14 +113,8 @@ fn a_viscoelastic_cube_that_is_sheared_and_held_relaxes_as_its_closed_form() {
     let (end, ramp, steps) = (0.5, 0.1, 5);
     let shear = 1000.0 / 2.6;
     let field = "x = \"1e-3*y*min(10*t, 1)\"\ny = 0\nz = 0";
-    for (share, time) in [
-        (0.01, 2.0),
-        (0.5, 2.0),
-        (0.99, 2.0),
-        (0.5, 10.0),
-        (0.5, 0.1),
-        (0.5, 0.01),
-    ] {
+    // from little to almost all, and from far longer than the ramp to far shorter
+    for (share, time) in [(0.01, 2.0), (0.5, 10.0), (0.5, 0.01), (0.99, 0.1)] {
         let folder = tempfile::tempdir().unwrap();
         let law = format!(
             "pave]\nrelaxing-share = {share}\nrelaxation-time = {time}\nrelaxing-share-2 = 0.006\nrelaxation-time-2 = 3\nrelaxing-share-16 = 0.004\nrelaxation-time-16 = 0.3"

@@ -129,10 +129,21 @@ pub struct Enclosed<const D: usize> {
     pub coupling: Box<dyn Coupling<D>>,
     /// Its stiffness.
     pub stiffness: BlockCsr,
+    /// What the rows of the stiffness are.
+    pub rows: Rows,
     /// Half the width of the block \[m\].
     pub half: f64,
     /// The elastic tensor of the elements \[Pa\].
     pub tensor: Tensor4<D>,
+}
+
+/// Which volume the rows of a stiffness are equations of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rows {
+    /// Each that of its own row, as the operator writes it; their sums hold.
+    Own,
+    /// The volume of the site, as in a run.
+    OfSites,
 }
 
 /// What a block has otherwise than its case says.
@@ -190,6 +201,7 @@ impl<const D: usize> Enclosed<D> {
             model,
             coupling,
             stiffness,
+            rows: Rows::Own,
             half,
             tensor,
         })
@@ -203,6 +215,7 @@ impl<const D: usize> Enclosed<D> {
         let laid = scene::model::<D>(text, files)?;
         Ok(Self {
             stiffness: laid.stiffness()?,
+            rows: Rows::OfSites,
             tensor: *laid.model.tensor_of_cell(0),
             model: laid.model,
             coupling: laid.coupling,
@@ -213,6 +226,12 @@ impl<const D: usize> Enclosed<D> {
     /// Whether a site lies on the outer boundary.
     pub fn is_outer(&self, site: usize) -> bool {
         self.model.sites[site].position.amax() > self.half * (1.0 - 1e-9)
+    }
+
+    /// What makes of the force in the row of a site one per volume.
+    pub fn per_volume(&self, site: usize) -> f64 {
+        let scale = self.model.row_scale().filter(|_| self.rows == Rows::Own);
+        scale.map_or(1.0, |scale| scale[site]) / self.model.sites[site].volume
     }
 
     /// Positions of all sites.

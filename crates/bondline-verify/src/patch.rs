@@ -93,14 +93,13 @@ fn largest_density<const D: usize>(
     wanted: impl Fn(usize, usize) -> f64,
 ) -> f64 {
     let mut largest = 0.0;
-    for (s, site) in enclosed.model.sites.iter().enumerate() {
-        if !enclosed.is_outer(s) {
-            for i in 0..D {
-                largest = worst(
-                    largest,
-                    (force[s * D + i] / site.volume - wanted(s, i)).abs(),
-                );
-            }
+    for s in (0..enclosed.model.sites.len()).filter(|&s| !enclosed.is_outer(s)) {
+        let per_volume = enclosed.per_volume(s);
+        for i in 0..D {
+            largest = worst(
+                largest,
+                (force[s * D + i] * per_volume - wanted(s, i)).abs(),
+            );
         }
     }
     largest

@@ -235,15 +235,18 @@ pub(super) fn balances<const D: usize>(
 /// Row sums bound the rows of the tangent, and not by far; `n` unknowns.
 pub(super) fn row_sums_bound_rows<const D: usize>(pass: &dyn BondPass<D>, n: usize, name: &str) {
     let sums = pass.row_sums();
-    let mut column = vec![0.0; n];
-    for row in [0, n / 2, n - 1] {
-        let mut sum = 0.0;
-        for c in 0..n {
-            let mut x = vec![0.0; n];
-            x[c] = 1.0;
-            pass.tangent_into(&x, &mut column);
-            sum += column[row].abs();
+    let (mut unit, mut column) = (vec![0.0; n], vec![0.0; n]);
+    let rows = [0, n / 2, n - 1];
+    let mut found = [0.0; 3];
+    for c in 0..n {
+        unit[c] = 1.0;
+        pass.tangent_into(&unit, &mut column);
+        unit[c] = 0.0;
+        for (found, &row) in found.iter_mut().zip(&rows) {
+            *found += column[row].abs();
         }
+    }
+    for (sum, row) in found.into_iter().zip(rows) {
         assert!(
             sum <= sums[row] * (1.0 + 1e-12) && sum > 0.2 * sums[row],
             "{name}: row sums {sum} {}",

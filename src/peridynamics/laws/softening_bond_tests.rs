@@ -72,6 +72,18 @@ impl<const D: usize> Point<D> {
         })
     }
 
+    /// The largest horizon of a strength and an energy, as the refusal of a horizon beyond it names it: nothing else has to be found for that.
+    fn largest_horizon(&self, strength: f64, energy: f64) -> f64 {
+        match self.calibrate(Softening {
+            strength,
+            energy,
+            is_exponential: false,
+        }) {
+            Err(CalibrationError::SnapBack { largest, .. }) => largest,
+            other => panic!("{other:?}"),
+        }
+    }
+
     /// Force states under extensions, with the history before and after; and the energies.
     fn respond(
         &self,
@@ -201,12 +213,7 @@ fn largest_stress<const D: usize>(point: &Point<D>, law: &SofteningBond<D>) -> f
 
 fn has_its_strength<const D: usize>(m: i32) {
     let point = point::<D>(0.1, m);
-    let bound = point.calibrate(Softening {
-        strength: 1.0,
-        energy: 1e9,
-        is_exponential: false,
-    });
-    let largest = bound.unwrap().largest_horizon / 1e9;
+    let largest = point.largest_horizon(1.0, 1e-9) / 1e-9;
     for shape in [0.0, 1.0] {
         // from nearly brittle to soft
         for softness in [1.3, 10.0] {
@@ -293,36 +300,13 @@ fn a_bar_has_the_closed_form() {
 
 #[test]
 fn the_largest_horizon_tends_to_that_of_a_continuous_family() {
-    let typed = Softening {
-        strength: 0.1,
-        energy: 1e6,
-        is_exponential: false,
-    };
-    let over = |largest: f64, modulus: f64| largest / (modulus * 1e6 / 0.01);
-    let bar = over(
-        point::<1>(0.01, 400)
-            .calibrate(typed)
-            .unwrap()
-            .largest_horizon,
-        young::<1>(),
-    );
+    // in units of E G/σ²
+    let bar = point::<1>(0.01, 400).largest_horizon(0.1, 1e-6) / (young::<1>() * 1e-4);
     assert!((bar / 3.0 - 1.0).abs() < 0.01, "{bar}");
-    let plane = over(
-        point::<2>(0.01, 40)
-            .calibrate(typed)
-            .unwrap()
-            .largest_horizon,
-        young::<2>(),
-    );
+    let plane = point::<2>(0.01, 40).largest_horizon(0.1, 1e-6) / (young::<2>() * 1e-4);
     let exact = 4.0 * std::f64::consts::PI / 9.0;
     assert!((plane / exact - 1.0).abs() < 0.03, "{plane} {exact}");
-    let solid = over(
-        point::<3>(0.01, 12)
-            .calibrate(typed)
-            .unwrap()
-            .largest_horizon,
-        young::<3>(),
-    );
+    let solid = point::<3>(0.01, 12).largest_horizon(0.1, 1e-6) / (young::<3>() * 1e-4);
     assert!((solid * 1.2 - 1.0).abs() < 0.05, "{solid}");
 }
 

@@ -28,7 +28,7 @@ use bondline::{
 };
 use lattices::{Families, Meeting, Solid};
 use plane::{Between, Strip};
-use variants::{LEAST, Variant};
+use variants::{LEAST, Uniform, Variant};
 
 /// Forces and sums that must vanish may be this large.
 const ROUND_OFF: f64 = 1e-11;
@@ -58,53 +58,87 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         Effort::Full => &[4, 2],
     };
     let mut tables = Vec::new();
+    let mut widest = Vec::new();
     for &ratio in ratios {
-        progress.stage(
-            &format!("horizons, bars {ratio}:1"),
-            Some(Variant::ALL.len() as u64),
-        );
-        let found: Vec<(Variant, Option<Found>)> = Variant::ALL
-            .par_iter()
-            .map(|&variant| {
-                let bar = variant.bar(ratio, FINE);
-                let pure = || Pure::new(variant, ratio);
-                let found = bar.map(|bar| measure(variant, &bar, &pure()));
-                progress.advance(1);
-                (variant, found)
-            })
-            .collect();
-        tables.push(forces(ratio, &found));
-        let found: Vec<Found> = found.into_iter().filter_map(|f| f.1).collect();
-        tables.push(passes(ratio, &found));
-        tables.push(statements(ratio, &found));
+        let (of_ratio, found) = bars(ratio, progress);
+        tables.extend(of_ratio);
+        if ratio == 4 {
+            widest = found;
+        }
     }
     progress.stage("horizons, half the spacing", None);
-    tables.push(half_the_spacing(effort));
-    progress.stage("horizons, plates", None);
-    tables.push(plates(effort));
-    progress.stage("horizons, state-based laws on two lattices", None);
-    tables.push(state_based(effort));
+    tables.push(half_the_spacing(effort, &widest));
+    tables.extend(planes(effort, progress));
     progress.finish();
     tables
 }
 
-/// Bars of one lattice by the law of a variant.
+/// The tables of bars of a ratio of horizons, and what they are of.
+fn bars(ratio: usize, progress: &dyn Progress) -> ([Table; 3], Vec<Found>) {
+    progress.stage(
+        &format!("horizons, bars {ratio}:1"),
+        Some(Variant::ALL.len() as u64),
+    );
+    let pure: Vec<Pure> = Uniform::ALL
+        .par_iter()
+        .map(|&law| Pure::new(law, ratio))
+        .collect();
+    let pure = |law: Uniform| &pure[law as usize];
+    let found: Vec<(Variant, Option<Found>)> = Variant::ALL
+        .par_iter()
+        .map(|&variant| {
+            let bar = variant.bar(ratio, FINE);
+            let found = bar.map(|bar| measure(variant, &bar, pure(variant.alone())));
+            progress.advance(1);
+            (variant, found)
+        })
+        .collect();
+    let of_forces = forces(ratio, &found);
+    let found: Vec<Found> = found.into_iter().filter_map(|f| f.1).collect();
+    let of_passes = passes(ratio, &found, pure(Uniform::BondBased));
+    let stated = statements(ratio, &found);
+    ([of_forces, of_passes, stated], found)
+}
+
+/// The tables of lattices in two and three dimensions.
+fn planes(effort: Effort, progress: &dyn Progress) -> [Table; 2] {
+    progress.stage("horizons, plates", None);
+    let plates = plates(effort);
+    progress.stage("horizons, state-based laws on two lattices", None);
+    [plates, state_based(effort)]
+}
+
+/// Bars of one lattice by a law, and what waves do in them.
 struct Pure {
     fine: Bar,
     coarse: Bar,
     fine_passes: Vec<Vec<f64>>,
+    /// Displacements of both pulses from the coarse side in the coarse bar and from the fine side in the fine bar, when [`reflection`] looks.
+    alone: [[Vec<f64>; 2]; 2],
 }
 
 impl Pure {
-    fn new(variant: Variant, ratio: usize) -> Self {
-        let fine = variant.uniform(FINE);
+    fn new(law: Uniform, ratio: usize) -> Self {
+        let (fine, coarse) = (law.bar(FINE), law.bar(FINE * ratio as f64));
+        let alone = NARROW.map(|narrow| {
+            [
+                displacement(&coarse, WAYS[0], narrow),
+                displacement(&fine, WAYS[1], narrow),
+            ]
+        });
         Self {
             fine_passes: eight_passes(&fine),
-            coarse: variant.uniform(FINE * ratio as f64),
+            alone,
             fine,
+            coarse,
         }
     }
 }
+
+/// How many times as narrow as the paper's the pulses are that are sent onto a change.
+const NARROW: [f64; 2] = [1.0, 2.0];
+/// Where they start, and the change that they meet: from the middle to the right, and from the left end to the right.
+const WAYS: [[f64; 2]; 2] = [[0.5 * LENGTH, CHANGES[1]], [10.0, CHANGES[0]]];
 
 /// Velocities each time the wave is back.
 fn eight_passes(bar: &Bar) -> Vec<Vec<f64>> {
@@ -118,11 +152,11 @@ fn eight_passes(bar: &Bar) -> Vec<Vec<f64>> {
 }
 
 fn measure(variant: Variant, bar: &Bar, pure: &Pure) -> Found {
-    let reflected = [1.0, 2.0].map(|narrow| {
+    let reflected = [0, 1].map(|p| {
+        let [coarse, fine] = &pure.alone[p];
         [
-            // from the middle to the right, and from the left end to the right
-            reflection(bar, &pure.coarse, 0.5 * LENGTH, CHANGES[1], narrow),
-            reflection(bar, &pure.fine, 10.0, CHANGES[0], narrow),
+            reflection(bar, &pure.coarse, coarse, WAYS[0], NARROW[p]),
+            reflection(bar, &pure.fine, fine, WAYS[1], NARROW[p]),
         ]
     });
     let passes = errors_of_passes(bar, &pure.fine_passes, FINE);
@@ -161,19 +195,19 @@ fn larger(most: f64, value: f64) -> f64 {
     }
 }
 
-/// The largest displacement that a change of the horizon sends back, against the bar without one, over the height of the pulse.
-fn reflection(bar: &Bar, pure: &Bar, start: f64, change: f64, narrow: f64) -> f64 {
-    // until what is sent back is 0.6 of the way from the change to where it started
-    let time = 1.6 * (change - start);
-    let displacement = |bar: &Bar| {
-        let mut wave = Wave::moving(&bar.x, start, narrow);
-        bar.run(&mut wave, time);
-        wave.u
-    };
-    let (u, alone) = (displacement(bar), displacement(pure));
+/// Displacements when what a change sends back is 0.6 of the way from it to where the pulse started.
+fn displacement(bar: &Bar, [start, change]: [f64; 2], narrow: f64) -> Vec<f64> {
+    let mut wave = Wave::moving(&bar.x, start, narrow);
+    bar.run(&mut wave, 1.6 * (change - start));
+    wave.u
+}
+
+/// The largest displacement that a change of the horizon sends back, against `alone`, that of the bar without one, over the height of the pulse.
+fn reflection(bar: &Bar, pure: &Bar, alone: &[f64], way: [f64; 2], narrow: f64) -> f64 {
+    let [start, change] = way;
     let spacing = pure.x[1] - pure.x[0];
     let mut most = 0.0;
-    for (x, u) in bar.x.iter().zip(&u) {
+    for (x, u) in bar.x.iter().zip(displacement(bar, way, narrow)) {
         let at = x / spacing;
         let twin = at.round();
         if *x < change - 2.0 && *x > start - 15.0 && (at - twin).abs() < 1e-6 {
@@ -222,8 +256,7 @@ fn forces(ratio: usize, found: &[(Variant, Option<Found>)]) -> Table {
     table
 }
 
-fn passes(ratio: usize, found: &[Found]) -> Table {
-    let pure = Pure::new(Variant::Splice, ratio);
+fn passes(ratio: usize, found: &[Found], pure: &Pure) -> Table {
     let mut table = Table::new(
         format!(
             "{ratio}:1, the multi-horizon paper's figure 5: largest velocity error each time the wave is back, over the height of the pulse"
@@ -246,7 +279,7 @@ fn passes(ratio: usize, found: &[Found]) -> Table {
         }
     };
     for (name, bar) in [("all fine", &pure.fine), ("all coarse", &pure.coarse)] {
-        push(name, &measure(Variant::Splice, bar, &pure).passes);
+        push(name, &errors_of_passes(bar, &pure.fine_passes, FINE));
     }
     for f in found {
         push(&format!("{ratio}:1 {}", f.variant.name()), &f.passes);
@@ -299,7 +332,7 @@ fn statements(ratio: usize, found: &[Found]) -> Table {
 }
 
 /// The multi-horizon paper's figure 7: the same bar with 0.2 mm in the middle and 0.05 mm at its ends.
-fn half_the_spacing(effort: Effort) -> Table {
+fn half_the_spacing(effort: Effort, found: &[Found]) -> Table {
     let mut table = Table::new(
         "4:1, the multi-horizon paper's figure 7, half the spacing of figure 5 (0.2 and 0.05 mm): largest velocity error of the eighth pass over the height of the pulse, and that of figure 5 over it",
         Columns::ByQuantity,
@@ -315,15 +348,24 @@ fn half_the_spacing(effort: Effort) -> Table {
             Variant::Fitted,
         ],
     };
-    let last = |variant: Variant, h: f64| {
-        let fine = eight_passes(&variant.uniform(h));
-        let bar = variant.bar(4, h)?;
-        errors_of_passes(&bar, &fine, h).pop()
+    let spacing = 0.5 * FINE;
+    let laws = Uniform::ALL.map(|law| variants.iter().any(|v| v.alone() == law).then_some(law));
+    let fine: Vec<Option<Vec<Vec<f64>>>> = laws
+        .par_iter()
+        .map(|law| law.map(|law| eight_passes(&law.bar(spacing))))
+        .collect();
+    let half = |variant: Variant| {
+        let fine = fine[variant.alone() as usize].as_ref()?;
+        errors_of_passes(&variant.bar(4, spacing)?, fine, spacing).pop()
+    };
+    let whole = |variant: Variant| {
+        let found = found.iter().find(|f| f.variant == variant)?;
+        found.passes.last().copied()
     };
     let rows: Vec<Vec<Row>> = variants
         .par_iter()
         .map(|&variant| {
-            let (Some(half), Some(whole)) = (last(variant, 0.5 * FINE), last(variant, FINE)) else {
+            let (Some(half), Some(whole)) = (half(variant), whole(variant)) else {
                 let why = "no bonds of that sign balance every node";
                 return vec![Row::refused(variant.name(), "error", why)];
             };
@@ -500,17 +542,20 @@ mod tests {
 
     #[test]
     fn waves_in_one_lattice_come_back_as_they_went() {
-        let pure = Pure::new(Variant::Splice, 4);
+        let pure = Pure::new(Uniform::BondBased, 4);
         // nothing is sent back where nothing changes, and the fine bar is right to some per mille after one pass
-        assert!(reflection(&pure.fine, &pure.fine, 10.0, CHANGES[0], 1.0) == 0.0);
-        let fine = measure(Variant::Splice, &pure.fine, &pure);
-        assert!(fine.passes[0][0] < 5e-3, "{:?}", fine.passes[0]);
-        assert!(fine.passes[7][1] == 0.0);
+        let [_, alone] = &pure.alone[0];
+        assert!(reflection(&pure.fine, &pure.fine, alone, WAYS[1], 1.0) == 0.0);
+        let passes = errors_of_passes(&pure.fine, &pure.fine_passes, FINE);
+        assert!(passes[0][0] < 5e-3, "{:?}", passes[0]);
+        assert!(passes[7][1] == 0.0);
     }
 
     #[test]
     fn no_row_is_short() {
-        for table in run(Effort::Quick, &Silent) {
+        // half the spacing has no limits
+        let (of_bars, _) = bars(4, &Silent);
+        for table in of_bars.into_iter().chain(planes(Effort::Quick, &Silent)) {
             let short = table.count(bondline::observe::report::Verdict::Short);
             assert_eq!(short, 0, "{}", table.text());
         }

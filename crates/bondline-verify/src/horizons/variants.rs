@@ -47,6 +47,33 @@ pub enum Variant {
     FittedMulti,
 }
 
+/// A law of bars of one lattice, with nothing to reflect at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Uniform {
+    /// Bonds.
+    BondBased,
+    /// An ordinary state-based law.
+    StateBased,
+    /// The divergence of the partial stress.
+    PartialStress,
+}
+
+impl Uniform {
+    /// All of them, in their order.
+    pub const ALL: [Self; 3] = [Self::BondBased, Self::StateBased, Self::PartialStress];
+
+    /// The bar of that spacing.
+    pub fn bar(self, h: f64) -> Bar {
+        let layout = Layout::uniform(h);
+        let rows = match self {
+            Self::BondBased => splice(&layout),
+            Self::StateBased => state_based(&layout, |i| own_family(&layout, i)),
+            Self::PartialStress => partial_stress(&layout),
+        };
+        layout.bar(&rows)
+    }
+}
+
 impl Variant {
     /// All of them, published ones first.
     pub const ALL: [Self; 13] = [
@@ -100,17 +127,13 @@ impl Variant {
         !matches!(self, Self::SourceNode | Self::Splice | Self::PartialStress)
     }
 
-    /// A bar of one lattice by the same law, with nothing to reflect at.
-    pub fn uniform(self, h: f64) -> Bar {
-        let layout = Layout::uniform(h);
-        let rows = match self {
-            Self::DualHorizonState | Self::MultiHorizonState => {
-                state_based(&layout, |i| own_family(&layout, i))
-            }
-            Self::PartialStress => partial_stress(&layout),
-            _ => splice(&layout),
-        };
-        layout.bar(&rows)
+    /// The law that it has where the horizon does not change.
+    pub fn alone(self) -> Uniform {
+        match self {
+            Self::DualHorizonState | Self::MultiHorizonState => Uniform::StateBased,
+            Self::PartialStress => Uniform::PartialStress,
+            _ => Uniform::BondBased,
+        }
     }
 
     /// The bar whose middle has `ratio` times the spacing and the horizon of its ends, where the spacing is `fine`; `None` where a fit does not exist.

@@ -40,7 +40,7 @@ pub fn spectrum(bar: &Enclosed<1>) -> Spectrum {
     let mut dense = DMatrix::zeros(free.len(), free.len());
     for (n, &s) in free.iter().enumerate() {
         let (columns, blocks) = bar.stiffness.row(s);
-        let scale = SPACING * SPACING / YOUNGS_MODULUS / bar.model.sites[s].volume;
+        let scale = SPACING * SPACING / YOUNGS_MODULUS * bar.per_volume(s);
         for (&c, k) in columns.iter().zip(blocks) {
             if number[c as usize] != usize::MAX {
                 dense[(n, number[c as usize])] = k * scale;
