@@ -169,6 +169,7 @@ fn solve_chosen<const D: usize>(
         broken: &[],
         sections: &sections,
         stresses: rest.stresses.at(0.0),
+        on_points: None,
     };
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
@@ -223,6 +224,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 },
                 system: None,
                 affine_forces: &[],
+                ranks: None,
             },
             progress,
         )?;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::kinematics::Kinematics;
+use super::shared_rows::SharedRows;
 use crate::{
     peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
     tensor::Vector,
@@ -115,6 +116,8 @@ pub struct BondSetup<'a, const D: usize> {
     pub layout: Layout,
     /// How lists store weights.
     pub storage: Storage,
+    /// Who has which families, where they are spread over processes; none where all are here.
+    pub shared: Option<SharedRows<'a>>,
 }
 
 /// Why no pass can be built.
@@ -204,7 +207,7 @@ impl<const D: usize> BondSetup<'_, D> {
 
     /// Whether point `i` wants a force.
     pub(super) fn row(&self, i: usize) -> bool {
-        !self.families.of(i).is_empty() && self.rows.get(i).copied().unwrap_or(true)
+        self.has_family(i) && self.rows.get(i).copied().unwrap_or(true)
     }
 
     /// The number that a law gives to a bond: `2 p r²` (pairwise) or `ω` (state-based).
