@@ -326,7 +326,6 @@ impl<const D: usize> Model<D> {
         self.spacing = cloud.spacing;
         self.is_lattice = factors[0].is_lattice();
         self.volumes = cloud.volumes;
-
         let point_site = self.place_point_sites(&cloud);
         progress.stage("seam", None);
         let transfer = self.express_places(p, &cloud, wide, &point_site, node_site, coupling)?;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::kinematics::Kinematics;
-use super::shared_rows::SharedRows;
 use crate::{
     peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
+    system::Ranks,
     tensor::Vector,
 };
 
@@ -89,6 +89,17 @@ impl<const D: usize> Failure<'_, D> {
     pub(super) fn has_limit(&self) -> bool {
         !matches!(self.critical, CriticalStretch::Uniform(f64::INFINITY))
     }
+}
+
+/// Which families this process holds, and what all know of the others. Calls of passes that are made with it are collective.
+#[derive(Clone, Copy)]
+pub struct SharedRows<'a> {
+    /// The processes.
+    pub ranks: &'a dyn Ranks,
+    /// Points whose families no other process holds as its own, one mark per point.
+    pub own: &'a [bool],
+    /// Bonds of the family of each point, held here or not.
+    pub sizes: &'a [u32],
 }
 
 /// Points, families and law of a bond pass. One horizon for all points.

@@ -68,10 +68,10 @@ pub(super) mod stretch;
 mod tests;
 
 pub use force_problem::{
-    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Layout, Storage,
+    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Layout, SharedRows,
+    Storage,
 };
 pub use kinematics::Kinematics;
-pub use shared_rows::SharedRows;
 
 pub use stencil::BlockSetup;
 

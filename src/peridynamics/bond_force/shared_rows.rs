@@ -2,21 +2,12 @@
 //!
 //! A lattice asks for numbers of its offsets and for the bits of all bonds, a quarter of a byte for each. Lists hold the bonds of all points.
 
-use super::force_problem::{BondForce, BondFunction, BondSetup, CriticalStretch, Failure};
+use super::force_problem::{
+    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, SharedRows,
+};
 use crate::peridynamics::{Families, offset_table::OffsetTable};
-use crate::system::{Ranks, all_say};
+use crate::system::all_say;
 use crate::tensor::Vector;
-
-/// Which families this process holds, and what all know of the others. Calls of passes that are made with it are collective.
-#[derive(Clone, Copy)]
-pub struct SharedRows<'a> {
-    /// The processes.
-    pub ranks: &'a dyn Ranks,
-    /// Points whose families no other process holds as its own, one mark per point.
-    pub own: &'a [bool],
-    /// Bonds of the family of each point, held here or not.
-    pub sizes: &'a [u32],
-}
 
 /// Weight and limit of the bonds of an offset, and the bond that they are from.
 pub(super) type Known = ((f64, f64), usize, u32);
