@@ -159,6 +159,7 @@ fn list<const D: usize>(
         precracked: None,
         layout: Layout::List,
         storage,
+        shared: None,
     })
     .expect("a list")
 }

@@ -14,6 +14,7 @@ pub(crate) mod wrapped;
 
 pub use element_tangent::ElementTangent;
 pub use ranks::{Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
+pub(crate) use ranks::{all_say, first_text};
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
 pub use spmv::ROW_CHUNK;
 pub use springs::{SpringRows, Sprung};

@@ -351,6 +351,13 @@ fn processes_are_told_their_sites_and_ghosts() {
             assert_eq!(share, [100, ghosts, 0, 100 * 16], "{law}");
         }
     }
+    // families that are spread are not known before: their points count the same, where those at the edges have fewer bonds
+    let sites = |solve: &str| -> Vec<u64> {
+        let shares = shares("bond-based]", solve, 5).into_iter();
+        shares.map(|share| share[0]).collect()
+    };
+    assert_eq!(sites(moves), [40; 5]);
+    assert_ne!(sites(""), [40; 5]);
     // more processes than sites
     let many = shares("bond-based]", "", 300);
     assert_eq!(many.iter().map(|share| share[0]).sum::<u64>(), 200);

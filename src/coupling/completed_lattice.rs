@@ -2,6 +2,7 @@
 
 use super::bond_cutting::LatticeFactors;
 use super::point_cloud::PointCloud;
+use super::shared_families::SharedFamilies;
 use crate::peridynamics::Families;
 
 /// One lattice on its way into the body.
@@ -13,4 +14,8 @@ pub(super) struct CompletedLattice<const D: usize> {
     /// All points before any is dropped, with their new numbers, where elements need them.
     pub wide: Option<(PointCloud<D>, Vec<u32>)>,
     pub is_constant: bool,
+    /// Who has which families, where they are spread over processes.
+    pub shared: Option<SharedFamilies>,
+    /// Whether families came from the places of the points on their lattice.
+    pub is_searched_by_lattice: bool,
 }

@@ -10,7 +10,8 @@
 //! | `truncated_families/` | the same of laws whose points have a stress: symmetric, patch-exact at any strain, in equilibrium | `docs/truncated.md` |
 //! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
 //! | `problem.rs` | what a coupled problem consists of | |
-//! | `model.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
+//! | `model.rs`, `sites.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
+//! | `shared_families.rs`, `shared_body.rs` | families that are spread over processes | |
 //! | `multi_lattice.rs`, `completed_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
 //! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
@@ -52,6 +53,9 @@ mod recovery;
 mod rows;
 mod seam_order;
 pub mod semidiscrete;
+mod shared_body;
+pub mod shared_families;
+mod sites;
 pub mod splice;
 pub mod state_transfer;
 pub mod tributary;
@@ -73,6 +77,7 @@ pub use problem::{
     HorizonField, Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces,
 };
 pub use semidiscrete::CoupledSystem;
+pub use shared_families::SharedFamilies;
 pub use splice::Splice;
 pub use state_transfer::{BrokenBonds, Carried, CarryError, Carrying};
 pub use tributary::Tributary;
@@ -147,6 +152,11 @@ pub trait Coupling<const D: usize>: Send + Sync {
         } else {
             Reach::Neighbours
         }
+    }
+
+    /// Whether each process of a run may hold the families of its own sites alone: nothing is fitted to those of several sites, and no other place completes them.
+    fn shares_families(&self) -> bool {
+        false
     }
 
     /// Whether its rows hold the products of dilatations and deviatoric extensions that a law with [`LinearForceState::has_deviators`] has; any other coupling is refused for such a law.

@@ -18,16 +18,17 @@ use crate::{
         problem,
         recovery::Patch,
         seam_order::{self, Ties},
+        shared_families::SharedFamilies,
         tributary::Tributary,
         truncated_families::{self, Feet},
     },
-    dimension, fem,
+    dimension,
     material::LocalLaw,
     mesh::{CellShape, Mesh},
     peridynamics::{BondWeights, CauchyBorn, Cloud, Ends, Families, PdBody},
     progress::Progress,
     shape::Barriers,
-    system::Symmetry,
+    system::{Ranks, Symmetry},
     tensor::{Tensor4, Vector},
 };
 
@@ -101,10 +102,14 @@ pub struct Model<const D: usize> {
     pub(super) dilatation: Option<Arc<CauchyBorn<D>>>,
     /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
     pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
+    /// Who has which families, where they are spread over processes.
+    pub(super) shared: Option<SharedFamilies>,
+    /// Whether families came from the places of the points on their lattice.
+    pub(super) is_searched_by_lattice: bool,
 }
 
 type LaidOut<const D: usize> = Result<(Model<D>, Box<dyn Coupling<D>>), ModelError>;
-type Layout<const D: usize> = fn(Problem<D>, &dyn Progress) -> LaidOut<D>;
+type Layout<const D: usize> = fn(Problem<D>, Option<&dyn Ranks>, &dyn Progress) -> LaidOut<D>;
 static LAYOUTS: (Layout<1>, Layout<2>, Layout<3>) =
     (Model::laid_out, Model::laid_out, Model::laid_out);
 
@@ -114,10 +119,27 @@ impl<const D: usize> Model<D> {
     /// # Errors
     /// [`ModelError`], each with place and remedy.
     pub fn new(problem: Problem<D>, progress: &dyn Progress) -> LaidOut<D> {
-        dimension::of::<Layout<D>>(&LAYOUTS)(problem, progress)
+        Self::shared(problem, None, progress)
     }
 
-    fn laid_out(problem: Problem<D>, progress: &dyn Progress) -> LaidOut<D> {
+    /// Collective: as [`Model::new`], with the families spread over processes where [`Coupling::shares_families`] and the points are a lattice of one horizon. Who asks for it needs the rows of its own sites only.
+    ///
+    /// # Errors
+    /// As [`Model::new`].
+    pub fn shared(
+        problem: Problem<D>,
+        ranks: Option<&dyn Ranks>,
+        progress: &dyn Progress,
+    ) -> LaidOut<D> {
+        dimension::of::<Layout<D>>(&LAYOUTS)(problem, ranks, progress)
+    }
+
+    fn laid_out(
+        problem: Problem<D>,
+        ranks: Option<&dyn Ranks>,
+        progress: &dyn Progress,
+    ) -> LaidOut<D> {
+        let ranks = ranks.filter(|_| problem.coupling.shares_families());
         let Problem {
             mesh,
             zones,
@@ -167,6 +189,8 @@ impl<const D: usize> Model<D> {
             left_out: Vec::new(),
             dilatation: None,
             operator_cache: OnceLock::new(),
+            shared: None,
+            is_searched_by_lattice: false,
         };
         let has_points = model.roles.contains(&CellRole::Points);
         if has_points && model.peridynamics.is_none() {
@@ -179,13 +203,7 @@ impl<const D: usize> Model<D> {
         let clouds = model.place_clouds(coupling.as_ref())?;
         let node_site = model.place_nodes(coupling.interface());
         if !clouds.is_empty() {
-            model.place_points(
-                clouds,
-                &node_site,
-                coupling.as_ref(),
-                peridynamic_material,
-                progress,
-            )?;
+            model.place_points(clouds, &node_site, coupling.as_ref(), ranks, progress)?;
         } else {
             let rows = (0..node_site.len() as u32).map(|n| match node_site[n as usize] {
                 NONE => model.ties.row(n, &node_site).unwrap_or_default(),
@@ -236,63 +254,19 @@ impl<const D: usize> Model<D> {
         (&self.node_cells.0, &self.node_cells.1)
     }
 
-    /// Makes sites of the nodes of finite elements; returns the site of each node.
-    fn place_nodes(&mut self, interface: Interface) -> Vec<u32> {
-        let mut element = vec![false; self.mesh.nodes.len()];
-        let mut points = vec![false; self.mesh.nodes.len()];
-        for c in 0..self.mesh.cell_count() {
-            let flags = if self.roles[c] == CellRole::Points {
-                &mut points
-            } else {
-                &mut element
-            };
-            for &n in self.mesh.cell(c) {
-                flags[n as usize] = true;
-            }
-        }
-        let own = (0..self.mesh.cell_count()).filter(|&c| self.node_takes(c));
-        let mut volumes = fem::nodal_volumes(&self.mesh, own);
-        for n in 0..volumes.len() as u32 {
-            for &tied in self.ties.followers(n) {
-                volumes[n as usize] += 0.5 * volumes[tied as usize];
-            }
-        }
-        let mut node_site = vec![NONE; self.mesh.nodes.len()];
-        for n in 0..self.mesh.nodes.len() {
-            let constrained = matches!(interface, Interface::Constrained(_)) && points[n];
-            let tied = self.ties.ends(n as u32).is_some();
-            if element[n] && !constrained && !tied {
-                node_site[n] = self.sites.len() as u32;
-                self.sites.push(Site {
-                    position: self.mesh.nodes[n],
-                    kind: SiteKind::Node(n as u32),
-                    volume: volumes[n],
-                });
-            }
-        }
-        node_site
-    }
-
     /// Makes sites of points, completes families, and expresses every other place through sites.
     fn place_points(
         &mut self,
         clouds: Vec<PointCloud<D>>,
         node_site: &[u32],
         coupling: &dyn Coupling<D>,
-        peridynamic_material: u16,
+        ranks: Option<&dyn Ranks>,
         progress: &dyn Progress,
     ) -> Result<(), ModelError> {
         let Some(p) = self.peridynamics.take() else {
             return Ok(());
         };
-        let result = self.place_points_of(
-            &p,
-            clouds,
-            node_site,
-            coupling,
-            peridynamic_material,
-            progress,
-        );
+        let result = self.place_points_of(&p, clouds, node_site, coupling, ranks, progress);
         self.peridynamics = Some(p);
         result?;
         self.calibrate_law()
@@ -304,18 +278,19 @@ impl<const D: usize> Model<D> {
         p: &Peridynamics<D>,
         clouds: Vec<PointCloud<D>>,
         coupling: &dyn Coupling<D>,
+        ranks: Option<&dyn Ranks>,
     ) -> Result<(Vec<CompletedLattice<D>>, Option<Feet<D>>), ModelError> {
         let mut feet = None;
         let reach = reach(coupling, p);
         let grow = |(l, cloud): (usize, PointCloud<D>)| match self.interface {
             Interface::Feet => {
-                let whole = self.grow(p, cloud, l, Reach::Neighbours)?;
+                let whole = self.grow(p, cloud, l, Reach::Neighbours, None)?;
                 let (lattice, ends) =
                     truncated_families::place((&self.mesh, &self.roles), p, whole)?;
                 feet = Some(ends);
                 Ok(lattice)
             }
-            _ => self.grow(p, cloud, l, reach),
+            _ => self.grow(p, cloud, l, reach, ranks),
         };
         let grown: Result<Vec<_>, ModelError> = clouds.into_iter().enumerate().map(grow).collect();
         Ok((grown?, feet))
@@ -327,11 +302,11 @@ impl<const D: usize> Model<D> {
         clouds: Vec<PointCloud<D>>,
         node_site: &[u32],
         coupling: &dyn Coupling<D>,
-        peridynamic_material: u16,
+        ranks: Option<&dyn Ranks>,
         progress: &dyn Progress,
     ) -> Result<(), ModelError> {
         progress.stage("families", None);
-        let (grown, feet) = self.grown(p, clouds, coupling)?;
+        let (grown, feet) = self.grown(p, clouds, coupling, ranks)?;
         let Some(merged) = MergedLattices::of(grown) else {
             return Ok(());
         };
@@ -344,11 +319,13 @@ impl<const D: usize> Model<D> {
             is_constant,
             of_point,
             horizons,
+            shared,
+            is_searched_by_lattice,
         } = merged;
+        self.is_searched_by_lattice = is_searched_by_lattice;
         self.spacing = cloud.spacing;
         self.is_lattice = factors[0].is_lattice();
         self.volumes = cloud.volumes;
-
         let point_site = self.place_point_sites(&cloud);
         progress.stage("seam", None);
         let transfer = self.express_places(p, &cloud, wide, &point_site, node_site, coupling)?;
@@ -368,7 +345,7 @@ impl<const D: usize> Model<D> {
             false => Ends::Differ,
         };
         if p.weights == BondWeights::Plain {
-            self.carry_plain_stiffness(p, &factors[0], horizons[0], peridynamic_material)?;
+            self.carry_plain_stiffness(p, &factors[0], horizons[0], self.peridynamic_material)?;
         }
         if let Some(families) = passing {
             let whole = multi_lattice::whole_families(p, &factors, &horizons, is_regular)?;
@@ -386,8 +363,9 @@ impl<const D: usize> Model<D> {
             transfer,
             material: materials.of_point,
         };
-        let mut body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
-            .map_err(|e| ModelError::family("the point", e))?;
+        let body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
+            .map_err(|e| ModelError::family("the point", e));
+        let mut body = self.held_body(shared.zip(ranks), body)?;
         if let Some(feet) = feet {
             let at = (&self.mesh, &self.node_transfer, self.spacing);
             truncated_families::balance(at, &feet, p.law.linearised(), &mut body)?;
@@ -398,22 +376,6 @@ impl<const D: usize> Model<D> {
         self.body = Some(body);
         self.factors = factors.into_iter().zip(horizons).collect();
         Ok(())
-    }
-
-    /// Makes sites of the points that follow no element; returns the site of each point.
-    fn place_point_sites(&mut self, cloud: &PointCloud<D>) -> Vec<u32> {
-        let mut point_site = vec![NONE; cloud.position.len()];
-        for (i, element) in cloud.element.iter().enumerate() {
-            if element.is_none() {
-                point_site[i] = self.sites.len() as u32;
-                self.sites.push(Site {
-                    position: cloud.position[i],
-                    kind: SiteKind::Point(i as u32),
-                    volume: cloud.volume[i],
-                });
-            }
-        }
-        point_site
     }
 
     /// Expresses nodes that are no sites, points in elements and those around elements that carry a partial stress through sites; returns how points follow.

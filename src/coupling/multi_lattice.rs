@@ -7,6 +7,7 @@ use crate::{
         bond_cutting::{self, LatticeFactors, WholeFamily},
         completed_lattice::CompletedLattice,
         point_cloud::PointCloud,
+        shared_families::SharedFamilies,
     },
     mesh::boundary::BoundaryFacet,
     peridynamics::{
@@ -14,6 +15,7 @@ use crate::{
         TIE_TOLERANCE,
         softening::{CalibrationError, RegularFamily},
     },
+    system::Ranks,
     tensor::{Tensor4, Vector},
 };
 
@@ -49,6 +51,10 @@ pub(super) struct MergedLattices<const D: usize> {
     pub of_point: Vec<u16>,
     /// Of each lattice.
     pub horizons: Vec<f64>,
+    /// Of the first lattice, see [`CompletedLattice::shared`].
+    pub shared: Option<SharedFamilies>,
+    /// Of the first lattice.
+    pub is_searched_by_lattice: bool,
 }
 
 impl<const D: usize> MergedLattices<D> {
@@ -62,6 +68,8 @@ impl<const D: usize> MergedLattices<D> {
             factors: first,
             wide,
             is_constant,
+            shared,
+            is_searched_by_lattice,
         } = grown.next()?;
         let mut factors = vec![first];
         let mut of_point = vec![0u16; cloud.position.len()];
@@ -92,6 +100,8 @@ impl<const D: usize> MergedLattices<D> {
             is_constant,
             of_point,
             horizons,
+            shared,
+            is_searched_by_lattice,
         })
     }
 }
@@ -116,6 +126,28 @@ fn check_cloud<const D: usize>(cloud: &PointCloud<D>) -> Result<(), ModelError> 
     Ok(())
 }
 
+/// The families of points on a lattice along the axes, all of one `reach`, or those of this process; none of other points.
+fn by_lattice<const D: usize>(
+    p: &Peridynamics<D>,
+    cloud: &PointCloud<D>,
+    reaches: &[f64],
+    ranks: Option<&dyn Ranks>,
+) -> Option<(Families, Option<SharedFamilies>)> {
+    let reach = *reaches.first()?;
+    if !cloud.is_axis_parallel() || reaches.iter().any(|r| *r != reach) {
+        return None;
+    }
+    let Some(ranks) = ranks else {
+        let (points, spacing) = (&cloud.position, cloud.spacing);
+        let found = Families::search_lattice(points, spacing, reach, TIE_TOLERANCE)?;
+        return Some((found, None));
+    };
+    // the force of a law with a state takes those of neighbours
+    let with_neighbours = !p.law.linearised().is_pairwise();
+    let (found, shared) = SharedFamilies::search(ranks, cloud, reach, with_neighbours)?;
+    Some((found, Some(shared)))
+}
+
 impl<const D: usize> Model<D> {
     /// Completes the families of the points of one lattice, and drops the points that nothing needs.
     pub(super) fn grow(
@@ -124,18 +156,20 @@ impl<const D: usize> Model<D> {
         mut cloud: PointCloud<D>,
         lattice: usize,
         reach: Reach,
+        ranks: Option<&dyn Ranks>,
     ) -> Result<CompletedLattice<D>, ModelError> {
         check_cloud(&cloud)?;
         let is_constant = cloud.horizon.uniform().is_some();
         let points = 0..cloud.position.len();
         let reaches: Vec<f64> = points.map(|i| p.reach(cloud.horizon.of(i))).collect();
-        let one = reaches.first().filter(|d| reaches.iter().all(|r| r == *d));
-        let known = one.filter(|_| cloud.is_axis_parallel()).and_then(|reach| {
-            Families::search_lattice(&cloud.position, cloud.spacing, *reach, TIE_TOLERANCE)
-        });
-        let mut families = match known {
-            Some(families) => families,
-            None => Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?,
+        let known = by_lattice(p, &cloud, &reaches, ranks.filter(|_| is_constant));
+        let is_searched_by_lattice = is_constant && known.is_some();
+        let (mut families, shared) = match known {
+            Some(known) => known,
+            None => {
+                let found = Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?;
+                (found, None)
+            }
         };
         let factors = LatticeFactors::new(p, &cloud)?;
         factors.drop_without_share(&cloud, &mut families);
@@ -186,6 +220,8 @@ impl<const D: usize> Model<D> {
             passing,
             wide,
             is_constant,
+            shared,
+            is_searched_by_lattice,
         })
     }
 

@@ -172,6 +172,12 @@ pub(super) fn takes_law<const D: usize>(
 /// Why a model cannot be built.
 #[derive(Debug, Error)]
 pub enum ModelError {
+    /// A family that another process holds cannot be used; in the words of that one.
+    #[error("{message}")]
+    OfProcess {
+        /// What it says.
+        message: String,
+    },
     /// A zone has no cell.
     #[error(
         "the {zone} zone is empty: no cell of the mesh has its centroid in it; enlarge the zone, refine the mesh there, or choose coupling.local"

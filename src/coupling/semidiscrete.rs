@@ -7,8 +7,6 @@
 
 use std::sync::{Arc, PoisonError};
 
-use rayon::prelude::*;
-
 use self::{
     body::{MovingBody, reached},
     elements::LocalElements,
@@ -16,13 +14,12 @@ use self::{
     rows::SiteRows,
 };
 use crate::{
-    assembly,
     coupling::{Model, NonlinearSeam, Operator},
     material::LocalLaw,
     peridynamics::bond_force::{BondPass, Kinematics},
     system::{
-        BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, SemiDiscrete,
-        Symmetry,
+        BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, Ranks,
+        SemiDiscrete, Symmetry,
     },
 };
 use behaviour::NONE;
@@ -38,6 +35,7 @@ mod force_states;
 mod rows;
 mod shared_work;
 mod split;
+mod spread_families;
 mod stored_energy;
 mod tangent_pattern;
 
@@ -83,6 +81,21 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         density: impl Fn(u16) -> f64 + Sync,
         behaviour: &BondBehaviour<'_, D>,
     ) -> Result<Self, SystemError> {
+        Self::of_processes(model, operator, symmetry, density, behaviour, None)
+    }
+
+    /// As [`CoupledSystem::new`]; collective, where the families of the model are spread over `ranks`.
+    ///
+    /// # Errors
+    /// As [`CoupledSystem::new`].
+    pub fn of_processes(
+        model: &'a Model<D>,
+        operator: &dyn Operator<D>,
+        symmetry: Symmetry,
+        density: impl Fn(u16) -> f64 + Sync,
+        behaviour: &BondBehaviour<'_, D>,
+        ranks: Option<&dyn Ranks>,
+    ) -> Result<Self, SystemError> {
         let sites = model.sites.len();
         let law = model.peridynamics.as_ref().map(|p| &p.law);
         let is_linear = behaviour.critical_stretch.is_none()
@@ -95,7 +108,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         } else {
             operator.seam_bonds()
         };
-        let body = MovingBody::new(model, operator, behaviour, seam.as_ref())?;
+        let body = MovingBody::new(model, operator, behaviour, seam.as_ref(), ranks)?;
         if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
             let cloud = &body.cloud;
             seam.follow_motion(behaviour.kinematics);
@@ -394,48 +407,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     }
 
     fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
-        assembly::assemble_rows(
-            sites.len(),
-            self.mass.len(),
-            |_| (),
-            |r, row| {
-                let site = sites[r] as usize;
-                self.linear.add_row(site, row);
-                if let (Some(moving), Some(body)) = (&self.body, self.model.body())
-                    && moving.bonds_of_site[site] != NONE
-                {
-                    let point = moving.bonds_of_site[site] as usize;
-                    let without_energy = self
-                        .seam
-                        .as_ref()
-                        .map_or(&[][..], NonlinearSeam::without_energy);
-                    if without_energy.is_empty() {
-                        let weight = |j: usize| match self.is_passed_over(point, j as u32) {
-                            true => 1.0,
-                            false => 0.0,
-                        };
-                        body.add_force_row(point, weight, row);
-                    } else {
-                        // a point with an energy in the body's pass has whole bonds only
-                        body.add_force_row_of_energies(
-                            point,
-                            |_| [1.0; 2],
-                            |j| !without_energy[j],
-                            row,
-                        );
-                    }
-                }
-                if let (Some(moving), Some(body)) = (&self.body, self.model.body()) {
-                    moving.add_rows_of_feet(body, sites[r], row);
-                }
-                if let Some(seam) = &self.seam {
-                    seam.add_row(site, row);
-                }
-                if let Some(scale) = self.model.row_scale() {
-                    row.scale(scale[site]);
-                }
-            },
-        )
+        self.rows_at(sites)
     }
 
     fn seam_sites(&self) -> Vec<u32> {
@@ -535,24 +507,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     }
 
     fn broken_bonds(&self) -> Vec<(u32, u32)> {
-        let (Some(moving), Some(body)) = (self.body.as_ref(), self.model.body()) else {
-            return Vec::new();
-        };
-        let site = |p: usize| moving.site_of_point[p];
-        (0..moving.site_of_point.len())
-            .into_par_iter()
-            .filter(|&i| site(i) != NONE && moving.pass.is_damaged(i))
-            .flat_map_iter(|i| {
-                let family = body.families.of(i).iter();
-                family
-                    .filter(move |&&j| {
-                        !moving.pass.bonded(i, j as usize)
-                            && site(j as usize) != NONE
-                            && self.is_passed_over(i, j)
-                    })
-                    .map(move |&j| (site(i), site(j as usize)))
-            })
-            .collect()
+        self.broken_between_sites()
     }
 
     fn damage_state(&self) -> Vec<u64> {

@@ -55,6 +55,10 @@ impl<const D: usize> Coupling<D> for Nonlocal {
         true
     }
 
+    fn shares_families(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(own_model(model))
     }

@@ -13,6 +13,33 @@ const PLACES_PER_POINT: usize = 16;
 
 const NONE: u32 = u32::MAX;
 
+/// The points whose families are searched, by a mark of each point.
+#[derive(Clone, Copy, Debug)]
+pub enum Wanted<'a> {
+    /// All of them.
+    All,
+    /// Those marked.
+    Of(&'a [bool]),
+    /// Those marked, and all points in their families.
+    WithNeighbours(&'a [bool]),
+}
+
+impl Wanted<'_> {
+    /// A mark of each point that is wanted, empty for all; `neighbours` calls back with those of a point.
+    fn marks(&self, neighbours: impl Fn(usize, &mut dyn FnMut(u32))) -> Vec<bool> {
+        let (own, with_neighbours) = match self {
+            Self::All => return Vec::new(),
+            Self::Of(own) => (own, false),
+            Self::WithNeighbours(own) => (own, true),
+        };
+        let mut marks = own.to_vec();
+        for i in (0..own.len()).filter(|&i| with_neighbours && own[i]) {
+            neighbours(i, &mut |j| marks[j as usize] = true);
+        }
+        marks
+    }
+}
+
 impl Families {
     /// As [`Families::search`] with one horizon for all, of points that lie on a lattice of the given spacing; `None` if they do not, or fill too little of their box.
     ///
@@ -22,6 +49,17 @@ impl Families {
         spacing: f64,
         horizon: f64,
         tie_tolerance: f64,
+    ) -> Option<Self> {
+        Self::search_lattice_of(points, spacing, horizon, tie_tolerance, &Wanted::All)
+    }
+
+    /// As [`Families::search_lattice`], the families of the points that are `wanted`; those of the others are empty. Whether there is a lattice does not depend on which are.
+    pub fn search_lattice_of<const D: usize>(
+        points: &[Vector<D>],
+        spacing: f64,
+        horizon: f64,
+        tie_tolerance: f64,
+        wanted: &Wanted<'_>,
     ) -> Option<Self> {
         let steps = horizon / spacing * (1.0 + tie_tolerance);
         if !(0.0..1e3).contains(&steps) || points.len() >= NONE as usize {
@@ -75,7 +113,12 @@ impl Families {
                 .map(move |way| table[place.wrapping_add_signed(*way)]);
             at.filter(|&j| j != NONE)
         };
-        let sizes: Vec<usize> = places.par_iter().map(|&place| of(place).count()).collect();
+        let is_wanted = wanted.marks(|i, mark| of(places[i]).for_each(mark));
+        let size = |(i, &place): (usize, &usize)| match is_wanted.get(i) {
+            Some(false) => 0,
+            _ => of(place).count(),
+        };
+        let sizes: Vec<usize> = places.par_iter().enumerate().map(size).collect();
         Some(Self::filled(sizes.into_iter(), |i, row| {
             row.iter_mut().zip(of(places[i])).for_each(|(n, j)| *n = j);
             if !row.is_sorted() {
@@ -133,6 +176,30 @@ mod tests {
         check([40]);
         check([17, 12]);
         check([9, 7, 8]);
+    }
+
+    #[test]
+    fn some_families_are_those_of_all() {
+        let points = block([13, 11], 0.1, 0.2, true);
+        let search = |wanted: &Wanted<'_>| {
+            Families::search_lattice_of(&points, 0.1, 0.3, TIE_TOLERANCE, wanted).unwrap()
+        };
+        let all = search(&Wanted::All);
+        let own: Vec<bool> = points.iter().map(|x| x[0] < 0.7).collect();
+        let mut near = own.clone();
+        for i in (0..points.len()).filter(|&i| own[i]) {
+            all.of(i).iter().for_each(|&j| near[j as usize] = true);
+        }
+        assert!(near != own && near.contains(&false));
+        for (found, held) in [
+            (search(&Wanted::Of(&own)), &own),
+            (search(&Wanted::WithNeighbours(&own)), &near),
+        ] {
+            for (i, held) in held.iter().enumerate() {
+                let wanted: &[u32] = if *held { all.of(i) } else { &[] };
+                assert_eq!(found.of(i), wanted);
+            }
+        }
     }
 
     #[test]

@@ -51,6 +51,14 @@ impl<T: Copy, const D: usize> OffsetTable<T, D> {
         self.values.get_mut(place)
     }
 
+    /// Another value in the place of each.
+    pub fn map<U>(self, f: impl Fn(T) -> U) -> OffsetTable<U, D> {
+        OffsetTable {
+            reach: self.reach,
+            values: self.values.into_iter().map(|v| v.map(&f)).collect(),
+        }
+    }
+
     /// Offsets with values, ascending.
     pub fn known(&self) -> impl Iterator<Item = ([i32; D], T)> + '_ {
         let side = (2 * self.reach + 1) as usize;

@@ -231,6 +231,7 @@ impl OutputCost {
                 broken: &[],
                 sections: &[],
                 stresses: None,
+                on_points: None,
             };
             let mut series = Series::new(folder.path(), "trial");
             let more = [OverSites::Vector("velocity", &u)];

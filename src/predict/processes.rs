@@ -7,10 +7,9 @@ use serde::Serialize;
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
+use crate::run::motion::may_share;
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
-use crate::system::Partition;
-use crate::tensor::padded;
 
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
 const SCALAR: u64 = 12;
@@ -53,12 +52,13 @@ fn shares<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Vec<ProcessShare>, RunError> {
     let is_static = scene.solve == Solve::Static;
+    let is_explicit = matches!(scene.solve, Solve::Explicit(_));
     let (problem, rest) = setup::problem(scene);
+    let is_shared = is_explicit && may_share(&problem, &rest);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let operator = coupling.operator(&model)?;
     let pattern = model.pattern(operator.as_ref(), &[], progress);
-    let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let partition = Partition::by_bisection(&positions, &model.work_of_sites(), count);
+    let partition = model.partition(count, is_shared);
     let of_rank = |rank: usize| {
         let own = partition.of(rank);
         let row = |site: &u32| {

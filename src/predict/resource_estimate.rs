@@ -258,6 +258,7 @@ fn seconds_of_output<const D: usize>(
         broken: &[],
         sections: &[],
         stresses: rest.stresses.at(0.0),
+        on_points: None,
     };
     Ok(output_seconds(&rest.output, &made_up)?)
 }
@@ -284,6 +285,7 @@ fn proved<const D: usize>(
             product: None,
             system: None,
             affine_forces: &pattern.products,
+            ranks: None,
         },
         progress,
     )?;

@@ -22,7 +22,7 @@ use crate::solve::statics::{
     self, Method, MethodUsed, SpreadProblem, SpreadRows, StaticError, StaticInfo, StaticParams,
     StaticProblem, StaticSolution,
 };
-use crate::system::{BlockCsr, Partition, Ranks, SemiDiscrete, Spread, Sprung, Symmetry};
+use crate::system::{BlockCsr, Ranks, SemiDiscrete, Spread, Sprung, Symmetry};
 use crate::tensor::padded;
 
 /// A model at rest under its conditions, about to be solved.
@@ -178,7 +178,7 @@ fn spread<const D: usize>(
     let mut watch = Stopwatch::start();
     let model = at.model;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let partition = Partition::by_bisection(&positions, &model.work_of_sites(), ranks.count());
+    let partition = model.partition(ranks.count(), false);
     let spread = Spread {
         ranks,
         partition: &partition,

@@ -39,6 +39,7 @@ pub mod motion;
 mod observed_tests;
 pub(crate) mod placed_scene;
 mod point_cells;
+mod point_tensors;
 pub mod proof;
 mod results;
 mod rotation;

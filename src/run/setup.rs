@@ -21,6 +21,7 @@ use crate::scene::materials::{Material, Ratio};
 use crate::scene::points::Points;
 use crate::scene::spec::{BondsSpec, CouplingTraits, ElementsSpec, SurfacesSpec, WeightsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
+use crate::system::Ranks;
 use crate::tensor::padded;
 
 /// A typed horizon.
@@ -215,7 +216,20 @@ pub(crate) fn model<const D: usize>(
     rest: &RunSettings<D>,
     progress: &dyn Progress,
 ) -> Result<(Model<D>, Box<dyn Coupling<D>>), RunError> {
-    let (mut model, coupling) = Model::new(problem, progress)?;
+    shared_model(problem, rest, None, progress)
+}
+
+/// Collective: as [`model`], with its families spread over processes where they can be.
+///
+/// # Errors
+/// [`RunError::Model`] for one that cannot be laid out.
+pub(crate) fn shared_model<const D: usize>(
+    problem: Problem<D>,
+    rest: &RunSettings<D>,
+    ranks: Option<&dyn Ranks>,
+    progress: &dyn Progress,
+) -> Result<(Model<D>, Box<dyn Coupling<D>>), RunError> {
+    let (mut model, coupling) = Model::shared(problem, ranks, progress)?;
     if rest.elements == ElementsSpec::CauchyBorn {
         model.follow_bonds(rest.kinematics())?;
     }

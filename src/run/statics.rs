@@ -156,7 +156,6 @@ fn solve_chosen<const D: usize>(
     };
     watch = Stopwatch::start();
     choices.extend(body.decisions(equilibrium));
-    let zone_of_site = zone_of_site(model);
     let residual = equilibrium.residual();
     let sections = body.section_forces(&residual)?;
     let solved = Solved {
@@ -164,11 +163,12 @@ fn solve_chosen<const D: usize>(
         operator: operator.as_ref(),
         displacement: &equilibrium.solution.displacement,
         residual: &residual,
-        zone_of_site: &zone_of_site,
+        zone_of_site: &zone_of_site(model),
         system: system.as_ref().map(|s| s as &dyn SemiDiscrete),
         broken: &[],
         sections: &sections,
         stresses: rest.stresses.at(0.0),
+        on_points: None,
     };
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
@@ -223,6 +223,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 },
                 system: None,
                 affine_forces: &[],
+                ranks: None,
             },
             progress,
         )?;

@@ -252,8 +252,11 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                 shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
             })
             .map(|site| {
-                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
-                (site, strain(&solved.point_gradient(site, &intact)), stress)
+                let [strain, stress] = match solved.on_points {
+                    Some(known) => known[site],
+                    None => solved.tensors_at(site, &intact, known),
+                };
+                (site, strain, stress)
             })
             .collect();
         for (site, e, stress) in on_points {

@@ -214,6 +214,33 @@ fn bisect(
     bisect(positions, work, upper, first + below, count - below, owner);
 }
 
+/// Collective: whether all ranks say so.
+pub(crate) fn all_say(ranks: &dyn Ranks, own: bool) -> bool {
+    ranks
+        .gather_words(&[u64::from(own)])
+        .iter()
+        .all(|words| *words == [1])
+}
+
+/// Collective: the text of the first rank that has one.
+pub(crate) fn first_text(ranks: &dyn Ranks, own: Option<&str>) -> Option<String> {
+    let words = own.map_or(Vec::new(), |text| text.bytes().map(u64::from).collect());
+    let texts = ranks.gather_words(&words);
+    let first = texts.into_iter().find(|text| !text.is_empty())?;
+    let bytes = first.into_iter().map(|byte| byte as u8).collect();
+    String::from_utf8(bytes).ok()
+}
+
+/// Where the part of each rank begins.
+fn starts(lengths: &[usize]) -> Vec<usize> {
+    let mut end = 0;
+    let begin = |n: &usize| {
+        end += n;
+        end - n
+    };
+    lengths.iter().map(begin).collect()
+}
+
 /// Values of sites that are spread over ranks.
 #[derive(Clone, Copy, Debug)]
 pub struct Spread<'a> {
@@ -265,6 +292,83 @@ impl<'a> Spread<'a> {
     /// Collective: the sum of a number over ranks, in their order.
     pub fn sum(&self, own: f64) -> f64 {
         self.each(own).iter().sum()
+    }
+
+    /// The own ones of some sites, in their order.
+    fn own_among(&self, sites: &[u32]) -> Vec<u32> {
+        let rank = self.ranks.rank();
+        let own = sites.iter().copied();
+        own.filter(|&s| self.partition.owner(s) == rank).collect()
+    }
+
+    /// Collective: whether all ranks say so.
+    pub fn all(&self, own: bool) -> bool {
+        all_say(self.ranks, own)
+    }
+
+    /// Collective: `width` numbers of each of some sites, from the rank that has it; the same `sites` on every rank, of which `own` computes some.
+    pub fn of_sites(
+        &self,
+        sites: &[u32],
+        width: usize,
+        own: impl FnOnce(&[u32]) -> Vec<f64>,
+    ) -> Vec<f64> {
+        let mine = own(&self.own_among(sites));
+        let mut lengths = vec![0; self.partition.ranks()];
+        for &s in sites {
+            lengths[self.partition.owner(s)] += width;
+        }
+        let mut found = vec![0.0; sites.len() * width];
+        self.ranks.gather_into(&mine, &lengths, &mut found);
+        let mut next = starts(&lengths);
+        let mut sorted = vec![0.0; found.len()];
+        for (&s, to) in sites.iter().zip(sorted.chunks_exact_mut(width.max(1))) {
+            let next = &mut next[self.partition.owner(s)];
+            to.copy_from_slice(&found[*next..*next + width]);
+            *next += width;
+        }
+        sorted
+    }
+
+    /// Collective: the rows of some sites, each from the rank that has it; the same `sites` on every rank, of which `own` computes some.
+    ///
+    /// Rows of state-based laws have a thousand blocks, and messages are held several times: a few rows are told at a time.
+    pub fn gather_rows(&self, sites: &[u32], own: impl Fn(&[u32]) -> BlockCsr) -> BlockCsr {
+        /// Rows of a message.
+        const AT_A_TIME: usize = 16;
+        let mut all = BlockCsr {
+            row_offsets: vec![0],
+            ..BlockCsr::default()
+        };
+        for sites in sites.chunks(AT_A_TIME) {
+            self.append_rows(sites, &own(&self.own_among(sites)), &mut all);
+        }
+        all
+    }
+
+    /// Collective: appends the rows of some sites to `all`, of which `own` are those of this rank.
+    fn append_rows(&self, sites: &[u32], own: &BlockCsr, all: &mut BlockCsr) {
+        let mut words = vec![own.block as u64];
+        for r in 0..own.rows() {
+            let (columns, values) = own.row(r);
+            words.push(columns.len() as u64);
+            words.extend(columns.iter().map(|&c| u64::from(c)));
+            words.extend(values.iter().map(|x| x.to_bits()));
+        }
+        let parts = self.ranks.gather_words(&words);
+        let block = own.block;
+        all.block = block;
+        let mut rest: Vec<&[u64]> = parts.iter().map(|part| &part[1..]).collect();
+        for &s in sites {
+            let rest = &mut rest[self.partition.owner(s)];
+            let (count, tail) = rest.split_first().expect("a row for each site");
+            let (columns, tail) = tail.split_at(*count as usize);
+            let (values, tail) = tail.split_at(columns.len() * block * block);
+            all.columns.extend(columns.iter().map(|&c| c as u32));
+            all.values.extend(values.iter().map(|x| f64::from_bits(*x)));
+            all.row_offsets.push(all.columns.len());
+            *rest = tail;
+        }
     }
 
     /// Collective: the largest of a number over ranks.

@@ -8,15 +8,16 @@ use super::split::Split;
 use crate::coupling::semidiscrete::behaviour::{BondBehaviour, CHUNK, Critical, NONE, SystemError};
 use crate::{
     assembly::{Row, Transfer},
-    coupling::{Model, NonlinearSeam, Operator, SiteKind},
+    coupling::{Model, NonlinearSeam, Operator, SharedFamilies, SiteKind},
     peridynamics::{
         Accelerator, Families, Law, PdBody,
         bond_force::{
-            BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, Storage, bond_pass,
+            BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, SharedRows, Storage,
+            bond_pass,
         },
         contact::{Contact, ContactSetup, contact_stiffness},
     },
-    system::{FailureUpdate, Interval},
+    system::{FailureUpdate, Interval, Ranks},
     tensor::Vector,
 };
 
@@ -85,6 +86,8 @@ struct PassInput<'a, const D: usize> {
     no_fail: &'a [bool],
     seam: Option<&'a NonlinearSeam<D>>,
     behaviour: &'a BondBehaviour<'a, D>,
+    /// Who has which families, where they are spread over processes.
+    shared: Option<SharedRows<'a>>,
 }
 
 impl<const D: usize> PassInput<'_, D> {
@@ -163,9 +166,38 @@ impl<const D: usize> PassInput<'_, D> {
                 Storage::Single => Layout::List,
             },
             storage: behaviour.storage,
+            shared: self.shared,
         })?;
         Ok(pass)
     }
+}
+
+/// Who has which families, where they are spread over processes; `own` marks the points of this one.
+fn shared_rows<'a, const D: usize>(
+    model: &'a Model<D>,
+    own: Option<&'a [bool]>,
+    ranks: Option<&'a dyn Ranks>,
+) -> Option<SharedRows<'a>> {
+    Some(SharedRows {
+        ranks: ranks?,
+        own: own?,
+        sizes: model.shared_families()?.sizes(),
+    })
+}
+
+/// The families that are passed over, where rows keep some bonds of their points to themselves.
+fn passed_families<const D: usize>(
+    model: &Model<D>,
+    operator: &dyn Operator<D>,
+    body: &PdBody<D>,
+    own_row: &[bool],
+) -> Option<Families> {
+    let shares = |site: usize| operator.has_body_bonds(site);
+    (0..model.sites.len()).any(shares).then(|| {
+        let mut passed = body.families.clone();
+        passed.retain_of(|i| !own_row[i], |i, j| operator.is_body_bond(i, j as usize));
+        passed.mirrored(&model.feet)
+    })
 }
 
 /// Points with a row of the body whose families reach beyond those.
@@ -232,6 +264,7 @@ impl<const D: usize> MovingBody<D> {
         operator: &dyn Operator<D>,
         behaviour: &BondBehaviour<'_, D>,
         seam: Option<&NonlinearSeam<D>>,
+        ranks: Option<&dyn Ranks>,
     ) -> Result<Option<Self>, SystemError> {
         let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref()) else {
             return Ok(None);
@@ -251,12 +284,10 @@ impl<const D: usize> MovingBody<D> {
             .into_par_iter()
             .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
             .collect();
-        let shares = |site: usize| operator.has_body_bonds(site);
-        let passed = (seam.is_none() && (0..model.sites.len()).any(shares)).then(|| {
-            let mut passed = body.families.clone();
-            passed.retain_of(|i| !own_row[i], |i, j| operator.is_body_bond(i, j as usize));
-            passed.mirrored(&model.feet)
-        });
+        let passed = match seam {
+            None => passed_families(model, operator, body, &own_row),
+            Some(_) => None,
+        };
         let families = match (seam, &passed) {
             (Some(seam), _) => seam.families(),
             (None, Some(passed)) => passed,
@@ -269,6 +300,7 @@ impl<const D: usize> MovingBody<D> {
         } else {
             Vec::new()
         };
+        let own = model.shared_families().map(SharedFamilies::own);
         let pass = PassInput {
             body,
             law: &p.law,
@@ -279,6 +311,7 @@ impl<const D: usize> MovingBody<D> {
             no_fail: &no_fail,
             seam,
             behaviour,
+            shared: shared_rows(model, own.as_deref(), ranks),
         }
         .pass()?;
         let contact = contact_of(behaviour, body, &own_row, model.spacing())?;

@@ -7,8 +7,7 @@
 use super::behaviour::NONE;
 use super::split::Split;
 use super::{CoupledSystem, scale_rows};
-use crate::system::{FailureUpdate, Interval, Partition, Ranks, Spread};
-use crate::tensor::padded;
+use crate::system::{FailureUpdate, Interval, Ranks, Spread};
 
 impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// Shares the work of each pass out among processes, if there are several; all of them make the same calls from now on.
@@ -17,10 +16,10 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         let Some(ranks) = ranks else {
             return self;
         };
-        let sites = &self.model.sites;
-        let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
-        let work = self.model.work_of_sites();
-        let partition = Partition::by_bisection(&positions, &work, ranks.count());
+        let partition = match self.model.shared_families() {
+            Some(shared) => shared.partition().clone(),
+            None => self.model.partition(ranks.count(), false),
+        };
         let is_own = |site: u32| partition.owner(site) == ranks.rank();
         self.linear.compute_only(|site| is_own(site as u32));
         let breaks = self.breaks();

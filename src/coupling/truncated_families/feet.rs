@@ -115,6 +115,8 @@ pub(in crate::coupling) fn place<const D: usize>(
         factors: whole.factors,
         wide: None,
         is_constant: true,
+        shared: None,
+        is_searched_by_lattice: false,
     };
     Ok((lattice, feet))
 }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::kinematics::Kinematics;
 use crate::{
     peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
+    system::Ranks,
     tensor::Vector,
 };
 
@@ -90,6 +91,17 @@ impl<const D: usize> Failure<'_, D> {
     }
 }
 
+/// Which families this process holds, and what all know of the others. Calls of passes that are made with it are collective.
+#[derive(Clone, Copy)]
+pub struct SharedRows<'a> {
+    /// The processes.
+    pub ranks: &'a dyn Ranks,
+    /// Points whose families no other process holds as its own, one mark per point.
+    pub own: &'a [bool],
+    /// Bonds of the family of each point, held here or not.
+    pub sizes: &'a [u32],
+}
+
 /// Points, families and law of a bond pass. One horizon for all points.
 #[derive(Clone, Copy)]
 pub struct BondSetup<'a, const D: usize> {
@@ -115,6 +127,8 @@ pub struct BondSetup<'a, const D: usize> {
     pub layout: Layout,
     /// How lists store weights.
     pub storage: Storage,
+    /// Who has which families, where they are spread over processes; none where all are here.
+    pub shared: Option<SharedRows<'a>>,
 }
 
 /// Why no pass can be built.
@@ -204,7 +218,7 @@ impl<const D: usize> BondSetup<'_, D> {
 
     /// Whether point `i` wants a force.
     pub(super) fn row(&self, i: usize) -> bool {
-        !self.families.of(i).is_empty() && self.rows.get(i).copied().unwrap_or(true)
+        self.has_family(i) && self.rows.get(i).copied().unwrap_or(true)
     }
 
     /// The number that a law gives to a bond: `2 p r²` (pairwise) or `ω` (state-based).

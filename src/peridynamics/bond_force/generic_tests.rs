@@ -60,6 +60,7 @@ fn with_law<const D: usize, T>(
         precracked: None,
         layout: Layout::List,
         storage: Storage::Double,
+        shared: None,
     };
     run(bond_pass(&setup).unwrap())
 }

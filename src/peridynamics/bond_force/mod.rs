@@ -17,7 +17,8 @@
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
 //! | `lattice_setup.rs` | how that one is made |
 //! | `own_points.rs` | points shared out among several passes |
-//! | `stencil.rs` | the lattice's padded box, its offsets and bits |
+//! | `shared_rows.rs` | families that are spread over processes |
+//! | `stencil.rs`, `stencil_numbers.rs` | the lattice's padded box, its offsets and bits; their weights |
 //! | `lattice_simd.rs` | the inner loops of the lattice pass |
 //! | `simd.rs` | eight numbers at a time, by the machine's widest instructions |
 //! | `reference_force.rs`, `tests.rs` | passes against a plain double loop |
@@ -57,15 +58,18 @@ mod point_loops;
 mod point_state;
 #[cfg(test)]
 mod reference_force;
+mod shared_rows;
 #[allow(unsafe_code)]
 mod simd;
 mod stencil;
+mod stencil_numbers;
 pub(super) mod stretch;
 #[cfg(test)]
 mod tests;
 
 pub use force_problem::{
-    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Layout, Storage,
+    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Layout, SharedRows,
+    Storage,
 };
 pub use kinematics::Kinematics;
 
@@ -202,7 +206,15 @@ type Pass<const D: usize> = fn(&BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>
 static PASSES: (Pass<1>, Pass<2>, Pass<3>) = (pass, pass, pass);
 
 fn pass<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>, KernelError> {
-    setup.check_lists()?;
+    let lists = setup.check_lists();
+    if !setup.holds_on_all(lists.is_ok()) {
+        return shared_rows::with_all_families(setup, |setup| setup.check_lists())
+            .and(lists)
+            .and(Err(KernelError::NoLattice {
+                why: "lists differ between processes".into(),
+            }));
+    }
+    lists?;
     let tears = (setup.failure.as_ref())
         .is_some_and(|f| matches!(f.critical, CriticalStretch::TearingParameter(_)));
     if tears && !setup.flows() {
@@ -222,12 +234,14 @@ fn pass<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>
             Err(reason) => why = Some(reason),
         }
     }
-    // a lattice has looked at its bonds by offsets; what stands against one may be a fault
-    setup.check_bonds()?;
-    match why {
-        Some(why) if setup.layout == Layout::Lattice => Err(KernelError::NoLattice { why }),
-        _ => Ok(Box::new(bond_list::List::new(setup))),
-    }
+    shared_rows::with_all_families(setup, |setup| {
+        // a lattice has looked at its bonds by offsets; what stands against one may be a fault
+        setup.check_bonds()?;
+        match why {
+            Some(why) if setup.layout == Layout::Lattice => Err(KernelError::NoLattice { why }),
+            _ => Ok(Box::new(bond_list::List::new(setup)) as _),
+        }
+    })
 }
 
 /// The pass of a full block of a lattice, without lists on the way.

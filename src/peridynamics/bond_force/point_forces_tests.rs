@@ -82,6 +82,7 @@ fn pass_beside(
         precracked: None,
         layout: Layout::List,
         storage: Storage::Double,
+        shared: None,
     };
     Generic::new(&setup, law, law.force_state().unwrap(), &body)
 }

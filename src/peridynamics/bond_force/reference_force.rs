@@ -120,6 +120,7 @@ pub(super) fn with<const D: usize, T>(
         precracked: None,
         layout,
         storage: Storage::Double,
+        shared: None,
     };
     run(bond_pass(&setup).unwrap())
 }

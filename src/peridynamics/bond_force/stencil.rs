@@ -1,18 +1,19 @@
 //! A lattice of points in a padded box, and its families as one stencil.
 
-use super::{BondSetup, force_problem::ENDS, simd::LANES};
+use super::{
+    BondSetup,
+    simd::LANES,
+    stencil_numbers::{Numbers, numbers},
+};
 use crate::{peridynamics::offset_table::OffsetTable, tensor::Vector};
 use rayon::prelude::*;
 
-/// Largest distance of a point from its lattice site, and of a weight from that of its offset, in parts of the spacing and of the weight.
+/// Largest distance of a point from its lattice site, in parts of the spacing.
 const TOLERANCE: f64 = 1e-9;
 
 /// Cells of the box per point, and lanes per point with a family, above which lists are better.
 const SPARSEST_BOX: usize = 12;
 const SPARSEST_LANES: usize = 3;
-
-/// Steps of the box around the longest bond above which lists are better.
-const MOST_STEPS: f64 = 1e6;
 
 /// Rows and groups of eight of a tile: two to three tiles' width of 2m + 1 planes stay in the second-level cache.
 const TILE_ROWS: usize = 16;
@@ -147,10 +148,10 @@ struct Sites<const D: usize> {
 fn sites<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Sites<D>, String> {
     let points = setup.position.len();
     let mut spacing = [f64::INFINITY; D];
-    let Some(longest) = (0..points).max_by_key(|&i| setup.families.of(i).len()) else {
+    let Some(longest) = (0..points).max_by_key(|&i| setup.family_size(i)) else {
         return Err("there are no points".into());
     };
-    for &j in setup.families.of(longest) {
+    for j in setup.family_of_any(longest) {
         let xi = setup.bond(longest, j as usize);
         for a in 0..D {
             if xi[a].abs() > 1e-6 * xi.norm() {
@@ -197,94 +198,6 @@ fn sites<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Sites<D>, String> {
         spacing,
         site,
         counts,
-    })
-}
-
-/// Points of which a task looks at the bonds, at least, and tasks at most: each has a table.
-const POINTS: usize = 1024;
-const TASKS: usize = 64;
-
-/// Part of [`ENDS`] by which like bonds may differ for their ends to be known alike without a look at each: a bond and its reverse are five comparisons apart.
-const ALIKE: f64 = 0.2 * ENDS;
-
-/// Whether weights and limits of two bonds differ by more than a part of them.
-fn differs((w, l): (f64, f64), (weight, limit): (f64, f64), part: f64) -> bool {
-    (w - weight).abs() > part * w.abs() || (l != limit && (l - limit).abs() > part * l.abs())
-}
-
-/// Weights and limits of the bonds of a lattice.
-struct Numbers<const D: usize> {
-    by_steps: OffsetTable<(f64, f64), D>,
-    /// Whether all of them differ so little that no bond differs between its ends.
-    are_alike: bool,
-}
-
-/// Weight and limit of each bond that occurs, by its steps; or why bonds of the same steps differ.
-fn numbers<const D: usize>(
-    setup: &BondSetup<'_, D>,
-    points: usize,
-    step: impl Fn(usize, u32) -> [i32; D] + Sync,
-) -> Result<Numbers<D>, String> {
-    let reach = (0..points)
-        .into_par_iter()
-        .with_min_len(POINTS)
-        .map(|i| {
-            let family = setup.families.of(i).iter();
-            let farthest = |&j: &u32| step(i, j).into_iter().map(i32::abs).max();
-            family.filter_map(farthest).max().unwrap_or(0)
-        })
-        .max()
-        .unwrap_or(0);
-    if f64::from(2 * reach + 1).powi(D as i32) > MOST_STEPS {
-        return Err(format!("a bond takes {reach} steps of it"));
-    }
-    let fault = |i: usize, j: u32| {
-        format!("the bond of points {i} and {j} weighs other than its like elsewhere")
-    };
-    // tasks of fixed size, joined in order: the first point with a bond gives its numbers, for any number of threads
-    let size = POINTS.max(points.div_ceil(TASKS));
-    let parts: Vec<_> = (0..points.div_ceil(size))
-        .into_par_iter()
-        .map(|task| {
-            let (mut found, mut are_alike) = (OffsetTable::empty(reach), true);
-            for i in task * size..((task + 1) * size).min(points) {
-                for (k, &j) in setup.families.of(i).iter().enumerate() {
-                    let xi = setup.bond(i, j as usize);
-                    let own = (setup.weight(i, k, &xi), setup.limit(i, k, &xi));
-                    let Some(known) = found.slot(&step(i, j)) else {
-                        continue;
-                    };
-                    let (known, ..) = *known.get_or_insert((own, i, j));
-                    if differs(known, own, TOLERANCE) {
-                        return Err(fault(i, j));
-                    }
-                    are_alike &= !differs(known, own, ALIKE);
-                }
-            }
-            Ok((found, are_alike))
-        })
-        .collect::<Result<_, _>>()?;
-    let (mut all, mut are_alike) = (OffsetTable::empty(reach), true);
-    for (part, are) in parts {
-        are_alike &= are;
-        for (steps, (own, i, j)) in part.known() {
-            let Some(known) = all.slot(&steps) else {
-                continue;
-            };
-            let known = *known.get_or_insert(own);
-            if differs(known, own, TOLERANCE) {
-                return Err(fault(i, j));
-            }
-            are_alike &= !differs(known, own, ALIKE);
-        }
-    }
-    let back = |steps: &[i32; D]| all.of(&steps.map(|s| -s));
-    are_alike &= all
-        .known()
-        .all(|(steps, own)| back(&steps).is_none_or(|other| !differs(other, own, ALIKE)));
-    Ok(Numbers {
-        by_steps: all,
-        are_alike,
     })
 }
 
@@ -345,6 +258,37 @@ impl<const D: usize> LaneSites<'_, D> {
             });
         (reference, intact)
     }
+
+    /// As [`LaneSites::bits`]; collective where families are spread, of all points then.
+    fn bits_of_all(
+        &self,
+        setup: &BondSetup<'_, D>,
+        stencil: usize,
+        step: impl Fn(usize, u32) -> [i32; D] + Sync,
+    ) -> (Vec<u8>, Vec<u8>) {
+        let (mut reference, mut intact) = self.bits(setup, stencil, step);
+        if let Some(shared) = setup.shared {
+            let is_own = |g: usize| {
+                let points = &self.point_of[self.groups[g] as usize..][..LANES];
+                points.iter().any(|&p| p != NONE && shared.own[p as usize])
+            };
+            shared.merge_bits(stencil, is_own, &mut reference);
+            shared.merge_bits(stencil, is_own, &mut intact);
+        }
+        (reference, intact)
+    }
+}
+
+/// Collective where families are spread: whether bonds weigh the same from both ends, as they do where all like bonds do. Of families that others hold, they look themselves.
+fn check_ends<const D: usize>(setup: &BondSetup<'_, D>, are_alike: bool) -> Result<(), String> {
+    let fault = match are_alike {
+        true => None,
+        false => setup.check_bonds().err(),
+    };
+    match setup.holds_on_all(fault.is_none()) {
+        true => Ok(()),
+        false => Err(fault.map_or(String::new(), |fault| fault.to_string())),
+    }
 }
 
 /// The offsets of a stencil with their weights; one that is known only as its opposite has the numbers of that.
@@ -381,9 +325,7 @@ impl<const D: usize> Stencil<D> {
             by_steps: found,
             are_alike,
         } = numbers(setup, site.len(), step)?;
-        if !are_alike {
-            setup.check_bonds().map_err(|fault| fault.to_string())?;
-        }
+        check_ends(setup, are_alike)?;
         let mut steps: Vec<[i32; D]> = found.known().map(|(s, _)| s).collect();
         // by the flat offset; the numbers of an offset and its opposite are one
         steps.sort_unstable_by_key(|s| {
@@ -409,7 +351,7 @@ impl<const D: usize> Stencil<D> {
         let number = |(o, s): (usize, &[i32; D])| (*s, o);
         let position = OffsetTable::new(&steps.iter().enumerate().map(number).collect::<Vec<_>>());
         let point_of = points_of_cells(&cells, &site)?;
-        let with_family = |p: u32| p != NONE && !setup.families.of(p as usize).is_empty();
+        let with_family = |p: u32| p != NONE && setup.has_family(p as usize);
         let groups: Vec<u32> = cells
             .groups()
             .filter(|&c| point_of[c..c + LANES].iter().any(|&p| with_family(p)))
@@ -428,7 +370,7 @@ impl<const D: usize> Stencil<D> {
             point_of: &point_of,
             position: &position,
         };
-        let (reference, intact) = sites.bits(setup, stencil, step);
+        let (reference, intact) = sites.bits_of_all(setup, stencil, step);
         let stencil = Self {
             offsets,
             point_of,

@@ -421,6 +421,7 @@ fn precracks_count_as_damage_and_single_weights_err_by_little() {
         precracked: Some(&cut),
         layout: Layout::List,
         storage: Storage::Double,
+        shared: None,
     };
     let (mut force, mut single) = (vec![0.0; n], vec![0.0; n]);
     let mut pass = bond_pass(&setup).unwrap();
@@ -455,6 +456,7 @@ fn what_cannot_be_is_refused() {
             precracked: None,
             layout: Layout::Automatic,
             storage: Storage::Double,
+            shared: None,
         })
         .err()
         .map(|e| e.to_string())

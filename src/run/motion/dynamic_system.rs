@@ -40,6 +40,8 @@ pub(crate) struct LayoutStart<'a, const D: usize> {
     pub broken: Option<&'a BrokenBonds<D>>,
     /// The processes that compute together, if there are several.
     pub ranks: Option<&'a dyn Ranks>,
+    /// Whether each of them may hold the families of its own sites alone.
+    pub is_shared: bool,
 }
 
 /// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks.
@@ -72,7 +74,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
         && !rest.has_nonlinear_elements(model);
     definiteness::check(model, operator, rest.ratio, choices, progress)?;
-    let moving = CoupledSystem::new(
+    let moving = CoupledSystem::of_processes(
         model,
         operator,
         coupling.symmetry(),
@@ -88,6 +90,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
             storage,
             broken: start.broken,
         },
+        start.ranks,
     );
     match moving {
         Ok(motion) => {

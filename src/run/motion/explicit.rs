@@ -8,6 +8,7 @@ use super::impact_record::ImpactRecord;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
 use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
+use super::sharing::sharing;
 use super::step_observer::{Segment, StepObserver, Stop, Watched, moment};
 use super::writer::{Saved, Zone as FollowedZone};
 use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
@@ -40,7 +41,7 @@ pub fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Si
             .iter()
             .filter(|s| matches!(s.kind, SiteKind::Point(_)))
             .count(),
-        bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
+        bonds: model.bond_count() + operator.additional_bonds(),
         dofs: model.sites.len() * D,
         nonzeros: 0,
     }
@@ -90,6 +91,7 @@ pub(crate) fn run<const D: usize>(
     let start = LayoutStart {
         broken: None,
         ranks: options.ranks,
+        is_shared: sharing(&problem, &rest, options),
     };
     loop {
         let (segment, back) = match from {

@@ -40,6 +40,7 @@ pub(crate) mod rezoning;
 mod section_rows;
 pub(crate) mod seen;
 pub mod setup;
+mod sharing;
 pub(crate) mod step_observer;
 mod supports;
 mod tables;
@@ -49,6 +50,8 @@ mod tips;
 mod way;
 pub mod writer;
 pub(crate) mod zone_monitor;
+
+pub(crate) use sharing::may_share;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

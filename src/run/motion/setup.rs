@@ -99,7 +99,8 @@ pub(crate) fn lay_out<const D: usize, T>(
         mut timings,
         mut watch,
     } = begun;
-    let (model, coupling) = setup::model(problem, rest, progress)?;
+    let sharing = start.ranks.filter(|_| start.is_shared);
+    let (model, coupling) = setup::shared_model(problem, rest, sharing, progress)?;
     choices.extend(setup::model_choices(&model));
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
@@ -114,7 +115,8 @@ pub(crate) fn lay_out<const D: usize, T>(
         &mut choices,
         progress,
     )?;
-    let proved = growth::proved(&model, operator.as_ref(), moving.system.as_ref(), progress);
+    let of = (start.ranks, moving.system.as_ref());
+    let proved = growth::proved(&model, operator.as_ref(), of, progress);
     watch.lap(&mut timings, "rows and bonds");
     let proof = proof::prove(
         &Subject {
@@ -126,6 +128,7 @@ pub(crate) fn lay_out<const D: usize, T>(
             product: None,
             system: Some(moving.system.as_ref()),
             affine_forces: &[],
+            ranks: start.ranks,
         },
         progress,
     )?;
@@ -185,6 +188,7 @@ pub fn laid_out<const D: usize, S, T>(
     let start = LayoutStart {
         broken: None,
         ranks,
+        is_shared: false,
     };
     let done = lay_out(begun, problem, &rest, start, progress, |laid_out| {
         then(laid_out, ready)

@@ -94,7 +94,14 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
         recorder: &mut Recorder<'_, D>,
         moment: &Moment<'_>,
     ) -> Result<(), ObserveError> {
-        recorder.output(moment, &self.solved(moment, &moment.broken_bonds()))
+        let broken = moment.broken_bonds();
+        let mut solved = self.solved(moment, &broken);
+        let spread = self.model.spread(recorder.ranks());
+        let [has_snapshots, writes] = recorder.snapshots();
+        let spread = spread.filter(|_| has_snapshots);
+        let gathered = spread.map(|spread| solved.gathered_tensors(&spread, writes));
+        solved.on_points = gathered.as_deref();
+        recorder.output(moment, &solved)
     }
 
     /// A moment as it is shown.
@@ -109,6 +116,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
             broken,
             sections: &[],
             stresses: self.stresses.at(moment.state.time),
+            on_points: None,
         }
     }
 

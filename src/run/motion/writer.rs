@@ -32,7 +32,7 @@ use crate::run::write::{ENERGY_DENSITY, OverSites, Shown, energy_densities, snap
 use crate::scene::conditions::Condition;
 use crate::scene::validated::Output;
 use crate::solve::explicit::State;
-use crate::system::SemiDiscrete;
+use crate::system::{Ranks, SemiDiscrete};
 use crate::tensor::Vector;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -428,6 +428,16 @@ impl<'a, const D: usize> Recorder<'a, D> {
         )?;
         self.seconds += begun.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// The processes of the run, if there are several.
+    pub fn ranks(&self) -> Option<&'a dyn Ranks> {
+        self.options.ranks
+    }
+
+    /// Whether the run has VTU files, and whether this process writes them.
+    pub fn snapshots(&self) -> [bool; 2] {
+        [self.output.vtu, self.output.vtu && self.options.writes()]
     }
 
     /// Appends the state to the tables of the lines, writes a VTU file, if the scene wants any, and shows the same to the observer.

@@ -14,7 +14,7 @@ use crate::run::error::RunError;
 use crate::run::loads::holders;
 use crate::scene::conditions::{Condition, Support};
 use crate::scene::spec::PrecisionSpec;
-use crate::system::BlockCsr;
+use crate::system::{BlockCsr, Spread};
 use crate::tensor::{Tensor, Tensor4, Vector};
 
 /// Most rows whose kind is found out one by one; of more, a sample of the worst.
@@ -33,6 +33,8 @@ struct Subject<'a, const D: usize> {
     holder: Vec<Option<usize>>,
     /// Sites with broken bonds, ascending.
     damaged: Vec<u32>,
+    /// The sites over processes, where families are spread over these.
+    spread: Option<Spread<'a>>,
 }
 
 /// The displacement of all sites under each affine field.
@@ -84,6 +86,7 @@ pub(super) fn part<const D: usize>(
         conditions: &proved.rest.conditions,
         holder: holders(model, &proved.rest.conditions)?,
         damaged: proved.system.map_or(Vec::new(), |s| s.damaged_sites()),
+        spread: model.spread(proved.ranks),
     };
     // weights in four bytes are off by as much
     let exact = match (proved.system, proved.rest.breaking.precision) {
@@ -221,6 +224,18 @@ fn cut_bonds_reach<const D: usize>(model: &Model<D>, site: u32) -> f64 {
 /// What a row is, the facet that it lies at, and whether no other surface is near.
 type Class = (RowClass, Option<usize>, bool);
 
+/// A class as numbers, for other processes.
+fn numbers_of_class((class, facet, is_alone): &Class) -> [f64; 3] {
+    let facet = facet.map_or(-1.0, |f| f as f64);
+    [class.number(), facet, f64::from(u8::from(*is_alone))]
+}
+
+/// Back from [`numbers_of_class`].
+fn class_of_numbers(numbers: &[f64]) -> Class {
+    let facet = (numbers[1] >= 0.0).then_some(numbers[1] as usize);
+    (RowClass::numbered(numbers[0]), facet, numbers[2] == 1.0)
+}
+
 /// The rows that are out of balance by what they are, and what the stress at them is predicted with.
 struct Classified<'a, const D: usize> {
     subject: &'a Subject<'a, D>,
@@ -292,6 +307,34 @@ impl<const D: usize> Classified<'_, D> {
     }
 }
 
+/// The classes of rows out of balance; collective where families are spread.
+fn classes<const D: usize>(
+    subject: &Subject<'_, D>,
+    boundary: &Boundary<'_, D>,
+    reach: f64,
+    off: &[u32],
+) -> Vec<Class> {
+    let model = subject.model;
+    let classes_of = |sites: &[u32]| -> Vec<Class> {
+        let sites = sites.par_iter();
+        let classes = sites.map_init(
+            || Row::<D>::new(model.sites.len()),
+            |row, &s| class(subject, boundary, reach, s, row),
+        );
+        classes.collect()
+    };
+    match &subject.spread {
+        // a row takes families that its own process holds
+        Some(spread) => {
+            let told = spread.of_sites(off, 3, |own| {
+                classes_of(own).iter().flat_map(numbers_of_class).collect()
+            });
+            told.chunks_exact(3).map(class_of_numbers).collect()
+        }
+        None => classes_of(off),
+    }
+}
+
 /// Sorts the rows that are out of balance, and predicts the error of the stress at the worst of each class.
 fn unbalanced<const D: usize>(
     subject: &Subject<'_, D>,
@@ -314,13 +357,7 @@ fn unbalanced<const D: usize>(
         .fold(0.0, f64::max);
     let widest = reach + widest + model.spacing();
     let boundary = Boundary::new(model, subject.conditions, widest, (low, high));
-    let classified: Vec<Class> = off
-        .par_iter()
-        .map_init(
-            || Row::<D>::new(model.sites.len()),
-            |row, &s| class(subject, &boundary, reach, s, row),
-        )
-        .collect();
+    let classified = classes(subject, &boundary, reach, off);
     let held: Vec<bool> = subject.holder.iter().map(Option::is_some).collect();
     let around = Around {
         model,
@@ -330,6 +367,7 @@ fn unbalanced<const D: usize>(
         held: &held,
         reach,
         centre: centre(model),
+        spread: subject.spread,
     };
     let classified = Classified {
         subject,

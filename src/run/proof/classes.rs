@@ -50,6 +50,31 @@ pub(super) enum RowClass {
     SeamAtSurface,
 }
 
+impl RowClass {
+    const ALL: [Self; 9] = [
+        Self::Seam,
+        Self::Points,
+        Self::Transition,
+        Self::FreeSurface,
+        Self::Support,
+        Self::LoadedSurface,
+        Self::Crack,
+        Self::Border,
+        Self::SeamAtSurface,
+    ];
+
+    /// The class as a number, for other processes.
+    pub fn number(self) -> f64 {
+        let place = Self::ALL.iter().position(|class| *class == self);
+        place.unwrap_or(0) as f64
+    }
+
+    /// The class of a number.
+    pub fn numbered(number: f64) -> Self {
+        Self::ALL[number as usize]
+    }
+}
+
 /// Rows of one class that affine fields leave out of balance.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unbalanced {

@@ -10,7 +10,7 @@ use crate::scene::spec::{CouplingSpec, GrowingModesSpec};
 use crate::solve::instability_growth::{
     Evidence, Growth, LARGEST_GAIN, REMEDY, REMEDY_SEAM, growth,
 };
-use crate::system::{SemiDiscrete, Symmetry};
+use crate::system::{Ranks, SemiDiscrete, Symmetry};
 
 /// The largest factor by which a mode that is not seen may grow over the run, if the answer is to be that none grows.
 const UNSEEN: f64 = 1.1;
@@ -44,11 +44,11 @@ pub(crate) fn remedy(coupling: &CouplingSpec) -> &'static str {
 
 /// What shows that no mode grows at rest: a symmetric stiffness whose energy is a sum of squares, or that has been factorised.
 ///
-/// The energy of bonds is a sum of squares if no weight is negative, that of a state-based law below the Poisson ratio of its bonds too: its squares are those of volume and shape.
+/// Collective, of processes. The energy of bonds is a sum of squares if no weight is negative, that of a state-based law below the Poisson ratio of its bonds too: its squares are those of volume and shape.
 pub(crate) fn proved<const D: usize>(
     model: &Model<D>,
     operator: &dyn Operator<D>,
-    system: &dyn SemiDiscrete,
+    (ranks, system): (Option<&dyn Ranks>, &dyn SemiDiscrete),
     progress: &dyn Progress,
 ) -> Option<&'static str> {
     if system.symmetry() != Symmetry::Symmetric {
@@ -67,6 +67,10 @@ pub(crate) fn proved<const D: usize>(
     let no_weight_is_negative = model.body().is_none_or(|body| {
         (0..body.families.len()).all(|i| body.kernel(i).0.iter().all(|pair| *pair >= 0.0))
     });
+    let no_weight_is_negative = match model.spread(ranks) {
+        Some(spread) => spread.all(no_weight_is_negative),
+        None => no_weight_is_negative,
+    };
     no_weight_is_negative.then_some("the stiffness is symmetric, and its energy a sum of squares")
 }
 

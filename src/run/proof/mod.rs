@@ -29,7 +29,7 @@ use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::spec::UnprovenSpec;
 use crate::solve::krylov::LinearMap;
-use crate::system::{BlockCsr, SemiDiscrete};
+use crate::system::{BlockCsr, Ranks, SemiDiscrete};
 
 pub use self::affine::displacements as affine_displacements;
 
@@ -51,6 +51,8 @@ pub struct Subject<'a, const D: usize> {
     pub system: Option<&'a dyn SemiDiscrete>,
     /// Forces of the fields of [`affine_displacements`], where they are known already.
     pub affine_forces: &'a [Vec<f64>],
+    /// The processes over which the families of the model may be spread.
+    pub ranks: Option<&'a dyn Ranks>,
 }
 
 /// Runs every check that the scene calls for.

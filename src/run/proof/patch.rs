@@ -11,7 +11,7 @@ use crate::solve::FreeDofs;
 use crate::solve::direct::{Analysis, Factor};
 use crate::solve::direct_params::DirectParams;
 use crate::solve::ordering::Ordering;
-use crate::system::{BlockCsr, Symmetry};
+use crate::system::{BlockCsr, Spread, Symmetry};
 use crate::tensor::{Tensor, Vector, padded};
 
 /// Most sites of a patch: in the plane some four horizons around its middle at m = 3, in space one and a half. With 300 in the plane the patch of a splice on scattered points came near to a singular one.
@@ -30,6 +30,8 @@ pub(super) struct Around<'a, const D: usize> {
     pub reach: f64,
     /// The point that all fields leave in place.
     pub centre: Vector<D>,
+    /// The sites over processes, where families are spread over these: rows and stresses of points are those of their own processes.
+    pub spread: Option<Spread<'a>>,
 }
 
 /// The largest error of the stress in a patch.
@@ -143,16 +145,43 @@ fn keeps_field<const D: usize>(around: &Around<'_, D>, site: u32, main: Option<u
 /// The rows of the sites of a patch.
 fn rows<const D: usize>(around: &Around<'_, D>, list: &[u32]) -> BlockCsr {
     let (model, sites) = (around.model, around.model.sites.len());
-    let add_row = |r: usize, row: &mut Row<D>| match around.stiffness {
-        Some(stiffness) => {
-            let (columns, values) = stiffness.row(list[r] as usize);
-            for (&column, block) in columns.iter().zip(values.chunks_exact(D * D)) {
-                row.add_site(column, &Tensor::from_row_slice(block));
+    let rows_of = |list: &[u32]| {
+        let add_row = |r: usize, row: &mut Row<D>| match around.stiffness {
+            Some(stiffness) => {
+                let (columns, values) = stiffness.row(list[r] as usize);
+                for (&column, block) in columns.iter().zip(values.chunks_exact(D * D)) {
+                    row.add_site(column, &Tensor::from_row_slice(block));
+                }
             }
-        }
-        None => model.add_scaled_row(around.operator, list[r] as usize, row),
+            None => model.add_scaled_row(around.operator, list[r] as usize, row),
+        };
+        assembly::assemble_rows::<D>(list.len(), sites, |_| (), add_row)
     };
-    assembly::assemble_rows::<D>(list.len(), sites, |_| (), add_row)
+    match &around.spread {
+        Some(spread) => spread.gather_rows(list, rows_of),
+        None => rows_of(list),
+    }
+}
+
+/// The stresses of some points of the body at a displacement, from the processes that hold their families; empty where all are here.
+fn spread_stresses<const D: usize>(
+    around: &Around<'_, D>,
+    list: &[u32],
+    u: &[f64],
+) -> Vec<Tensor<D>> {
+    let stress = |&s: &u32| {
+        let point = around.model.point_of(s as usize);
+        point.map_or(Tensor::zeros(), |(body, p)| body.partial_stress(p, u))
+    };
+    let Some(spread) = &around.spread else {
+        return Vec::new();
+    };
+    let numbers = spread.of_sites(list, D * D, |own| {
+        let stresses: Vec<Tensor<D>> = own.iter().map(stress).collect();
+        stresses.iter().flat_map(|t| t.iter()).copied().collect()
+    });
+    let stresses = numbers.chunks_exact(D * D);
+    stresses.map(Tensor::from_column_slice).collect()
 }
 
 /// The rows of a patch among its own sites, and which of their dofs are released.
@@ -229,7 +258,8 @@ fn largest<const D: usize>(
         None => of_points,
     };
     let mut cells: Vec<usize> = Vec::new();
-    for (&s, keeps) in list.iter().zip(keeps) {
+    let known = spread_stresses(around, list, u);
+    for (place, (&s, keeps)) in list.iter().zip(keeps).enumerate() {
         let site = &model.sites[s as usize];
         // what families that other surfaces cut show is no error of this row
         if *keeps && matches!(site.kind, SiteKind::Point(_)) {
@@ -238,7 +268,9 @@ fn largest<const D: usize>(
         match (site.kind, model.point_of(s as usize)) {
             (SiteKind::Point(_), Some((body, p))) => {
                 let Some(c) = cell_of_point(p) else { continue };
-                compare(body.partial_stress(p, u), c, site.position);
+                let known = known.get(place).copied();
+                let stress = known.unwrap_or_else(|| body.partial_stress(p, u));
+                compare(stress, c, site.position);
             }
             _ => cells.extend(model.cells_of_site(s as usize).map(|(c, _)| c)),
         }

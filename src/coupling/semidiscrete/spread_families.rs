@@ -1,0 +1,111 @@
+//! What a coupled system tells of bonds one by one, of families that may be spread over processes: each tells of its own, and all learn it.
+
+use rayon::prelude::*;
+
+use super::CoupledSystem;
+use super::behaviour::NONE;
+use crate::assembly;
+use crate::coupling::NonlinearSeam;
+use crate::system::{BlockCsr, Spread};
+
+impl<const D: usize> CoupledSystem<'_, D> {
+    /// The sites over processes, where families are.
+    fn spread_families(&self) -> Option<Spread<'_>> {
+        let ranks = self.split.as_ref().map(|split| split.ranks);
+        self.model.spread(ranks)
+    }
+
+    /// See [`crate::system::SemiDiscrete::tangent_rows`]. Collective where families are spread.
+    pub(super) fn rows_at(&self, sites: &[u32]) -> BlockCsr {
+        match self.spread_families() {
+            Some(spread) => spread.gather_rows(sites, |own| self.own_rows_at(own)),
+            None => self.own_rows_at(sites),
+        }
+    }
+
+    fn own_rows_at(&self, sites: &[u32]) -> BlockCsr {
+        assembly::assemble_rows(
+            sites.len(),
+            self.mass.len(),
+            |_| (),
+            |r, row| {
+                let site = sites[r] as usize;
+                self.linear.add_row(site, row);
+                if let (Some(moving), Some(body)) = (&self.body, self.model.body())
+                    && moving.bonds_of_site[site] != NONE
+                {
+                    let point = moving.bonds_of_site[site] as usize;
+                    let without_energy = self
+                        .seam
+                        .as_ref()
+                        .map_or(&[][..], NonlinearSeam::without_energy);
+                    if without_energy.is_empty() {
+                        let weight = |j: usize| match self.is_passed_over(point, j as u32) {
+                            true => 1.0,
+                            false => 0.0,
+                        };
+                        body.add_force_row(point, weight, row);
+                    } else {
+                        // a point with an energy in the body's pass has whole bonds only
+                        body.add_force_row_of_energies(
+                            point,
+                            |_| [1.0; 2],
+                            |j| !without_energy[j],
+                            row,
+                        );
+                    }
+                }
+                if let (Some(moving), Some(body)) = (&self.body, self.model.body()) {
+                    moving.add_rows_of_feet(body, sites[r], row);
+                }
+                if let Some(seam) = &self.seam {
+                    seam.add_row(site, row);
+                }
+                if let Some(scale) = self.model.row_scale() {
+                    row.scale(scale[site]);
+                }
+            },
+        )
+    }
+
+    /// See [`crate::system::SemiDiscrete::broken_bonds`]. Collective where families are spread.
+    pub(super) fn broken_between_sites(&self) -> Vec<(u32, u32)> {
+        let held = self.broken_of_held_families();
+        let Some(spread) = self.spread_families() else {
+            return held;
+        };
+        // neighbours of own points may be held as well
+        let rank = spread.ranks.rank();
+        let own = held.into_iter();
+        let own = own.filter(|&(i, _)| spread.partition.owner(i) == rank);
+        let words: Vec<u64> = own
+            .map(|(i, j)| u64::from(i) << 32 | u64::from(j))
+            .collect();
+        let mut all = spread.ranks.gather_words(&words).concat();
+        // points and sites have the same order
+        all.sort_unstable();
+        let ends = |word: u64| ((word >> 32) as u32, word as u32);
+        all.into_iter().map(ends).collect()
+    }
+
+    fn broken_of_held_families(&self) -> Vec<(u32, u32)> {
+        let (Some(moving), Some(body)) = (self.body.as_ref(), self.model.body()) else {
+            return Vec::new();
+        };
+        let site = |p: usize| moving.site_of_point[p];
+        (0..moving.site_of_point.len())
+            .into_par_iter()
+            .filter(|&i| site(i) != NONE && moving.pass.is_damaged(i))
+            .flat_map_iter(|i| {
+                let family = body.families.of(i).iter();
+                family
+                    .filter(move |&&j| {
+                        !moving.pass.bonded(i, j as usize)
+                            && site(j as usize) != NONE
+                            && self.is_passed_over(i, j)
+                    })
+                    .map(move |&j| (site(i), site(j as usize)))
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,63 @@
+//! A model whose families are spread over processes.
+
+use crate::{
+    coupling::{Model, ModelError, SharedFamilies},
+    peridynamics::PdBody,
+    system::{Partition, Ranks, Spread, first_text},
+};
+
+impl<const D: usize> Model<D> {
+    /// The body; collective where its families are spread over processes: if a process could not make its own, the error of the first of them, on all.
+    pub(super) fn held_body(
+        &mut self,
+        shared: Option<(SharedFamilies, &dyn Ranks)>,
+        body: Result<PdBody<D>, ModelError>,
+    ) -> Result<PdBody<D>, ModelError> {
+        let Some((mut shared, ranks)) = shared else {
+            return body;
+        };
+        let own = body.as_ref().err().map(ToString::to_string);
+        if let Some(message) = first_text(ranks, own.as_deref()) {
+            return Err(ModelError::OfProcess { message });
+        }
+        let body = body?;
+        shared.count(ranks, &body.families);
+        self.shared = Some(shared);
+        Ok(body)
+    }
+
+    /// Who has which families, where they are spread over processes; else every process has all.
+    pub fn shared_families(&self) -> Option<&SharedFamilies> {
+        self.shared.as_ref()
+    }
+
+    /// The sites over processes, where families are spread over these.
+    pub fn spread<'a>(&'a self, ranks: Option<&'a dyn Ranks>) -> Option<Spread<'a>> {
+        let shared = self.shared.as_ref()?;
+        Some(shared.spread(ranks?))
+    }
+
+    /// Which of `count` processes computes which sites; `is_shared` where families shall be spread over these as well.
+    ///
+    /// Sites are weighted by the bonds and cells around them, or count the same where families are not known before they are spread.
+    pub fn partition(&self, count: usize, is_shared: bool) -> Partition {
+        let positions: Vec<[f64; 3]> = self
+            .sites
+            .iter()
+            .map(|s| crate::tensor::padded(&s.position))
+            .collect();
+        let work = match is_shared && self.is_searched_by_lattice {
+            true => vec![1.0; positions.len()],
+            false => self.work_of_sites(),
+        };
+        Partition::by_bisection(&positions, &work, count)
+    }
+
+    /// Directed bonds of all points, whoever holds them.
+    pub fn bond_count(&self) -> usize {
+        match &self.shared {
+            Some(shared) => shared.bond_count(),
+            None => self.body().map_or(0, PdBody::bond_count),
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! Threads as processes, and runs of scenes by them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Barrier, Mutex};
+
+use bondline::observe::checkpoint::Pace;
+use bondline::progress::Silent;
+use bondline::run::{AnyScene, RunError, RunOptions, StartFrom};
+use bondline::scene::Source;
+use bondline::system::{RankRows, RankSolve, RankSolver, RankSolverKind, Ranks};
+use nalgebra::{DMatrix, DVector};
+
+/// What the threads of a run share.
+#[derive(Debug)]
+struct Board {
+    words: Mutex<Vec<Vec<u64>>>,
+    barrier: Barrier,
+    /// Gathers of all threads.
+    gathers: AtomicUsize,
+}
+
+/// One thread as a process.
+#[derive(Debug)]
+struct ThreadRank {
+    rank: usize,
+    board: Arc<Board>,
+    /// Gathers that are left until all are killed.
+    left: Mutex<usize>,
+}
+
+impl Ranks for ThreadRank {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn count(&self) -> usize {
+        self.board.words.lock().unwrap().len()
+    }
+
+    fn gather_into(&self, own: &[f64], lengths: &[usize], all: &mut [f64]) {
+        assert_eq!(own.len(), lengths[self.rank]);
+        let words: Vec<u64> = own.iter().map(|x| x.to_bits()).collect();
+        let found = self.gather_words(&words).concat();
+        assert_eq!(found.len(), all.len());
+        all.iter_mut()
+            .zip(found)
+            .for_each(|(to, word)| *to = f64::from_bits(word));
+    }
+
+    fn gather_words(&self, own: &[u64]) -> Vec<Vec<u64>> {
+        let mut left = self.left.lock().unwrap();
+        assert!(*left > 0, "killed");
+        *left -= 1;
+        self.board.gathers.fetch_add(1, Ordering::Relaxed);
+        self.board.words.lock().unwrap()[self.rank] = own.to_vec();
+        self.board.barrier.wait();
+        let all = self.board.words.lock().unwrap().clone();
+        self.board.barrier.wait();
+        all
+    }
+
+    fn solver(
+        &self,
+        rows: &RankRows<'_>,
+        _: RankSolverKind,
+    ) -> Result<Box<dyn RankSolver>, String> {
+        // every thread has all rows, and factorises them as one matrix
+        let (d, partition) = (rows.matrix.block, rows.partition);
+        let mut own = Vec::new();
+        for (r, &site) in partition.of(self.rank).iter().enumerate() {
+            let (columns, blocks) = rows.matrix.row(r);
+            for (c, block) in columns.iter().zip(blocks.chunks_exact(d * d)) {
+                for (k, value) in block.iter().enumerate() {
+                    let row = partition.number(site) as usize * d + k / d;
+                    let column = partition.number(*c) as usize * d + k % d;
+                    let free = |s: u32, a: usize| !rows.prescribed[s as usize * d + a];
+                    if free(site, k / d) && free(*c, k % d) {
+                        own.extend([row as u64, column as u64, value.to_bits()]);
+                    }
+                }
+            }
+        }
+        let size = partition.sites() * d;
+        let mut matrix = DMatrix::<f64>::zeros(size, size);
+        for entry in self.gather_words(&own).concat().chunks_exact(3) {
+            matrix[(entry[0] as usize, entry[1] as usize)] += f64::from_bits(entry[2]);
+        }
+        for k in 0..size {
+            if matrix.row(k).iter().all(|x| *x == 0.0) {
+                matrix[(k, k)] = 1.0;
+            }
+        }
+        Ok(Box::new(Dense {
+            matrix: matrix.lu(),
+            rank: Self {
+                rank: self.rank,
+                board: Arc::clone(&self.board),
+                left: Mutex::new(usize::MAX),
+            },
+            lengths: partition.lengths(d),
+        }))
+    }
+}
+
+/// All rows, factorised.
+struct Dense {
+    matrix: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
+    rank: ThreadRank,
+    lengths: Vec<usize>,
+}
+
+impl RankSolver for Dense {
+    fn solve_into(&mut self, b: &[f64], x: &mut [f64], _: f64, _: usize) -> RankSolve {
+        let mut all = vec![0.0; self.lengths.iter().sum()];
+        self.rank.gather_into(b, &self.lengths, &mut all);
+        let found = self
+            .matrix
+            .solve(&DVector::from_vec(all))
+            .expect("a regular matrix");
+        let first: usize = self.lengths[..self.rank.rank].iter().sum();
+        x.copy_from_slice(&found.as_slice()[first..first + x.len()]);
+        RankSolve {
+            iterations: 1,
+            failure: None,
+        }
+    }
+}
+
+/// How a scene is run.
+#[derive(Clone, Copy)]
+pub struct How {
+    /// Threads that are its processes; none for a run that knows of no others.
+    pub ranks: usize,
+    pub start: StartFrom,
+    pub every: Option<Pace>,
+    /// Gathers until the processes are killed.
+    pub lives: usize,
+}
+
+pub const ALONE: How = How {
+    ranks: 0,
+    start: StartFrom::Beginning,
+    every: None,
+    lives: usize::MAX,
+};
+
+/// A run that has come to its end.
+#[derive(Debug, PartialEq)]
+pub struct Done {
+    /// Gathers of each process.
+    pub gathers: usize,
+    /// Its sizes, proof and warnings: what is printed of the proof, as figures end in other digits where rows are gathered.
+    pub told: String,
+}
+
+/// Runs a scene in a folder, or says why it did not come to its end.
+pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
+    let one = |ranks: Option<&dyn Ranks>| -> Result<String, RunError> {
+        let source = Source::new("scene.toml", text.to_owned());
+        let mut scene = AnyScene::from_source(&source, folder, "scene").expect("a valid scene");
+        scene.set_output_directory(folder.to_owned());
+        let options = RunOptions {
+            start: how.start,
+            checkpoint_every: how.every,
+            ranks,
+            ..RunOptions::default()
+        };
+        let done = scene.run_with(&options, &Silent)?;
+        let parts = done.proof.parts.iter();
+        let proof: Vec<_> = parts.map(|part| (part.name, &part.line)).collect();
+        Ok(format!("{:?} {proof:?} {:?}", done.sizes, done.warnings))
+    };
+    if how.ranks == 0 {
+        // one thread, as each process has
+        let [told] = &on_processes(1, |_| one(None).map_err(|e| e.to_string()))[..] else {
+            unreachable!("one thread");
+        };
+        let told = told.clone()?;
+        return Ok(Done { gathers: 0, told });
+    }
+    let gathers = AtomicUsize::new(0);
+    let ends = on_processes_for(how.ranks, how.lives, |rank| {
+        let end = one(Some(rank)).map_err(|e| e.to_string());
+        gathers.store(
+            rank.board.gathers.load(Ordering::Relaxed),
+            Ordering::Relaxed,
+        );
+        end
+    });
+    let ends: Vec<Result<String, String>> = ends
+        .into_iter()
+        .map(|end| end.unwrap_or_else(|| Err("killed".to_owned())))
+        .collect();
+    // all of them tell the same
+    assert!(ends.iter().all(|end| *end == ends[0]), "{ends:?}");
+    let end = ends.into_iter().next().expect("a process");
+    let gathers = gathers.load(Ordering::Relaxed) / how.ranks;
+    end.map(|told| Done { gathers, told })
+}
+
+/// What each of some processes makes of its work.
+pub fn on_processes<T: Send>(count: usize, work: impl Fn(&dyn Ranks) -> T + Sync) -> Vec<T> {
+    let done = on_processes_for(count, usize::MAX, |rank| work(rank));
+    done.into_iter()
+        .map(|done| done.expect("no panic"))
+        .collect()
+}
+
+/// As [`on_processes`], until all have gathered so often; none of those that are killed then.
+fn on_processes_for<T: Send>(
+    count: usize,
+    lives: usize,
+    work: impl Fn(&ThreadRank) -> T + Sync,
+) -> Vec<Option<T>> {
+    let board = Arc::new(Board {
+        words: Mutex::new(vec![Vec::new(); count]),
+        barrier: Barrier::new(count),
+        gathers: AtomicUsize::new(0),
+    });
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..count)
+            .map(|rank| {
+                let rank = ThreadRank {
+                    rank,
+                    board: Arc::clone(&board),
+                    left: Mutex::new(lives),
+                };
+                let work = &work;
+                scope.spawn(move || {
+                    // a pool of its own: a thread that waits for others must not hold up theirs
+                    let pool = rayon::ThreadPoolBuilder::new()
+                        .num_threads(1)
+                        .build()
+                        .unwrap();
+                    pool.install(|| work(&rank))
+                })
+            })
+            .collect();
+        threads.into_iter().map(|t| t.join().ok()).collect()
+    })
+}
+
+/// The files of a folder.
+pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    entries
+        .map(|e| e.expect("an entry"))
+        .map(|e| {
+            let name = e.file_name().to_string_lossy().into_owned();
+            (name, std::fs::read(e.path()).expect("a file"))
+        })
+        .filter(|(name, _)| !name.ends_with(".lock"))
+        .collect()
+}
+
+pub fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder")
+}
+
+/// A scene has the same bytes on any number of processes.
+pub fn assert_same(text: &str, ranks: &[usize]) -> BTreeMap<String, Vec<u8>> {
+    let one = folder();
+    let told = run(text, one.path(), ALONE).expect("one process").told;
+    let wanted = files(one.path());
+    assert!(
+        wanted.keys().any(|name| name.ends_with("_history.csv")),
+        "{:?}",
+        wanted.keys()
+    );
+    for &ranks in ranks {
+        let several = folder();
+        let done = run(text, several.path(), How { ranks, ..ALONE }).expect("several processes");
+        assert_eq!(done.told, told, "on {ranks} processes");
+        let found = files(several.path());
+        assert!(found.keys().eq(wanted.keys()), "{:?}", found.keys());
+        for (name, bytes) in &found {
+            assert!(*bytes == wanted[name], "{name} on {ranks} processes");
+        }
+    }
+    wanted
+}
