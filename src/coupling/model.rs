@@ -367,14 +367,25 @@ impl<const D: usize> Model<D> {
             .map_err(|e| ModelError::family("the point", e));
         let mut body = self.held_body(shared.zip(ranks), body)?;
         if let Some(feet) = feet {
-            let at = (&self.mesh, &self.node_transfer, self.spacing);
-            truncated_families::balance(at, &feet, p.law.linearised(), &mut body)?;
-            self.feet = (feet.points as u32..body.cloud.position.len() as u32).collect();
-            self.left_out = feet.left_out;
-            body.set_ends(feet.ends);
+            self.end_families(p, feet, &mut body)?;
         }
         self.body = Some(body);
         self.factors = factors.into_iter().zip(horizons).collect();
+        Ok(())
+    }
+
+    /// Balances families that end at feet, and keeps where they do.
+    fn end_families(
+        &mut self,
+        p: &Peridynamics<D>,
+        feet: Feet<D>,
+        body: &mut PdBody<D>,
+    ) -> Result<(), ModelError> {
+        let at = (&self.mesh, &self.node_transfer, self.spacing);
+        truncated_families::balance(at, &feet, p.law.linearised(), body)?;
+        self.feet = (feet.points as u32..body.cloud.position.len() as u32).collect();
+        self.left_out = feet.left_out;
+        body.set_ends(feet.ends);
         Ok(())
     }
 

@@ -256,6 +256,35 @@ fn clocks_pace_no_checkpoints_of_several_processes() {
     assert!(told.contains("count steps"), "{told}");
 }
 
+/// A plastic square that is struck; families end at feet on the faces of elements, whose forces go to nodes of other processes.
+#[test]
+fn families_that_end_at_a_seam_move_alike() {
+    let text = r#"
+kinematics = "plane-stress"
+coupling = "truncated"
+mesh.rectangle = { min = [0, 0], max = [20, 20], x.cells = 20, y.cells = 20 }
+[materials.m.plastic-correspondence]
+youngs-modulus = 1000
+poisson-ratio = 0.3
+density = 1
+yield-stress = 5
+hardening-modulus = 100
+[peridynamics]
+horizon = 1.5
+points.lattice = { spacing = 0.5 }
+[zones.nonlocal]
+box = { min = [7, 7], max = [13, 13] }
+[initial.struck.velocity]
+inside.box = { min = [-1, -1], max = [4, 21] }
+x = 0.3
+[solve.explicit]
+duration = 0.5
+outputs = 2
+history-interval = 0.02
+"#;
+    assert_same(text, &[2, 5]);
+}
+
 /// A bar at rest.
 fn bar(coupling: &str) -> String {
     format!(

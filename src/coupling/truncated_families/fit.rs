@@ -85,8 +85,8 @@ const STRICT: usize = 20;
 /// How far the equations of a step are solved: the next one takes what is left.
 const ROUGH: f64 = 1e-3;
 
-/// Conditions of which a step leaves more than this cannot be met by positive weights.
-const STALLED: f64 = 0.9;
+/// Conditions of which so many steps leave more than this part cannot be met by positive weights.
+const STALLED: (usize, f64) = (4, 0.9);
 
 /// What is left of a weight in a step at least, and after all steps.
 const SMALLEST: f64 = 0.1;
@@ -192,13 +192,18 @@ impl Fit {
         for _ in 0..DAMPED {
             self.step(&all, (self.damping, ROUGH), &mut factors);
         }
-        let mut before = f64::INFINITY;
+        let (mut least, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..STRICT {
             let lacks = self.step(&self.is_strict, (0.0, ROUGH), &mut factors);
-            if lacks < ENOUGH * self.damping || lacks > STALLED * before {
+            stalled = if lacks < STALLED.1 * least {
+                0
+            } else {
+                stalled + 1
+            };
+            if lacks < ENOUGH * self.damping || stalled == STALLED.0 {
                 break;
             }
-            before = lacks;
+            least = least.min(lacks);
         }
         factors
     }
