@@ -10,6 +10,10 @@ use bondline::{
 const SCENE: &str = include_str!("../../../examples/notched_bar.toml");
 const MESH: &str = include_str!("../../../meshes/notched_bar.msh");
 
+/// The bar with elements outside its notch.
+const COUPLED: &str = include_str!("../../../examples/notched_bar_coupled.toml");
+const COUPLED_MESH: &str = include_str!("../../../meshes/notched_bar_ends.msh");
+
 /// Load of the bar without failure \[kN\] over its nominal strain: axisymmetric elements of second order in large strains, CalculiX 2.20 (`tests/fixtures/plasticity/notched_bar.py`).
 const LOADS: &str = include_str!("../../../tests/fixtures/plasticity/notched_bar_load.csv");
 
@@ -27,6 +31,9 @@ pub const AXIS_LIMIT: f64 = 0.5 * NECK;
 
 /// Largest share of the work that is not accounted for, at any time of the run.
 pub const BALANCE_LIMIT: f64 = 1e-4;
+
+/// Largest relative distance of loads of the coupled bar from those of points alone.
+pub const COUPLED_LIMIT: f64 = 0.05;
 
 /// Spacings of the points \[mm\], strengths of the drag, and the load at the end over that of CalculiX without failure, at most: a neck of eight spacings tears late, one of twelve by half, those of twenty and more by three quarters.
 const BARS: [[f64; 3]; 4] = [
@@ -54,6 +61,70 @@ fn bar(spacing: f64, horizon: f64, drag: f64) -> Result<Seen, String> {
         "output.tips.out={ direction = [1, 0, 0], threshold = 0.01 }".to_owned(),
     ];
     run_scene_with(&text, &set, &[("bar.msh", MESH)])
+}
+
+/// The bar with elements outside its notch, and points alone on its mesh and its lattice: spacing 1.5 mm.
+fn coupled_and_alone() -> Result<[(Pulled, f64); 2], String> {
+    let quiet = "output.vtu=false".to_owned();
+    let text = COUPLED.replace("../meshes/notched_bar_ends.msh", "bar.msh");
+    let mesh = [("bar.msh", COUPLED_MESH)];
+    let coupled = run_scene_with(&text, std::slice::from_ref(&quiet), &mesh)?;
+    let text = SCENE.replace("../meshes/notched_bar.msh", "bar.msh");
+    let origin = "peridynamics.points.lattice.origin=[-10.25, -10.25, -14.25]".to_owned();
+    let alone = run_scene_with(&text, &[quiet, origin], &mesh)?;
+    Ok([
+        (pulled(&coupled)?, coupled.seconds),
+        (pulled(&alone)?, alone.seconds),
+    ])
+}
+
+/// The coupled bar beside points alone.
+fn coupled() -> Table {
+    let mut table = Table::new(
+        "Notched bar coupled outside the notch (truncated, spacing 1.5 mm) beside points alone on the same lattice: loads [kN] and nominal strains",
+        Columns::Full,
+    );
+    let case = "coupled";
+    match coupled_and_alone() {
+        Ok([(bar, seconds), (alone, of_points)]) => {
+            let limit = COUPLED_LIMIT;
+            let quantity = "largest load";
+            table.push(Row::within(
+                case,
+                quantity,
+                bar.peak[0],
+                alone.peak[0],
+                limit,
+            ));
+            let quantity = "load at the first break";
+            table.push(Row::within(
+                case,
+                quantity,
+                bar.first[0],
+                alone.first[0],
+                limit,
+            ));
+            table.push(Row::info(case, "strain at the first break", bar.first[1]));
+            table.push(Row::info(
+                "points alone",
+                "strain at the first break",
+                alone.first[1],
+            ));
+            table.push(Row::info(case, "load at the end", bar.left[1]));
+            table.push(Row::info("points alone", "load at the end", alone.left[1]));
+            let quantity = "work not accounted for, largest share";
+            table.push(Row::at_most(case, quantity, bar.missing, BALANCE_LIMIT));
+            table.push(Row::info(
+                case,
+                "seconds over those of points alone",
+                seconds / of_points,
+            ));
+        }
+        Err(why) => {
+            table.push(Row::at_most(case, "largest load", f64::NAN, 0.0).because(why));
+        }
+    }
+    table
 }
 
 /// What a bar did.
@@ -153,5 +224,5 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         }
     }
     progress.finish();
-    vec![table]
+    vec![table, coupled()]
 }
