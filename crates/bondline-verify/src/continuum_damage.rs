@@ -1,6 +1,8 @@
 //! Continuum damage of bonds, [SAND2015-7998] section 6.2: a bar that is damaged along its length, and the plate with a hole of section 6.2.5, by scenes.
 //!
-//! The report's plate is a solid of some 38 000 points with ν = 1/4. Here it is in plane stress, where bonds that act alone have ν = 1/3; the plate is thin against its hole.
+//! The report's plate is a solid of some 38 000 points with ν = 1/4 (`solid`). In plane stress, where bonds that act alone have ν = 1/3, it is cheaper; the plate is thin against its hole.
+
+mod solid;
 
 use std::path::{Path, PathBuf};
 
@@ -26,6 +28,9 @@ const RATE: f64 = 45.0;
 
 /// Damage from which a point counts as damaged, and as cracked. Bonds that break by their stretch leave at least 0.35 beside a crack.
 const LEVELS: [f64; 2] = [0.01, 0.35];
+
+/// Tables of the plate in plane stress by these levels.
+const TIPS: [&str; 2] = ["tip_level0", "tip_level1"];
 
 /// Young's modulus of the bar, its strain at the onset over ε₀, and η.
 const BAR: (f64, f64, f64) = (1000.0, 0.816_496_580_927_726, 10.0);
@@ -75,8 +80,8 @@ fn plate(
 }
 
 /// How far points of a level of damage lie from the hole at a nominal strain, along the ligament \[mm\]; 0 if there are none.
-fn extent(seen: &Seen, level: usize, strain: f64) -> f64 {
-    let rows = seen.columns(&format!("tip_level{level}"), ["time", "x"]);
+fn extent(seen: &Seen, level: &str, strain: f64) -> f64 {
+    let rows = seen.columns(level, ["time", "x"]);
     let until = rows
         .iter()
         .filter(|[time, _]| RATE * time <= strain * (1.0 + 1e-9));
@@ -84,8 +89,8 @@ fn extent(seen: &Seen, level: usize, strain: f64) -> f64 {
 }
 
 /// The nominal strain at which a level of damage has come so far; none if it never does.
-fn reaches(seen: &Seen, level: usize, extent: f64) -> Option<f64> {
-    let rows = seen.columns(&format!("tip_level{level}"), ["time", "x"]);
+fn reaches(seen: &Seen, level: &str, extent: f64) -> Option<f64> {
+    let rows = seen.columns(level, ["time", "x"]);
     let first = rows.iter().find(|[_, x]| x - 10.0 >= extent);
     first.map(|[time, _]| RATE * time)
 }
@@ -133,7 +138,7 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         0.0035, 0.0045, 0.0055, 0.0057, 0.006, 0.0065, 0.007, 0.008, 0.009,
     ] {
         let case = |law: &str| format!("{law}, nominal strain {strain}");
-        for (level, what) in ["damaged", "cracked"].into_iter().enumerate() {
+        for (level, what) in TIPS.into_iter().zip(["damaged", "cracked"]) {
             let of = |seen: &Seen| extent(seen, level, strain);
             table.push(Row::info(case("continuum damage"), what, of(&damaged)));
             table.push(Row::info(case("critical stretch"), what, of(&brittle)));
@@ -148,24 +153,24 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     found.push(Row::at_least(
         case,
         "damaged at 0.0057",
-        extent(&damaged, 0, SHOWN[0]),
+        extent(&damaged, TIPS[0], SHOWN[0]),
         1.0,
     ));
     found.push(Row::at_most(
         case,
         "cracked at 0.0057",
-        extent(&damaged, 1, SHOWN[0]),
+        extent(&damaged, TIPS[1], SHOWN[0]),
         5.0,
     ));
     found.push(Row::at_least(
         case,
         "cracked at 0.009",
-        extent(&damaged, 1, SHOWN[1]),
+        extent(&damaged, TIPS[1], SHOWN[1]),
         through,
     ));
     let growth = |seen: &Seen| {
-        let begun = reaches(seen, 0, 0.0).unwrap_or(f64::NAN);
-        let ended = reaches(seen, 1, through).unwrap_or(f64::NAN);
+        let begun = reaches(seen, TIPS[0], 0.0).unwrap_or(f64::NAN);
+        let ended = reaches(seen, TIPS[1], through).unwrap_or(f64::NAN);
         (begun, ended)
     };
     for (case, seen) in [(case, &damaged), ("critical stretch", &brittle)] {
@@ -213,7 +218,7 @@ pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<Vec<PathBuf>, S
         progress.advance(1);
         let seen = run(material, 1.0)?;
         let strains = (0..=180).map(|k| SHOWN[1] * f64::from(k) / 180.0);
-        let reached = strains.map(|strain| (100.0 * strain, extent(&seen, 0, strain)));
+        let reached = strains.map(|strain| (100.0 * strain, extent(&seen, TIPS[0], strain)));
         series.push(Series::new(name, Stroke::Line, reached.collect()));
     }
     progress.finish();
@@ -236,12 +241,12 @@ fn coupled(whole: &Seen, spacing: f64, table: &mut Table) {
     match with_elements(DAMAGING, spacing) {
         Ok(seen) => {
             let strains = [0.0035, 0.0045, 0.0055, SHOWN[0], 0.006, 0.0065, SHOWN[1]];
-            let off = |level: usize| {
+            let off = |level: &str| {
                 let each = strains.map(|s| extent(&seen, level, s) - extent(whole, level, s));
                 each.into_iter()
                     .fold(0.0, |most: f64, off| most.max(off.abs()))
             };
-            for (level, what) in ["damaged", "cracked"].into_iter().enumerate() {
+            for (level, what) in TIPS.into_iter().zip(["damaged", "cracked"]) {
                 let quantity = format!("{what}, most beside points alone [mm]");
                 table.push(Row::at_most(case, quantity, off(level), spacing));
             }
@@ -254,7 +259,7 @@ fn coupled(whole: &Seen, spacing: f64, table: &mut Table) {
 
 /// The suite `damage`.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    progress.stage("continuum damage", Some(4));
+    progress.stage("continuum damage", Some(5));
     let mut table = Table::new(
         "Bar in load steps up to its largest stress, ends kept whole: stress against E ε (1 − φ), φ = ((ε/ε₁)² − 1)/η",
         Columns::Full,
@@ -266,6 +271,9 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     });
     let mut tables = vec![table];
     tables.extend(plates(effort, progress));
+    if effort == Effort::Full {
+        tables.push(solid::plates(progress));
+    }
     progress.finish();
     tables
 }
