@@ -236,6 +236,11 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// The algorithmic tangent `C_ijkl = ∂P_ij/∂G_kl` of [`LocalLaw::respond`] \[Pa\], with which Newton's method converges quadratically; where it has a kink, at the onset of flow, that of either side.
     /// Not a number where there is no response. A law that says nothing has the central differences of its response, `2 D²` of them.
     fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
+        self.differenced_tangent(gradient, step, past)
+    }
+
+    /// The central differences of [`LocalLaw::respond`].
+    fn differenced_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
         central_differences(gradient, past.len(), |gradient, present| {
             self.respond(gradient, step, past, present).stress
         })

@@ -35,6 +35,8 @@ pub struct UmatSettings {
     pub length: f64,
     /// What energies are taken from.
     pub energies: UmatEnergies,
+    /// Whether `DDSDDE` is the tangent of Newton's method; else it is differenced.
+    pub has_tangent: bool,
     /// See [`LocalLaw::flows_at_constant_volume`].
     pub flows_at_constant_volume: bool,
 }

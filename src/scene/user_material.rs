@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::bounds_checks::{not_negative, positive};
 use super::error::{SceneError, SceneErrorKind};
-use super::spec::{EnergiesSpec, StrainsSpec, UmatSpec};
+use super::spec::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};
 use super::value::Text;
 use crate::material::{Reduced, RoutineError, UmatEnergies, UmatSettings, routine_loader};
 use crate::observe::checkpoint::Fingerprint;
@@ -62,6 +62,7 @@ pub(crate) fn umat<const D: usize>(
             EnergiesSpec::Stress => UmatEnergies::Stress,
             EnergiesSpec::Routine => UmatEnergies::Routine,
         },
+        has_tangent: spec.tangent == TangentSpec::Routine,
         flows_at_constant_volume: spec.mean_dilatation.unwrap_or(true),
     };
     let solid = load(&path, symbol.map(|s| s.value.as_str()), settings).map_err(|error| {

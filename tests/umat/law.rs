@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bondline::material::{J2, LocalLaw, LocalResponse, RoutineError, UmatEnergies, UmatSettings};
-use bondline::tensor::Tensor;
+use bondline::tensor::{Tensor, Tensor4, inverse};
 use bondline_umat::{Routine, Umat};
 
 use crate::{in_c, j2};
@@ -29,6 +29,7 @@ fn settings(is_large: bool, yield_stress: f64) -> UmatSettings {
         temperature: 293.0,
         length: f64::NAN,
         energies: UmatEnergies::Stress,
+        has_tangent: false,
         flows_at_constant_volume: true,
     }
 }
@@ -78,6 +79,72 @@ fn small_strains_are_those_of_our_own_law() {
         assert!((history[27] - remembered[6]).abs() < 1e-12);
         assert_eq!(history[26], 200.0);
         assert!((history[25] - 20.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn ddsdde_is_the_tangent_where_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = J2::<3>::new(lame().0, lame().1, YIELD, MODULUS);
+    let scale = own.tangent().amax();
+    let distance = |a: &Tensor4<3>, b: &Tensor4<3>| {
+        let mut off = a.clone();
+        off.add_scaled(-1.0, b);
+        off.amax() / scale
+    };
+    for library in j2(folder.path()) {
+        let law = |is_large: bool| {
+            let settings = UmatSettings {
+                has_tangent: true,
+                ..settings(is_large, YIELD)
+            };
+            Umat::new(Routine::load(&library, None).unwrap(), settings)
+        };
+        // small strains: that of our own law, which has a closed form
+        let small = law(false);
+        let (mut past, mut ours) = (vec![0.0; small.history().len()], vec![0.0; 7]);
+        let (mut next, mut our_next) = (past.clone(), ours.clone());
+        for gradient in winding(200) {
+            let found = small.algorithmic_tangent(&gradient, 0.1, &past);
+            let off = distance(&found, &own.algorithmic_tangent(&gradient, 0.1, &ours));
+            assert!(off < 1e-10, "{}: {off:e}", library.display());
+            small.respond(&gradient, 0.1, &past, &mut next);
+            own.respond(&gradient, 0.1, &ours, &mut our_next);
+            past.copy_from_slice(&next);
+            ours.copy_from_slice(&our_next);
+        }
+        assert!(ours[6] > 0.05, "it flows: {}", ours[6]);
+        // large ones: differences but for what the length of the step leaves
+        let large = law(true);
+        let stretched = |t: f64| {
+            let pulled =
+                Tensor::<3>::from_row_slice(&[1.0 + t, t, 0.0, 0.0, 1.0, 0.3 * t, 0.0, 0.0, 1.0]);
+            turn(2.0 * t) * pulled - Tensor::identity()
+        };
+        let worst = |steps: usize| {
+            let mut past = vec![0.0; large.history().len()];
+            let mut next = past.clone();
+            let mut worst: f64 = 0.0;
+            for k in 1..=steps {
+                let gradient = stretched(0.3 * k as f64 / steps as f64);
+                let found = large.algorithmic_tangent(&gradient, 0.1, &past);
+                let differenced = large.differenced_tangent(&gradient, 0.1, &past);
+                let stress = large.respond(&gradient, 0.1, &past, &mut next).stress;
+                // the routine's is the slope of σ; that of the convention, of J σ over J, has σ ⊗ I more
+                let (reverse, _) = inverse(&(Tensor::identity() + gradient)).unwrap();
+                let whole = Tensor4::from_fn(|i, j, k, l| {
+                    found.get(i, j, k, l) + stress[(i, j)] * reverse[(l, k)]
+                });
+                worst = worst.max(distance(&whole, &differenced));
+                past.copy_from_slice(&next);
+            }
+            worst
+        };
+        let (coarse, fine) = (worst(100), worst(200));
+        assert!(
+            fine < 0.02 && (1.7..2.3).contains(&(coarse / fine)),
+            "{coarse:e} {fine:e}"
+        );
     }
 }
 

@@ -253,6 +253,36 @@ fn what_is_not_a_number_names_point_and_step() {
 }
 
 #[test]
+fn a_tangent_of_the_routine_solves_the_same_load_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |coupling: &str, material: &str| {
+        let scene = PULLED.replace("{coupling}", coupling);
+        let scene = scene.replace("{pull}", "0.1*t").replace("{steps}", "5");
+        scene.replace("{material}", material)
+    };
+    let given = "tangent = \"routine\"\n";
+    for library in j2(folder.path()) {
+        for (coupling, strains) in [("local", "small"), ("splice", "small"), ("local", "large")] {
+            let more = format!("strains = \"{strains}\"\n");
+            let differenced = history(folder.path(), &scene(coupling, &routine(&library, &more)));
+            let material = routine(&library, &(more + given));
+            let found = history(folder.path(), &scene(coupling, &material));
+            let (off, _) = difference(&differenced, &found, "reaction");
+            assert!(off < 1e-9, "{coupling}, {strains}: {off:e}");
+        }
+    }
+    let lost = user(
+        &in_c(folder.path(), "odd.c"),
+        "symbol = \"lost_\"\nconstants = [1000, 1]",
+    );
+    let said = refused(folder.path(), &scene("local", &(lost + given)));
+    assert!(
+        said.contains("gave no DDSDDE") && said.contains("tangent = \"routine\""),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_routine_that_gives_up_ends_the_run() {
     let folder = tempfile::tempdir().unwrap();
     for library in j2(folder.path()) {

@@ -20,7 +20,7 @@ use crate::library::{Call, Routine};
 /// For strains of any size it is the rate form of \[HughesWinget1980\]: with `L = ΔF F⁻¹` of the middle of the step, `DSTRAN = sym L`, `ω = skew L`, `DROT = (I − ½ ω)⁻¹ (I + ½ ω)`. `STRESS` and `STRAN`
 /// are turned by `DROT` before the call, as Abaqus does, which makes it of second order in the length of a step where the principal directions stay, and of first order where they turn; tensors among `STATEV` are the routine's own (`ROTSIG`); `P = J σ F⁻ᵀ`. A rotation stresses nothing, whatever its size below half a turn within a step.
 ///
-/// `DDSDDE` is not used: the algorithmic tangent is that of central differences. `COORDS` is not a number, `NOEL`, `NPT`, `LAYER`, `KSPT` are 1: a law does not know its place. `KINC` counts the increments of a point. Without time (`step` of zero) and at the deformation
+/// The algorithmic tangent is that of central differences, or `DDSDDE`, which for strains of any size is that of the Jaumann rate of `J σ`: then it is exact but for terms of the length of a step. `COORDS` is not a number, `NOEL`, `NPT`, `LAYER`, `KSPT` are 1: a law does not know its place. `KINC` counts the increments of a point. Without time (`step` of zero) and at the deformation
 /// that is remembered the routine is not called.
 #[derive(Debug)]
 pub struct Umat {
@@ -207,8 +207,8 @@ impl Umat {
         }
     }
 
-    /// Notes what failed, and responds with what is not a number.
-    fn failed(&self, call: &Call<'_>, what: &str, remedy: &str) -> LocalResponse<3> {
+    /// Notes what failed.
+    fn note(&self, call: &Call<'_>, what: &str, remedy: &str) {
         let strain: Vec<String> = (call.strain.iter().zip(&call.change))
             .map(|(e, d)| format!("{:.4e}", e + d))
             .collect();
@@ -223,7 +223,103 @@ impl Umat {
         );
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         *failure = Some(message);
-        NOT_A_NUMBER
+    }
+
+    /// Calls the routine; `states` is `STATEV`, before and after. None where nothing can be had of it, which is noted.
+    fn called(
+        &self,
+        gradient: &Tensor<3>,
+        step: f64,
+        past: &[f64],
+        states: &mut [f64],
+    ) -> Option<Called> {
+        let before = Tensor::<3>::from_column_slice(&past[..STRESS]);
+        let increment = self.increment(&before, gradient)?;
+        // what is not a number already says nothing of the routine
+        let is_lost = !gradient.iter().all(|x| x.is_finite());
+        if is_lost || self.is_over.load(Ordering::Relaxed) {
+            return None;
+        }
+        let rotation = increment.rotation;
+        let turned = |t: Tensor<3>| rotation * t * rotation.transpose();
+        let stress = turned(tensor(&past[STRESS..STRAIN], 1.0));
+        let total = turned(tensor(&past[STRAIN..ENERGIES], 0.5));
+        let settings = &self.settings;
+        let identity = Tensor::identity();
+        let mut call = Call {
+            stress: components(&stress, 1.0),
+            state: states,
+            energies: std::array::from_fn(|k| past[ENERGIES + k]),
+            strain: components(&total, 2.0),
+            change: components(&increment.change, 2.0),
+            time: past[TIME],
+            step,
+            temperature: settings.temperature,
+            name: &settings.name,
+            constants: &settings.constants,
+            rotation: columns(&rotation),
+            length: settings.length,
+            deformation: [
+                columns(&(identity + before)),
+                columns(&(identity + gradient)),
+            ],
+            is_large: settings.is_large,
+            increment: past[INCREMENTS] as i32 + 1,
+            tangent: [0.0; 36],
+            wanted_step: 1.0,
+        };
+        self.routine.call(&mut call, !settings.is_thread_safe);
+        let wrong = self.wrong(&call);
+        // what was to be read only is as it was, whatever the routine wrote there
+        call.strain = components(&total, 2.0);
+        call.change = components(&increment.change, 2.0);
+        (call.time, call.step) = (past[TIME], step);
+        if let Some((what, remedy)) = wrong {
+            self.note(&call, &what, remedy);
+            return None;
+        }
+        Some(Called {
+            turned: stress,
+            total,
+            stress: call.stress,
+            energies: call.energies,
+            tangent: call.tangent,
+            increment,
+        })
+    }
+
+    /// `∂P_ij/∂G_kl` of `DDSDDE`: for small strains that itself. Else it is `C` of `δτ = J C : δD + δW τ − τ δW`, τ = J σ, with `δD + δW = δF F⁻¹`, and `P = τ F⁻ᵀ`.
+    fn moduli(&self, gradient: &Tensor<3>, called: &Called) -> Tensor4<3> {
+        let numbered = |i: usize, j: usize| {
+            let found = COMPONENTS.iter().position(|c| *c == (i, j) || *c == (j, i));
+            found.expect("six components name all pairs")
+        };
+        let given = |i: usize, j: usize, k: usize, l: usize| {
+            called.tangent[6 * numbered(k, l) + numbered(i, j)]
+        };
+        if !self.settings.is_large {
+            return Tensor4::from_fn(given);
+        }
+        let Some((reverse, volume_ratio)) = inverse(&(Tensor::identity() + gradient)) else {
+            return Tensor4::from_fn(|_, _, _, _| f64::NAN);
+        };
+        let given = Tensor4::from_fn(given);
+        let kirchhoff = tensor(&called.stress, 1.0) * volume_ratio;
+        let mut tangent = Tensor4::zeros();
+        for (k, l) in (0..3).flat_map(|k| (0..3).map(move |l| (k, l))) {
+            let mut flow = Tensor::<3>::zeros();
+            for j in 0..3 {
+                flow[(k, j)] = reverse[(l, j)];
+            }
+            let spin = (flow - flow.transpose()) * 0.5;
+            let stressed = given.contract(&flow) * volume_ratio;
+            let change = stressed + spin * kirchhoff - kirchhoff * spin;
+            let slope = (change - kirchhoff * flow.transpose()) * reverse.transpose();
+            for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+                tangent.0[i][j][(k, l)] = slope[(i, j)];
+            }
+        }
+        tangent
     }
 
     /// What is wrong with what a call gave, and the remedy.
@@ -238,19 +334,38 @@ impl Umat {
             ("STRESS", &call.stress[..]),
             ("STATEV", &*call.state),
             ("SSE, SPD, SCD", &call.energies[..]),
+            ("DDSDDE", &call.tangent[..]),
         ];
-        let bad = named.into_iter().find(|(_, numbers)| !is_finite(numbers));
+        let named = &named[..if self.settings.has_tangent { 4 } else { 3 }];
+        let bad = named.iter().find(|(_, numbers)| !is_finite(numbers));
         if let Some((what, numbers)) = bad {
             let k = numbers.iter().position(|x| !x.is_finite()).unwrap_or(0);
             let what = format!("gave {what} whose number {} is {}", k + 1, numbers[k]);
             let remedy = "check the routine and its constants; COORDS, and CELENT without `element-length`, are not numbers";
             return Some((what, remedy));
         }
+        if self.settings.has_tangent && call.tangent.iter().all(|x| *x == 0.0) {
+            let remedy = "without `tangent = \"routine\"` its stress is differenced";
+            return Some(("gave no DDSDDE".to_owned(), remedy));
+        }
         (call.wanted_step < 1.0).then(|| {
             let what = format!("asked for a smaller step, PNEWDT = {}", call.wanted_step);
             (what, "take more load steps, or a smaller time step")
         })
     }
+}
+
+/// What a routine gave for an increment, and what it was given.
+struct Called {
+    increment: Increment,
+    /// Stress and strain before, turned.
+    turned: Tensor<3>,
+    total: Tensor<3>,
+    /// `STRESS` \[Pa\], and `SSE`, `SPD`, `SCD` \[J/m³\].
+    stress: [f64; 6],
+    energies: [f64; 3],
+    /// `DDSDDE` \[Pa\], by columns.
+    tangent: [f64; 36],
 }
 
 /// The response where there is none.
@@ -303,64 +418,36 @@ impl LocalLaw<3> for Umat {
         if step == 0.0 && (gradient - before).amax() <= SAME * gradient.amax() {
             return self.answer(&before, past, 0.0);
         }
-        let Some(increment) = self.increment(&before, gradient) else {
+        let Some(called) = self.called(gradient, step, past, &mut present[STATES..]) else {
             return NOT_A_NUMBER;
         };
-        // what is not a number already says nothing of the routine
-        let is_lost = !gradient.iter().all(|x| x.is_finite());
-        if is_lost || self.is_over.load(Ordering::Relaxed) {
-            return NOT_A_NUMBER;
-        }
-        let Increment {
+        let change = &called.increment.change;
+        let ends = [called.turned, tensor(&called.stress, 1.0)];
+        let (stored, dissipated) = self.energies(
+            past,
+            &called.energies,
+            &ends,
             change,
-            rotation,
-            volume_ratio,
-        } = increment;
-        let turned = |t: Tensor<3>| rotation * t * rotation.transpose();
-        let stress = turned(tensor(&past[STRESS..STRAIN], 1.0));
-        let total = turned(tensor(&past[STRAIN..ENERGIES], 0.5));
-        let settings = &self.settings;
-        let identity = Tensor::identity();
-        let mut call = Call {
-            stress: components(&stress, 1.0),
-            state: &mut present[STATES..],
-            energies: std::array::from_fn(|k| past[ENERGIES + k]),
-            strain: components(&total, 2.0),
-            change: components(&change, 2.0),
-            time: past[TIME],
-            step,
-            temperature: settings.temperature,
-            name: &settings.name,
-            constants: &settings.constants,
-            rotation: columns(&rotation),
-            length: settings.length,
-            deformation: [
-                columns(&(identity + before)),
-                columns(&(identity + gradient)),
-            ],
-            is_large: settings.is_large,
-            increment: past[INCREMENTS] as i32 + 1,
-            wanted_step: 1.0,
-        };
-        self.routine.call(&mut call, !settings.is_thread_safe);
-        let wrong = self.wrong(&call);
-        // what was to be read only is as it was, whatever the routine wrote there
-        call.strain = components(&total, 2.0);
-        call.change = components(&change, 2.0);
-        (call.time, call.step) = (past[TIME], step);
-        if let Some((what, remedy)) = wrong {
-            return self.failed(&call, &what, remedy);
-        }
-        let (found, energies) = (call.stress, call.energies);
-        let ends = [stress, tensor(&found, 1.0)];
-        let (stored, dissipated) = self.energies(past, &energies, &ends, &change, volume_ratio);
+            called.increment.volume_ratio,
+        );
         present[..STRESS].copy_from_slice(&columns(gradient));
-        present[STRESS..STRAIN].copy_from_slice(&found);
-        present[STRAIN..ENERGIES].copy_from_slice(&components(&(total + change), 2.0));
-        present[ENERGIES..STORED].copy_from_slice(&energies);
+        present[STRESS..STRAIN].copy_from_slice(&called.stress);
+        present[STRAIN..ENERGIES].copy_from_slice(&components(&(called.total + change), 2.0));
+        present[ENERGIES..STORED].copy_from_slice(&called.energies);
         present[STORED] = stored;
         present[TIME] = past[TIME] + step;
         present[INCREMENTS] = past[INCREMENTS] + 1.0;
         self.answer(gradient, present, dissipated)
+    }
+
+    fn algorithmic_tangent(&self, gradient: &Tensor<3>, step: f64, past: &[f64]) -> Tensor4<3> {
+        if !self.settings.has_tangent {
+            return self.differenced_tangent(gradient, step, past);
+        }
+        let mut states = past[STATES..].to_vec();
+        match self.called(gradient, step, past, &mut states) {
+            Some(called) => self.moduli(gradient, &called),
+            None => Tensor4::from_fn(|_, _, _, _| f64::NAN),
+        }
     }
 }

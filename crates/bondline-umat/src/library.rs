@@ -110,6 +110,8 @@ pub(crate) struct Call<'a> {
     pub is_large: bool,
     /// `KINC`.
     pub increment: i32,
+    /// `DDSDDE` \[Pa\], by columns; zero before the call.
+    pub tangent: [f64; 36],
     /// `PNEWDT`; below 1 the routine wants a smaller step.
     pub wanted_step: f64,
 }
@@ -185,7 +187,7 @@ impl Routine {
         }
         // a routine may write where it should not: what is ours is copied
         let mut constants = call.constants.to_vec();
-        let (mut tangent, mut thermal) = ([0.0; 36], [[0.0; 6]; 2]);
+        let mut thermal = [[0.0; 6]; 2];
         let (mut heat, mut heat_rate, mut warming) = (0.0, 0.0, 0.0);
         let mut time = [call.time; 2];
         let (mut fields, mut field_changes) = ([0.0], [0.0]);
@@ -204,7 +206,7 @@ impl Routine {
             (self.entry)(
                 call.stress.as_mut_ptr(),
                 call.state.as_mut_ptr(),
-                tangent.as_mut_ptr(),
+                call.tangent.as_mut_ptr(),
                 stored,
                 plastic,
                 creep,

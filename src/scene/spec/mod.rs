@@ -49,7 +49,7 @@ pub use region::{
     ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
 pub use table::TableSpec;
-pub use user_material::{EnergiesSpec, StrainsSpec, UmatSpec};
+pub use user_material::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};
 
 use std::collections::BTreeMap;
 

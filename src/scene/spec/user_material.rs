@@ -34,6 +34,9 @@ pub struct UmatSpec {
     /// What the energies are taken from.
     #[serde(default)]
     pub energies: EnergiesSpec,
+    /// Where the tangent of Newton's method comes from.
+    #[serde(default)]
+    pub tangent: TangentSpec,
     /// Whether the routine keeps no common state, so that several calls may run at a time; no if left out.
     #[serde(default)]
     pub thread_safe: bool,
@@ -92,5 +95,16 @@ pub enum EnergiesSpec {
     #[default]
     Stress,
     /// The routine: SSE, SPD and SCD.
+    Routine,
+}
+
+/// Where the tangent of Newton's method comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TangentSpec {
+    /// Differences of the stress: 18 calls.
+    #[default]
+    Differences,
+    /// The routine: DDSDDE.
     Routine,
 }
