@@ -4,12 +4,14 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 use serde::Serialize;
 
+use crate::coupling::Model;
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
-use crate::run::motion::may_share;
+use crate::run::motion::{may_share, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
+use crate::system::Partition;
 
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
 const SCALAR: u64 = 12;
@@ -25,7 +27,7 @@ pub struct ProcessShare {
     pub blocks: usize,
     /// What its part of the stiffness takes \[bytes\], without factors or coarse levels; zero of a scene in time, which assembles none.
     pub stiffness_bytes: u64,
-    /// What it receives for each product with the stiffness, or for each step in time \[bytes\].
+    /// What it receives for each product with the stiffness, or for each step in time \[bytes\]: the numbers of its ghosts, or of all sites that others have.
     pub received_bytes: u64,
 }
 
@@ -52,13 +54,18 @@ fn shares<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Vec<ProcessShare>, RunError> {
     let is_static = scene.solve == Solve::Static;
-    let is_explicit = matches!(scene.solve, Solve::Explicit(_));
+    let explicit = match &scene.solve {
+        Solve::Explicit(spec) => Some(spec.clone()),
+        _ => None,
+    };
     let (problem, rest) = setup::problem(scene);
-    let is_shared = is_explicit && may_share(&problem, &rest);
+    let is_shared = explicit.is_some() && may_share(&problem, &rest);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let operator = coupling.operator(&model)?;
     let pattern = model.pattern(operator.as_ref(), &[], progress);
     let partition = model.partition(count, is_shared);
+    let moves_own = |spec| model.can_spread_families() && moves_own_sites(spec, &rest);
+    let moves_own = is_shared && explicit.as_ref().is_some_and(moves_own);
     let of_rank = |rank: usize| {
         let own = partition.of(rank);
         let row = |site: &u32| {
@@ -67,15 +74,22 @@ fn shares<const D: usize>(
         };
         let blocks = own.iter().map(|site| row(site).len()).sum();
         let columns = own.iter().flat_map(row).copied();
-        let ghosts: FxHashSet<u32> = columns.filter(|&c| partition.owner(c) != rank).collect();
-        let numbers = match is_static {
-            true => ghosts.len(),
+        let ghosts = match moves_own {
+            true => ghosts_of_points(&model, &partition, rank),
+            false => {
+                let foreign: FxHashSet<u32> =
+                    columns.filter(|&c| partition.owner(c) != rank).collect();
+                foreign.len()
+            }
+        };
+        let numbers = match is_static || moves_own {
+            true => ghosts,
             // forces are gathered
             false => model.sites.len() - own.len(),
         };
         ProcessShare {
             sites: own.len(),
-            ghosts: ghosts.len(),
+            ghosts,
             blocks,
             stiffness_bytes: match is_static {
                 true => (blocks * D * D) as u64 * SCALAR,
@@ -90,6 +104,16 @@ fn shares<const D: usize>(
         .collect();
     progress.finish();
     Ok(all)
+}
+
+/// Points of other processes whose displacements the forces of a process take.
+fn ghosts_of_points<const D: usize>(model: &Model<D>, partition: &Partition, rank: usize) -> usize {
+    let points = 0..partition.sites() as u32;
+    let own: Vec<bool> = points.map(|i| partition.owner(i) == rank).collect();
+    let reached = model.points_reached(&own).into_iter().zip(own);
+    reached
+        .filter(|(is_reached, is_own)| *is_reached && !is_own)
+        .count()
 }
 
 /// The least, the mean and the most of what processes have, as a table.

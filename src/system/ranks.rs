@@ -3,7 +3,7 @@
 //! All of them do the same, in the same order, with the same mesh; each computes the rows of its own sites. Whoever starts them supplies [`Ranks`]: the library
 //! knows no message passing. Sites are numbered anew for such a run, rank by rank, so that the rows of a rank follow one another.
 
-use super::{BlockCsr, Symmetry};
+use super::{BlockCsr, Exchange, Symmetry};
 
 /// The processes of a run, as one of them sees them.
 ///
@@ -22,6 +22,14 @@ pub trait Ranks: Send + Sync + std::fmt::Debug {
 
     /// Collective: the words of each rank, whatever their number.
     fn gather_words(&self, own: &[u64]) -> Vec<Vec<u64>>;
+
+    /// Collective: overwrites each number with the sum of those of all ranks at its place.
+    fn add_into(&self, sums: &mut [i64]);
+
+    /// Collective: what brings blocks of `block` numbers from the ranks that have them to those that want them.
+    ///
+    /// Each rank has `own` blocks, and they are numbered rank by rank; `wanted` are blocks of other ranks, ascending.
+    fn exchange(&self, own: usize, wanted: &[u64], block: usize) -> Box<dyn Exchange>;
 
     /// Collective: what solves systems with a matrix of which each rank holds its own rows.
     ///
