@@ -23,7 +23,7 @@ pub struct ProcessShare {
     pub sites: usize,
     /// Sites of other processes whose displacements these rows need.
     pub ghosts: usize,
-    /// Blocks of these rows: bonds, and pairs of nodes of an element.
+    /// Blocks of these rows: bonds, and pairs of nodes of an element; where points alone move in time, bonds.
     pub blocks: usize,
     /// What its part of the stiffness takes \[bytes\], without factors or coarse levels; zero of a scene in time, which assembles none.
     pub stiffness_bytes: u64,
@@ -61,11 +61,17 @@ fn shares<const D: usize>(
     let (problem, rest) = setup::problem(scene);
     let is_shared = explicit.is_some() && may_share(&problem, &rest);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
+    let partition = model.partition(count, is_shared);
+    let ranks = (0..partition.ranks()).into_par_iter();
+    let moves_own = |spec| model.can_spread_families() && moves_own_sites(spec, &rest);
+    if is_shared && explicit.as_ref().is_some_and(moves_own) {
+        progress.finish();
+        return Ok(ranks
+            .map(|rank| of_points(&model, &partition, rank))
+            .collect());
+    }
     let operator = coupling.operator(&model)?;
     let pattern = model.pattern(operator.as_ref(), &[], progress);
-    let partition = model.partition(count, is_shared);
-    let moves_own = |spec| model.can_spread_families() && moves_own_sites(spec, &rest);
-    let moves_own = is_shared && explicit.as_ref().is_some_and(moves_own);
     let of_rank = |rank: usize| {
         let own = partition.of(rank);
         let row = |site: &u32| {
@@ -74,22 +80,15 @@ fn shares<const D: usize>(
         };
         let blocks = own.iter().map(|site| row(site).len()).sum();
         let columns = own.iter().flat_map(row).copied();
-        let ghosts = match moves_own {
-            true => ghosts_of_points(&model, &partition, rank),
-            false => {
-                let foreign: FxHashSet<u32> =
-                    columns.filter(|&c| partition.owner(c) != rank).collect();
-                foreign.len()
-            }
-        };
-        let numbers = match is_static || moves_own {
-            true => ghosts,
+        let ghosts: FxHashSet<u32> = columns.filter(|&c| partition.owner(c) != rank).collect();
+        let numbers = match is_static {
+            true => ghosts.len(),
             // forces are gathered
             false => model.sites.len() - own.len(),
         };
         ProcessShare {
             sites: own.len(),
-            ghosts,
+            ghosts: ghosts.len(),
             blocks,
             stiffness_bytes: match is_static {
                 true => (blocks * D * D) as u64 * SCALAR,
@@ -98,22 +97,27 @@ fn shares<const D: usize>(
             received_bytes: (numbers * D * 8) as u64,
         }
     };
-    let all = (0..partition.ranks())
-        .into_par_iter()
-        .map(of_rank)
-        .collect();
+    let all = ranks.map(of_rank).collect();
     progress.finish();
     Ok(all)
 }
 
-/// Points of other processes whose displacements the forces of a process take.
-fn ghosts_of_points<const D: usize>(model: &Model<D>, partition: &Partition, rank: usize) -> usize {
+/// The same where each process moves its own points, and knows those of others whose displacements their forces take.
+fn of_points<const D: usize>(model: &Model<D>, partition: &Partition, rank: usize) -> ProcessShare {
     let points = 0..partition.sites() as u32;
     let own: Vec<bool> = points.map(|i| partition.owner(i) == rank).collect();
     let reached = model.points_reached(&own).into_iter().zip(own);
-    reached
-        .filter(|(is_reached, is_own)| *is_reached && !is_own)
-        .count()
+    let ghosts = reached.filter(|(is_reached, is_own)| *is_reached && !is_own);
+    let ghosts = ghosts.count();
+    let sites = partition.of(rank);
+    let bonds = |i: &u32| model.body().map_or(0, |b| b.families.of(*i as usize).len());
+    ProcessShare {
+        sites: sites.len(),
+        ghosts,
+        blocks: sites.iter().map(bonds).sum(),
+        stiffness_bytes: 0,
+        received_bytes: (ghosts * D * 8) as u64,
+    }
 }
 
 /// The least, the mean and the most of what processes have, as a table.

@@ -313,8 +313,7 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
         let stencil = field.offsets.len();
         let vectors = if JOB == job::MOMENTS { 2 } else { D };
         let range = if EXACT { SERIES_RANGE } else { f64::INFINITY };
-        let high = l.splat(range.min(field.limit));
-        let low = l.splat(-range);
+        let (high, low) = (l.splat(range.min(field.limit)), l.splat(-range));
         let mut broken = Vec::new();
         for (g, cell) in groups.iter().map(|cell| *cell as usize).enumerate() {
             if flags[g] & skip != 0 {
