@@ -18,8 +18,10 @@ pub(crate) mod wrapped;
 
 pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
-pub use ghosts::{Exchange, Ghosts, Traffic};
-pub use ranks::{Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
+pub use ghosts::{Ghosts, Traffic};
+pub use ranks::{
+    Exchange, Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread,
+};
 pub(crate) use ranks::{all_say, first_text};
 pub use segments::Segments;
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};

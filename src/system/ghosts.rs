@@ -1,15 +1,6 @@
 //! Numbers of ghosts: sites whose numbers a process needs while another computes them.
 
-use super::{Partition, Ranks, Spread};
-
-/// Brings blocks of numbers from the processes that have them to those that want them, again and again.
-pub trait Exchange: Send + Sync + std::fmt::Debug {
-    /// Collective: sends the own blocks, which may change again at once.
-    fn begin(&mut self, own: &[f64]);
-
-    /// Collective: overwrites `wanted` with the blocks of the last [`Exchange::begin`], once they are there.
-    fn end(&mut self, wanted: &mut [f64]);
-}
+use super::{Exchange, Partition, Ranks, Spread};
 
 /// What a process exchanged with others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]

@@ -3,7 +3,7 @@
 //! All of them do the same, in the same order, with the same mesh; each computes the rows of its own sites. Whoever starts them supplies [`Ranks`]: the library
 //! knows no message passing. Sites are numbered anew for such a run, rank by rank, so that the rows of a rank follow one another.
 
-use super::{BlockCsr, Exchange, Symmetry};
+use super::{BlockCsr, Symmetry};
 
 /// The processes of a run, as one of them sees them.
 ///
@@ -40,6 +40,15 @@ pub trait Ranks: Send + Sync + std::fmt::Debug {
         rows: &RankRows<'_>,
         kind: RankSolverKind,
     ) -> Result<Box<dyn RankSolver>, String>;
+}
+
+/// Brings blocks of numbers from the processes that have them to those that want them, again and again.
+pub trait Exchange: Send + Sync + std::fmt::Debug {
+    /// Collective: sends the own blocks, which may change again at once.
+    fn begin(&mut self, own: &[f64]);
+
+    /// Collective: overwrites `wanted` with the blocks of the last [`Exchange::begin`], once they are there.
+    fn end(&mut self, wanted: &mut [f64]);
 }
 
 /// How a system that is spread over ranks is solved.
