@@ -57,6 +57,6 @@ mod tests {
             }
         }
         assert_eq!(found, marked);
-        assert!(Segments::all(20, 10).of_chunk(1).eq([0..10]));
+        assert!(Segments::all(20, 10).of_chunk(1).eq(std::iter::once(0..10)));
     }
 }
