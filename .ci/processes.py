@@ -1,11 +1,18 @@
 #!/usr/bin/env python3
 """processes.py PROGRAM [CELLS] [STEPS]: what a block of points takes on one program and on 1, 2 and 4 processes under mpirun.
+processes.py --speed PROGRAM [CELLS] [STEPS] [ROUNDS]: how fast its steps are on 1 and 2 processes, and on 2 with a block twice as long.
 
 The block has CELLS (48) points along each edge, three spacings in a horizon, bond-based and LPS. For each run: the peak memory of each process, the same less that of a block with the
 same points and one spacing in a horizon, which is what bonds take, and the user and system seconds of each process. Times are those of a machine on which nothing else runs, or none.
 PROGRAM is built with the feature petsc; every process has one thread.
+
+A table of speed is that of STEPS (100) steps, ROUNDS (3) times in turn, of a block of CELLS (56, which has 2e7 bonds) points along each edge: the run with so many steps less that
+with two, over the steps between, the least of all rounds. So set-up, files and the energies of the last row are left out. Seconds are those of the clock in steps, as the first process
+tells, and of the processor (user and system, waiting included) of each process. "Speed" is the bonds that pass in a second over those of one process: 2 is the most. Ghosts and bytes
+of a step are those of each process, counted in the run; it fails where `bondline check --processes` predicts others.
 """
 
+import json
 import os
 import pathlib
 import resource
@@ -19,8 +26,8 @@ coupling = "nonlocal"
 
 [mesh.box]
 min = [0, 0, 0]
-max = [{n}, {n}, {n}]
-x = {{ cells = {n} }}
+max = [{long}, {n}, {n}]
+x = {{ cells = {long} }}
 y = {{ cells = {n} }}
 z = {{ cells = {n} }}
 
@@ -49,45 +56,106 @@ vtu = false
 
 def measured(command):
     """Runs a command, and prints its peak memory and seconds: a process of the job."""
-    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     rank = os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0"))
     print("process", rank, used.ru_maxrss, used.ru_utime, used.ru_stime, flush=True)
     if done.returncode:
         print(done.stderr, file=sys.stderr)
+    if done.stdout:
+        # the summary of the first process, in a line of its own
+        print("summary", json.dumps(json.loads(done.stdout)), flush=True)
     return done.returncode
 
 
+THREADS = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+
+
 def run(program, scene, folder, count):
-    """Peak memory [MiB], user and system seconds of each process; of one program, if count is none."""
-    command = [sys.executable, __file__, "--measured", program, "run", scene, "--output", folder]
+    """Peak memory [MiB], user and system seconds of each process, of one program if count is none; and the summary."""
+    command = [sys.executable, __file__, "--measured", program, "run", scene, "--json", "--output", folder]
     if count:
         command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(count)] + command
-    threads = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
-    done = subprocess.run(command, env={**os.environ, **threads}, stdout=subprocess.PIPE, text=True, check=True)
+    done = subprocess.run(command, env={**os.environ, **THREADS}, stdout=subprocess.PIPE, text=True, check=True)
     lines = [line.split() for line in done.stdout.splitlines() if line.startswith("process ")]
-    return [(int(peak) / 1024, float(user), float(system)) for _, _, peak, user, system in sorted(lines)]
+    each = [(int(peak) / 1024, float(user), float(system)) for _, _, peak, user, system in sorted(lines)]
+    summary = next(line for line in done.stdout.splitlines() if line.startswith("summary "))
+    return each, json.loads(summary.removeprefix("summary "))
 
 
-def main(program, n=48, steps=4):
+LAWS = (("bond-based", "critical-stretch = 0.5"), ("lps", "poisson-ratio = 0.3\ncritical-stretch = 0.5"))
+
+
+def text_of(law, more, n, steps, spacings=3, times=1):
+    """The scene; the step is about half a spacing over the speed of waves, which is one."""
+    return SCENE.format(n=n, long=n * times, law=law, more=more, spacings=spacings, duration=0.5 * steps)
+
+
+def memory(program, n=48, steps=4):
     print("| law | processes | peak memory [MiB] | of bonds [MiB] | user + system [s] |\n|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         scene = os.path.join(folder, "block.toml")
-        for law, more in (("bond-based", "critical-stretch = 0.5"), ("lps", "poisson-ratio = 0.3\ncritical-stretch = 0.5")):
+        for law, more in LAWS:
             for count in (None, 1, 2, 4):
                 runs = []
                 for spacings in (1.5, 3):
-                    # the step is about half a spacing over the speed of waves, which is one
-                    text = SCENE.format(n=n, law=law, more=more, spacings=spacings, duration=0.5 * steps)
-                    pathlib.Path(scene).write_text(text)
-                    runs.append(run(program, scene, os.path.join(folder, "out"), count))
+                    pathlib.Path(scene).write_text(text_of(law, more, n, steps, spacings))
+                    runs.append(run(program, scene, os.path.join(folder, "out"), count)[0])
                 few, many = runs
                 words = [" ".join(f"{a[0]:.0f}" for a in many), " ".join(f"{a[0] - b[0]:.0f}" for a, b in zip(many, few))]
                 words.append(" ".join(f"{user:.1f}+{system:.1f}" for _, user, system in many))
                 print(f"| {law} | {count or 'one program'} | {' | '.join(words)} |", flush=True)
 
 
+def of_steps(runs):
+    """Seconds of a step by the clock, and by the processor of each process, from two runs of few and of many steps."""
+    (few, first), (many, last) = runs
+    steps = [summary["motion"]["steps"] for summary in (first, last)]
+    clock = [sum(stage["seconds"] for stage in summary["timings"] if stage["name"] == "steps") for summary in (first, last)]
+    between = steps[1] - steps[0]
+    used = [(b[1] + b[2] - a[1] - a[2]) / between for a, b in zip(few, many)]
+    return (clock[1] - clock[0]) / between, used
+
+
+def predicted(program, scene, count):
+    """Sites, ghosts and bytes of a step of each process, as a check tells."""
+    done = subprocess.run([program, "check", scene, "--json", "--processes", str(count)], env={**os.environ, **THREADS}, stdout=subprocess.PIPE, text=True, check=True)
+    shares = json.loads(done.stdout)["processes"]
+    return [(share["sites"], share["ghosts"], share["received_bytes"]) for share in shares]
+
+
+def speed(program, n=56, steps=100, rounds=3):
+    print("| law | points along an edge | bonds | processes | clock [ms/step] | processor [ms/step] | speed | ghosts | received [kB/step] |\n|---|---|---|---|---|---|---|---|---|")
+    cases = [(1, 1), (2, 1), (2, 2)]
+    with tempfile.TemporaryDirectory() as folder:
+        scene = os.path.join(folder, "block.toml")
+        for law, more in LAWS:
+            least, told = {}, {}
+            for _ in range(rounds):
+                for count, times in cases:
+                    runs = []
+                    for length in (2, steps):
+                        pathlib.Path(scene).write_text(text_of(law, more, n, length, times=times))
+                        runs.append(run(program, scene, os.path.join(folder, "out"), count))
+                    found = of_steps(runs)
+                    held = least.setdefault((count, times), found)
+                    least[count, times] = min(held[0], found[0]), [min(pair) for pair in zip(held[1], found[1])]
+                    told[count, times] = runs[1][1]
+            for count, times in cases:
+                pathlib.Path(scene).write_text(text_of(law, more, n, steps, times=times))
+                motion, bonds = told[count, times]["motion"], told[count, times]["sizes"]["bonds"]
+                of_step = [(p["sites"], p["ghosts"], p["received_bytes"] // motion["steps"]) for p in motion["processes"]]
+                if of_step != predicted(program, scene, count) or any(p["exchanges"] != motion["steps"] for p in motion["processes"]):
+                    sys.exit(f"{law}, {count} processes: {motion['processes']} is not what was predicted: {predicted(program, scene, count)}")
+                (clock, used), alone = least[count, times], least[1, 1][0]
+                rate = (bonds / clock) / (told[1, 1]["sizes"]["bonds"] / alone)
+                words = [law, f"{n * times} × {n} × {n}", f"{bonds:.3g}", str(count), f"{1e3 * clock:.1f}", " ".join(f"{1e3 * x:.1f}" for x in used), f"{rate:.2f}"]
+                words += [" ".join(str(ghosts) for _, ghosts, _ in of_step), " ".join(f"{1e-3 * received:.0f}" for _, _, received in of_step)]
+                print("| " + " | ".join(words) + " |", flush=True)
+
+
 if __name__ == "__main__":
     if sys.argv[1] == "--measured":
         sys.exit(measured(sys.argv[2:]))
-    main(os.path.abspath(sys.argv[1]), *map(int, sys.argv[2:]))
+    what, rest = (speed, sys.argv[2:]) if sys.argv[1] == "--speed" else (memory, sys.argv[1:])
+    what(os.path.abspath(rest[0]), *map(int, rest[1:]))

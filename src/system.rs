@@ -6,16 +6,26 @@
 use rayon::prelude::*;
 
 mod element_tangent;
+mod exact_sum;
+mod ghosts;
 pub mod ranks;
+mod segments;
 mod shared_blocks;
+mod shared_steps;
 mod spmv;
 mod springs;
 pub(crate) mod wrapped;
 
 pub use element_tangent::ElementTangent;
-pub use ranks::{Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
+pub use exact_sum::ExactSum;
+pub use ghosts::{Ghosts, Traffic};
+pub use ranks::{
+    Exchange, Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread,
+};
 pub(crate) use ranks::{all_say, first_text};
+pub use segments::Segments;
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
+pub use shared_steps::{LostToBreaks, SharedSteps};
 pub use spmv::ROW_CHUNK;
 pub use springs::{SpringRows, Sprung};
 
@@ -146,6 +156,11 @@ pub trait SemiDiscrete: Send + Sync {
 
     /// Ends the interval at the displacement of the last call of [`SemiDiscrete::internal_force_into`]: what laws remember is from now on what they remembered there. A trial that is not committed leaves no trace.
     fn commit(&mut self);
+
+    /// The system as one of which each process may move its own sites alone; none where each has to have the numbers of all in every step.
+    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
+        None
+    }
 
     /// `y = K x` with the tangent `K` at rest, broken bonds left out.
     fn tangent_into(&self, x: &[f64], y: &mut [f64]);

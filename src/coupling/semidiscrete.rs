@@ -19,7 +19,7 @@ use crate::{
     peridynamics::bond_force::{BondPass, Kinematics},
     system::{
         BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, Ranks,
-        SemiDiscrete, Symmetry,
+        SemiDiscrete, SharedSteps, Symmetry,
     },
 };
 use behaviour::NONE;
@@ -32,6 +32,7 @@ mod dissipation;
 mod elements;
 mod energy;
 mod force_states;
+mod own_steps;
 mod rows;
 mod shared_work;
 mod split;
@@ -56,6 +57,8 @@ pub struct CoupledSystem<'a, const D: usize> {
     elements: Option<LocalElements<D>>,
     /// Who computes which sites, where several processes do.
     split: Option<split::Split<'a>>,
+    /// What belongs to steps of which each process takes its own, once these have begun.
+    own_steps: Option<own_steps::OwnSteps>,
     /// What breaking bonds has cost so far.
     spent: Dissipation,
     /// See [`SemiDiscrete::difference_length`].
@@ -158,6 +161,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             energy,
             elements: None,
             split: None,
+            own_steps: None,
             spent: Dissipation::default(),
         })
     }
@@ -289,6 +293,13 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         }
         self.finish(force);
         broken
+    }
+
+    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
+        match self.own_steps.is_some() || self.may_share_steps() {
+            true => Some(self),
+            false => None,
+        }
     }
 
     fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {

@@ -2,7 +2,7 @@
 
 use crate::{
     coupling::{Model, ModelError, SharedFamilies},
-    peridynamics::PdBody,
+    peridynamics::{Accelerator, PdBody},
     system::{Partition, Ranks, Spread, first_text},
 };
 
@@ -46,11 +46,38 @@ impl<const D: usize> Model<D> {
             .iter()
             .map(|s| crate::tensor::padded(&s.position))
             .collect();
-        let work = match is_shared && self.is_searched_by_lattice {
+        let work = match is_shared && self.can_spread_families() {
             true => vec![1.0; positions.len()],
             false => self.work_of_sites(),
         };
         Partition::by_bisection(&positions, &work, count)
+    }
+
+    /// Whether families are searched along a lattice, and can be spread over processes.
+    pub fn can_spread_families(&self) -> bool {
+        self.is_searched_by_lattice
+    }
+
+    /// Own points and all whose displacements the forces of these take, and whether bonds of these break: neighbours, and those of neighbours where a law takes their dilatations.
+    ///
+    /// Bonds without a weight count, for they break too.
+    pub fn points_reached(&self, own: &[bool]) -> Vec<bool> {
+        let mut reached = own.to_vec();
+        let (Some(p), Some(body)) = (&self.peridynamics, self.body()) else {
+            return reached;
+        };
+        let layers = match p.accelerator() {
+            Some(Accelerator::Solid { .. }) => 2,
+            _ => 1,
+        };
+        for _ in 0..layers {
+            let inner = reached.clone();
+            let points = inner.iter().enumerate().filter(|(_, is_inner)| **is_inner);
+            for &j in points.flat_map(|(i, _)| body.families.of(i)) {
+                reached[j as usize] = true;
+            }
+        }
+        reached
     }
 
     /// Directed bonds of all points, whoever holds them.

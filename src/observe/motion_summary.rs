@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::cracks::CrackSummary;
 use super::report::{components, grouped, number};
 use super::rezoning_event::{self, Switch};
+use crate::system::Traffic;
 
 /// Why a run in time ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -201,6 +202,9 @@ pub struct MotionSummary {
     pub switches: Vec<Switch>,
     /// What the nonlocal zone has of the body's volume at the start, the most that it had, and at the end.
     pub nonlocal_share: [f64; 3],
+    /// What each of several processes exchanged for its steps, by their number; none where each has the numbers of all sites in every step.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub processes: Vec<Traffic>,
 }
 
 impl MotionSummary {

@@ -4,12 +4,14 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 use serde::Serialize;
 
+use crate::coupling::Model;
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
-use crate::run::motion::may_share;
+use crate::run::motion::{may_share, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
+use crate::system::Partition;
 
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
 const SCALAR: u64 = 12;
@@ -21,11 +23,11 @@ pub struct ProcessShare {
     pub sites: usize,
     /// Sites of other processes whose displacements these rows need.
     pub ghosts: usize,
-    /// Blocks of these rows: bonds, and pairs of nodes of an element.
+    /// Blocks of these rows: bonds, and pairs of nodes of an element; where points alone move in time, bonds.
     pub blocks: usize,
     /// What its part of the stiffness takes \[bytes\], without factors or coarse levels; zero of a scene in time, which assembles none.
     pub stiffness_bytes: u64,
-    /// What it receives for each product with the stiffness, or for each step in time \[bytes\].
+    /// What it receives for each product with the stiffness, or for each step in time \[bytes\]: the numbers of its ghosts, or of all sites that others have.
     pub received_bytes: u64,
 }
 
@@ -52,13 +54,24 @@ fn shares<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Vec<ProcessShare>, RunError> {
     let is_static = scene.solve == Solve::Static;
-    let is_explicit = matches!(scene.solve, Solve::Explicit(_));
+    let explicit = match &scene.solve {
+        Solve::Explicit(spec) => Some(spec.clone()),
+        _ => None,
+    };
     let (problem, rest) = setup::problem(scene);
-    let is_shared = is_explicit && may_share(&problem, &rest);
+    let is_shared = explicit.is_some() && may_share(&problem, &rest);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
+    let partition = model.partition(count, is_shared);
+    let ranks = (0..partition.ranks()).into_par_iter();
+    let moves_own = |spec| model.can_spread_families() && moves_own_sites(spec, &rest);
+    if is_shared && explicit.as_ref().is_some_and(moves_own) {
+        progress.finish();
+        return Ok(ranks
+            .map(|rank| of_points(&model, &partition, rank))
+            .collect());
+    }
     let operator = coupling.operator(&model)?;
     let pattern = model.pattern(operator.as_ref(), &[], progress);
-    let partition = model.partition(count, is_shared);
     let of_rank = |rank: usize| {
         let own = partition.of(rank);
         let row = |site: &u32| {
@@ -84,12 +97,27 @@ fn shares<const D: usize>(
             received_bytes: (numbers * D * 8) as u64,
         }
     };
-    let all = (0..partition.ranks())
-        .into_par_iter()
-        .map(of_rank)
-        .collect();
+    let all = ranks.map(of_rank).collect();
     progress.finish();
     Ok(all)
+}
+
+/// The same where each process moves its own points, and knows those of others whose displacements their forces take.
+fn of_points<const D: usize>(model: &Model<D>, partition: &Partition, rank: usize) -> ProcessShare {
+    let points = 0..partition.sites() as u32;
+    let own: Vec<bool> = points.map(|i| partition.owner(i) == rank).collect();
+    let reached = model.points_reached(&own).into_iter().zip(own);
+    let ghosts = reached.filter(|(is_reached, is_own)| *is_reached && !is_own);
+    let ghosts = ghosts.count();
+    let sites = partition.of(rank);
+    let bonds = |i: &u32| model.body().map_or(0, |b| b.families.of(*i as usize).len());
+    ProcessShare {
+        sites: sites.len(),
+        ghosts,
+        blocks: sites.iter().map(bonds).sum(),
+        stiffness_bytes: 0,
+        received_bytes: (ghosts * D * 8) as u64,
+    }
 }
 
 /// The least, the mean and the most of what processes have, as a table.

@@ -17,37 +17,27 @@
 //! H_{n+1/2} − H_{n−1/2} = ½ (u_{n+1} − u_{n−1})ᵀ f_n
 //! ```
 //!
-//! Vectors run over chunks of fixed size and sums are added in the order of the chunks: the bits do not depend on the number of threads.
+//! Vectors run over chunks of fixed size and sums are added in the order of the chunks; the work is an exact sum. The bits depend neither on the number of threads
+//! nor, where processes move their own sites alone (`shared.rs`), on that of processes.
 
 use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::system::{FailureUpdate, Halfway, Interval, SemiDiscrete};
+use crate::system::{FailureUpdate, Halfway, Interval, Segments, SemiDiscrete};
 
+mod shared;
 mod state;
+mod sums;
 
 pub use state::{
     Drive, End, Energies, ExplicitError, ExplicitInfo, ExplicitParams, State, Undriven,
 };
 
+use sums::{Sums, total};
+
 /// Sites per chunk: the chunks, not the threads, decide the order of sums.
 const SITES: usize = 1024;
-
-/// Partial sums of one chunk.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    /// `Σ m v²`.
-    kinetic: f64,
-    /// `Σ m v²` before the last half kick.
-    kinetic_half: f64,
-    /// `Σ f v`.
-    power: f64,
-    /// `Σ |f v|`.
-    absolute: f64,
-    /// `Σ u_n F_{n+1}`.
-    pair: f64,
-}
 
 /// A motion under way.
 pub struct Explicit<'a> {
@@ -69,6 +59,10 @@ pub struct Explicit<'a> {
     previous: Vec<f64>,
     next: Vec<f64>,
     sums: Vec<Sums>,
+    /// Sites that are moved here.
+    moved: Segments,
+    /// What belongs to steps that processes share; none where each moves all sites.
+    shared: Option<shared::Shared>,
 }
 
 impl<'a> Explicit<'a> {
@@ -135,6 +129,8 @@ impl<'a> Explicit<'a> {
             next: values,
             prescribed,
             sums: vec![Sums::default(); sites.div_ceil(SITES)],
+            moved: Segments::all(sites, SITES),
+            shared: None,
         };
         if starts {
             motion.begin();
@@ -147,6 +143,7 @@ impl<'a> Explicit<'a> {
             motion.state.supplied = motion.energies.kinetic + stored.abs();
         }
         motion.check_numbers()?;
+        motion.share();
         Ok(motion)
     }
 
@@ -236,7 +233,7 @@ impl<'a> Explicit<'a> {
             self.state.v[k] = (self.next[p] - self.previous[p]) / dt;
             self.state.u[k] = self.next[p];
         }
-        let before = total(&self.sums);
+        let mut before = total(&self.sums);
         self.state.time += dt;
         self.state.step += 1;
         let reading = if self.drive.is_steady() {
@@ -245,71 +242,94 @@ impl<'a> Explicit<'a> {
             self.drive.load_into(self.state.time, &mut self.load);
             Reading::Fresh
         };
+        let mut outcome = self.respond();
+        self.system.commit();
+        self.look_ahead();
+        self.accelerate_prescribed();
+        self.add_reactions(reading);
+        self.keep_half();
+        self.accelerate_and_kick();
+        self.settle_prescribed();
+        let mut after = total(&self.sums);
+        self.add_over_processes([&mut before, &mut after], &mut outcome);
+        self.state.broken += outcome.broken;
+        let work_half = self.state.work + 0.5 * dt * before.power.sum.value();
+        self.state.work = work_half + 0.5 * dt * after.power.sum.value();
+        let [first, second] = [before, after.clone()].map(|sums| sums.power.absolute.value());
+        self.state.supplied += 0.5 * dt * (first + second);
+        self.energies = Energies::of(&after, self.state.work, work_half);
+        debug_assert_eq!(self.state.u.len(), self.inverse_mass.len() * d);
+        self.gather_for_trouble();
+        self.check_numbers()
+    }
+
+    /// The internal force at the displacement that was reached, with what it broke.
+    fn respond(&mut self) -> shared::Outcome {
+        if self.shared.is_some() {
+            return self.respond_at_own();
+        }
         let interval = Interval {
             end: self.state.time,
-            length: dt,
+            length: self.params.step,
         };
-        let broken = self.system.internal_force_into(
-            &self.state.u,
-            &mut self.force,
-            interval,
-            FailureUpdate::Update,
-        );
+        let update = FailureUpdate::Update;
+        let (u, force) = (&self.state.u, &mut self.force);
+        let broken = self.system.internal_force_into(u, force, interval, update);
         if broken > 0 {
-            self.system.account_for_breaks(&Halfway {
-                u: &self.state.u,
-                v: &self.state.v,
-                back: 0.5 * dt,
-            });
+            self.system
+                .account_for_breaks(&self.state.halfway(self.params.step));
         }
-        self.system.commit();
-        self.state.broken += broken;
-        self.look_ahead();
+        shared::Outcome {
+            broken,
+            ..Default::default()
+        }
+    }
+
+    /// Accelerations of prescribed dofs.
+    fn accelerate_prescribed(&mut self) {
+        let dt = self.params.step;
         for (p, &k) in self.prescribed.iter().enumerate() {
             let k = k as usize;
             let (last, now, next) = (self.previous[p], self.state.u[k], self.next[p]);
             self.state.a[k] = ((next - now) - (now - last)) / (dt * dt);
         }
-        self.add_reactions(reading);
-        self.accelerate_and_kick();
+    }
+
+    /// Accelerations and velocities of prescribed dofs, where the others have moved on.
+    fn settle_prescribed(&mut self) {
+        self.accelerate_prescribed();
         for (p, &k) in self.prescribed.iter().enumerate() {
-            let k = k as usize;
-            let (last, now, next) = (self.previous[p], self.state.u[k], self.next[p]);
-            self.state.a[k] = ((next - now) - (now - last)) / (dt * dt);
-            self.state.v[k] = (next - last) / (2.0 * dt);
+            self.state.v[k as usize] = (self.next[p] - self.previous[p]) / (2.0 * self.params.step);
         }
-        let after = total(&self.sums);
-        let work_half = self.state.work + 0.5 * dt * before.power;
-        self.state.work = work_half + 0.5 * dt * after.power;
-        self.state.supplied += 0.5 * dt * (before.absolute + after.absolute);
-        self.energies = Energies {
-            kinetic: 0.5 * after.kinetic,
-            kinetic_half: 0.5 * after.kinetic_half,
-            discrete: 0.5 * (after.kinetic_half + after.pair),
-            work: self.state.work,
-            work_half,
-        };
-        debug_assert_eq!(self.state.u.len(), self.inverse_mass.len() * d);
-        self.check_numbers()
     }
 
     /// `v += Δt/2 a`, `u += Δt v`; sums the power of the external forces at `n`.
     fn kick_and_drift(&mut self) {
         let (d, dt) = (self.block, self.params.step);
         let State { u, v, a, .. } = &mut self.state;
+        let (moved, own) = (&self.moved, shared::own(self.shared.as_ref(), &self.moved));
         u.par_chunks_mut(SITES * d)
             .zip(v.par_chunks_mut(SITES * d))
             .zip(a.par_chunks(SITES * d))
             .zip(self.load.par_chunks(SITES * d))
             .zip(self.sums.par_iter_mut())
-            .for_each(|((((u, v), a), load), sums)| {
-                *sums = Sums::default();
-                for (((u, v), a), f) in u.iter_mut().zip(v).zip(a).zip(load) {
-                    *v += 0.5 * dt * a;
-                    *u += dt * *v;
-                    let power = f * *v;
-                    sums.power += power;
-                    sums.absolute += power.abs();
+            .enumerate()
+            .for_each(|(chunk, ((((u, v), a), load), sums))| {
+                sums.power.clear();
+                for sites in moved.of_chunk(chunk) {
+                    let dofs = sites.start * d..sites.end * d;
+                    let moving = u[dofs.clone()].iter_mut().zip(&mut v[dofs.clone()]);
+                    for ((u, v), a) in moving.zip(&a[dofs]) {
+                        *v += 0.5 * dt * a;
+                        *u += dt * *v;
+                    }
+                }
+                for sites in own.of_chunk(chunk) {
+                    let dofs = sites.start * d..sites.end * d;
+                    let loads = load[dofs.clone()].chunks_exact(d);
+                    for (f, v) in loads.zip(v[dofs].chunks_exact(d)) {
+                        sums.power.add(f, v);
+                    }
                 }
             });
     }
@@ -319,6 +339,7 @@ impl<'a> Explicit<'a> {
         let (d, dt) = (self.block, self.params.step);
         let State { u, v, a, .. } = &mut self.state;
         let mass = self.system.mass();
+        let (moved, own) = (&self.moved, shared::own(self.shared.as_ref(), &self.moved));
         v.par_chunks_mut(SITES * d)
             .zip(a.par_chunks_mut(SITES * d))
             .zip(u.par_chunks(SITES * d))
@@ -327,25 +348,35 @@ impl<'a> Explicit<'a> {
             .zip(mass.par_chunks(SITES))
             .zip(self.inverse_mass.par_chunks(SITES))
             .zip(self.sums.par_iter_mut())
-            .for_each(|(((((((v, a), u), load), force), mass), inverse), sums)| {
-                *sums = Sums::default();
-                for (i, (m, w)) in mass.iter().zip(inverse).enumerate() {
-                    let (mut half, mut full) = (0.0, 0.0);
-                    for k in i * d..(i + 1) * d {
-                        let (f, r) = (load[k], force[k]);
-                        half += v[k] * v[k];
-                        let power = f * v[k];
-                        sums.power += power;
-                        sums.absolute += power.abs();
-                        sums.pair += (u[k] - dt * v[k]) * r;
-                        a[k] = (f - r) * w;
-                        v[k] += 0.5 * dt * a[k];
-                        full += v[k] * v[k];
+            .enumerate()
+            .for_each(
+                |(chunk, (((((((v, a), u), load), force), mass), inverse), sums))| {
+                    (sums.kinetic, sums.kinetic_half, sums.pair) = (0.0, 0.0, 0.0);
+                    sums.power.clear();
+                    for sites in own.of_chunk(chunk) {
+                        for i in sites {
+                            let mut half = 0.0;
+                            for k in i * d..(i + 1) * d {
+                                half += v[k] * v[k];
+                                sums.pair += (u[k] - dt * v[k]) * force[k];
+                            }
+                            let dofs = i * d..(i + 1) * d;
+                            sums.power.add(&load[dofs.clone()], &v[dofs]);
+                            sums.kinetic_half += mass[i] * half;
+                        }
                     }
-                    sums.kinetic_half += m * half;
-                    sums.kinetic += m * full;
-                }
-            });
+                    for i in moved.of_chunk(chunk).flatten() {
+                        for k in i * d..(i + 1) * d {
+                            a[k] = (load[k] - force[k]) * inverse[i];
+                            v[k] += 0.5 * dt * a[k];
+                        }
+                    }
+                    for i in own.of_chunk(chunk).flatten() {
+                        let v = &v[i * d..(i + 1) * d];
+                        sums.kinetic += mass[i] * v.iter().fold(0.0, |sum, v| sum + v * v);
+                    }
+                },
+            );
     }
 
     /// Whether numbers are finite and the energy is one that was put in.
@@ -395,7 +426,7 @@ impl<'a> Explicit<'a> {
     pub fn run(
         &mut self,
         last: u64,
-        observe: &mut dyn FnMut(&Explicit<'_>) -> ControlFlow<()>,
+        observe: &mut dyn FnMut(&mut Explicit<'_>) -> ControlFlow<()>,
     ) -> Result<ExplicitInfo, ExplicitError> {
         let (first, broken) = (self.state.step, self.state.broken);
         let mut end = End::Finished;
@@ -414,7 +445,7 @@ impl<'a> Explicit<'a> {
         })
     }
 
-    /// Where the motion stands.
+    /// Where the motion stands; where processes move their own sites alone, the numbers of others are there once they are gathered ([`Explicit::gather`]).
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -488,17 +519,6 @@ fn set(dofs: &[u32], values: &[f64], field: &mut [f64]) {
     for (&k, v) in dofs.iter().zip(values) {
         field[k as usize] = *v;
     }
-}
-
-/// Adds the chunks in their order.
-fn total(sums: &[Sums]) -> Sums {
-    sums.iter().fold(Sums::default(), |a, b| Sums {
-        kinetic: a.kinetic + b.kinetic,
-        kinetic_half: a.kinetic_half + b.kinetic_half,
-        power: a.power + b.power,
-        absolute: a.absolute + b.absolute,
-        pair: a.pair + b.pair,
-    })
 }
 
 #[cfg(test)]

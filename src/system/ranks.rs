@@ -23,6 +23,14 @@ pub trait Ranks: Send + Sync + std::fmt::Debug {
     /// Collective: the words of each rank, whatever their number.
     fn gather_words(&self, own: &[u64]) -> Vec<Vec<u64>>;
 
+    /// Collective: overwrites each number with the sum of those of all ranks at its place.
+    fn add_into(&self, sums: &mut [i64]);
+
+    /// Collective: what brings blocks of `block` numbers from the ranks that have them to those that want them.
+    ///
+    /// Each rank has `own` blocks, and they are numbered rank by rank; `wanted` are blocks of other ranks, ascending.
+    fn exchange(&self, own: usize, wanted: &[u64], block: usize) -> Box<dyn Exchange>;
+
     /// Collective: what solves systems with a matrix of which each rank holds its own rows.
     ///
     /// # Errors
@@ -32,6 +40,15 @@ pub trait Ranks: Send + Sync + std::fmt::Debug {
         rows: &RankRows<'_>,
         kind: RankSolverKind,
     ) -> Result<Box<dyn RankSolver>, String>;
+}
+
+/// Brings blocks of numbers from the processes that have them to those that want them, again and again.
+pub trait Exchange: Send + Sync + std::fmt::Debug {
+    /// Collective: sends the own blocks, which may change again at once.
+    fn begin(&mut self, own: &[f64]);
+
+    /// Collective: overwrites `wanted` with the blocks of the last [`Exchange::begin`], once they are there.
+    fn end(&mut self, wanted: &mut [f64]);
 }
 
 /// How a system that is spread over ranks is solved.

@@ -2,6 +2,7 @@
 
 mod memory;
 mod threads;
+mod traffic;
 
 use std::path::Path;
 

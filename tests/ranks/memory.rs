@@ -65,9 +65,9 @@ fn most_held(work: impl FnOnce()) -> f64 {
 }
 
 /// Points along the axes of the block.
-const COUNTS: [i64; 3] = [24, 10, 10];
+pub const COUNTS: [i64; 3] = [24, 10, 10];
 
-fn block(material: &str, spacings: i64, [x, y, z]: [i64; 3]) -> String {
+pub fn block(material: &str, spacings: i64, [x, y, z]: [i64; 3]) -> String {
     let ratio = if material == "lps" {
         "poisson-ratio = 0.3"
     } else {

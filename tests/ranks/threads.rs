@@ -9,7 +9,7 @@ use bondline::observe::checkpoint::Pace;
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, RunError, RunOptions, StartFrom};
 use bondline::scene::Source;
-use bondline::system::{RankRows, RankSolve, RankSolver, RankSolverKind, Ranks};
+use bondline::system::{Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Traffic};
 use nalgebra::{DMatrix, DVector};
 
 /// What the threads of a run share.
@@ -19,6 +19,22 @@ struct Board {
     barrier: Barrier,
     /// Gathers of all threads.
     gathers: AtomicUsize,
+    /// Calls of all threads that gather numbers of all sites, or the like.
+    of_all: AtomicUsize,
+    /// Bytes that came to each thread by exchanges.
+    received: Mutex<Vec<u64>>,
+}
+
+impl Board {
+    fn of(count: usize) -> Self {
+        Self {
+            words: Mutex::new(vec![Vec::new(); count]),
+            barrier: Barrier::new(count),
+            gathers: AtomicUsize::new(0),
+            of_all: AtomicUsize::new(0),
+            received: Mutex::new(vec![0; count]),
+        }
+    }
 }
 
 /// One thread as a process.
@@ -40,6 +56,7 @@ impl Ranks for ThreadRank {
     }
 
     fn gather_into(&self, own: &[f64], lengths: &[usize], all: &mut [f64]) {
+        self.board.of_all.fetch_add(1, Ordering::Relaxed);
         assert_eq!(own.len(), lengths[self.rank]);
         let words: Vec<u64> = own.iter().map(|x| x.to_bits()).collect();
         let found = self.gather_words(&words).concat();
@@ -54,11 +71,28 @@ impl Ranks for ThreadRank {
         assert!(*left > 0, "killed");
         *left -= 1;
         self.board.gathers.fetch_add(1, Ordering::Relaxed);
-        self.board.words.lock().unwrap()[self.rank] = own.to_vec();
-        self.board.barrier.wait();
-        let all = self.board.words.lock().unwrap().clone();
-        self.board.barrier.wait();
-        all
+        self.told_to_all(own)
+    }
+
+    fn add_into(&self, sums: &mut [i64]) {
+        let words: Vec<u64> = sums.iter().map(|n| n.cast_unsigned()).collect();
+        sums.fill(0);
+        for part in self.gather_words(&words) {
+            sums.iter_mut()
+                .zip(part)
+                .for_each(|(sum, n)| *sum += n.cast_signed());
+        }
+    }
+
+    fn exchange(&self, own: usize, wanted: &[u64], block: usize) -> Box<dyn Exchange> {
+        assert!(wanted.is_sorted());
+        self.gather_words(&[own as u64]);
+        Box::new(Told {
+            rank: self.another(),
+            wanted: wanted.to_vec(),
+            block,
+            own: None,
+        })
     }
 
     fn solver(
@@ -94,13 +128,59 @@ impl Ranks for ThreadRank {
         }
         Ok(Box::new(Dense {
             matrix: matrix.lu(),
-            rank: Self {
-                rank: self.rank,
-                board: Arc::clone(&self.board),
-                left: Mutex::new(usize::MAX),
-            },
+            rank: self.another(),
             lengths: partition.lengths(d),
         }))
+    }
+}
+
+impl ThreadRank {
+    /// What each thread tells.
+    fn told_to_all(&self, own: &[u64]) -> Vec<Vec<u64>> {
+        self.board.words.lock().unwrap()[self.rank] = own.to_vec();
+        self.board.barrier.wait();
+        let all = self.board.words.lock().unwrap().clone();
+        self.board.barrier.wait();
+        all
+    }
+
+    /// The same, of which another part of a run makes its calls.
+    fn another(&self) -> Self {
+        Self {
+            rank: self.rank,
+            board: Arc::clone(&self.board),
+            left: Mutex::new(usize::MAX),
+        }
+    }
+}
+
+/// Blocks on their way.
+#[derive(Debug)]
+struct Told {
+    rank: ThreadRank,
+    wanted: Vec<u64>,
+    block: usize,
+    own: Option<Vec<f64>>,
+}
+
+impl Exchange for Told {
+    fn begin(&mut self, own: &[f64]) {
+        assert!(self.own.replace(own.to_vec()).is_none(), "begun twice");
+    }
+
+    fn end(&mut self, wanted: &mut [f64]) {
+        let own = self.own.take().expect("an exchange that has begun");
+        let own: Vec<u64> = own.iter().map(|x| x.to_bits()).collect();
+        let all = self.rank.told_to_all(&own).concat();
+        assert_eq!(wanted.len(), self.wanted.len() * self.block);
+        for (to, &block) in wanted.chunks_exact_mut(self.block).zip(&self.wanted) {
+            let from = &all[block as usize * self.block..][..self.block];
+            to.iter_mut()
+                .zip(from)
+                .for_each(|(to, word)| *to = f64::from_bits(*word));
+        }
+        let received = &mut self.rank.board.received.lock().unwrap()[self.rank.rank];
+        *received += 8 * wanted.len() as u64;
     }
 }
 
@@ -153,11 +233,20 @@ pub struct Done {
     pub gathers: usize,
     /// Its sizes, proof and warnings: what is printed of the proof, as figures end in other digits where rows are gathered.
     pub told: String,
+    /// What each process exchanged in steps, and how many of these there were, as the summary tells.
+    pub traffic: (Vec<Traffic>, u64),
+    /// Bytes that exchanges brought to each process, as the threads count them.
+    pub received: Vec<u64>,
+    /// How often each process gathered numbers of all sites, or the like.
+    pub of_all: usize,
 }
+
+/// What a process tells of its run.
+type ToldByProcess = (String, (Vec<Traffic>, u64));
 
 /// Runs a scene in a folder, or says why it did not come to its end.
 pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
-    let one = |ranks: Option<&dyn Ranks>| -> Result<String, RunError> {
+    let one = |ranks: Option<&dyn Ranks>| -> Result<ToldByProcess, RunError> {
         let source = Source::new("scene.toml", text.to_owned());
         let mut scene = AnyScene::from_source(&source, folder, "scene").expect("a valid scene");
         scene.set_output_directory(folder.to_owned());
@@ -170,26 +259,42 @@ pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
         let done = scene.run_with(&options, &Silent)?;
         let parts = done.proof.parts.iter();
         let proof: Vec<_> = parts.map(|part| (part.name, &part.line)).collect();
-        Ok(format!("{:?} {proof:?} {:?}", done.sizes, done.warnings))
+        let told = format!("{:?} {proof:?} {:?}", done.sizes, done.warnings);
+        let motion = done.motion.as_ref();
+        let traffic = motion.map_or((Vec::new(), 0), |m| (m.processes.clone(), m.steps));
+        Ok((told, traffic))
     };
     if how.ranks == 0 {
         // one thread, as each process has
         let [told] = &on_processes(1, |_| one(None).map_err(|e| e.to_string()))[..] else {
             unreachable!("one thread");
         };
-        let told = told.clone()?;
-        return Ok(Done { gathers: 0, told });
+        let (told, traffic) = told.clone()?;
+        return Ok(Done {
+            gathers: 0,
+            told,
+            traffic,
+            received: Vec::new(),
+            of_all: 0,
+        });
     }
     let gathers = AtomicUsize::new(0);
+    let (of_all, received) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let ends = on_processes_for(how.ranks, how.lives, |rank| {
         let end = one(Some(rank)).map_err(|e| e.to_string());
         gathers.store(
             rank.board.gathers.load(Ordering::Relaxed),
             Ordering::Relaxed,
         );
+        of_all.store(rank.board.of_all.load(Ordering::Relaxed), Ordering::Relaxed);
+        rank.board
+            .received
+            .lock()
+            .unwrap()
+            .clone_into(&mut received.lock().unwrap());
         end
     });
-    let ends: Vec<Result<String, String>> = ends
+    let ends: Vec<Result<ToldByProcess, String>> = ends
         .into_iter()
         .map(|end| end.unwrap_or_else(|| Err("killed".to_owned())))
         .collect();
@@ -197,7 +302,13 @@ pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
     assert!(ends.iter().all(|end| *end == ends[0]), "{ends:?}");
     let end = ends.into_iter().next().expect("a process");
     let gathers = gathers.load(Ordering::Relaxed) / how.ranks;
-    end.map(|told| Done { gathers, told })
+    end.map(|(told, traffic)| Done {
+        gathers,
+        told,
+        traffic,
+        received: received.into_inner().unwrap(),
+        of_all: of_all.load(Ordering::Relaxed) / how.ranks,
+    })
 }
 
 /// What each of some processes makes of its work.
@@ -214,11 +325,7 @@ fn on_processes_for<T: Send>(
     lives: usize,
     work: impl Fn(&ThreadRank) -> T + Sync,
 ) -> Vec<Option<T>> {
-    let board = Arc::new(Board {
-        words: Mutex::new(vec![Vec::new(); count]),
-        barrier: Barrier::new(count),
-        gathers: AtomicUsize::new(0),
-    });
+    let board = Arc::new(Board::of(count));
     std::thread::scope(|scope| {
         let threads: Vec<_> = (0..count)
             .map(|rank| {

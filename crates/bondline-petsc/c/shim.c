@@ -58,6 +58,41 @@ int bl_gather_words(const unsigned long long *own, int n, unsigned long long *al
   return MPI_Allgatherv(own, n, MPI_UNSIGNED_LONG_LONG, all, counts, starts, MPI_UNSIGNED_LONG_LONG, PETSC_COMM_WORLD);
 }
 
+/* each number the sum of those of all ranks */
+int bl_add(long long *sums, int n) { return MPI_Allreduce(MPI_IN_PLACE, sums, n, MPI_LONG_LONG, MPI_SUM, PETSC_COMM_WORLD); }
+
+/* `mine` blocks of this rank and those of others that it wants, by their numbers over all ranks */
+int bl_ghosts(int bs, int mine, int n, const long long *wanted, Vec *out) {
+  PetscInt *w = malloc(((size_t)n + 1) * sizeof *w);
+  if (!w) return PETSC_ERR_MEM;
+  for (int i = 0; i < n; i++) w[i] = (PetscInt)wanted[i];
+  int e = (int)VecCreateGhostBlock(PETSC_COMM_WORLD, bs, (PetscInt)bs * mine, PETSC_DETERMINE, n, w, out);
+  free(w);
+  return e;
+}
+
+int bl_ghosts_begin(Vec v, const double *own, int n) {
+  PetscScalar *p;
+  OK(VecGetArray(v, &p));
+  memcpy(p, own, (size_t)n * sizeof *p);
+  OK(VecRestoreArray(v, &p));
+  return (int)VecGhostUpdateBegin(v, INSERT_VALUES, SCATTER_FORWARD);
+}
+
+/* `mine` numbers of this rank come before the `n` that are wanted */
+int bl_ghosts_end(Vec v, int mine, double *wanted, int n) {
+  Vec all;
+  const PetscScalar *p;
+  OK(VecGhostUpdateEnd(v, INSERT_VALUES, SCATTER_FORWARD));
+  OK(VecGhostGetLocalForm(v, &all));
+  OK(VecGetArrayRead(all, &p));
+  memcpy(wanted, p + mine, (size_t)n * sizeof *p);
+  OK(VecRestoreArrayRead(all, &p));
+  return (int)VecGhostRestoreLocalForm(v, &all);
+}
+
+void bl_ghosts_free(Vec v) { VecDestroy(&v); }
+
 typedef struct {
   Mat a;
   Vec b, x;

@@ -3,9 +3,11 @@
 use std::process::exit;
 use std::time::Duration;
 
-use bondline::system::{RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Symmetry};
+use bondline::system::{
+    Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Symmetry,
+};
 
-use crate::shim::{self, System};
+use crate::shim::{self, GhostVector, System};
 
 /// Variables by which the starters of OpenMPI, MPICH, Intel MPI and PMIx tell a process that it is one of several.
 const STARTED: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMI_RANK", "PMIX_RANK"];
@@ -107,12 +109,39 @@ impl Ranks for PetscRanks {
         parts.collect()
     }
 
+    fn add_into(&self, sums: &mut [i64]) {
+        self.must(shim::add(sums));
+    }
+
+    fn exchange(&self, own: usize, wanted: &[u64], block: usize) -> Box<dyn Exchange> {
+        let vector = self.must(GhostVector::new(own, wanted, block));
+        let ranks = Self { ..*self };
+        Box::new(PetscExchange { vector, ranks })
+    }
+
     fn solver(
         &self,
         rows: &RankRows<'_>,
         kind: RankSolverKind,
     ) -> Result<Box<dyn RankSolver>, String> {
         Ok(Box::new(solver(rows, kind, self.rank)?))
+    }
+}
+
+/// A vector of PETSc with ghosts.
+#[derive(Debug)]
+struct PetscExchange {
+    vector: GhostVector,
+    ranks: PetscRanks,
+}
+
+impl Exchange for PetscExchange {
+    fn begin(&mut self, own: &[f64]) {
+        self.ranks.must(self.vector.begin(own));
+    }
+
+    fn end(&mut self, wanted: &mut [f64]) {
+        self.ranks.must(self.vector.end(wanted));
     }
 }
 

@@ -9,6 +9,12 @@ struct Bl {
     _private: [u8; 0],
 }
 
+/// A vector of PETSc.
+#[repr(C)]
+struct Vector {
+    _private: [u8; 0],
+}
+
 unsafe extern "C" {
     fn bl_message() -> *const c_char;
     fn bl_start(rank: *mut c_int, size: *mut c_int, threads: *mut c_int) -> c_int;
@@ -29,6 +35,17 @@ unsafe extern "C" {
         counts: *const c_int,
         starts: *const c_int,
     ) -> c_int;
+    fn bl_add(sums: *mut c_longlong, n: c_int) -> c_int;
+    fn bl_ghosts(
+        block: c_int,
+        mine: c_int,
+        n: c_int,
+        wanted: *const c_longlong,
+        out: *mut *mut Vector,
+    ) -> c_int;
+    fn bl_ghosts_begin(v: *mut Vector, own: *const c_double, n: c_int) -> c_int;
+    fn bl_ghosts_end(v: *mut Vector, mine: c_int, wanted: *mut c_double, n: c_int) -> c_int;
+    fn bl_ghosts_free(v: *mut Vector);
     fn bl_matrix(
         block: c_int,
         mine: c_int,
@@ -149,6 +166,70 @@ pub fn gather_words(own: &[u64], lengths: &[usize]) -> Result<Vec<u64>, String> 
         )
     })?;
     Ok(all)
+}
+
+/// The sums over all ranks, number by number.
+pub fn add(sums: &mut [i64]) -> Result<(), String> {
+    // SAFETY: as many numbers as are told
+    told(unsafe { bl_add(sums.as_mut_ptr(), int(sums.len())?) })
+}
+
+/// Numbers of this rank, and those of others that it wants.
+#[derive(Debug)]
+pub struct GhostVector {
+    vector: NonNull<Vector>,
+    own: usize,
+    wanted: usize,
+}
+
+// SAFETY: PETSc is started for calls from any thread, one at a time, and whoever calls has the vector for itself
+unsafe impl Send for GhostVector {}
+// SAFETY: nothing is done by a shared reference
+unsafe impl Sync for GhostVector {}
+
+impl GhostVector {
+    /// Of `own` blocks of this rank, and of others by their numbers over all ranks.
+    pub fn new(own: usize, wanted: &[u64], block: usize) -> Result<Self, String> {
+        let wanted: Vec<c_longlong> = wanted.iter().map(|n| n.cast_signed()).collect();
+        let mut out = null_mut();
+        // SAFETY: as many numbers as are told
+        told(unsafe {
+            bl_ghosts(
+                int(block)?,
+                int(own)?,
+                int(wanted.len())?,
+                wanted.as_ptr(),
+                &raw mut out,
+            )
+        })?;
+        Ok(Self {
+            vector: NonNull::new(out).ok_or("no memory for a vector")?,
+            own: own * block,
+            wanted: wanted.len() * block,
+        })
+    }
+
+    /// Sends the own numbers.
+    pub fn begin(&mut self, own: &[f64]) -> Result<(), String> {
+        assert_eq!(own.len(), self.own, "numbers of this rank");
+        // SAFETY: the vector has as many numbers of this rank
+        told(unsafe { bl_ghosts_begin(self.vector.as_ptr(), own.as_ptr(), int(own.len())?) })
+    }
+
+    /// Receives the wanted ones.
+    pub fn end(&mut self, wanted: &mut [f64]) -> Result<(), String> {
+        assert_eq!(wanted.len(), self.wanted, "numbers of other ranks");
+        let (own, count) = (int(self.own)?, int(wanted.len())?);
+        // SAFETY: the vector has as many numbers of this rank, and of others after them
+        told(unsafe { bl_ghosts_end(self.vector.as_ptr(), own, wanted.as_mut_ptr(), count) })
+    }
+}
+
+impl Drop for GhostVector {
+    fn drop(&mut self) {
+        // SAFETY: made by `new`, freed once, before PETSc is stopped
+        unsafe { bl_ghosts_free(self.vector.as_ptr()) };
+    }
 }
 
 /// A matrix with its solver.

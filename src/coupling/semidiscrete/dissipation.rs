@@ -4,16 +4,42 @@ use super::CoupledSystem;
 use crate::coupling::semidiscrete::behaviour::NONE;
 use crate::{
     peridynamics::CrackArea,
-    system::{Dissipation, Halfway},
+    system::{Dissipation, Halfway, LostToBreaks},
 };
 
 impl<const D: usize> CoupledSystem<'_, D> {
     /// Energy and area of the bonds that the last pass broke, all removed at once.
     pub(super) fn of_last_breaks(&self, at: &Halfway<'_>) -> Dissipation {
-        let (Some(moving), Some(body)) = (&self.body, self.model.body()) else {
-            return Dissipation::default();
+        let lost = self.lost_by_pass(at);
+        let mut spent = Dissipation {
+            energy: lost.energy.value(),
+            area: lost.area.value(),
+            inelastic: 0.0,
         };
-        let cloud = &body.cloud;
+        if let Some(seam) = self.seam.as_ref().filter(|seam| seam.has_broken()) {
+            spent.energy += seam.lost_energy(&at.all());
+            for (bond, share) in seam.last_own() {
+                spent.area += share * self.area_of(bond);
+            }
+        }
+        spent
+    }
+
+    /// What a bond leaves of a crack where it breaks.
+    fn area_of(&self, [i, j]: [u32; 2]) -> f64 {
+        self.model.body().map_or(0.0, |body| {
+            let spacing = self.model.spacing_at(i);
+            let area = CrackArea::<D>::new(spacing, body.cloud.horizon.of(i as usize));
+            area.of(&body.bond(i as usize, j as usize))
+        })
+    }
+
+    /// Energy and area of the bonds that the pass over the body broke last.
+    pub(super) fn lost_by_pass(&self, at: &Halfway<'_>) -> LostToBreaks {
+        let mut lost = LostToBreaks::default();
+        let Some(moving) = &self.body else {
+            return lost;
+        };
         let displaced = |point: usize| -> [f64; D] {
             match (moving.site_of_point[point], &moving.transfer) {
                 (NONE, None) => [0.0; D],
@@ -29,25 +55,10 @@ impl<const D: usize> CoupledSystem<'_, D> {
                 (site, _) => std::array::from_fn(|a| at.of(site as usize * D + a)),
             }
         };
-        let area_of = |[i, j]: [u32; 2]| {
-            let spacing = self.model.spacing_at(i);
-            let area = CrackArea::<D>::new(spacing, cloud.horizon.of(i as usize));
-            area.of(&body.bond(i as usize, j as usize))
-        };
-        let mut spent = Dissipation {
-            energy: moving.pass.lost_energy(&displaced),
-            area: 0.0,
-            inelastic: 0.0,
-        };
+        moving.pass.add_lost_energy(&displaced, &mut lost.energy);
         for (i, j) in moving.pass.last_broken() {
-            spent.area += 0.5 * area_of([i, j]);
+            lost.area.add(0.5 * self.area_of([i, j]));
         }
-        if let Some(seam) = self.seam.as_ref().filter(|seam| seam.has_broken()) {
-            spent.energy += seam.lost_energy(&at.all());
-            for (bond, share) in seam.last_own() {
-                spent.area += share * area_of(bond);
-            }
-        }
-        spent
+        lost
     }
 }

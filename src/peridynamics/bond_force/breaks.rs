@@ -4,6 +4,7 @@ use super::lattice::Lattice;
 use super::list::{extension, stretched};
 use super::simd::LANES;
 use crate::peridynamics::bond_force::bond_list::List;
+use crate::system::ExactSum;
 
 impl<const D: usize> Lattice<D> {
     /// Directed bonds that the last pass broke: group, lane and offset, ascending.
@@ -31,8 +32,11 @@ impl<const D: usize> Lattice<D> {
         (extension::<EXACT>(s.t()), self.volume[there])
     }
 
-    pub(super) fn lost<const EXACT: bool>(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
-        let mut energy = 0.0;
+    pub(super) fn lost<const EXACT: bool>(
+        &self,
+        at: &dyn Fn(usize) -> [f64; D],
+        lost: &mut ExactSum,
+    ) {
         for bonds in self.last().chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let (g, lane, _) = bonds[0];
             let cell = self.stencil.groups[g] as usize + lane;
@@ -51,7 +55,7 @@ impl<const D: usize> Lattice<D> {
                 let (a, b) = moments(offset);
                 (first, second) = (first + a, second + b);
             }
-            energy += volume
+            let of_point = volume
                 * match &self.solid {
                     None => 0.25 * second,
                     Some(s) => {
@@ -63,14 +67,17 @@ impl<const D: usize> Lattice<D> {
                         0.5 * (bulk * first * (first + 2.0 * left) + s.deviatoric[cell] * second)
                     }
                 };
+            lost.add(of_point);
         }
-        energy
     }
 }
 
 impl<const D: usize> List<D> {
-    pub(super) fn lost<const EXACT: bool>(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
-        let mut energy = 0.0;
+    pub(super) fn lost<const EXACT: bool>(
+        &self,
+        at: &dyn Fn(usize) -> [f64; D],
+        lost: &mut ExactSum,
+    ) {
         for bonds in self.last.chunk_by(|a, b| a.0 == b.0) {
             let i = bonds[0].0 as usize;
             if !self.row[i] {
@@ -89,7 +96,7 @@ impl<const D: usize> List<D> {
                 let (a, b) = moments(bond);
                 (first, second) = (first + a, second + b);
             }
-            energy += self.volume[i]
+            let of_point = self.volume[i]
                 * match &self.solid {
                     None => 0.25 * second,
                     Some(c) => {
@@ -102,7 +109,7 @@ impl<const D: usize> List<D> {
                         0.5 * (bulk * first * (first + 2.0 * left) + c.deviatoric[i] * second)
                     }
                 };
+            lost.add(of_point);
         }
-        energy
     }
 }

@@ -19,7 +19,7 @@ use crate::{
         DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, KeptDamage, Law, Past,
         PdBody, Present, StatePart, body::split_rows, tearing_parameter::Flow,
     },
-    system::{FailureUpdate, Interval},
+    system::{ExactSum, FailureUpdate, Interval},
     tensor::{Tensor, Vector},
 };
 
@@ -521,8 +521,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         self.rate_of_drag(mass)
     }
 
-    fn lost_energy(&self, displaced: &dyn Fn(usize) -> [f64; D]) -> f64 {
-        self.lost(displaced)
+    fn add_lost_energy(&self, displaced: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum) {
+        lost.add(self.lost(displaced));
     }
 
     fn bonded(&self, i: usize, j: usize) -> bool {

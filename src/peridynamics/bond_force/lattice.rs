@@ -4,16 +4,16 @@ use rayon::prelude::*;
 
 use super::{
     BondPass, Kinematics,
-    lattice_simd::{Bits, Broken, CARE, FOREIGN, FULL, Field, IDLE, Task, job},
-    simd::{LANES, Source, dispatch},
+    lattice_simd::{Broken, CARE, FOREIGN, FULL, IDLE, job},
+    simd::LANES,
     stencil::{NONE, Stencil},
 };
-use crate::system::{FailureUpdate, Interval};
+use crate::system::{ExactSum, FailureUpdate, Interval, Segments};
 
 /// Groups of eight points per task; a constant, so that no result depends on the number of threads.
 pub(super) const TASK: usize = 64;
 /// Cells or points per task of copying.
-const COPY: usize = 4096;
+pub(super) const COPY: usize = 4096;
 
 /// Coefficients of the state-based law.
 pub(super) struct Solid {
@@ -25,6 +25,18 @@ pub(super) struct Solid {
     pub(super) pull: Vec<f64>,
     /// Group of each eight cells.
     pub(super) group_of: Vec<u32>,
+}
+
+/// What a process has of a lattice whose points are moved by several, each its own.
+pub(super) struct OwnReach {
+    /// Own points, in chunks of [`COPY`].
+    pub(super) own: Segments,
+    /// Cells whose displacements are known, in the same chunks.
+    pub(super) cells: Segments,
+    /// Lanes of each group whose bonds break here, since all that they see is known.
+    pub(super) seen: Vec<u8>,
+    /// Own points whose forces others wait for.
+    pub(super) sent: Vec<u32>,
 }
 
 /// A bond pass over a lattice: one bit per directed bond, the rest per point.
@@ -51,6 +63,8 @@ pub(super) struct Lattice<const D: usize> {
     pub(super) broken: Vec<Broken>,
     /// Lanes of each group that are not left to others; empty if all are.
     pub(super) own: Vec<u8>,
+    /// What is known of others where each process moves its own points.
+    pub(super) reach: Option<OwnReach>,
 }
 
 impl<const D: usize> Lattice<D> {
@@ -66,190 +80,13 @@ impl<const D: usize> Lattice<D> {
         }
     }
 
-    /// Displacements by cell.
-    fn spread(point_of: &[u32], u: &[f64], to: &mut [Vec<f64>; D]) {
-        // one component after another: each is a plain stream
-        for (a, to) in to.iter_mut().enumerate() {
-            to.par_chunks_mut(COPY)
-                .zip(point_of.par_chunks(COPY))
-                .for_each(|(to, points)| {
-                    for (to, &p) in to.iter_mut().zip(points) {
-                        if p != NONE {
-                            *to = u[p as usize * D + a];
-                        }
-                    }
-                });
-        }
-    }
-
-    fn field<'a>(&'a self, u: &'a [Vec<f64>; D], pull: &'a [f64], limit: f64) -> Field<'a, D> {
-        let groups = &self.stencil.groups;
-        let starts = (
-            groups.iter().min().map_or(0, |c| *c as usize),
-            groups.iter().max().map_or(0, |c| *c as usize),
-        );
-        let deltas = || self.stencil.offsets.iter().map(|o| o.delta).chain([0]);
-        let offsets = (deltas().min().unwrap_or(0), deltas().max().unwrap_or(0));
-        // what a law does without is never read, but any array will do
-        let source =
-            |x: &'a [f64]| Source::new(if x.is_empty() { &u[0] } else { x }, starts, offsets);
-        Field {
-            offsets: &self.stencil.offsets,
-            u: std::array::from_fn(|a| source(&u[a])),
-            volume: source(&self.volume),
-            deviatoric: source(self.solid.as_ref().map_or(&[], |s| &s.deviatoric)),
-            pull: source(pull),
-            limit,
-            no_fail: &self.no_fail,
-        }
-    }
-
-    /// One sweep over all groups with bits as they stand.
-    fn sweep<const EXACT: bool, const JOB: u8>(
-        &self,
-        field: &Field<'_, D>,
-        flags: &mut [u8],
-        sums: &mut [[f64; LANES]],
-    ) {
-        let stencil = self.stencil.offsets.len().max(1);
-        let vectors = if JOB == job::MOMENTS { 2 } else { D };
-        self.stencil
-            .groups
-            .par_chunks(TASK)
-            .zip(self.stencil.intact.par_chunks(TASK * stencil))
-            .zip(flags.par_chunks_mut(TASK))
-            .zip(sums.par_chunks_mut(TASK * vectors))
-            .for_each(|(((groups, bits), flags), sums)| {
-                dispatch(Task::<D, EXACT, JOB> {
-                    field,
-                    first: 0,
-                    groups,
-                    bits: Bits::Held(bits),
-                    flags,
-                    sums,
-                });
-            });
-    }
-
-    /// One sweep that may break bonds; returns which.
-    fn breaking_sweep<const EXACT: bool, const JOB: u8>(
-        &self,
-        field: &Field<'_, D>,
-        intact: &mut [u8],
-        flags: &mut [u8],
-        sums: &mut [[f64; LANES]],
-    ) -> Vec<Broken> {
-        let stencil = self.stencil.offsets.len().max(1);
-        let vectors = if JOB == job::MOMENTS { 2 } else { D };
-        self.stencil
-            .groups
-            .par_chunks(TASK)
-            .zip(intact.par_chunks_mut(TASK * stencil))
-            .zip(flags.par_chunks_mut(TASK))
-            .zip(sums.par_chunks_mut(TASK * vectors))
-            .enumerate()
-            .map(|(task, (((groups, bits), flags), sums))| {
-                dispatch(Task::<D, EXACT, JOB> {
-                    field,
-                    first: task * TASK,
-                    groups,
-                    bits: Bits::Breaking(bits),
-                    flags,
-                    sums,
-                })
-            })
-            // in the order of the tasks; lists without an entry take no memory
-            .reduce(Vec::new, |mut all, more| {
-                all.extend(more);
-                all
-            })
-    }
-
-    /// What the dilatations of a sweep make of `pull`.
-    fn pull_from(&self, solid: &Solid, sums: &[[f64; LANES]], pull: &mut [f64]) {
-        pull.par_chunks_mut(LANES)
-            .with_min_len(COPY / LANES)
-            .zip(&solid.group_of)
-            .filter(|(_, g)| **g != NONE)
-            .for_each(|(pull, &g)| {
-                let g = g as usize;
-                for lane in 0..LANES {
-                    let theta = solid.dilatation[g][lane] * sums[2 * g][lane];
-                    pull[lane] = solid.volumetric[g][lane] * theta;
-                }
-            });
-    }
-
-    /// Forces by point.
-    fn collect(&self, sums: &[[f64; LANES]], force: &mut [f64]) {
-        force
-            .par_chunks_mut(COPY * D)
-            .enumerate()
-            .for_each(|(chunk, force)| {
-                for (k, force) in force.chunks_exact_mut(D).enumerate() {
-                    let p = chunk * COPY + k;
-                    let scale = self.scale.get(p).copied().unwrap_or(self.unit);
-                    let place = self.place[p] as usize;
-                    for a in 0..D {
-                        force[a] = if scale == 0.0 || place == NONE as usize {
-                            0.0
-                        } else {
-                            -scale * sums[place / LANES * D + a][place % LANES]
-                        };
-                    }
-                }
-            });
-    }
-
-    fn pass<const EXACT: bool>(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        breakage: FailureUpdate,
-    ) -> u64 {
-        let mut field_u = std::mem::replace(&mut self.u, std::array::from_fn(|_| Vec::new()));
-        Self::spread(&self.stencil.point_of, u, &mut field_u);
-        let mut flags = std::mem::take(&mut self.flags);
-        let mut sums = std::mem::take(&mut self.sums);
-        let mut intact = std::mem::take(&mut self.stencil.intact);
-        let mut pull = self
-            .solid
-            .as_mut()
-            .map_or(Vec::new(), |s| std::mem::take(&mut s.pull));
-        let may_break = breakage == FailureUpdate::Update && self.limit < f64::INFINITY;
-        let limit = if may_break { self.limit } else { f64::INFINITY };
-        self.broken = {
-            let field = self.field(&field_u, &[], limit);
-            let (i, f, s) = (&mut intact, &mut flags, &mut sums);
-            match self.solid {
-                None => self.breaking_sweep::<EXACT, { job::PAIR }>(&field, i, f, s),
-                Some(_) => self.breaking_sweep::<EXACT, { job::MOMENTS }>(&field, i, f, s),
-            }
-        };
-        self.stencil.intact = intact;
-        if let Some(solid) = &self.solid {
-            self.pull_from(solid, &sums, &mut pull);
-            let field = self.field(&field_u, &pull, f64::INFINITY);
-            self.sweep::<EXACT, { job::SOLID }>(&field, &mut flags, &mut sums);
-        }
-        self.collect(&sums, force);
-        self.u = field_u;
-        self.flags = flags;
-        self.sums = sums;
-        if let Some(solid) = &mut self.solid {
-            solid.pull = pull;
-        }
-        let lanes = self.broken.iter().map(|b| u64::from(b.lanes.count_ones()));
-        lanes.sum()
-    }
-
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
         let mut field_u = std::array::from_fn(|_| vec![0.0; self.stencil.point_of.len()]);
-        Self::spread(&self.stencil.point_of, u, &mut field_u);
+        Self::spread(&self.stencil.point_of, None, u, &mut field_u);
         let mut flags: Vec<u8> = self.flags.iter().map(|f| f & !(IDLE | FOREIGN)).collect();
         let mut sums = vec![[0.0; LANES]; self.stencil.groups.len() * 2];
         let field = self.field(&field_u, &[], f64::INFINITY);
-        self.sweep::<EXACT, { job::MOMENTS }>(&field, &mut flags, &mut sums);
+        self.sweep::<EXACT, { job::MOMENTS }>(&field, IDLE, &mut flags, &mut sums);
         let mut energy = 0.0;
         for (p, &place) in self.place.iter().enumerate() {
             let volume = self.scale.get(p).copied().unwrap_or(self.unit);
@@ -327,29 +164,29 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         breakage: FailureUpdate,
     ) -> u64 {
         match self.kinematics {
-            Kinematics::Exact => self.pass::<true>(u, force, breakage),
-            Kinematics::Linear => self.pass::<false>(u, force, breakage),
+            Kinematics::Exact => self.pass::<true>(u, force, breakage, None),
+            Kinematics::Linear => self.pass::<false>(u, force, breakage, None),
         }
     }
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         let mut field_x = std::array::from_fn(|_| vec![0.0; self.stencil.point_of.len()]);
-        Self::spread(&self.stencil.point_of, x, &mut field_x);
+        Self::spread(&self.stencil.point_of, None, x, &mut field_x);
         // linear bonds need no care
         let mut flags: Vec<u8> = self.flags.iter().map(|f| f & !CARE).collect();
         let mut sums = vec![[0.0; LANES]; self.sums.len()];
         match &self.solid {
             None => {
                 let field = self.field(&field_x, &[], f64::INFINITY);
-                self.sweep::<false, { job::PAIR }>(&field, &mut flags, &mut sums);
+                self.sweep::<false, { job::PAIR }>(&field, FOREIGN, &mut flags, &mut sums);
             }
             Some(solid) => {
                 let field = self.field(&field_x, &[], f64::INFINITY);
-                self.sweep::<false, { job::MOMENTS }>(&field, &mut flags, &mut sums);
+                self.sweep::<false, { job::MOMENTS }>(&field, IDLE, &mut flags, &mut sums);
                 let mut pull = vec![0.0; self.stencil.point_of.len()];
-                self.pull_from(solid, &sums, &mut pull);
+                self.pull_from(solid, &flags, &sums, &mut pull);
                 let field = self.field(&field_x, &pull, f64::INFINITY);
-                self.sweep::<false, { job::SOLID }>(&field, &mut flags, &mut sums);
+                self.sweep::<false, { job::SOLID }>(&field, FOREIGN, &mut flags, &mut sums);
             }
         }
         self.collect(&sums, y);
@@ -499,10 +336,10 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         .collect()
     }
 
-    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+    fn add_lost_energy(&self, at: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum) {
         match self.kinematics {
-            Kinematics::Exact => self.lost::<true>(at),
-            Kinematics::Linear => self.lost::<false>(at),
+            Kinematics::Exact => self.lost::<true>(at, lost),
+            Kinematics::Linear => self.lost::<false>(at, lost),
         }
     }
 

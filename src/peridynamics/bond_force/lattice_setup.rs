@@ -224,6 +224,7 @@ impl<const D: usize> Lattice<D> {
             stencil,
             broken: Vec::new(),
             own: Vec::new(),
+            reach: None,
         };
         lattice.mark_full();
         Ok(lattice)

@@ -29,6 +29,10 @@ pub(super) const CARE: u8 = 4;
 pub(super) const IDLE: u8 = 8;
 /// Forces of the group are computed by others.
 pub(super) const FOREIGN: u8 = 16;
+/// Others wait for forces of the group.
+pub(super) const EARLY: u8 = 32;
+/// Nobody does.
+pub(super) const LATE: u8 = 64;
 
 /// What all tasks of a sweep read.
 #[derive(Clone, Copy)]
@@ -47,11 +51,6 @@ pub(super) struct Field<'a, const D: usize> {
     pub no_fail: &'a [bool],
 }
 
-/// The flag of groups that a sweep leaves out.
-const fn skipped(of: u8) -> u8 {
-    if of == job::MOMENTS { IDLE } else { FOREIGN }
-}
-
 /// Bonds of one group along one offset that a sweep has broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Broken {
@@ -66,6 +65,8 @@ pub(super) struct Task<'a, 'f, const D: usize, const EXACT: bool, const JOB: u8>
     pub field: &'a Field<'f, D>,
     /// Number of the first group.
     pub first: usize,
+    /// Flags of groups that are left out.
+    pub skip: u8,
     /// First cell of each group.
     pub groups: &'a [u32],
     /// One byte per group and offset.
@@ -303,6 +304,7 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
         let Task {
             field,
             first,
+            skip,
             groups,
             mut bits,
             flags,
@@ -311,11 +313,10 @@ impl<const D: usize, const EXACT: bool, const JOB: u8> Work for Task<'_, '_, D, 
         let stencil = field.offsets.len();
         let vectors = if JOB == job::MOMENTS { 2 } else { D };
         let range = if EXACT { SERIES_RANGE } else { f64::INFINITY };
-        let high = l.splat(range.min(field.limit));
-        let low = l.splat(-range);
+        let (high, low) = (l.splat(range.min(field.limit)), l.splat(-range));
         let mut broken = Vec::new();
         for (g, cell) in groups.iter().map(|cell| *cell as usize).enumerate() {
-            if flags[g] & skipped(JOB) != 0 {
+            if flags[g] & skip != 0 {
                 continue;
             }
             let span = g * stencil..(g + 1) * stencil;

@@ -10,7 +10,7 @@ use super::{
     list_simd::{self, Sum},
     stretch::psi,
 };
-use crate::system::{FailureUpdate, Interval};
+use crate::system::{ExactSum, FailureUpdate, Interval};
 
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
@@ -492,10 +492,10 @@ impl<const D: usize> BondPass<D> for List<D> {
             .collect()
     }
 
-    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+    fn add_lost_energy(&self, at: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum) {
         match self.kinematics {
-            Kinematics::Exact => self.lost::<true>(at),
-            Kinematics::Linear => self.lost::<false>(at),
+            Kinematics::Exact => self.lost::<true>(at, lost),
+            Kinematics::Linear => self.lost::<false>(at, lost),
         }
     }
 

@@ -15,6 +15,7 @@
 //! | `list.rs`, `list_simd.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `compressed_list.rs` | neighbours and weights of a list in few bytes |
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
+//! | `lattice_pass.rs` | its sweeps, and forces by point |
 //! | `lattice_setup.rs` | how that one is made |
 //! | `own_points.rs` | points shared out among several passes |
 //! | `shared_rows.rs` | families that are spread over processes |
@@ -44,6 +45,7 @@ mod generic_tangent;
 mod generic_tests;
 mod kinematics;
 mod lattice;
+mod lattice_pass;
 mod lattice_setup;
 // vector instructions: the other modules of the crate have no unsafe code
 #[allow(unsafe_code)]
@@ -79,7 +81,7 @@ pub(crate) use carried_deformation::{conjugate, felt};
 pub(crate) use list::{extension, ratio, stretched};
 
 use crate::dimension;
-use crate::system::{FailureUpdate, Interval};
+use crate::system::{ExactSum, FailureUpdate, Interval};
 use crate::tensor::Tensor;
 
 /// One sweep over the bonds of a cloud.
@@ -138,9 +140,16 @@ pub trait BondPass<const D: usize>: Send + Sync {
         0.0
     }
 
-    /// What the points with rows would store less at the displacement `at` of each point, for the bonds that the last pass broke:
+    /// Adds to `lost`, point by point, what the points with rows would store less at the displacement `at` of each point, for the bonds that the last pass broke:
     /// their energy before less that after, all of these bonds removed at once \[J\]. Of a state-based law that is the change of dilatations too.
-    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64;
+    fn add_lost_energy(&self, at: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum);
+
+    /// What [`BondPass::add_lost_energy`] adds up to \[J\].
+    fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
+        let mut lost = ExactSum::default();
+        self.add_lost_energy(at, &mut lost);
+        lost.value()
+    }
 
     /// Whether a bond of the reference families joins points `i` and `j`, both with a family, and stands; contact leaves such pairs to their bond.
     fn bonded(&self, i: usize, j: usize) -> bool;
@@ -171,6 +180,32 @@ pub trait OwnPoints {
 
     /// Breaks the bonds that all passes broke at their own points, this one's included; from now on they are what the last pass broke. Returns how many.
     fn take_broken(&mut self, words: &[u64]) -> u64;
+
+    /// Goes on with the displacements of some points alone: own ones and all that own forces take theirs from. Each pass then breaks bonds of own points only.
+    fn reach_only(&mut self, reach: &Reach<'_>);
+
+    /// Overwrites the forces of own points, and calls `told` with them as soon as those are there that others wait for. Returns how many bonds of own points broke.
+    fn own_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        breakage: FailureUpdate,
+        told: Told<'_>,
+    ) -> u64;
+}
+
+/// What is done once the forces are there that others wait for.
+pub type Told<'a> = &'a mut dyn FnMut(&[f64]);
+
+/// Points of a process among those of a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach<'a> {
+    /// Whether each point is its own.
+    pub own: &'a [bool],
+    /// Whether the displacement of each is known.
+    pub known: &'a [bool],
+    /// Own points whose forces others wait for.
+    pub sent: &'a [u32],
 }
 
 /// What force states tell of a body.

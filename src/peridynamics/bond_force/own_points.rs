@@ -3,12 +3,13 @@
 //! The sums of a point are the same whoever computes them. A state-based law takes the dilatations of the neighbours of own points too, and bonds of these break
 //! here as they do where they are owned, since both ends and all who look at a bond see the same numbers.
 
-use super::OwnPoints;
 use super::bond_list::List;
-use super::lattice::Lattice;
-use super::lattice_simd::{Broken, FOREIGN, FULL, IDLE};
+use super::lattice::{COPY, Lattice, OwnReach};
+use super::lattice_simd::{Broken, EARLY, FOREIGN, FULL, IDLE, LATE};
 use super::simd::LANES;
 use super::stencil::NONE;
+use super::{BondPass, OwnPoints, Reach, Told};
+use crate::system::{FailureUpdate, Interval, Segments};
 
 /// What a list pass computes of a point.
 pub(super) mod part {
@@ -16,6 +17,41 @@ pub(super) mod part {
     pub const SEEN: u8 = 1;
     /// Its force too.
     pub const OWN: u8 = 2;
+}
+
+impl<const D: usize> Lattice<D> {
+    /// Own lanes of each group; of a state-based law also those of neighbours, whose dilatations own forces take.
+    fn lanes_seen(&self) -> Vec<u8> {
+        let mut seen = self.own.clone();
+        let Some(solid) = &self.solid else {
+            return seen;
+        };
+        for (g, &own) in self.own.iter().enumerate() {
+            for lane in (0..LANES).filter(|lane| own >> lane & 1 == 1) {
+                self.each(&self.stencil.reference, g, lane, |_, there| {
+                    let group = solid.group_of[there / LANES];
+                    if group != NONE {
+                        seen[group as usize] |= 1 << (there % LANES);
+                    }
+                });
+            }
+        }
+        seen
+    }
+
+    /// Where processes move their own points: mends what displacements that are not known broke, and lists breaks of own points only.
+    pub(super) fn forget_breaks_of_others(&mut self) {
+        let Some(reach) = &self.reach else {
+            return;
+        };
+        let stencil = self.stencil.offsets.len();
+        for b in &mut self.broken {
+            let (group, offset) = (b.group as usize, b.offset as usize);
+            self.stencil.intact[group * stencil + offset] |= b.lanes & !reach.seen[group];
+            b.lanes &= self.own[group];
+        }
+        self.broken.retain(|b| b.lanes != 0);
+    }
 }
 
 impl<const D: usize> OwnPoints for Lattice<D> {
@@ -80,6 +116,41 @@ impl<const D: usize> OwnPoints for Lattice<D> {
         let lanes = self.broken.iter().map(|b| u64::from(b.lanes.count_ones()));
         lanes.sum()
     }
+
+    fn reach_only(&mut self, reach: &Reach<'_>) {
+        self.compute_only(reach.own);
+        let mut is_early = vec![false; self.flags.len()];
+        for &p in reach.sent {
+            let place = self.place[p as usize];
+            if place != NONE {
+                is_early[place as usize / LANES] = true;
+            }
+        }
+        for (flags, is_early) in self.flags.iter_mut().zip(is_early) {
+            *flags &= !(EARLY | LATE);
+            *flags |= if is_early { EARLY } else { LATE };
+        }
+        let point_of = self.stencil.point_of.iter();
+        let cells: Vec<bool> = point_of
+            .map(|&p| p != NONE && reach.known[p as usize])
+            .collect();
+        self.reach = Some(OwnReach {
+            own: Segments::of(reach.own, COPY),
+            cells: Segments::of(&cells, COPY),
+            seen: self.lanes_seen(),
+            sent: reach.sent.to_vec(),
+        });
+    }
+
+    fn own_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        breakage: FailureUpdate,
+        told: Told<'_>,
+    ) -> u64 {
+        self.pass_at_own(u, force, breakage, told)
+    }
 }
 
 impl<const D: usize> OwnPoints for List<D> {
@@ -113,6 +184,25 @@ impl<const D: usize> OwnPoints for List<D> {
             self.intact[self.bytes[i] + k / 8] &= !(1 << (k % 8));
             self.last.push((i as u32, self.offsets[i] + k));
         }
+        self.last.len() as u64
+    }
+
+    fn reach_only(&mut self, reach: &Reach<'_>) {
+        self.compute_only(reach.own);
+    }
+
+    fn own_force_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        breakage: FailureUpdate,
+        told: Told<'_>,
+    ) -> u64 {
+        // points whose bonds are looked at see known displacements only
+        self.force_into(u, force, Interval::AT_ONCE, breakage);
+        let parts = &self.parts;
+        self.last.retain(|(i, _)| parts[*i as usize] == part::OWN);
+        told(force);
         self.last.len() as u64
     }
 }

@@ -28,7 +28,7 @@ use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams, State};
-use crate::system::SemiDiscrete;
+use crate::system::{SemiDiscrete, Traffic};
 
 /// The sizes of a model that moves.
 pub fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Sizes {
@@ -251,7 +251,8 @@ fn take_segment<'r, const D: usize>(
         None => Ended::Finished,
     };
     progress.finish();
-    let summary = record.summary(observer, &motion, ended)?;
+    let processes = motion.traffic().unwrap_or_default();
+    let summary = record.summary(observer, &motion, ended, processes)?;
     Ok(RunSegment::Ended(Box::new(summary)))
 }
 
@@ -302,6 +303,7 @@ impl SegmentRecord {
         observer: StepObserver<'_, '_, D>,
         motion: &Explicit<'_>,
         ended: Ended,
+        processes: Vec<Traffic>,
     ) -> Result<RunSummary, RunError> {
         let Segment {
             model,
@@ -329,7 +331,10 @@ impl SegmentRecord {
         let files = observer.recorder.files();
         let reactions = observer.recorder.reactions();
         let sections = observer.recorder.section_forces();
-        let motion = motion_summary(observer, motion, ended, energy_gain, self.taken)?;
+        let motion = MotionSummary {
+            processes,
+            ..motion_summary(observer, motion, ended, energy_gain, self.taken)?
+        };
         Ok(RunSummary {
             scene: self.title,
             dimension: D,
@@ -400,6 +405,7 @@ fn motion_summary<const D: usize>(
         },
         nonlocal_share: [shares[0], shares[1], share(model)],
         switches,
+        processes: Vec::new(),
     })
 }
 

@@ -63,6 +63,11 @@ impl<'m, const D: usize> Guard<'m, D> {
         }
     }
 
+    /// Whether anything may be looked at after a step.
+    pub fn looks_after(&self, step: u64) -> bool {
+        step.is_multiple_of(self.every)
+    }
+
     /// Whether energies are wanted after a step, be there a row of the history or not.
     pub fn wants_energies(&self, step: u64) -> bool {
         self.balance != Balance::Proved && step.is_multiple_of(self.every)

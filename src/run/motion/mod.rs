@@ -51,7 +51,7 @@ mod way;
 pub mod writer;
 pub(crate) mod zone_monitor;
 
-pub(crate) use sharing::may_share;
+pub(crate) use sharing::{may_share, moves_own_sites};
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -480,6 +480,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),
             switches: Vec::new(),
             nonlocal_share: [0.0; 3],
+            processes: Vec::new(),
         };
         let warnings = without_response(system, &state.u).into_iter();
         let horizon = model

@@ -3,6 +3,8 @@
 use super::RunOptions;
 use crate::coupling::Problem;
 use crate::run::setup::RunSettings;
+use crate::scene::conditions::Prescribed;
+use crate::scene::solve::Explicit;
 use crate::scene::spec::PrecisionSpec;
 use crate::system::all_say;
 
@@ -20,6 +22,14 @@ pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings
         && rest.stresses.at(0.0).is_none()
         && rest.output.lines.is_empty()
         && !rest.output.energy_density
+}
+
+/// Whether a process then moves its own sites and their ghosts alone, and not all: no sub-steps, no springs, nothing that strikes.
+pub(crate) fn moves_own_sites<const D: usize>(spec: &Explicit, rest: &RunSettings<D>) -> bool {
+    let mut conditions = rest.conditions.iter();
+    spec.sub_steps.is_none()
+        && rest.impactors.is_empty()
+        && conditions.all(|c| !matches!(c.prescribed, Prescribed::Spring(_)))
 }
 
 /// Collective: whether families are spread over the processes of a run; not where the scene or one of the processes needs all of them.

@@ -292,7 +292,10 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     }
 
     /// Watches and writes a step; says whether the next is taken.
-    fn observe(&mut self, motion: &Explicit<'_>) -> ControlFlow<()> {
+    fn observe(&mut self, motion: &mut Explicit<'_>) -> ControlFlow<()> {
+        if self.asks_for_all(motion.state().step) {
+            motion.gather();
+        }
         let moment = moment(motion, self.segment.is_linear);
         if let Some(impact) = &mut self.recorder.impact {
             impact.watch(moment.state, moment.supports.0);
@@ -331,6 +334,18 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             (None, None) => return ControlFlow::Continue(()),
         };
         ControlFlow::Break(())
+    }
+
+    /// Whether something asks for all sites after a step, be it on another process: a row, a file, a checkpoint, a look at energies or rotations.
+    fn asks_for_all(&self, step: u64) -> bool {
+        let Segment { spec, pace, .. } = *self.segment;
+        let (before, after) = (pace.time(step - 1), pace.time(step));
+        let is_due = |interval| is_due(before, after, interval);
+        step == pace.steps
+            || is_due(spec.history_interval)
+            || is_due(spec.output_interval)
+            || self.guard.looks_after(step)
+            || self.recorder.is_checkpoint_step(step)
     }
 
     /// Looks for damage at the edge of the nonlocal zone where bonds have broken, or may be damaged; says whether it has just come there.

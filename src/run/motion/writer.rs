@@ -487,6 +487,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(())
     }
 
+    /// Whether a checkpoint is due after `step` steps on the process that writes it.
+    pub fn is_checkpoint_step(&self, step: u64) -> bool {
+        matches!(self.options.checkpoint_every, Some(Pace::Steps(n)) if step.is_multiple_of(n))
+    }
+
     /// Whether a checkpoint is due after `step` steps.
     pub fn is_checkpoint_due(&self, step: u64) -> bool {
         match self.options.checkpoint_every {

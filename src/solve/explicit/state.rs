@@ -1,6 +1,6 @@
 //! What an explicit motion is driven by, what it carries from step to step, and why it stops.
 
-use crate::system::SemiDiscrete;
+use crate::system::{Halfway, SemiDiscrete};
 
 /// What drives a motion: external forces and prescribed displacements, as functions of time.
 ///
@@ -72,6 +72,15 @@ impl State {
             u,
             v,
             ..State::default()
+        }
+    }
+
+    /// The displacement at which bonds are accounted for that the last force broke, within steps of a given size; velocities are those of the half step.
+    pub(super) fn halfway(&self, step: f64) -> Halfway<'_> {
+        Halfway {
+            u: &self.u,
+            v: &self.v,
+            back: 0.5 * step,
         }
     }
 

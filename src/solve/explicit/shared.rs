@@ -1,0 +1,161 @@
+//! Steps in which each process moves its own sites and ghosts, and what gathers all sites where they are asked for.
+
+use super::sums::{Sums, total};
+use super::{Energies, Explicit, Reading, SITES};
+use crate::system::{ExactSum, FailureUpdate, LostToBreaks, Segments, Traffic};
+
+/// What belongs to steps that processes share.
+pub(super) struct Shared {
+    /// Sites that are moved here, of which sums are taken.
+    own: Segments,
+    /// Velocity half a step ago, of sites that are moved here; empty before the first step.
+    half: Vec<f64>,
+    /// Whether the numbers of all sites are those of the present step.
+    is_whole: bool,
+}
+
+/// The sites of which sums are taken: all that are moved, unless some are ghosts.
+pub(super) fn own<'s>(shared: Option<&'s Shared>, moved: &'s Segments) -> &'s Segments {
+    shared.map_or(moved, |shared| &shared.own)
+}
+
+/// What a force has done to bonds.
+#[derive(Default)]
+pub(super) struct Outcome {
+    /// Bonds that broke.
+    pub broken: u64,
+    /// What they cost, where that is still to be added over processes.
+    pub lost: LostToBreaks,
+}
+
+impl Explicit<'_> {
+    /// Begins to share steps with other processes, where the system can.
+    pub(super) fn share(&mut self) {
+        let Some(system) = self.system.shared_steps() else {
+            return;
+        };
+        system.begin();
+        self.moved = Segments::of(&system.known(), SITES);
+        self.shared = Some(Shared {
+            own: Segments::of(&system.own(), SITES),
+            half: Vec::new(),
+            is_whole: true,
+        });
+    }
+
+    /// The force on own sites and ghosts.
+    pub(super) fn respond_at_own(&mut self) -> Outcome {
+        let mut outcome = Outcome::default();
+        let Some(system) = self.system.shared_steps() else {
+            return outcome;
+        };
+        let update = FailureUpdate::Update;
+        outcome.broken = system.force_into(&self.state.u, &mut self.force, update);
+        if outcome.broken > 0 {
+            outcome.lost = system.lost(&self.state.halfway(self.params.step));
+        }
+        if let Some(shared) = &mut self.shared {
+            shared.is_whole = false;
+        }
+        outcome
+    }
+
+    /// Keeps the velocity of the half step, from which that of all sites can be found later.
+    pub(super) fn keep_half(&mut self) {
+        let Some(shared) = &mut self.shared else {
+            return;
+        };
+        let (v, d) = (&self.state.v, self.block);
+        shared.half.resize(v.len(), 0.0);
+        for (chunk, half) in shared.half.chunks_mut(SITES * d).enumerate() {
+            let v = &v[chunk * SITES * d..];
+            for sites in shared.own.of_chunk(chunk) {
+                let dofs = sites.start * d..sites.end * d;
+                half[dofs.clone()].copy_from_slice(&v[dofs]);
+            }
+        }
+    }
+
+    /// Collective: the sums of a step over all processes. Those of energies differ from those of one process in their last digits, and tell of trouble only.
+    pub(super) fn add_over_processes(&mut self, sums: [&mut Sums; 2], outcome: &mut Outcome) {
+        let Some(system) = self.system.shared_steps() else {
+            return;
+        };
+        if self.shared.is_none() {
+            return;
+        }
+        let [before, after] = sums;
+        let single = |x: f64| {
+            let mut sum = ExactSum::default();
+            sum.add(x);
+            sum
+        };
+        let mut energies = [after.kinetic, after.kinetic_half, after.pair].map(single);
+        let mut words = vec![outcome.broken as i64];
+        let lost = &mut outcome.lost;
+        let powers = [&mut before.power, &mut after.power];
+        let powers = powers
+            .into_iter()
+            .flat_map(|p| [&mut p.sum, &mut p.absolute]);
+        let spent = [&mut lost.energy, &mut lost.area];
+        let mut all: Vec<&mut ExactSum> = powers.chain(&mut energies).chain(spent).collect();
+        all.iter_mut().for_each(|sum| sum.extend(&mut words));
+        system.add_into(&mut words);
+        let parts = words[1..].chunks_exact(ExactSum::WORDS);
+        for (sum, words) in all.into_iter().zip(parts) {
+            *sum = ExactSum::of_words(words);
+        }
+        outcome.broken = words[0] as u64;
+        let [kinetic, kinetic_half, pair] = energies.map(|sum| sum.value());
+        (after.kinetic, after.kinetic_half, after.pair) = (kinetic, kinetic_half, pair);
+        if outcome.broken > 0 {
+            system.spend(&outcome.lost);
+        }
+    }
+
+    /// Gathers all sites where the energies of a step are not those of a motion, so that the error can name the site.
+    pub(super) fn gather_for_trouble(&mut self) {
+        if self.shared.is_some() && self.check_numbers().is_err() {
+            self.gather();
+        }
+    }
+
+    /// Collective where processes move their own sites alone: the state, forces, energies and bonds of all sites become known to this one, with the bits of one process.
+    ///
+    /// Displacements, half-step velocities and forces come from their processes; the last half step is then taken for all sites once more.
+    pub fn gather(&mut self) {
+        let Some(shared) = self.shared.as_mut().filter(|shared| !shared.is_whole) else {
+            return;
+        };
+        let Some(system) = self.system.shared_steps() else {
+            return;
+        };
+        shared.is_whole = true;
+        system.learn_breaks();
+        system.gather(&mut self.state.u);
+        system.gather(&mut shared.half);
+        system.gather(&mut self.force);
+        self.state.v.copy_from_slice(&shared.half);
+        let all = Segments::all(self.inverse_mass.len(), SITES);
+        let moved = std::mem::replace(&mut self.moved, all.clone());
+        let own = std::mem::replace(&mut shared.own, all);
+        self.accelerate_prescribed();
+        self.add_reactions(Reading::Kept);
+        self.accelerate_and_kick();
+        self.settle_prescribed();
+        let Energies {
+            work, work_half, ..
+        } = self.energies;
+        self.energies = Energies::of(&total(&self.sums), work, work_half);
+        self.moved = moved;
+        if let Some(shared) = &mut self.shared {
+            shared.own = own;
+        }
+    }
+
+    /// Collective: what each process exchanged for its steps; none where each moves all sites.
+    pub fn traffic(&mut self) -> Option<Vec<Traffic>> {
+        self.shared.as_ref()?;
+        Some(self.system.shared_steps()?.traffic())
+    }
+}

@@ -1,0 +1,50 @@
+//! Steps of which each process takes those of its own sites, and of their ghosts: what a driver asks of a system that is spread over processes.
+//!
+//! A process moves its own sites and its ghosts by forces that are its own or come from their processes, so that it never needs another number of a ghost.
+//! What asks for all sites, as tables and files do, gathers them before.
+
+use super::{ExactSum, FailureUpdate, Halfway, Traffic};
+
+/// What bonds cost that broke in one step, at own sites: sums that processes add.
+#[derive(Clone, Debug, Default)]
+pub struct LostToBreaks {
+    /// See [`super::Dissipation::energy`].
+    pub energy: ExactSum,
+    /// See [`super::Dissipation::area`].
+    pub area: ExactSum,
+}
+
+/// A system whose processes move their own sites and ghosts.
+///
+/// Vectors have the numbers of all sites; those of sites that are neither own nor ghosts are anything.
+pub trait SharedSteps {
+    /// Collective: begins to share steps, where all processes have the numbers of all sites.
+    fn begin(&mut self);
+
+    /// Whether each site is this process's own.
+    fn own(&self) -> Vec<bool>;
+
+    /// Whether each site is its own or a ghost.
+    fn known(&self) -> Vec<bool>;
+
+    /// Collective: overwrites the forces of own sites and ghosts, and returns how many bonds of own sites broke.
+    fn force_into(&mut self, u: &[f64], force: &mut [f64], update: FailureUpdate) -> u64;
+
+    /// What the bonds of own sites cost that broke in the last force.
+    fn lost(&self, at: &Halfway<'_>) -> LostToBreaks;
+
+    /// Adds what all processes lost to the account of [`super::SemiDiscrete::dissipation`].
+    fn spend(&mut self, lost: &LostToBreaks);
+
+    /// Collective: overwrites each number with the sum of those of all processes.
+    fn add_into(&self, sums: &mut [i64]);
+
+    /// Collective: overwrites the numbers of all sites with those of their processes.
+    fn gather(&self, values: &mut [f64]);
+
+    /// Collective: breaks the bonds that other processes broke since they were told last.
+    fn learn_breaks(&mut self);
+
+    /// Collective: what each process exchanged.
+    fn traffic(&self) -> Vec<Traffic>;
+}
