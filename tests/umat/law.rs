@@ -88,7 +88,7 @@ fn ddsdde_is_the_tangent_where_it_is_asked_for() {
     let own = J2::<3>::new(lame().0, lame().1, YIELD, MODULUS);
     let scale = own.tangent().amax();
     let distance = |a: &Tensor4<3>, b: &Tensor4<3>| {
-        let mut off = a.clone();
+        let mut off = *a;
         off.add_scaled(-1.0, b);
         off.amax() / scale
     };
