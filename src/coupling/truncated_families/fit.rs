@@ -1,7 +1,7 @@
 //! The smallest change of weights that balances every uniform stress at the seam.
 
 use super::feet::Feet;
-use super::least_squares::{Columns, least_squares};
+use super::least_squares::{Columns, Metric, least_squares};
 use crate::assembly::Transfer;
 use crate::coupling::ModelError;
 use crate::fem;
@@ -92,8 +92,12 @@ const STALLED: (usize, f64) = (4, 0.9);
 const SMALLEST: f64 = 0.1;
 const LEAST: f64 = 0.01;
 
-/// Rows of conditions are made of one length, but for those that are shorter than this, over the damping.
+/// Conditions shorter than this, over the damping, give way to others.
 const SMALL_ROW: f64 = 0.5;
+
+/// Iterations of a step that the metric of an earlier step may take, and at most.
+const SLOW: usize = 20;
+const LONGEST: usize = 4000;
 
 /// What a condition may lack, over the damping.
 const ENOUGH: f64 = 1e-13;
@@ -189,12 +193,15 @@ impl Fit {
     fn factors(&self) -> Vec<f64> {
         let mut factors = vec![1.0; self.bonds.len() + self.volumes.len()];
         let all = vec![true; self.lacks.len()];
+        let mut metric = None;
         for _ in 0..DAMPED {
-            self.step(&all, (self.damping, ROUGH), &mut factors);
+            self.step((&all, &mut metric), (self.damping, ROUGH), &mut factors);
         }
+        metric = None;
         let (mut least, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..STRICT {
-            let lacks = self.step(&self.is_strict, (0.0, ROUGH), &mut factors);
+            let how = (&self.is_strict[..], &mut metric);
+            let lacks = self.step(how, (0.0, ROUGH), &mut factors);
             stalled = if lacks < STALLED.1 * least {
                 0
             } else {
@@ -208,8 +215,13 @@ impl Fit {
         factors
     }
 
-    /// A step of Newton's method for the rows that count; returns the largest of what they lacked.
-    fn step(&self, counts: &[bool], how: (f64, f64), factors: &mut [f64]) -> f64 {
+    /// A step of Newton's method for the rows that count; returns the largest of what they lacked. The metric of one step serves the next, as long as it leads there.
+    fn step(
+        &self,
+        (counts, metric): (&[bool], &mut Option<Metric>),
+        how: (f64, f64),
+        factors: &mut [f64],
+    ) -> f64 {
         let mut lacks = self.lacks.clone();
         let minus: Vec<f64> = factors.iter().map(|f| 1.0 - f).collect();
         let changed = self.conditions.product(&minus, counts);
@@ -220,13 +232,17 @@ impl Fit {
         let root = |f: &f64| if *f > LEAST { f.sqrt() } else { 0.0 };
         let roots: Vec<f64> = factors.iter().map(root).collect();
         let smallest = SMALL_ROW * self.damping;
-        let changes = least_squares(
-            (&self.conditions, smallest),
-            &roots,
-            lacks.clone(),
-            counts,
-            how,
-        );
+        let new = || Metric::new(&self.conditions, &roots, counts, (how.0, smallest));
+        let solve = |metric: &Metric, most: usize| {
+            let system = (&self.conditions, metric);
+            least_squares(system, &roots, &lacks, counts, (how.0, how.1, most))
+        };
+        // the metric of weights that have changed much leads nowhere
+        let kept = metric.as_ref().map(|metric| solve(metric, SLOW));
+        let changes = match kept.filter(|(_, iterations)| *iterations < SLOW) {
+            Some((changes, _)) => changes,
+            None => solve(metric.insert(new()), LONGEST).0,
+        };
         for ((factor, root), change) in factors.iter_mut().zip(&roots).zip(&changes) {
             if *root > 0.0 {
                 *factor *= (1.0 + change / root).max(SMALLEST);

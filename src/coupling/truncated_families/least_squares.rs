@@ -1,5 +1,8 @@
-//! Least squares of a sparse matrix by conjugate gradients on the normal equations (CGLS, \[Bjorck1996\] section 7.4.1).
+//! Least squares of a sparse matrix by conjugate gradients on the normal equations (CGLS, \[Bjorck1996\] section 7.4.1), led by the factors of those of other scales.
 
+use faer::prelude::Solve;
+use faer::sparse::linalg::solvers::Llt;
+use faer::sparse::{SparseColMat, Triplet};
 use rayon::prelude::*;
 
 /// Columns of a sparse matrix, and once they are all there its rows.
@@ -80,69 +83,122 @@ impl Columns {
         columns.map(product).collect()
     }
 
-    /// One over the length of each row of `A S`, or over the smallest length if that is shorter.
-    fn row_weights(&self, scale: &[f64], counts: &[bool], smallest: f64) -> Vec<f64> {
-        self.of_each_row(counts, |row| {
-            let square = |(k, a): &(u32, f64)| (a * scale[*k as usize]).powi(2);
-            1.0 / row.iter().map(square).sum::<f64>().sqrt().max(smallest)
-        })
+    /// The lower half of `A S² Aᵀ`, of the rows that count, with `damping²` and a little more on its diagonal, of short rows a part of the square of the `smallest`.
+    fn normal(
+        &self,
+        scale: &[f64],
+        counts: &[bool],
+        (damping, smallest): (f64, f64),
+    ) -> Option<SparseColMat<usize, f64>> {
+        let row = |sums: &mut Vec<f64>, r: usize| {
+            let mut touched = vec![r];
+            let of = &self.by_rows[self.of_rows[r]..self.of_rows[r + 1]];
+            for &(k, a) in of.iter().filter(|_| counts[r]) {
+                let k = k as usize;
+                let a = a * scale[k] * scale[k];
+                for &(s, b) in &self.entries[self.offsets[k]..self.offsets[k + 1]] {
+                    let s = s as usize;
+                    if s <= r && counts[s] {
+                        if sums[s] == 0.0 {
+                            touched.push(s);
+                        }
+                        sums[s] += a * b;
+                    }
+                }
+            }
+            sums[r] += REGULAR * sums[r].max(smallest * smallest) + damping * damping;
+            touched.sort_unstable();
+            touched.dedup();
+            let entry = |s: usize| Triplet::new(r, s, std::mem::take(&mut sums[s]));
+            touched.into_iter().map(entry).collect::<Vec<_>>()
+        };
+        let rows = (0..self.rows).into_par_iter();
+        let rows = rows.map_init(|| vec![0.0; self.rows], row);
+        let entries: Vec<Vec<_>> = rows.collect();
+        SparseColMat::try_new_from_triplets(self.rows, self.rows, &entries.concat()).ok()
     }
 }
 
-/// Iterations at most.
-const LONGEST: usize = 4000;
+/// Added to the diagonal of the normal equations, over what is there: conditions that follow from each other leave them singular.
+const REGULAR: f64 = 1e-8;
 
-/// The least x that minimises `|W (A S x − b)|² + damping² |x|²` over the rows that count, of columns that are scaled by S; b is zero in other rows. It ends where the
-/// residual of the normal equations is `tolerance` of that at the start.
+/// The inverse of `A S² Aᵀ + damping²`, for the scales that it was made with: the metric in which residuals are measured.
+pub(super) struct Metric(Option<Llt<usize, f64>>);
+
+impl Metric {
+    /// Rows shorter than the `smallest` need not be met.
+    pub fn new(
+        a: &Columns,
+        scale: &[f64],
+        counts: &[bool],
+        (damping, smallest): (f64, f64),
+    ) -> Self {
+        let normal = a.normal(scale, counts, (damping, smallest));
+        Self(normal.and_then(|n| n.sp_cholesky(faer::Side::Lower).ok()))
+    }
+
+    /// The numbers themselves where there are no factors: then conjugate gradients take more iterations.
+    fn applied(&self, values: &[f64]) -> Vec<f64> {
+        let mut solution = values.to_vec();
+        if let Some(factors) = &self.0 {
+            let rows = solution.len();
+            let column = faer::MatMut::from_column_major_slice_mut(&mut solution, rows, 1);
+            factors.solve_in_place(column);
+        }
+        solution
+    }
+}
+
+/// The least x, y for which `A S x + damping y` is b in the rows that count, of columns that are scaled by S, or comes nearest to it in the metric; b is zero in other rows. Returns x, and how many
+/// iterations it took.
 ///
-/// Without damping the weights W make rows of one length, all but those shorter than the `smallest`, which converges sooner and leaves a solution of `A S x = b` what it is; with it they are one.
+/// With damping, x is also what minimises `|A S x − b|² + damping² |x|²`. It ends where the residual of the normal equations is `tolerance` of that at the start, or after the `most`
+/// iterations; with the metric of the same scales it takes one.
 pub(super) fn least_squares(
-    (a, smallest): (&Columns, f64),
+    (a, metric): (&Columns, &Metric),
     scale: &[f64],
-    b: Vec<f64>,
+    b: &[f64],
     counts: &[bool],
-    (damping, tolerance): (f64, f64),
-) -> Vec<f64> {
-    let weights = match damping > 0.0 {
-        true => vec![1.0; a.rows],
-        false => a.row_weights(scale, counts, smallest),
-    };
-    let weighted = |mut values: Vec<f64>| {
-        values.iter_mut().zip(&weights).for_each(|(v, w)| *v *= w);
-        values
-    };
-    let mut residual = weighted(b);
+    (damping, tolerance, most): (f64, f64, usize),
+) -> (Vec<f64>, usize) {
     let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-    let mut x = vec![0.0; scale.len()];
-    let mut gradient = a.transposed(scale, &weighted(residual.clone()));
-    let mut direction = gradient.clone();
-    let mut size = dot(&gradient, &gradient);
-    let enough = size * tolerance * tolerance;
-    for _ in 0..LONGEST {
-        if size <= enough {
-            break;
-        }
-        let scaled: Vec<f64> = direction.iter().zip(scale).map(|(d, s)| d * s).collect();
-        let image = weighted(a.product(&scaled, counts));
-        let curvature = dot(&image, &image) + damping * damping * dot(&direction, &direction);
-        let step = size / curvature;
-        x.iter_mut()
-            .zip(&direction)
-            .for_each(|(x, d)| *x += step * d);
-        residual
-            .iter_mut()
-            .zip(&image)
-            .for_each(|(r, i)| *r -= step * i);
-        gradient = a.transposed(scale, &weighted(residual.clone()));
+    // x, and y behind it where there is damping
+    let columns = scale.len();
+    let slope = |measured: &[f64]| {
+        let mut slope = a.transposed(scale, measured);
         if damping > 0.0 {
-            let damped = gradient.iter_mut().zip(&x);
-            damped.for_each(|(g, x)| *g -= damping * damping * x);
+            slope.extend(measured.iter().map(|m| damping * m));
         }
+        slope
+    };
+    let image_of = |direction: &[f64]| {
+        let (x, y) = direction.split_at(columns);
+        let scaled: Vec<f64> = x.iter().zip(scale).map(|(d, s)| d * s).collect();
+        let mut image = a.product(&scaled, counts);
+        image.iter_mut().zip(y).for_each(|(i, y)| *i += damping * y);
+        image
+    };
+    let mut measured = metric.applied(b);
+    let mut direction = slope(&measured);
+    let mut x = vec![0.0; columns];
+    let mut size = dot(&direction, &direction);
+    let enough = size * tolerance * tolerance;
+    let mut iterations = 0;
+    while size > enough && iterations < most {
+        iterations += 1;
+        let image = image_of(&direction);
+        let of_image = metric.applied(&image);
+        let step = size / dot(&image, &of_image);
+        let pairs = x.iter_mut().zip(&direction);
+        pairs.for_each(|(x, d)| *x += step * d);
+        let pairs = measured.iter_mut().zip(&of_image);
+        pairs.for_each(|(m, i)| *m -= step * i);
+        let gradient = slope(&measured);
         let next = dot(&gradient, &gradient);
         let share = next / size;
         let pairs = direction.iter_mut().zip(&gradient);
         pairs.for_each(|(d, g)| *d = g + share * *d);
         size = next;
     }
-    x
+    (x, iterations)
 }
