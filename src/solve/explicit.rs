@@ -20,7 +20,7 @@
 //! Vectors run over chunks of fixed size and sums are added in the order of the chunks; the work is an exact sum. The bits depend neither on the number of threads
 //! nor, where processes move their own sites alone (`shared.rs`), on that of processes.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use rayon::prelude::*;
 
@@ -59,8 +59,10 @@ pub struct Explicit<'a> {
     previous: Vec<f64>,
     next: Vec<f64>,
     sums: Vec<Sums>,
-    /// Sites that are moved here.
-    moved: Segments,
+    /// Sites that are moved here, and of which sums are taken.
+    own: Segments,
+    /// Sites of other processes that are moved here too.
+    ghosts: Segments,
     /// What belongs to steps that processes share; none where each moves all sites.
     shared: Option<shared::Shared>,
 }
@@ -129,7 +131,8 @@ impl<'a> Explicit<'a> {
             next: values,
             prescribed,
             sums: vec![Sums::default(); sites.div_ceil(SITES)],
-            moved: Segments::all(sites, SITES),
+            own: Segments::all(sites, SITES),
+            ghosts: Segments::none(sites, SITES),
             shared: None,
         };
         if starts {
@@ -307,7 +310,7 @@ impl<'a> Explicit<'a> {
     fn kick_and_drift(&mut self) {
         let (d, dt) = (self.block, self.params.step);
         let State { u, v, a, .. } = &mut self.state;
-        let (moved, own) = (&self.moved, shared::own(self.shared.as_ref(), &self.moved));
+        let (own, ghosts) = (&self.own, &self.ghosts);
         u.par_chunks_mut(SITES * d)
             .zip(v.par_chunks_mut(SITES * d))
             .zip(a.par_chunks(SITES * d))
@@ -316,20 +319,14 @@ impl<'a> Explicit<'a> {
             .enumerate()
             .for_each(|(chunk, ((((u, v), a), load), sums))| {
                 sums.power.clear();
-                for sites in moved.of_chunk(chunk) {
-                    let dofs = sites.start * d..sites.end * d;
-                    let moving = u[dofs.clone()].iter_mut().zip(&mut v[dofs.clone()]);
-                    for ((u, v), a) in moving.zip(&a[dofs]) {
-                        *v += 0.5 * dt * a;
-                        *u += dt * *v;
-                    }
+                let dofs = |sites: Range<usize>| sites.start * d..sites.end * d;
+                for dofs in ghosts.of_chunk(chunk).map(dofs) {
+                    drift(dt, &mut u[dofs.clone()], &mut v[dofs.clone()], &a[dofs]);
                 }
-                for sites in own.of_chunk(chunk) {
-                    let dofs = sites.start * d..sites.end * d;
-                    let loads = load[dofs.clone()].chunks_exact(d);
-                    for (f, v) in loads.zip(v[dofs].chunks_exact(d)) {
-                        sums.power.add(f, v);
-                    }
+                for dofs in own.of_chunk(chunk).map(dofs) {
+                    let (u, v) = (&mut u[dofs.clone()], &mut v[dofs.clone()]);
+                    drift(dt, u, v, &a[dofs.clone()]);
+                    sums.power.add(d, &load[dofs], v);
                 }
             });
     }
@@ -339,7 +336,7 @@ impl<'a> Explicit<'a> {
         let (d, dt) = (self.block, self.params.step);
         let State { u, v, a, .. } = &mut self.state;
         let mass = self.system.mass();
-        let (moved, own) = (&self.moved, shared::own(self.shared.as_ref(), &self.moved));
+        let (own, ghosts) = (&self.own, &self.ghosts);
         v.par_chunks_mut(SITES * d)
             .zip(a.par_chunks_mut(SITES * d))
             .zip(u.par_chunks(SITES * d))
@@ -351,29 +348,30 @@ impl<'a> Explicit<'a> {
             .enumerate()
             .for_each(
                 |(chunk, (((((((v, a), u), load), force), mass), inverse), sums))| {
-                    (sums.kinetic, sums.kinetic_half, sums.pair) = (0.0, 0.0, 0.0);
                     sums.power.clear();
+                    let (mut kinetic, mut kinetic_half, mut pair) = (0.0, 0.0, 0.0);
                     for sites in own.of_chunk(chunk) {
+                        let dofs = sites.start * d..sites.end * d;
+                        sums.power.add(d, &load[dofs.clone()], &v[dofs]);
                         for i in sites {
-                            let mut half = 0.0;
+                            let (mut half, mut full) = (0.0, 0.0);
                             for k in i * d..(i + 1) * d {
                                 half += v[k] * v[k];
-                                sums.pair += (u[k] - dt * v[k]) * force[k];
+                                pair += (u[k] - dt * v[k]) * force[k];
+                                a[k] = (load[k] - force[k]) * inverse[i];
+                                v[k] += 0.5 * dt * a[k];
+                                full += v[k] * v[k];
                             }
-                            let dofs = i * d..(i + 1) * d;
-                            sums.power.add(&load[dofs.clone()], &v[dofs]);
-                            sums.kinetic_half += mass[i] * half;
+                            kinetic_half += mass[i] * half;
+                            kinetic += mass[i] * full;
                         }
                     }
-                    for i in moved.of_chunk(chunk).flatten() {
+                    (sums.kinetic, sums.kinetic_half, sums.pair) = (kinetic, kinetic_half, pair);
+                    for i in ghosts.of_chunk(chunk).flatten() {
                         for k in i * d..(i + 1) * d {
                             a[k] = (load[k] - force[k]) * inverse[i];
                             v[k] += 0.5 * dt * a[k];
                         }
-                    }
-                    for i in own.of_chunk(chunk).flatten() {
-                        let v = &v[i * d..(i + 1) * d];
-                        sums.kinetic += mass[i] * v.iter().fold(0.0, |sum, v| sum + v * v);
                     }
                 },
             );
@@ -513,6 +511,15 @@ impl<'a> Explicit<'a> {
 enum Reading {
     Fresh,
     Kept,
+}
+
+/// Half a kick, and the drift of a step.
+#[inline]
+fn drift(dt: f64, u: &mut [f64], v: &mut [f64], a: &[f64]) {
+    for ((u, v), a) in u.iter_mut().zip(v).zip(a) {
+        *v += 0.5 * dt * a;
+        *u += dt * *v;
+    }
 }
 
 fn set(dofs: &[u32], values: &[f64], field: &mut [f64]) {

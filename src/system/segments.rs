@@ -34,6 +34,11 @@ impl Segments {
         Self::of(&vec![true; count], chunk)
     }
 
+    /// None of so many places.
+    pub fn none(count: usize, chunk: usize) -> Self {
+        Self::of(&vec![false; count], chunk)
+    }
+
     /// The ranges of a chunk, ascending, from its start.
     pub fn of_chunk(&self, chunk: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let ranges = self.starts[chunk] as usize..self.starts[chunk + 1] as usize;
@@ -57,6 +62,7 @@ mod tests {
             }
         }
         assert_eq!(found, marked);
+        assert_eq!(Segments::none(20, 10).of_chunk(1).count(), 0);
         assert!(Segments::all(20, 10).of_chunk(1).eq(std::iter::once(0..10)));
     }
 }

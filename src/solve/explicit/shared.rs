@@ -6,17 +6,10 @@ use crate::system::{ExactSum, FailureUpdate, LostToBreaks, Segments, Traffic};
 
 /// What belongs to steps that processes share.
 pub(super) struct Shared {
-    /// Sites that are moved here, of which sums are taken.
-    own: Segments,
     /// Velocity half a step ago, of sites that are moved here; empty before the first step.
     half: Vec<f64>,
     /// Whether the numbers of all sites are those of the present step.
     is_whole: bool,
-}
-
-/// The sites of which sums are taken: all that are moved, unless some are ghosts.
-pub(super) fn own<'s>(shared: Option<&'s Shared>, moved: &'s Segments) -> &'s Segments {
-    shared.map_or(moved, |shared| &shared.own)
 }
 
 /// What a force has done to bonds.
@@ -35,9 +28,12 @@ impl Explicit<'_> {
             return;
         };
         system.begin();
-        self.moved = Segments::of(&system.known(), SITES);
+        let own = system.own();
+        let known = system.known().into_iter().zip(&own);
+        let ghosts: Vec<bool> = known.map(|(known, own)| known && !own).collect();
+        self.own = Segments::of(&own, SITES);
+        self.ghosts = Segments::of(&ghosts, SITES);
         self.shared = Some(Shared {
-            own: Segments::of(&system.own(), SITES),
             half: Vec::new(),
             is_whole: true,
         });
@@ -69,7 +65,7 @@ impl Explicit<'_> {
         shared.half.resize(v.len(), 0.0);
         for (chunk, half) in shared.half.chunks_mut(SITES * d).enumerate() {
             let v = &v[chunk * SITES * d..];
-            for sites in shared.own.of_chunk(chunk) {
+            for sites in self.own.of_chunk(chunk) {
                 let dofs = sites.start * d..sites.end * d;
                 half[dofs.clone()].copy_from_slice(&v[dofs]);
             }
@@ -136,9 +132,10 @@ impl Explicit<'_> {
         system.gather(&mut shared.half);
         system.gather(&mut self.force);
         self.state.v.copy_from_slice(&shared.half);
-        let all = Segments::all(self.inverse_mass.len(), SITES);
-        let moved = std::mem::replace(&mut self.moved, all.clone());
-        let own = std::mem::replace(&mut shared.own, all);
+        // ghosts are among all of them, and are not moved twice
+        let sites = self.inverse_mass.len();
+        let own = std::mem::replace(&mut self.own, Segments::all(sites, SITES));
+        let ghosts = std::mem::replace(&mut self.ghosts, Segments::none(sites, SITES));
         self.accelerate_prescribed();
         self.add_reactions(Reading::Kept);
         self.accelerate_and_kick();
@@ -147,10 +144,7 @@ impl Explicit<'_> {
             work, work_half, ..
         } = self.energies;
         self.energies = Energies::of(&total(&self.sums), work, work_half);
-        self.moved = moved;
-        if let Some(shared) = &mut self.shared {
-            shared.own = own;
-        }
+        (self.own, self.ghosts) = (own, ghosts);
     }
 
     /// Collective: what each process exchanged for its steps; none where each moves all sites.

@@ -33,9 +33,17 @@ impl Power {
         }
     }
 
-    /// That of one site.
-    #[inline]
-    pub fn add(&mut self, force: &[f64], v: &[f64]) {
+    /// That of sites with `d` numbers each.
+    pub fn add(&mut self, d: usize, force: &[f64], v: &[f64]) {
+        // all bits but those of signs: one pass, where a loop that may end early is not made of vectors
+        let all = force.iter().fold(0, |all, f| all | f.to_bits() << 1);
+        if all != 0 {
+            let sites = force.chunks_exact(d).zip(v.chunks_exact(d));
+            sites.for_each(|(force, v)| self.add_site(force, v));
+        }
+    }
+
+    fn add_site(&mut self, force: &[f64], v: &[f64]) {
         if force.iter().all(|f| *f == 0.0) {
             return;
         }
