@@ -63,8 +63,8 @@ def measured(command):
     if done.returncode:
         print(done.stderr, file=sys.stderr)
     if done.stdout:
-        # the summary of the first process, in a line of its own
-        print("summary", json.dumps(json.loads(done.stdout)), flush=True)
+        # the summary of the first process, in a file: mpirun mixes the lines of its processes
+        pathlib.Path(os.environ["BONDLINE_SUMMARY"]).write_text(done.stdout)
     return done.returncode
 
 
@@ -76,11 +76,11 @@ def run(program, scene, folder, count):
     command = [sys.executable, __file__, "--measured", program, "run", scene, "--json", "--output", folder]
     if count:
         command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(count)] + command
-    done = subprocess.run(command, env={**os.environ, **THREADS}, stdout=subprocess.PIPE, text=True, check=True)
+    told = pathlib.Path(folder + ".json")
+    done = subprocess.run(command, env={**os.environ, **THREADS, "BONDLINE_SUMMARY": str(told)}, stdout=subprocess.PIPE, text=True, check=True)
     lines = [line.split() for line in done.stdout.splitlines() if line.startswith("process ")]
     each = [(int(peak) / 1024, float(user), float(system)) for _, _, peak, user, system in sorted(lines)]
-    summary = next(line for line in done.stdout.splitlines() if line.startswith("summary "))
-    return each, json.loads(summary.removeprefix("summary "))
+    return each, json.loads(told.read_text())
 
 
 LAWS = (("bond-based", "critical-stretch = 0.5"), ("lps", "poisson-ratio = 0.3\ncritical-stretch = 0.5"))

@@ -379,11 +379,7 @@ fn check(
     let found = bondline_study::check(&scene.scene, &scene.overrides, pilots, &progress);
     let mut prediction = found.map_err(told)?;
     if let Some(count) = processes {
-        if let Some(why) = &prediction.counted {
-            return Err(miette::miette!(
-                "what {count} processes would have is not known: {why}"
-            ));
-        }
+        // lays the model out even where a check alone would count it from volumes
         let count = count as usize;
         let found = bondline_study::processes(&scene.scene, &scene.overrides, count, &progress);
         prediction.processes = found.map_err(told)?;
