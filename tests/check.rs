@@ -67,23 +67,29 @@ const COARSE: [&str; 4] = [
     "peridynamics.points.lattice.spacing=1/60",
 ];
 
+/// The plate itself, by blending.
 #[test]
-fn slit_plate_by_every_method() {
-    // the plate itself, by blending
+fn slit_plate() {
     compare(SLIT_PLATE, &[]);
-    for coupling in [
-        "local",
-        "splice",
-        "blending",
-        "balanced",
-        "partial-stress",
-        "nonlocal",
-    ] {
+}
+
+fn coarse_slit_plate_by(couplings: &[&str]) {
+    for coupling in couplings {
         let coupling = format!("coupling={coupling}");
         let mut overrides = COARSE.to_vec();
         overrides.push(&coupling);
         compare(SLIT_PLATE, &overrides);
     }
+}
+
+#[test]
+fn coarse_slit_plate_of_one_model_or_spliced() {
+    coarse_slit_plate_by(&["local", "nonlocal", "splice"]);
+}
+
+#[test]
+fn coarse_slit_plate_with_a_transition() {
+    coarse_slit_plate_by(&["blending", "balanced", "partial-stress"]);
 }
 
 #[test]

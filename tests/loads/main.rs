@@ -57,12 +57,15 @@ impl Done {
 
 /// Reads a scene with overrides; meshes are those of the repository.
 fn read(text: &str, overrides: &[&str]) -> Result<AnyScene, String> {
-    let text = text.replace("MESHES", concat!(env!("CARGO_MANIFEST_DIR"), "/meshes"));
+    let text = text.replace(
+        "MESHES",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../../meshes"),
+    );
     let mut source = Source::new("scene.toml", &text);
     for o in overrides {
         source.push_override(o).map_err(|e| format!("{e:?}"))?;
     }
-    let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let here = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     AnyScene::from_source(&source, here, "scene").map_err(|e| e.to_string())
 }
 

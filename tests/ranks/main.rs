@@ -73,8 +73,12 @@ fn cracks_run_alike_on_any_number_of_processes() {
 }
 
 #[test]
-fn so_do_those_of_a_solid_and_of_listed_bonds() {
+fn so_do_those_of_a_solid() {
     assert_same(&plate("lps", "[coupling.truncated]", ""), &[3]);
+}
+
+#[test]
+fn so_do_those_of_listed_bonds() {
     let listed = plate("lps", "[coupling.splice]", "")
         .replace("points.lattice", "precision = \"single\"\npoints.lattice");
     assert_same(&listed, &[4]);
