@@ -3,6 +3,9 @@
 
 With LIMIT 0 every file has the same bytes, those of checkpoints included. Else displacements in VTU and CSV files differ by at most LIMIT of the largest. With LIMIT
 `readable` every VTU file of the first folder can be read, and that is all.
+
+A VTU file of one process may be a PVTU file of several. Its pieces together then hold each cell once and each point at least once, by their numbers in the file of one process; with
+LIMIT 0 places, cells and all fields are the same bits. A PVD file names the one or the other.
 """
 
 import base64
@@ -43,6 +46,65 @@ def fields(path):
     return {a.get("Name"): array(a, header) for a in arrays if a.get("type") == "Float64"}
 
 
+def grid(path):
+    """The arrays of a VTU file by element and name, each as a list of rows: those of points, of cells, and the points of each cell."""
+    root = tree.parse(path).getroot()
+    header = {"UInt32": "I", "UInt64": "Q"}[root.get("header_type", "UInt32")]
+    found = {}
+    for kind in ("PointData", "CellData", "Points", "Cells"):
+        for a in root.find(f".//{kind}").findall("DataArray"):
+            numbers, width = array(a, header), int(a.get("NumberOfComponents", 1))
+            # bits, so that -0 is not 0
+            if a.get("type") == "Float64":
+                numbers = struct.unpack("<%dQ" % len(numbers), struct.pack("<%dd" % len(numbers), *numbers))
+            found[kind, a.get("Name")] = [numbers[i : i + width] for i in range(0, len(numbers), width)]
+    nodes = [n for (n,) in found.pop(("Cells", "connectivity"))]
+    ends = [0] + [n for (n,) in found.pop(("Cells", "offsets"))]
+    found["Cells", "nodes"] = [tuple(nodes[a:b]) for a, b in zip(ends, ends[1:])]
+    return found
+
+
+def reals(rows):
+    """Rows of bits as numbers."""
+    return [struct.unpack("<%dd" % len(row), struct.pack("<%dQ" % len(row), *row)) for row in rows]
+
+
+def pieces(path):
+    """The files that a PVTU file names."""
+    return [path.parent / p.get("Source") for p in tree.parse(path).getroot().iter("Piece")]
+
+
+def joined(path, one):
+    """The pieces of a PVTU file as one file, and what is wrong with them; `one` is the file of one process."""
+    wanted, wrong = grid(one), []
+    sizes = {"PointData": len(wanted["Points", "Points"]), "CellData": len(wanted["Cells", "types"])}
+    sizes |= {"Points": sizes["PointData"], "Cells": sizes["CellData"]}
+    whole = {key: [None] * sizes[key[0]] for key in wanted}
+    declared = {
+        (kind[1:], a.get("Name"))
+        for kind in ("PPointData", "PCellData", "PPoints")
+        for a in tree.parse(path).getroot().find(f".//{kind}")
+    }
+    for piece in pieces(path):
+        found = grid(piece)
+        if declared != {key for key in found if key[0] != "Cells"}:
+            wrong.append(f"{path.name} does not declare the fields of {piece.name}")
+        points = [n for (n,) in found.pop(("PointData", "GlobalPointIds"))]
+        cells = [n for (n,) in found.pop(("CellData", "GlobalCellIds"))]
+        found["Cells", "nodes"] = [tuple(points[k] for k in nodes) for nodes in found["Cells", "nodes"]]
+        if found.keys() != wanted.keys():
+            wrong.append(f"{piece.name}: fields {sorted(found.keys() ^ wanted.keys())} in one of both")
+            continue
+        for key, rows in found.items():
+            own = whole[key]
+            for n, row in zip(points if key[0] in ("PointData", "Points") else cells, rows):
+                if own[n] is not None and (own[n] != row or key[0] in ("CellData", "Cells")):
+                    wrong.append(f"{piece.name}: {key[1]} of {n} is in another piece too")
+                own[n] = row
+    wrong += [f"{path.name}: {key[1]} lacks some" for key, rows in whole.items() if None in rows]
+    return whole, wanted, wrong
+
+
 def columns(path):
     """The columns of a CSV file by name, of those that are numbers."""
     rows = list(csv.reader(open(path)))
@@ -64,21 +126,42 @@ def main(limit, one, several):
     limit = float(limit)
     names = {p.name for p in one.iterdir()}
     others = {p.name for p in several.iterdir()}
+    lists = {p.with_suffix(".vtu").name: p for p in several.glob("*.pvtu")}
+    for name, path in lists.items():
+        # what the list does not name is left over
+        others -= {path.name} | {p.name for p in pieces(path)}
+        others.add(name)
     wrong = [f"only in one of both: {n}" for n in sorted(names ^ others)]
     if not names:
         wrong.append("nothing was written")
     compared = 0
     for name in sorted(names & others):
         a, b = one / name, several / name
-        if limit == 0:
+        if name in lists:
+            y, x, bad = joined(lists[name], a)
+            wrong += bad
+            if limit == 0:
+                compared += 1
+                wrong += [f"{name}: {key[1]} has other bits" for key in x if x[key] != y[key]]
+                continue
+            if any(x[key] != y[key] for key in (("Points", "Points"), ("Cells", "types"), ("Cells", "nodes"))):
+                wrong.append(f"{name}: other cells")
+            if bad:
+                continue
+            x, y = ({"displacement": [v for row in reals(g["PointData", "displacement"]) for v in row]} for g in (x, y))
+        elif limit == 0:
             compared += 1
-            if a.read_bytes() != b.read_bytes():
+            found = b.read_bytes()
+            if a.suffix == ".pvd":
+                found = found.replace(b".pvtu", b".vtu")
+            if a.read_bytes() != found:
                 wrong.append(f"{name}: other bytes")
             continue
-        read = {".vtu": fields, ".csv": columns}.get(a.suffix)
-        if read is None:
-            continue
-        x, y = read(a), read(b)
+        else:
+            read = {".vtu": fields, ".csv": columns}.get(a.suffix)
+            if read is None:
+                continue
+            x, y = read(a), read(b)
         if x.keys() != y.keys():
             wrong.append(f"{name}: fields {sorted(x.keys() ^ y.keys())} in one of both")
         # components of a vector are measured by the largest of all
