@@ -19,10 +19,8 @@ import zlib
 FORMATS = {"Float64": "d", "Float32": "f", "Int32": "i", "Int64": "q", "UInt8": "B", "UInt32": "I", "UInt64": "Q"}
 
 
-def array(element, header):
-    """The numbers of an inline array: as text, or compressed by zlib in blocks or not at all."""
-    if element.get("format") == "ascii":
-        return tuple(float(word) for word in element.text.split())
+def raw(element, header):
+    """The bytes of an inline array: compressed by zlib in blocks, or not at all."""
     text = "".join(element.text.split())
     size = struct.calcsize(header)
     count = struct.unpack("<" + header, base64.b64decode(text[: 4 * -(-size // 3)])[:size])[0]
@@ -30,12 +28,22 @@ def array(element, header):
     length = 4 * -(-head // 3)
     sizes = struct.unpack("<%d%s" % (3 + count, header), base64.b64decode(text[:length])[:head])[3:]
     data = base64.b64decode(text[length:])
-    raw, start = b"", 0
+    whole, start = b"", 0
     for block in sizes:
-        raw += zlib.decompress(data[start : start + block])
+        whole += zlib.decompress(data[start : start + block])
         start += block
-    kind = FORMATS[element.get("type")]
-    return struct.unpack("<%d%s" % (len(raw) // struct.calcsize(kind), kind), raw)
+    return whole
+
+
+def array(element, header):
+    """The numbers of an inline array: as text, or of its bytes."""
+    if element.get("format") == "ascii":
+        return tuple(float(word) for word in element.text.split())
+    return numbers(raw(element, header), FORMATS[element.get("type")])
+
+
+def numbers(whole, kind):
+    return struct.unpack("<%d%s" % (len(whole) // struct.calcsize(kind), kind), whole)
 
 
 def fields(path):
@@ -47,26 +55,24 @@ def fields(path):
 
 
 def grid(path):
-    """The arrays of a VTU file by element and name, each as a list of rows: those of points, of cells, and the points of each cell."""
+    """The arrays of a VTU file by element and name, each as a list of rows of bytes: those of points, of cells, and the numbers of the points of each cell."""
     root = tree.parse(path).getroot()
     header = {"UInt32": "I", "UInt64": "Q"}[root.get("header_type", "UInt32")]
     found = {}
     for kind in ("PointData", "CellData", "Points", "Cells"):
         for a in root.find(f".//{kind}").findall("DataArray"):
-            numbers, width = array(a, header), int(a.get("NumberOfComponents", 1))
-            # bits, so that -0 is not 0
-            if a.get("type") == "Float64":
-                numbers = struct.unpack("<%dQ" % len(numbers), struct.pack("<%dd" % len(numbers), *numbers))
-            found[kind, a.get("Name")] = [numbers[i : i + width] for i in range(0, len(numbers), width)]
-    nodes = [n for (n,) in found.pop(("Cells", "connectivity"))]
-    ends = [0] + [n for (n,) in found.pop(("Cells", "offsets"))]
+            # bytes, so that -0 is not 0
+            whole, width = raw(a, header), int(a.get("NumberOfComponents", 1)) * struct.calcsize(FORMATS[a.get("type")])
+            found[kind, a.get("Name")] = [whole[i : i + width] for i in range(0, len(whole), width)]
+    nodes, ends = (numbers(b"".join(found.pop(("Cells", name))), "q") for name in ("connectivity", "offsets"))
+    ends = (0, *ends)
     found["Cells", "nodes"] = [tuple(nodes[a:b]) for a, b in zip(ends, ends[1:])]
     return found
 
 
 def reals(rows):
-    """Rows of bits as numbers."""
-    return [struct.unpack("<%dd" % len(row), struct.pack("<%dQ" % len(row), *row)) for row in rows]
+    """Rows of bytes as reals."""
+    return [numbers(row, "d") for row in rows]
 
 
 def pieces(path):
@@ -89,16 +95,17 @@ def joined(path, one):
         found = grid(piece)
         if declared != {key for key in found if key[0] != "Cells"}:
             wrong.append(f"{path.name} does not declare the fields of {piece.name}")
-        points = [n for (n,) in found.pop(("PointData", "GlobalPointIds"))]
-        cells = [n for (n,) in found.pop(("CellData", "GlobalCellIds"))]
+        points = numbers(b"".join(found.pop(("PointData", "GlobalPointIds"))), "q")
+        cells = numbers(b"".join(found.pop(("CellData", "GlobalCellIds"))), "q")
         found["Cells", "nodes"] = [tuple(points[k] for k in nodes) for nodes in found["Cells", "nodes"]]
         if found.keys() != wanted.keys():
             wrong.append(f"{piece.name}: fields {sorted(found.keys() ^ wanted.keys())} in one of both")
             continue
         for key, rows in found.items():
-            own = whole[key]
-            for n, row in zip(points if key[0] in ("PointData", "Points") else cells, rows):
-                if own[n] is not None and (own[n] != row or key[0] in ("CellData", "Cells")):
+            own, of_points = whole[key], key[0] in ("PointData", "Points")
+            for n, row in zip(points if of_points else cells, rows):
+                # a node on the border of two pieces is in both
+                if own[n] is not None and not (of_points and own[n] == row):
                     wrong.append(f"{piece.name}: {key[1]} of {n} is in another piece too")
                 own[n] = row
     wrong += [f"{path.name}: {key[1]} lacks some" for key, rows in whole.items() if None in rows]
@@ -153,6 +160,8 @@ def main(limit, one, several):
             compared += 1
             found = b.read_bytes()
             if a.suffix == ".pvd":
+                steps = tree.parse(b).getroot().iter("DataSet")
+                wrong += [f"{name} names {s.get('file')}, which is not there" for s in steps if not (several / s.get("file")).exists()]
                 found = found.replace(b".pvtu", b".vtu")
             if a.read_bytes() != found:
                 wrong.append(f"{name}: other bytes")
