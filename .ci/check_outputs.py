@@ -4,6 +4,7 @@
     check_outputs.py FILE...
 
 .vtu: points, cells and every field are equal in both readers, and finite.
+.pvtu: VTK's own reader sees the points, cells and fields of the pieces one after another, as meshio sees each; no cell is in two pieces, and a point that is in two is the same in both.
 .pvd: every file that it names exists, and times do not fall.
 .csv: every row has as many entries as the header, and every number is finite.
 
@@ -46,12 +47,14 @@ def vtk_arrays(data):
     return {data.GetArrayName(i): vtk_to_numpy(data.GetArray(i)) for i in range(data.GetNumberOfArrays())}
 
 
-def check_vtu(path):
+def read_by_meshio(path):
     try:
-        mesh = meshio.read(path)
+        return meshio.read(path)
     except SystemExit:  # meshio leaves the interpreter on a file it cannot read
-        raise Wrong("meshio cannot read it") from None
-    reader = vtk.vtkXMLUnstructuredGridReader()
+        raise Wrong(f"meshio cannot read {path.name}") from None
+
+
+def read_by_vtk(path, reader):
     complaints = []
 
     def complain(_caller, _event, text="") -> None:
@@ -66,6 +69,43 @@ def check_vtu(path):
     grid = reader.GetOutput()
     if grid.GetNumberOfPoints() == 0 or grid.GetNumberOfCells() == 0:
         raise Wrong("no points or no cells")
+    return grid
+
+
+def check_pvtu(path):
+    grid = read_by_vtk(path, vtk.vtkXMLPUnstructuredGridReader())
+    sources = [path.parent / p.attrib["Source"] for p in xml.parse(path).getroot().iter("Piece")]
+    meshes = [read_by_meshio(source) for source in sources]
+    same("points", np.concatenate([m.points for m in meshes]), vtk_to_numpy(grid.GetPoints().GetData()))
+    starts = np.cumsum([0] + [len(m.points) for m in meshes])
+    nodes = [np.asarray(block.data).ravel() + start for m, start in zip(meshes, starts) for block in m.cells]
+    same("cells", np.concatenate(nodes), vtk_to_numpy(grid.GetCells().GetConnectivityArray()))
+    seen = [vtk_arrays(grid.GetPointData()), vtk_arrays(grid.GetCellData())]
+    for kind, arrays, values in (
+        ("point field", seen[0], lambda m, name: m.point_data[name]),
+        ("cell field", seen[1], lambda m, name: np.concatenate(m.cell_data[name])),
+    ):
+        for m in meshes:
+            if set(arrays) != set(m.point_data if kind == "point field" else m.cell_data):
+                raise Wrong(f"{kind}s: other ones in a piece than {sorted(arrays)}")
+        for name, found in arrays.items():
+            same(f"{kind} {name}", np.concatenate([values(m, name) for m in meshes]), found)
+    for data, name in ((grid.GetPointData(), "GlobalPointIds"), (grid.GetCellData(), "GlobalCellIds")):
+        if data.GetGlobalIds() is None or data.GetGlobalIds().GetName() != name:
+            raise Wrong(f"VTK does not take {name} for identifiers")
+    cells, (points, first, back) = seen[1]["GlobalCellIds"], np.unique(seen[0]["GlobalPointIds"], return_index=True, return_inverse=True)
+    for what, numbers in (("cells", np.sort(cells)), ("points", points)):
+        if not np.array_equal(numbers, np.arange(len(numbers))):
+            raise Wrong(f"{what} are not numbered each once from zero")
+    for name, values in seen[0].items():
+        if not np.array_equal(values, values[first][back]):
+            raise Wrong(f"{name} differs at a point that is in two pieces")
+    return f"{len(sources)} pieces, {len(points)} points, {len(cells)} cells, {len(seen[0]) + len(seen[1])} fields"
+
+
+def check_vtu(path):
+    mesh = read_by_meshio(path)
+    grid = read_by_vtk(path, vtk.vtkXMLUnstructuredGridReader())
 
     same("points", mesh.points, vtk_to_numpy(grid.GetPoints().GetData()))
     types = np.concatenate([np.full(len(block.data), VTK_TYPE[block.type]) for block in mesh.cells])
@@ -130,7 +170,7 @@ def check_csv(path):
     return f"{len(rows) - 1} rows, {len(header)} columns"
 
 
-CHECKS = {".vtu": check_vtu, ".pvd": check_pvd, ".csv": check_csv}
+CHECKS = {".vtu": check_vtu, ".pvtu": check_pvtu, ".pvd": check_pvd, ".csv": check_csv}
 
 
 def main(names):

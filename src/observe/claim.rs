@@ -12,6 +12,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::ObserveError;
+use super::pieces::stem;
 use crate::regular_file;
 
 /// The files of one run in its folder.
@@ -21,7 +22,7 @@ pub struct Files {
     pub name: String,
     /// Names, each in full.
     pub files: Vec<String>,
-    /// Whether there are files `NAME_0000.vtu`, `NAME_0001.vtu`, … too.
+    /// Whether there are files `NAME_0000.vtu`, `NAME_0001.vtu`, … too, or `NAME_0000.pvtu`, … with a piece of each process.
     pub series: bool,
 }
 
@@ -32,10 +33,9 @@ impl Files {
     }
 
     fn is_of_series(&self, file: &str) -> bool {
-        let number = file
-            .strip_prefix(&self.name)
-            .and_then(|rest| rest.strip_prefix('_'))
-            .and_then(|rest| rest.strip_suffix(".vtu"));
+        let number = stem(file)
+            .and_then(|stem| stem.strip_prefix(&self.name))
+            .and_then(|rest| rest.strip_prefix('_'));
         number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
     }
 
@@ -45,7 +45,7 @@ impl Files {
     /// only where another scene wrote that: its own runs, ended or killed, leave a claim, a collection or a table with it.
     fn of_another(&self, folder: &Path, was_claimed: bool) -> Option<(PathBuf, String)> {
         let listed = self.files.iter().find_map(|file| {
-            let (name, _) = file.strip_suffix(".vtu")?.rsplit_once('_')?;
+            let (name, _) = stem(file)?.rsplit_once('_')?;
             let series = Self {
                 name: name.to_owned(),
                 series: true,
@@ -58,9 +58,10 @@ impl Files {
             lists.then(|| (folder.join(file), collection.display().to_string()))
         });
         let alone = || {
-            let first = folder.join(format!("{}_0000.vtu", self.name));
+            let first = ["vtu", "pvtu"].map(|end| folder.join(format!("{}_0000.{end}", self.name)));
+            let first = first.into_iter().find(|file| file.exists())?;
             let is_own = self.files.iter().any(|file| folder.join(file).exists());
-            let foreign = self.series && !was_claimed && first.exists() && !is_own;
+            let foreign = self.series && !was_claimed && !is_own;
             foreign.then(|| (first, "a scene of another name".to_owned()))
         };
         listed.or_else(alone)
@@ -301,6 +302,8 @@ mod tests {
         let parts = [
             ".branching_moving_0001.vtu.17-3.part",
             ".branching_0001.vtu.17-3.part",
+            ".branching_0001_p2.vtu.17-4.part",
+            ".branching_0001.pvtu.17-5.part",
             ".branching_history.csv.17-12.part",
             ".branching_0001.vtu.part",
             ".branching_tip.csv.17-3.part",
@@ -310,7 +313,7 @@ mod tests {
         }
         let short = Claim::take(folder.path(), "short", &moving("branching")).unwrap();
         let left = parts.map(|part| folder.path().join(part).exists());
-        assert_eq!(left, [true, false, false, true, true]);
+        assert_eq!(left, [true, false, false, false, false, true, true]);
         // both stand, and a second one of either is refused
         let error = Claim::take(folder.path(), "again", &moving("branching")).unwrap_err();
         let said = error.to_string();

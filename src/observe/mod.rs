@@ -2,8 +2,9 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `vtu.rs` | FE cells and PD points in one VTU, and a PVD over several |
+//! | `vtu.rs` | FE cells and PD points in one VTU, and a PVTU or a PVD over several |
 //! | `data_array.rs` | numbers as text of a VTK XML file |
+//! | `pieces.rs` | one VTU of each of several processes, and a PVTU over them |
 //! | `series.rs` | VTU files over time and their PVD |
 //! | `history.rs` | tables that grow with a run, and are cut where it resumes |
 //! | `checkpoint.rs` | the state of a run, whole or not at all |
@@ -25,6 +26,7 @@ mod data_array;
 pub mod history;
 mod motion_summary;
 mod observer;
+pub mod pieces;
 pub mod proof;
 pub mod report;
 pub mod rezoning_event;
@@ -70,6 +72,20 @@ pub enum ObserveError {
         path: PathBuf,
         /// Whose it is.
         owner: String,
+    },
+    /// A file of another process does not appear in the folder.
+    #[error("{} does not appear in the folder of the first process, and another one has written it; give a folder that all processes share by --output", path.display())]
+    NotShared {
+        /// The file.
+        path: PathBuf,
+    },
+    /// One of several processes could not write.
+    #[error("{message}")]
+    OfProcess {
+        /// The folder, or the file that one process would write.
+        path: PathBuf,
+        /// Which process, and what it said.
+        message: String,
     },
     /// The encoder refused the data.
     #[error("cannot encode {} as {format}: {message}; please report this with the scene", path.display())]
@@ -161,6 +177,8 @@ impl ObserveError {
             | Self::Write { path, .. }
             | Self::Claimed { path, .. }
             | Self::OfAnother { path, .. }
+            | Self::NotShared { path }
+            | Self::OfProcess { path, .. }
             | Self::Encode { path, .. }
             | Self::FieldLength { path, .. }
             | Self::FieldTwice { path, .. }

@@ -1,4 +1,4 @@
-//! FE cells and PD points in one VTU file, as ParaView, VTK and meshio read it, and a PVD over several.
+//! FE cells and PD points in one VTU file, as ParaView, VTK and meshio read it, a PVTU over several of one time, and a PVD over several times.
 //!
 //! PD points are cells of one node ([`CellShape::Vertex`]): a piece without cells can be read by nobody, and points and
 //! cells so stand in one piece and share the fields. Arrays are inline binary, compressed by zlib, which all three readers
@@ -25,6 +25,8 @@ pub enum Values {
     Byte(Vec<u8>),
     /// Integers.
     Integer(Vec<i32>),
+    /// Numbers of points or cells among those of a larger data set, each once.
+    Identifier(Vec<i64>),
 }
 
 impl Values {
@@ -34,7 +36,19 @@ impl Values {
             Self::Real(v) => v.len(),
             Self::Byte(v) => v.len(),
             Self::Integer(v) => v.len(),
+            Self::Identifier(v) => v.len(),
         }
+    }
+
+    /// The attributes of their type in VTK's XML; identifiers are of a type of their own there.
+    fn type_attributes(&self) -> String {
+        let (kind, more) = match self {
+            Self::Real(_) => (f64::TYPE, ""),
+            Self::Byte(_) => (u8::TYPE, ""),
+            Self::Integer(_) => (i32::TYPE, ""),
+            Self::Identifier(_) => (i64::TYPE, " IdType=\"1\""),
+        };
+        format!("type=\"{kind}\"{more}")
     }
 
     /// Whether there is no value.
@@ -111,6 +125,20 @@ impl Field {
             components: 1,
             values: Values::Integer(values),
         }
+    }
+
+    /// One identifier per entry.
+    pub fn identifiers(name: &str, values: Vec<i64>) -> Self {
+        Self {
+            name: name.to_owned(),
+            components: 1,
+            values: Values::Identifier(values),
+        }
+    }
+
+    /// The attributes of its array: type, name, components.
+    fn attributes(&self) -> String {
+        attributes(&self.values.type_attributes(), &self.name, self.components)
     }
 }
 
@@ -246,6 +274,16 @@ fn vtk_type(shape: CellShape) -> u8 {
     }
 }
 
+/// The attributes of an array of a type: its type, name and components.
+fn attributes(kind: &str, name: &str, components: usize) -> String {
+    // meshio takes one component that is named for a matrix of one column
+    let columns = match components {
+        1 => String::new(),
+        n => format!(" NumberOfComponents=\"{n}\""),
+    };
+    format!("{kind} Name=\"{}\"{columns}", escape(name))
+}
+
 /// The element of an array.
 fn array<T: Number>(
     name: &str,
@@ -253,29 +291,38 @@ fn array<T: Number>(
     numbers: &[T],
     compression: Compression,
 ) -> std::io::Result<String> {
+    let kind = format!("type=\"{}\"", T::TYPE);
     let text = encoded(numbers, compression)?;
-    let (kind, name) = (T::TYPE, escape(name));
-    // meshio takes one component that is named for a matrix of one column
-    let columns = match components {
-        1 => String::new(),
-        n => format!(" NumberOfComponents=\"{n}\""),
-    };
-    Ok(format!(
-        "<DataArray type=\"{kind}\" Name=\"{name}\"{columns} format=\"binary\">{text}</DataArray>\n"
-    ))
+    Ok(element(&attributes(&kind, name, components), &text))
+}
+
+fn element(attributes: &str, text: &str) -> String {
+    format!("<DataArray {attributes} format=\"binary\">{text}</DataArray>\n")
 }
 
 /// The elements of some fields.
 fn arrays(fields: &[Field], compression: Compression) -> std::io::Result<Vec<String>> {
     let text = |field: &Field| {
-        let (name, n) = (field.name.as_str(), field.components);
-        match &field.values {
-            Values::Real(v) => array(name, n, v, compression),
-            Values::Byte(v) => array(name, n, v, compression),
-            Values::Integer(v) => array(name, n, v, compression),
-        }
+        let text = match &field.values {
+            Values::Real(v) => encoded(v, compression),
+            Values::Byte(v) => encoded(v, compression),
+            Values::Integer(v) => encoded(v, compression),
+            Values::Identifier(v) => encoded(v, compression),
+        };
+        Ok(element(&field.attributes(), &text?))
     };
     fields.par_iter().map(text).collect()
+}
+
+/// The attributes that say which of some fields a reader takes for vectors and for identifiers.
+fn active(fields: &[Field]) -> String {
+    let of = |kind: &str, is_of: fn(&Field) -> bool| {
+        let field = fields.iter().find(|f| is_of(f));
+        field.map_or_else(String::new, |f| format!(" {kind}=\"{}\"", escape(&f.name)))
+    };
+    // an active vector is what ParaView warps by at once
+    of("Vectors", Field::is_vector)
+        + &of("GlobalIds", |f| matches!(f.values, Values::Identifier(_)))
 }
 
 /// Writes a snapshot; makes the folder if it is missing.
@@ -322,16 +369,13 @@ pub fn write_vtu(
             out,
             "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">"
         )?;
-        let vector = snapshot.point_fields.iter().find(|f| f.is_vector());
-        // an active vector is what ParaView warps by at once
-        let active =
-            vector.map_or_else(String::new, |f| format!(" Vectors=\"{}\"", escape(&f.name)));
-        writeln!(
-            out,
-            "<PointData{active}>\n{}</PointData>",
-            on_points.concat()
-        )?;
-        writeln!(out, "<CellData>\n{}</CellData>", on_cells.concat())?;
+        for (kind, fields, arrays) in [
+            ("PointData", &snapshot.point_fields, on_points),
+            ("CellData", &snapshot.cell_fields, on_cells),
+        ] {
+            let (active, arrays) = (active(fields), arrays.concat());
+            writeln!(out, "<{kind}{active}>\n{arrays}</{kind}>")?;
+        }
         let positions = array("Points", 3, snapshot.points.as_flattened(), compression)?;
         writeln!(out, "<Points>\n{positions}</Points>")?;
         let numbers = [
@@ -342,6 +386,54 @@ pub fn write_vtu(
         writeln!(out, "<Cells>\n{}</Cells>", numbers.concat())?;
         writeln!(out, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")
     })
+}
+
+/// Writes what makes one data set of VTU files of the same fields; the files are named relative to it.
+///
+/// `like` is one of their snapshots, of which only the fields count.
+///
+/// # Errors
+/// [`ObserveError::Empty`] without files, or what stops the file from being written.
+pub fn write_pvtu(path: &Path, pieces: &[PathBuf], like: &Snapshot) -> Result<(), ObserveError> {
+    if pieces.is_empty() {
+        return Err(ObserveError::Empty {
+            path: path.to_path_buf(),
+            what: "no process has cells",
+        });
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    write_whole(path, |out| {
+        writeln!(
+            out,
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  <PUnstructuredGrid GhostLevel=\"0\">"
+        )?;
+        for (kind, fields) in [
+            ("PPointData", &like.point_fields),
+            ("PCellData", &like.cell_fields),
+        ] {
+            writeln!(out, "    <{kind}{}>", active(fields))?;
+            for field in fields {
+                writeln!(out, "      <PDataArray {}/>", field.attributes())?;
+            }
+            writeln!(out, "    </{kind}>")?;
+        }
+        let positions = attributes("type=\"Float64\"", "Points", 3);
+        writeln!(
+            out,
+            "    <PPoints>\n      <PDataArray {positions}/>\n    </PPoints>"
+        )?;
+        for piece in pieces {
+            let name = relative(piece, folder);
+            writeln!(out, "    <Piece Source=\"{name}\"/>")?;
+        }
+        writeln!(out, "  </PUnstructuredGrid>\n</VTKFile>")
+    })
+}
+
+/// A file as one in `folder` names it: both are moved together.
+fn relative(file: &Path, folder: &Path) -> String {
+    let name = file.strip_prefix(folder).unwrap_or(file);
+    escape(&name.to_string_lossy())
 }
 
 /// Writes a collection of VTU files, which ParaView opens as one; the files are named relative to the collection.
@@ -373,12 +465,10 @@ pub fn write_pvd(path: &Path, steps: &[(f64, PathBuf)]) -> Result<(), ObserveErr
             "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n  <Collection>"
         )?;
         for (time, file) in steps {
-            // a collection and its files are moved together
-            let name = file.strip_prefix(folder).unwrap_or(file);
+            let name = relative(file, folder);
             writeln!(
                 out,
-                "    <DataSet timestep=\"{time:e}\" group=\"\" part=\"0\" file=\"{}\"/>",
-                escape(&name.to_string_lossy())
+                "    <DataSet timestep=\"{time:e}\" group=\"\" part=\"0\" file=\"{name}\"/>"
             )?;
         }
         writeln!(out, "  </Collection>\n</VTKFile>")
@@ -394,201 +484,5 @@ pub fn escape(text: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use vtkio::model;
-
-    use super::*;
-
-    /// `n` vertices, one cell of every other shape, and a field of every kind.
-    fn sample(n: usize) -> Snapshot {
-        let mut s = Snapshot {
-            time: Some(0.125),
-            ..Snapshot::default()
-        };
-        let cloud: Vec<Vector<3>> = (0..n)
-            .map(|i| Vector::<3>::new(i as f64 / 7.0, (i as f64).sin(), -0.1 * i as f64))
-            .collect();
-        assert_eq!(s.push_vertices(&cloud), 0);
-        for shape in [
-            CellShape::Line2,
-            CellShape::Tri3,
-            CellShape::Quad4,
-            CellShape::Tet4,
-            CellShape::Hex8,
-        ] {
-            let nodes: Vec<u32> = (0..shape.node_count() as u32).collect();
-            s.push_cell(shape, &nodes);
-        }
-        let m = s.shapes.len();
-        s.point_fields = vec![
-            Field::vector("displacement", &cloud),
-            Field::labels("model", (0..n).map(|i| (i % 3) as u8).collect()),
-            Field::integers("family size", (0..n as i32).map(|i| -i).collect()),
-        ];
-        let tensors: Vec<Tensor<2>> = (0..m)
-            .map(|i| Tensor::<2>::new(1.0, 2.0, 3.0, i as f64))
-            .collect();
-        s.cell_fields = vec![
-            Field::tensor("stress", &tensors),
-            Field::scalar(
-                "beta < 1 & \"odd\"",
-                (0..m).map(|i| 1.0 / (i + 1) as f64).collect(),
-            ),
-        ];
-        s
-    }
-
-    fn read(path: &Path) -> model::UnstructuredGridPiece {
-        let model::DataSet::UnstructuredGrid { mut pieces, .. } =
-            model::Vtk::import(path).unwrap().data
-        else {
-            panic!("not an unstructured grid");
-        };
-        pieces.remove(0).into_loaded_piece_data(None).unwrap()
-    }
-
-    fn reals(attribute: &model::Attribute) -> Vec<f64> {
-        let model::Attribute::DataArray(array) = attribute else {
-            panic!("not a data array");
-        };
-        array.data.cast_into::<f64>().unwrap()
-    }
-
-    fn expected(field: &Field) -> Vec<f64> {
-        match &field.values {
-            Values::Real(v) => v.clone(),
-            Values::Byte(v) => v.iter().map(|&x| f64::from(x)).collect(),
-            Values::Integer(v) => v.iter().map(|&x| f64::from(x)).collect(),
-        }
-    }
-
-    #[test]
-    fn everything_comes_back_bit_for_bit() {
-        let folder = tempfile::tempdir().unwrap();
-        // 4096 reals fill one zlib block of 32 KiB to the last byte
-        for (n, compression) in [
-            (9, Compression::Plain),
-            (9, Compression::Zlib),
-            (4096, Compression::Zlib),
-            (5000, Compression::Zlib),
-        ] {
-            let s = sample(n);
-            let path = folder.path().join(format!("out/{n}.vtu"));
-            write_vtu(&path, &s, compression).unwrap();
-            let piece = read(&path);
-            assert_eq!(
-                piece.points.cast_into::<f64>().unwrap(),
-                s.points.as_flattened()
-            );
-            let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
-            let connectivity: Vec<u32> = connectivity.iter().map(|&c| c as u32).collect();
-            assert_eq!(connectivity, s.connectivity);
-            assert_eq!(offsets[n..], [2, 5, 9, 13, 21].map(|o| o + n as u64));
-            let codes: Vec<u8> = piece.cells.types.iter().map(|&t| t as u8).collect();
-            assert_eq!(codes[n - 1..], [1, 3, 5, 9, 10, 12]);
-            for (fields, read) in [
-                (&s.point_fields, &piece.data.point),
-                (&s.cell_fields, &piece.data.cell),
-            ] {
-                assert_eq!(fields.len(), read.len());
-                for (field, read) in fields.iter().zip(read) {
-                    assert_eq!(field.name, read.name());
-                    assert_eq!(expected(field), reals(read));
-                }
-            }
-            let text = std::fs::read(&path).unwrap();
-            let text = String::from_utf8_lossy(&text);
-            assert!(text.contains("\"TimeValue\"") && text.contains(">1.25e-1<"));
-        }
-    }
-
-    #[test]
-    fn plane_vectors_and_tensors_are_filled_up_by_rows() {
-        let v = Field::vector(
-            "u",
-            &[Vector::<2>::new(1.0, 2.0), Vector::<2>::new(3.0, 4.0)],
-        );
-        let vector = vec![1.0, 2.0, 0.0, 3.0, 4.0, 0.0];
-        assert_eq!((v.components, v.values), (3, Values::Real(vector)));
-        let t = Field::tensor("s", &[Tensor::<2>::new(1.0, 2.0, 3.0, 4.0)]);
-        let rows = vec![1.0, 2.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0];
-        assert_eq!((t.components, t.values), (9, Values::Real(rows)));
-    }
-
-    #[test]
-    fn zlib_is_smaller() {
-        let folder = tempfile::tempdir().unwrap();
-        let size = |compression| {
-            let path = folder.path().join("a.vtu");
-            write_vtu(&path, &sample(5000), compression).unwrap();
-            std::fs::metadata(&path).unwrap().len()
-        };
-        assert!(size(Compression::Zlib) < size(Compression::Plain) * 3 / 4);
-    }
-
-    #[test]
-    fn what_does_not_fit_is_named_and_nothing_is_written() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("bad.vtu");
-        let message = |change: &dyn Fn(&mut Snapshot)| {
-            let mut s = sample(9);
-            change(&mut s);
-            let error = write_vtu(&path, &s, Compression::Zlib).unwrap_err();
-            assert!(!path.exists());
-            error.to_string()
-        };
-        let short = message(&|s| s.point_fields[0].values = Values::Real(vec![0.0; 26]));
-        assert!(
-            short.contains("`displacement`") && short.contains("26 values where 27"),
-            "{short}"
-        );
-        let nan = message(&|s| {
-            let mut v = vec![0.0; 27];
-            v[13] = f64::NAN;
-            s.point_fields[0].values = Values::Real(v);
-        });
-        assert!(
-            nan.contains("`displacement`") && nan.contains("NaN at entry 4"),
-            "{nan}"
-        );
-        let stray = message(&|s| s.push_cell(CellShape::Line2, &[0, 9]));
-        assert!(stray.contains("point 9 of 9"), "{stray}");
-        let odd = message(&|s| s.shapes.push(CellShape::Tri3));
-        assert!(odd.contains("ask for 33 node numbers, 30"), "{odd}");
-        let twice = message(&|s| s.point_fields[1].name = "displacement".into());
-        assert!(twice.contains("called `displacement`"), "{twice}");
-        let none = message(&|s| *s = Snapshot::default());
-        assert!(none.contains("no cells"), "{none}");
-        let lost = message(&|s| s.points[3][1] = f64::INFINITY);
-        assert!(
-            lost.contains("`position`") && lost.contains("entry 3"),
-            "{lost}"
-        );
-    }
-
-    #[test]
-    fn a_collection_names_its_files_relative_to_itself() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("run.pvd");
-        let steps = [
-            (0.0, folder.path().join("run/a&b.vtu")),
-            (0.5, PathBuf::from("elsewhere.vtu")),
-        ];
-        write_pvd(&path, &steps).unwrap();
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert!(
-            text.contains("timestep=\"0e0\" group=\"\" part=\"0\" file=\"run/a&amp;b.vtu\""),
-            "{text}"
-        );
-        assert!(
-            text.contains("timestep=\"5e-1\" group=\"\" part=\"0\" file=\"elsewhere.vtu\""),
-            "{text}"
-        );
-        assert!(matches!(
-            write_pvd(&path, &[]),
-            Err(ObserveError::Empty { .. })
-        ));
-        let late = write_pvd(&path, &[(f64::NAN, PathBuf::from("a.vtu"))]);
-        assert!(matches!(late, Err(ObserveError::NotFinite { .. })));
-    }
-}
+#[path = "vtu_tests.rs"]
+mod tests;

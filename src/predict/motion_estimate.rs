@@ -21,11 +21,12 @@ use crate::run::motion::dynamic_system::start;
 use crate::run::motion::explicit::sizes;
 use crate::run::motion::impact::impacted;
 use crate::run::motion::impact_record::ImpactRecord;
+use crate::run::motion::saved::StepChoice;
 use crate::run::motion::setup::{ModelSetup, laid_out};
 use crate::run::motion::step_observer::moment;
 use crate::run::motion::time_dependent_loads::SceneDrive;
 use crate::run::motion::time_step::{held, paced};
-use crate::run::motion::writer::{Moment, Recorder, StepChoice};
+use crate::run::motion::writer::{Moment, Recorder};
 use crate::run::proof::growth::GrowthQuestion;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
@@ -231,7 +232,6 @@ impl OutputCost {
                 broken: &[],
                 sections: &[],
                 stresses: None,
-                on_points: None,
             };
             let mut series = Series::new(folder.path(), "trial");
             let more = [OverSites::Vector("velocity", &u)];

@@ -258,7 +258,6 @@ fn seconds_of_output<const D: usize>(
         broken: &[],
         sections: &[],
         stresses: rest.stresses.at(0.0),
-        on_points: None,
     };
     Ok(output_seconds(&rest.output, &made_up)?)
 }

@@ -37,9 +37,9 @@ pub mod loads;
 pub mod motion;
 #[cfg(test)]
 mod observed_tests;
+pub mod pieces;
 pub(crate) mod placed_scene;
 mod point_cells;
-mod point_tensors;
 pub mod proof;
 mod results;
 mod rotation;

@@ -4,7 +4,6 @@ use crate::coupling::{Model, Operator, SiteKind, Zone};
 use crate::observe::summary::SectionForce;
 use crate::run::stress_settings::StressSettings;
 use crate::system::SemiDiscrete;
-use crate::tensor::Tensor;
 
 /// A solved scene.
 pub struct Solved<'a, const D: usize> {
@@ -26,8 +25,6 @@ pub struct Solved<'a, const D: usize> {
     pub sections: &'a [SectionForce],
     /// What of the stress is thermal and what is made of it, at a time; none where neither is.
     pub stresses: Option<(&'a StressSettings<D>, f64)>,
-    /// Strain and stress of each site, where processes have gathered them.
-    pub on_points: Option<&'a [[Tensor<D>; 2]]>,
 }
 
 /// The zone that each site lies in; of a node the most nonlocal one of the elements around it.

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use crate::coupling::{Coupling, Model, Operator, SiteKind};
 use crate::dimension;
 use crate::observe::ObserveError;
+use crate::observe::pieces::agreed;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
     Decision, Reaction, Rotation, RunSummary, SectionForce, Sizes, Stopwatch, Timings,
@@ -44,8 +45,10 @@ pub(crate) fn run<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
     let moves = scene.solve != Solve::Static;
-    let claim = || scene.output.claim(&scene.title, moves);
-    let _claim = options.writes().then(claim).transpose()?;
+    let processes = options.writers().map_or(1, Ranks::count);
+    let claim = || scene.output.claim(&scene.title, moves, processes);
+    let claimed = options.writes().then(claim).transpose();
+    let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
     if moves {
         return with_choice(scene.scene, |scene| motion::run(scene, options, progress));
     }
@@ -168,7 +171,6 @@ fn solve_chosen<const D: usize>(
         broken: &[],
         sections: &sections,
         stresses: rest.stresses.at(0.0),
-        on_points: None,
     };
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");

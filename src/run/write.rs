@@ -1,12 +1,14 @@
 //! Results of a run as files: one VTU with cells and points together, and CSV along lines and at probes.
 
 use std::cell::LazyCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::RunOptions;
+use super::loads::site_of_node;
+use super::pieces::Piece;
 use super::point_cells::PointCells;
 use super::sections;
 use super::solution::Solved;
@@ -17,11 +19,13 @@ use crate::fem;
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
 use crate::observe::csv::{Entry, write_table};
+use crate::observe::pieces::{PieceFiles, agreed, write_pieces};
 use crate::observe::summary::SectionForce;
 use crate::observe::vtu::{Compression, Field, Snapshot, write_vtu};
 use crate::scene::output::{PROBES, SECTIONS};
 use crate::scene::spec::PointOutputSpec;
 use crate::scene::validated::Output;
+use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, padded, strain};
 
 /// Writes what the scene asks for; returns the files.
@@ -44,21 +48,33 @@ pub(super) fn write_for<const D: usize>(
     let mut files = Vec::new();
     let solution = LazyCell::new(|| SampledSolution::new(solved));
     let path = |end: &str| output.directory.join(format!("{}{end}", output.name));
-    let writes = output.vtu && options.writes();
-    if writes || options.observer.is_some() {
-        let energies = energy_densities(output, solved);
+    let whole = path(".vtu");
+    let of = |shown: Shown<'_>| {
+        let energies = energy_densities(output, solved, shown);
         let more = energies
             .as_deref()
             .map(|e| OverSites::Scalar(ENERGY_DENSITY, e));
-        let shown = snapshot(solved, more.as_slice(), output.points, Shown::All);
-        if writes {
-            files.push(path(".vtu"));
-            write_vtu(&files[0], &shown, Compression::Zlib)?;
-        }
-        if let Some(observer) = options.observer {
-            shown.check(&path(".vtu"))?;
-            observer.snapshot(shown);
-        }
+        snapshot(solved, more.as_slice(), output.points, shown)
+    };
+    let mut written = None;
+    if let Some(ranks) = options.writers().filter(|_| output.vtu) {
+        let piece = Piece::new(solved.model, output.points, ranks);
+        files.push(replaced_by_pieces(
+            &whole,
+            &of(Shown::Piece(&piece)),
+            ranks,
+        )?);
+    } else if output.vtu && options.writes() {
+        let shown = of(Shown::All);
+        write_vtu(&whole, &shown, Compression::Zlib)?;
+        PieceFiles::new(&whole).remove()?;
+        files.push(whole.clone());
+        written = Some(shown);
+    }
+    if let Some(observer) = options.observer {
+        let shown = written.unwrap_or_else(|| of(Shown::All));
+        shown.check(&whole)?;
+        observer.snapshot(shown);
     }
     let mut tables: Vec<(&str, Vec<Vector<D>>)> = Vec::new();
     let lines = output.lines.iter();
@@ -92,23 +108,62 @@ pub(super) fn write_for<const D: usize>(
     Ok(files)
 }
 
+/// Collective: writes a piece of each process and the list over them, in place of a file of one process and of pieces that lay here; returns the list.
+///
+/// # Errors
+/// The error of the first process that could not write, on all.
+fn replaced_by_pieces(
+    whole: &Path,
+    own: &Snapshot,
+    ranks: &dyn Ranks,
+) -> Result<PathBuf, ObserveError> {
+    let files = PieceFiles::new(whole);
+    let is_first = ranks.rank() == 0;
+    // a list that lay here would name pieces of both
+    let removed = if is_first { files.remove() } else { Ok(()) };
+    agreed(Some(ranks), removed, whole)?;
+    write_pieces(whole, own, ranks)?;
+    if is_first {
+        // most often there is none
+        let _ = std::fs::remove_file(whole);
+    }
+    Ok(files.list())
+}
+
 /// Which cells and points a file shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shown {
+#[derive(Clone, Copy, Debug)]
+pub enum Shown<'a> {
     /// All.
     All,
     /// Every so many: a sample, to tell how long all take.
     Every(usize),
+    /// Those of one of several processes, with their numbers among all.
+    Piece(&'a Piece),
 }
 
-impl Shown {
-    fn includes(self, number: usize) -> bool {
+impl Shown<'_> {
+    fn includes_cell(self, c: usize) -> bool {
         match self {
             Self::All => true,
-            Self::Every(n) => number.is_multiple_of(n.max(1)),
+            Self::Every(n) => c.is_multiple_of(n.max(1)),
+            Self::Piece(piece) => piece.cell(c).is_some(),
+        }
+    }
+
+    fn includes_site(self, site: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Every(n) => site.is_multiple_of(n.max(1)),
+            Self::Piece(piece) => piece.site(site).is_some(),
         }
     }
 }
+
+/// The field of the number of each point in the file that one process writes, named as VTK's filters name it; in pieces only.
+const POINT_IDENTIFIER: &str = "GlobalPointIds";
+
+/// The field of the number of each cell.
+const CELL_IDENTIFIER: &str = "GlobalCellIds";
 
 /// A field over sites, beside those that every solution has.
 #[derive(Clone, Copy, Debug)]
@@ -122,15 +177,18 @@ pub enum OverSites<'a> {
 /// The name of the field of [`energy_densities`].
 pub(super) const ENERGY_DENSITY: &str = "energy-density";
 
-/// The energy density of each site, zero at nodes, if the scene asks for it.
+/// The energy density of each site that is shown, zero at nodes, if the scene asks for it.
 pub(super) fn energy_densities<const D: usize>(
     output: &Output<D>,
     solved: &Solved<'_, D>,
+    shown: Shown<'_>,
 ) -> Option<Vec<f64>> {
     let u = solved.displacement;
     let of_site = |intact: &Intact, site: usize| match solved.model.point_of(site) {
-        Some((body, p)) => body.energy_density(p, u, |j| intact.is_intact(p, j)),
-        None => 0.0,
+        Some((body, p)) if shown.includes_site(site) => {
+            body.energy_density(p, u, |j| intact.is_intact(p, j))
+        }
+        _ => 0.0,
     };
     output.energy_density.then(|| {
         let told = solved.system.and_then(|system| system.energy_densities(u));
@@ -147,13 +205,20 @@ pub fn snapshot<const D: usize>(
     solved: &Solved<'_, D>,
     more: &[OverSites<'_>],
     points: PointOutputSpec,
-    shown: Shown,
+    shown: Shown<'_>,
 ) -> Snapshot {
     let mut rows = SnapshotRows::new(solved);
     rows.push_elements(shown);
     rows.push_points(points, shown);
     rows.snapshot.point_fields = rows.point_fields(more);
     rows.snapshot.cell_fields = rows.cell_fields();
+    if let Shown::Piece(_) = shown {
+        let [points, cells] = rows.identifiers;
+        let of_points = Field::identifiers(POINT_IDENTIFIER, points);
+        rows.snapshot.point_fields.push(of_points);
+        let of_cells = Field::identifiers(CELL_IDENTIFIER, cells);
+        rows.snapshot.cell_fields.push(of_cells);
+    }
     rows.snapshot
 }
 
@@ -169,13 +234,15 @@ struct SnapshotRows<'a, const D: usize> {
     sizes: Vec<f64>,
     zones: Vec<u8>,
     volumes: Vec<f64>,
-    /// The material of each cell; empty if all are of one.
+    /// The material of each cell, where there are several.
     materials: Vec<i32>,
     strains: Vec<Tensor<D>>,
     stresses: Vec<Tensor<D>>,
     shown_cells: Vec<u32>,
     known: KnownStresses,
     places: Vec<Place>,
+    /// Numbers of points and of cells among those of all processes; empty where one shows all.
+    identifiers: [Vec<i64>; 2],
 }
 
 impl<'a, const D: usize> SnapshotRows<'a, D> {
@@ -195,21 +262,20 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             shown_cells: Vec::new(),
             known: KnownStresses::of(solved),
             places: Vec::new(),
+            identifiers: [const { Vec::new() }; 2],
         }
     }
 
     /// Elements with strain and stress at their centres, and their nodes.
-    fn push_elements(&mut self, shown: Shown) {
+    fn push_elements(&mut self, shown: Shown<'_>) {
         let solved = self.solved;
         let (model, mesh) = (solved.model, &solved.model.mesh);
         let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
-        let mut site_of_node = vec![None; mesh.nodes.len()];
-        for (site, s) in model.sites.iter().enumerate() {
-            if let SiteKind::Node(n) = s.kind {
-                site_of_node[n as usize] = Some(site);
+        let site_of_node = site_of_node(model);
+        for c in 0..mesh.cell_count() {
+            if !shown.includes_cell(c) || !model.is_element(c) {
+                continue;
             }
-        }
-        for c in (0..mesh.cell_count()).filter(|&c| shown.includes(c) && model.is_element(c)) {
             let mut nodes = [0u32; fem::MAX_NODES];
             for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
                 let entry = &mut point_of_node[n as usize];
@@ -218,8 +284,12 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                     self.snapshot.points.push(padded(&mesh.nodes[n as usize]));
                     self.displacement.push(solved.node(n as usize));
                     self.sizes.push(0.0);
-                    self.site_of_point.push(site_of_node[n as usize]);
+                    let site = site_of_node[n as usize];
+                    self.site_of_point.push(site.map(|site| site as usize));
                     self.node_of_point.push(Some(n as usize));
+                    if let Shown::Piece(piece) = shown {
+                        self.identifiers[0].push(piece.node(n as usize).into());
+                    }
                 }
                 *slot = *entry;
             }
@@ -236,11 +306,14 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             self.stresses.push(stress);
             self.places.push(Place::Cell(c));
             self.shown_cells.push(c as u32);
+            if let Shown::Piece(piece) = shown {
+                self.identifiers[1].extend(piece.cell(c).map(i64::from));
+            }
         }
     }
 
     /// Peridynamic points with strain and stress of their families.
-    fn push_points(&mut self, form: PointOutputSpec, shown: Shown) {
+    fn push_points(&mut self, form: PointOutputSpec, shown: Shown<'_>) {
         let solved = self.solved;
         let model = solved.model;
         let cells = PointCells::of(model);
@@ -249,14 +322,11 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
             .into_par_iter()
             .filter(|&site| {
-                shown.includes(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
+                shown.includes_site(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
             })
             .map(|site| {
-                let [strain, stress] = match solved.on_points {
-                    Some(known) => known[site],
-                    None => solved.tensors_at(site, &intact, known),
-                };
-                (site, strain, stress)
+                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
+                (site, strain(&solved.point_gradient(site, &intact)), stress)
             })
             .collect();
         for (site, e, stress) in on_points {
@@ -269,8 +339,16 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                 PointOutputSpec::Cells => cells.cell(p, x),
             };
             let first = self.snapshot.points.len() as u32;
-            let numbers: Vec<u32> = (first..first + corners.len() as u32).collect();
+            let count = corners.len() as u32;
+            let numbers: Vec<u32> = (first..first + count).collect();
             self.snapshot.push_cell(shape, &numbers);
+            if let Shown::Piece(piece) = shown
+                && let Some([cell, corner]) = piece.site(site)
+            {
+                let [points, cells] = &mut self.identifiers;
+                points.extend((corner..corner + count).map(i64::from));
+                cells.push(cell.into());
+            }
             for corner in corners {
                 self.snapshot.points.push(corner);
                 self.displacement.push(solved.site(site));
@@ -358,7 +436,10 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             let values = derived.iter().map(|d| d[k]).collect();
             fields.push(Field::scalar(name, values));
         }
-        if !self.materials.is_empty() {
+        let model = self.solved.model;
+        let by_points = model.body().is_some_and(|b| !b.cloud.material.is_empty());
+        // also in a piece that shows nothing, whose fields stand for those of others
+        if model.several().is_some() || by_points {
             fields.push(Field::integers("material", self.materials.clone()));
         }
         let remembered = self

@@ -130,20 +130,25 @@ pub(super) fn stresses_agree<const D: usize>(
 }
 
 impl<const D: usize> Output<D> {
-    /// Keeps others from the files of a scene while it runs; nothing to keep where it writes none.
+    /// Keeps others from the files of a scene while it runs on some `processes`; nothing to keep where it writes none.
     ///
     /// # Errors
     /// As [`Claim::take`].
-    pub(crate) fn claim(&self, scene: &str, moves: bool) -> Result<Option<Claim>, ObserveError> {
-        let files = self.files(moves);
+    pub(crate) fn claim(
+        &self,
+        scene: &str,
+        moves: bool,
+        processes: usize,
+    ) -> Result<Option<Claim>, ObserveError> {
+        let files = self.files(moves, processes);
         if files.files.is_empty() {
             return Ok(None);
         }
         Claim::take(&self.directory, scene, &files).map(Some)
     }
 
-    /// The files that a scene writes: at rest, or where it `moves`.
-    fn files(&self, moves: bool) -> Files {
+    /// The files that a scene writes, or removes for those that another number of processes has written: at rest, or where it `moves`.
+    fn files(&self, moves: bool, processes: usize) -> Files {
         let name = &self.name;
         let mut ends: Vec<String> = Vec::new();
         if moves {
@@ -160,7 +165,9 @@ impl<const D: usize> Output<D> {
             ends.extend(self.lines.iter().map(|(line, _)| format!("_{line}.csv")));
         } else {
             if self.vtu {
-                ends.push(".vtu".to_owned());
+                ends.extend([".vtu", ".pvtu"].map(str::to_owned));
+                let pieces = (0..processes).filter(|_| processes > 1);
+                ends.extend(pieces.map(|rank| format!("_p{rank}.vtu")));
             }
             ends.extend(self.lines.iter().map(|(line, _)| format!("_{line}.csv")));
             if !self.probes.is_empty() {

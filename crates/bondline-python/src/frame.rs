@@ -40,6 +40,7 @@ fn fields(py: Python<'_>, fields: Vec<Field>) -> PyResult<Bound<'_, PyDict>> {
             Values::Real(v) => array(py, v, n),
             Values::Byte(v) => array(py, v, n),
             Values::Integer(v) => array(py, v, n),
+            Values::Identifier(v) => array(py, v, n),
         };
         found.set_item(field.name, values?)?;
     }

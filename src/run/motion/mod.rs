@@ -20,6 +20,7 @@
 //! | `probe_rows.rs`, `section_rows.rs` | what the history tells of probes, and of sections through the body |
 //! | `tips.rs` | where the tip of a crack is |
 //! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
+//! | `saved.rs` | what a checkpoint keeps |
 
 pub(crate) mod bounding_boxes;
 pub mod breaks;
@@ -37,6 +38,7 @@ mod newton_factors;
 mod probe_rows;
 pub mod quasi_static;
 pub(crate) mod rezoning;
+pub mod saved;
 mod section_rows;
 pub(crate) mod seen;
 pub mod setup;
@@ -93,11 +95,17 @@ pub struct RunOptions<'a> {
     pub ranks: Option<&'a dyn Ranks>,
 }
 
-impl RunOptions<'_> {
+impl<'a> RunOptions<'a> {
     /// Whether the run writes files.
     pub(crate) fn writes(&self) -> bool {
         self.ranks.is_none_or(|ranks| ranks.rank() == 0)
             && self.observer.is_none_or(Observer::wants_files)
+    }
+
+    /// The processes that each write a piece of a VTU file, if there are several.
+    pub(crate) fn writers(&self) -> Option<&'a dyn Ranks> {
+        let wanted = self.observer.is_none_or(Observer::wants_files);
+        self.ranks.filter(|ranks| wanted && ranks.count() > 1)
     }
 
     /// Appends a row to a table, and shows it to the observer.

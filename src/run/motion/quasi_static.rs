@@ -13,10 +13,11 @@ use super::explicit::{cracks, inelastic_energy, sizes};
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
 use super::newton_factors::NewtonFactors;
+use super::saved::{EdgeReached, Saved, StepChoice};
 use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
-use super::writer::{EdgeReached, Moment, Recorder, Saved, StepChoice};
+use super::writer::{Moment, Recorder};
 use crate::coupling::{Impact, Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
@@ -104,7 +105,7 @@ fn load_steps<const D: usize>(
         pace,
         breaks,
         drive: &drive,
-        fields: FieldOutput::new(model, operator, &rest.stresses, &rest.output),
+        fields: FieldOutput::new(model, operator, rest, options),
         recorder,
         rotations,
         doubts,

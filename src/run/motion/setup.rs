@@ -1,7 +1,7 @@
 //! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
-use super::writer::Saved;
+use super::saved::Saved;
 use super::{RunOptions, StartFrom};
 use std::sync::Arc;
 

@@ -8,14 +8,16 @@ use super::RunOptions;
 use super::breaks::Breaks;
 use super::dynamic_system::{critical_stretch, failing_stretch};
 use super::guard::{Balance, Guard};
+use super::saved::{EdgeReached, StepChoice, Zone};
 use super::seen::Seen;
-use super::writer::{EdgeReached, Moment, Recorder, Row, StepChoice, Zone};
+use super::writer::{Moment, Recorder, Row};
 use super::zone_monitor::{ZoneMonitor, fastest_crack};
 use crate::coupling::{Model, Operator};
 use crate::observe::ObserveError;
 use crate::observe::summary::{Ended, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
+use crate::run::pieces::Piece;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
@@ -23,7 +25,6 @@ use crate::run::stress_probes::StressProbes;
 use crate::run::stress_settings::StressSettings;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
-use crate::scene::validated::Output;
 use crate::solve::explicit::{Explicit, State};
 
 /// How often whoever watches is told.
@@ -66,6 +67,8 @@ pub(super) struct FieldOutput<'a, const D: usize> {
     zone_of_site: Vec<crate::coupling::Zone>,
     stresses: &'a StressSettings<D>,
     probes: StressProbes,
+    /// What each of several processes shows of them.
+    piece: Option<Piece>,
 }
 
 impl<'a, const D: usize> FieldOutput<'a, D> {
@@ -73,15 +76,18 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
     pub fn new(
         model: &'a Model<D>,
         operator: &'a dyn Operator<D>,
-        stresses: &'a StressSettings<D>,
-        output: &Output<D>,
+        rest: &'a RunSettings<D>,
+        options: &RunOptions<'_>,
     ) -> Self {
+        let (output, stresses) = (&rest.output, &rest.stresses);
+        let writers = options.writers().filter(|_| output.vtu);
         Self {
             probes: StressProbes::new(model, stresses, &output.probes),
             model,
             operator,
             zone_of_site: solution::zone_of_site(model),
             stresses,
+            piece: writers.map(|ranks| Piece::new(model, output.points, ranks)),
         }
     }
 
@@ -95,13 +101,8 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
         moment: &Moment<'_>,
     ) -> Result<(), ObserveError> {
         let broken = moment.broken_bonds();
-        let mut solved = self.solved(moment, &broken);
-        let spread = self.model.spread(recorder.ranks());
-        let [has_snapshots, writes] = recorder.snapshots();
-        let spread = spread.filter(|_| has_snapshots);
-        let gathered = spread.map(|spread| solved.gathered_tensors(&spread, writes));
-        solved.on_points = gathered.as_deref();
-        recorder.output(moment, &solved)
+        let solved = self.solved(moment, &broken);
+        recorder.output(moment, &solved, self.piece.as_ref())
     }
 
     /// A moment as it is shown.
@@ -116,7 +117,6 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
             broken,
             sections: &[],
             stresses: self.stresses.at(moment.state.time),
-            on_points: None,
         }
     }
 
@@ -196,7 +196,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         };
         Ok(Self {
             segment,
-            fields: FieldOutput::new(model, segment.operator, &rest.stresses, &rest.output),
+            fields: FieldOutput::new(model, segment.operator, rest, segment.options),
             monitor,
             guard,
             recorder,

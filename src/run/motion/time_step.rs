@@ -1,7 +1,7 @@
 //! The time step of a run: the stable one of what moves, sub-cycled where the scene wants it.
 
 use super::dynamic_system::DynamicSystem;
-use super::writer::StepChoice;
+use super::saved::StepChoice;
 use crate::coupling::Model;
 use crate::observe::{proof::Part, report::number, summary::Decision};
 use crate::run::error::RunError;

@@ -4,14 +4,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
-
 use super::RunOptions;
 use super::breaks::Breaks;
 use super::crack_growth::CrackGrowth;
-use super::impact_record::{ImpactRecord, Peak};
+use super::impact_record::ImpactRecord;
 use super::probe_rows::ProbeRows;
-use super::rezoning::{nonlocal, share};
+use super::saved::{EdgeReached, Saved, StepChoice, Written, Zone};
 use super::section_rows::SectionRows;
 use super::supports::Supports;
 use super::tables::Tables;
@@ -20,11 +18,12 @@ use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
 use crate::observe::csv::Entry;
 use crate::observe::history::History;
-use crate::observe::rezoning_event::Switch;
+use crate::observe::pieces::agreed;
 use crate::observe::series::Series;
 use crate::observe::summary::{Reaction, SectionForce};
 use crate::run::error::RunError;
 use crate::run::motion::seen::Seen;
+use crate::run::pieces::Piece;
 use crate::run::solution::Solved;
 use crate::run::springs::Springs;
 use crate::run::stress_probes;
@@ -32,128 +31,10 @@ use crate::run::write::{ENERGY_DENSITY, OverSites, Shown, energy_densities, snap
 use crate::scene::conditions::Condition;
 use crate::scene::validated::Output;
 use crate::solve::explicit::State;
-use crate::system::{Ranks, SemiDiscrete};
+use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// All that a run needs to go on; the same bytes for the same scene and step, whenever it was stopped before.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Saved {
-    /// Fields, time, step, work, broken bonds.
-    pub state: State,
-    /// What the system keeps of its damage.
-    pub damage: Vec<u64>,
-    /// The time step and what it was chosen by.
-    pub pace: StepChoice,
-    /// What was written so far.
-    pub written: Written,
-    /// When damage reached the edge of the nonlocal zone, if it did.
-    pub edge: Option<EdgeReached>,
-    /// Where a zone that follows the crack stands; none of one that does not.
-    pub zone: Option<Zone>,
-    /// What was seen of energy and rotation.
-    pub seen: Seen,
-}
-
-/// Where a zone that follows the crack stands.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Zone {
-    /// Whether each cell is nonlocal.
-    pub nonlocal: Vec<bool>,
-    /// When each was wanted last \[s\], or became nonlocal; minus infinity if never.
-    pub wanted: Vec<f64>,
-    /// Whether the state was looked at for a change already, where one is due.
-    pub looked: bool,
-    /// The changes so far.
-    pub switches: Vec<Switch>,
-    /// Its share of the volume at the start, and the most so far.
-    pub shares: [f64; 2],
-}
-
-impl Zone {
-    /// Of the layout that a run begins with.
-    pub fn first<const D: usize>(model: &Model<D>) -> Self {
-        let share = share(model);
-        let nonlocal = nonlocal(model);
-        let never = f64::NEG_INFINITY;
-        Self {
-            wanted: nonlocal
-                .iter()
-                .map(|n| if *n { 0.0 } else { never })
-                .collect(),
-            nonlocal,
-            looked: true,
-            switches: Vec::new(),
-            shares: [share; 2],
-        }
-    }
-
-    /// After a change to another layout.
-    pub fn after<const D: usize>(mut self, switch: Switch, model: &Model<D>) -> Self {
-        let now = nonlocal(model);
-        let was = std::mem::replace(&mut self.nonlocal, now);
-        for ((wanted, was), now) in self.wanted.iter_mut().zip(was).zip(&self.nonlocal) {
-            if *now && !was {
-                *wanted = switch.time;
-            }
-        }
-        self.looked = true;
-        self.shares[1] = self.shares[1].max(switch.share);
-        self.switches.push(switch);
-        self
-    }
-}
-
-/// A time step, and the limits that it keeps.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StepChoice {
-    /// The step.
-    pub step: f64,
-    /// Steps to the end.
-    pub steps: u64,
-    /// The largest step that is taken to be stable.
-    pub stable: f64,
-    /// What row sums guarantee.
-    pub certified: f64,
-    /// The site of the row that says so.
-    pub site: u64,
-    /// The step and the time since when steps are of this size.
-    pub since: (u64, f64),
-}
-
-impl StepChoice {
-    /// The time after a step.
-    pub fn time(&self, step: u64) -> f64 {
-        self.since.1 + (step - self.since.0) as f64 * self.step
-    }
-}
-
-/// Damage at the edge of the nonlocal zone.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EdgeReached {
-    /// After this step.
-    pub step: u64,
-    /// At this time.
-    pub time: f64,
-    /// At this site.
-    pub site: u64,
-}
-
-/// What of a run's files belongs to a state.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Written {
-    /// Lengths of the history and of the tables beside it: tips, then lines.
-    pub bytes: Vec<u64>,
-    /// Times of the VTU files.
-    pub times: Vec<f64>,
-    /// Kinetic and stored energy at the start.
-    pub energy_at_start: f64,
-    /// The largest forces of impactors so far.
-    pub peaks: Vec<Peak>,
-    /// How far cracks grew.
-    pub growth: CrackGrowth,
-}
 
 /// A state to tell of.
 pub struct Moment<'a> {
@@ -258,31 +139,15 @@ impl<'a, const D: usize> Recorder<'a, D> {
         written: Option<&Written>,
     ) -> Result<Self, ObserveError> {
         let probes = ProbeRows::new(&output.probes, sampler);
-        let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
-        let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
-        let table = |name: &str, header, file| match options.writes() {
-            true => History::resumed(&path(name), header, bytes(file)),
-            false => Ok(History::unwritten(header)),
-        };
         let supports = Supports::new(conditions);
         let sections = SectionRows::new(&output.sections);
         let mut header = history_header(&probes, &supports, breaks, is_linear);
         header.extend(sections.header());
         header.extend(stress_probes::header(output));
         header.extend(impact.iter().flat_map(ImpactRecord::header));
-        let history = table("history", header, 0)?;
-        let tables = Tables::new(output, |name, header, place| table(name, header, place + 1))?;
-        let series = match written {
-            _ if !options.writes() => Series::new(&output.directory, &output.name),
-            Some(w) => Series::resumed(&output.directory, &output.name, w.times.clone()),
-            None => {
-                checkpoint.remove()?;
-                let series = Series::new(&output.directory, &output.name);
-                series.remove_old();
-                series
-            }
-        };
-        series.write_collection()?;
+        let begun = files_begun(output, header, &checkpoint, &options, written);
+        let begun = agreed(options.ranks, begun, &output.directory);
+        let (history, tables, series) = begun?;
         Ok(Self {
             output,
             probes,
@@ -430,17 +295,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(())
     }
 
-    /// The processes of the run, if there are several.
-    pub fn ranks(&self) -> Option<&'a dyn Ranks> {
-        self.options.ranks
-    }
-
-    /// Whether the run has VTU files, and whether this process writes them.
-    pub fn snapshots(&self) -> [bool; 2] {
-        [self.output.vtu, self.output.vtu && self.options.writes()]
-    }
-
-    /// Appends the state to the tables of the lines, writes a VTU file, if the scene wants any, and shows the same to the observer.
+    /// Appends the state to the tables of the lines, writes a VTU file, if the scene wants any, and shows the same to the observer. Collective where each process writes
+    /// a `piece` of the file.
     ///
     /// # Errors
     /// [`ObserveError`] if a file cannot be written.
@@ -448,15 +304,22 @@ impl<'a, const D: usize> Recorder<'a, D> {
         &mut self,
         moment: &Moment<'_>,
         solved: &Solved<'_, D>,
+        piece: Option<&Piece>,
     ) -> Result<(), ObserveError> {
         let begun = Instant::now();
         self.tables
             .lines(self.output, &self.options, moment.state, solved)?;
         self.seconds += begun.elapsed().as_secs_f64();
+        let observer = self.options.observer;
+        let pieces = piece.zip(self.options.writers());
         let writes = self.output.vtu && self.options.writes();
-        if !writes && self.options.observer.is_none() {
+        if !writes && pieces.is_none() && observer.is_none() {
             return Ok(());
         }
+        let shown = match pieces {
+            Some((piece, _)) if observer.is_none() => Shown::Piece(piece),
+            _ => Shown::All,
+        };
         let begun = Instant::now();
         let mut more = vec![OverSites::Vector("velocity", &moment.state.v)];
         let damage = match self.breaks {
@@ -470,16 +333,22 @@ impl<'a, const D: usize> Recorder<'a, D> {
         for (name, values) in &remembered {
             more.push(OverSites::Scalar(name, values));
         }
-        let energies = energy_densities(self.output, solved);
+        let energies = energy_densities(self.output, solved, shown);
         if let Some(energies) = &energies {
             more.push(OverSites::Scalar(ENERGY_DENSITY, energies));
         }
-        let mut shown = snapshot(solved, &more, self.output.points, Shown::All);
-        if writes {
-            shown = self.series.push(moment.state.time, shown)?;
+        let of = |shown| snapshot(solved, &more, self.output.points, shown);
+        let time = moment.state.time;
+        let mut written = None;
+        if let Some((piece, ranks)) = pieces {
+            let own = of(Shown::Piece(piece));
+            self.series.push_pieces(time, own, ranks)?;
+        } else if writes {
+            written = Some(self.series.push(time, of(Shown::All))?);
         }
-        if let Some(observer) = self.options.observer {
-            shown.time = Some(moment.state.time);
+        if let Some(observer) = observer {
+            let mut shown = written.unwrap_or_else(|| of(Shown::All));
+            shown.time = Some(time);
             shown.check(&self.series.collection())?;
             observer.snapshot(shown);
         }
@@ -552,8 +421,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     /// The files that are there.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = Vec::new();
-        let times = self.series.times().len();
-        if times > 0 {
+        if self.options.writes() && !self.series.times().is_empty() {
             files.push(self.series.collection());
         }
         let tables = std::iter::once(&self.history).chain(self.tables.iter());
@@ -567,6 +435,35 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         files
     }
+}
+
+/// The files of a run, cut back to what was `written` at a checkpoint; what an earlier run left goes.
+fn files_begun<const D: usize>(
+    output: &Output<D>,
+    header: Vec<String>,
+    checkpoint: &CheckpointFile,
+    options: &RunOptions<'_>,
+    written: Option<&Written>,
+) -> Result<(History, Tables, Series), ObserveError> {
+    let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
+    let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
+    let table = |name: &str, header, file| match options.writes() {
+        true => History::resumed(&path(name), header, bytes(file)),
+        false => Ok(History::unwritten(header)),
+    };
+    let history = table("history", header, 0)?;
+    let tables = Tables::new(output, |name, header, place| table(name, header, place + 1))?;
+    let times = written.map_or(Vec::new(), |w| w.times.clone());
+    let series = Series::resumed(&output.directory, &output.name, times);
+    if options.writes() {
+        if written.is_none() {
+            checkpoint.remove()?;
+            series.remove_collection();
+        }
+        series.remove_later();
+        series.write_collection()?;
+    }
+    Ok((history, tables, series))
 }
 
 fn history_header<const D: usize>(
