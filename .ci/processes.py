@@ -55,16 +55,18 @@ vtu = false
 
 
 def measured(command):
-    """Runs a command, and prints its peak memory and seconds: a process of the job."""
+    """Runs a command, and writes down its peak memory and seconds: a process of the job."""
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     rank = os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0"))
-    print("process", rank, used.ru_maxrss, used.ru_utime, used.ru_stime, flush=True)
+    # in files: mpirun mixes the lines of its processes
+    told = pathlib.Path(os.environ["BONDLINE_MEASURED"])
+    told.with_suffix(f".{rank}").write_text(json.dumps([used.ru_maxrss / 1024, used.ru_utime, used.ru_stime]))
     if done.returncode:
         print(done.stderr, file=sys.stderr)
     if done.stdout:
-        # the summary of the first process, in a file: mpirun mixes the lines of its processes
-        pathlib.Path(os.environ["BONDLINE_SUMMARY"]).write_text(done.stdout)
+        # the summary of the first process
+        told.write_text(done.stdout)
     return done.returncode
 
 
@@ -77,9 +79,8 @@ def run(program, scene, folder, count):
     if count:
         command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(count)] + command
     told = pathlib.Path(folder + ".json")
-    done = subprocess.run(command, env={**os.environ, **THREADS, "BONDLINE_SUMMARY": str(told)}, stdout=subprocess.PIPE, text=True, check=True)
-    lines = [line.split() for line in done.stdout.splitlines() if line.startswith("process ")]
-    each = [(int(peak) / 1024, float(user), float(system)) for _, _, peak, user, system in sorted(lines)]
+    subprocess.run(command, env={**os.environ, **THREADS, "BONDLINE_MEASURED": str(told)}, stdout=subprocess.DEVNULL, check=True)
+    each = [json.loads(told.with_suffix(f".{rank}").read_text()) for rank in range(count or 1)]
     return each, json.loads(told.read_text())
 
 
