@@ -250,3 +250,82 @@ pub(super) fn least_squares(
     }
     (x, iterations)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    /// Conditions with random numbers.
+    fn columns(rows: usize, count: usize, in_each: usize) -> Columns {
+        let mut seed = 1u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1);
+            (seed >> 33) as f64 / f64::from(1u32 << 31)
+        };
+        let mut columns = Columns::new();
+        columns.rows = rows;
+        for _ in 0..count {
+            let first = (random() * rows as f64) as usize;
+            let of_row = |k: usize| ((first + k * k * 7) % rows) as u32;
+            let entries = (0..in_each).map(|k| (of_row(k), random() - 0.5));
+            columns.entries.extend(entries);
+            columns.end();
+        }
+        columns.finish();
+        columns
+    }
+
+    #[test]
+    fn solutions_are_those_of_dense_algebra() {
+        let a = columns(40, 90, 5);
+        let scale: Vec<f64> = (0..90).map(|k| 0.5 + f64::from(k % 7) / 7.0).collect();
+        let counts: Vec<bool> = (0..40).map(|r| r % 9 != 4).collect();
+        let b: Vec<f64> = (0..40)
+            .map(|r| f64::from(u8::from(counts[r])) * (r as f64).sin())
+            .collect();
+        let mut dense = DMatrix::<f64>::zeros(40, 90);
+        for k in 0..90 {
+            for &(r, v) in &a.entries[a.offsets[k]..a.offsets[k + 1]] {
+                dense[(r as usize, k)] += f64::from(u8::from(counts[r as usize])) * v * scale[k];
+            }
+        }
+        for damping in [0.0, 0.3] {
+            let normal: DMatrix<f64> =
+                &dense * dense.transpose() + DMatrix::identity(40, 40) * (damping * damping);
+            let multiplier = normal
+                .svd(true, true)
+                .solve(&DVector::from(b.clone()), 1e-12);
+            let wanted = dense.transpose() * multiplier.unwrap();
+            // the scales of the metric, and others
+            for other in [1.0, 0.6] {
+                let of_metric: Vec<f64> = scale.iter().map(|s| s.powf(other)).collect();
+                let metric = Metric::new(&a, &of_metric, &counts, (damping, 1e-3));
+                let (found, iterations) =
+                    least_squares((&a, &metric), &scale, &b, &counts, (damping, 1e-13, 60));
+                let apart = (DVector::from(found) - &wanted).norm() / wanted.norm();
+                assert!(apart < 1e-9, "{damping} {other} {apart:e}");
+                assert!(
+                    iterations < if other == 1.0 { 4 } else { 60 },
+                    "{iterations}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn bits_do_not_depend_on_the_number_of_threads() {
+        let a = columns(1200, 6000, 8);
+        let (scale, counts) = (vec![1.0; 6000], vec![true; 1200]);
+        let b: Vec<f64> = (0..1200).map(|r| f64::from(r).cos()).collect();
+        let of_threads = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let metric = Metric::new(&a, &scale, &counts, (0.1, 1e-3));
+                least_squares((&a, &metric), &scale, &b, &counts, (0.1, 1e-3, 60)).0
+            })
+        };
+        assert!(of_threads(1) == of_threads(2));
+    }
+}
