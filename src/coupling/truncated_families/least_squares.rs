@@ -316,9 +316,9 @@ mod tests {
 
     #[test]
     fn bits_do_not_depend_on_the_number_of_threads() {
-        let a = columns(1200, 6000, 8);
-        let (scale, counts) = (vec![1.0; 6000], vec![true; 1200]);
-        let b: Vec<f64> = (0..1200).map(|r| f64::from(r).cos()).collect();
+        let a = columns(2400, 9000, 8);
+        let (scale, counts) = (vec![1.0; 9000], vec![true; 2400]);
+        let b: Vec<f64> = (0..2400).map(|r| f64::from(r).cos()).collect();
         let of_threads = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().unwrap().install(|| {
