@@ -25,14 +25,16 @@ pub(super) fn cut<const D: usize>(
     families: &mut Families,
 ) {
     let barriers = Barriers::new(p.barriers.clone());
-    if barriers.is_empty() && surface.is_none() {
+    let cutter = surface
+        .as_ref()
+        .map(|facets| SegmentCutter::new(mesh, facets));
+    let cutter = cutter.filter(|cutter| !cutter.is_convex_around(position));
+    if barriers.is_empty() && cutter.is_none() {
         return;
     }
     // a bond crosses a facet only if both of its ends are within its length of it
-    let bins = surface
-        .as_ref()
-        .map(|facets| NearBins::new(mesh, facets, reach));
-    let cutter = surface.map(|facets| SegmentCutter::new(mesh, &facets));
+    let facets = surface.filter(|_| cutter.is_some());
+    let bins = facets.map(|facets| NearBins::new(mesh, &facets, reach));
     let near: Vec<bool> = position
         .par_iter()
         .map(|x| barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x)))

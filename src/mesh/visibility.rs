@@ -23,6 +23,12 @@ pub struct SegmentCutter<const D: usize> {
     entries: Vec<u32>,
 }
 
+/// Planes of the faces of a convex body at most: more are those of a curved surface, and looking at all of them takes longer than asking about bonds.
+const MOST_PLANES: usize = 16;
+
+/// How far a point may lie beyond a plane, over the size of the body: round-off.
+const CONVEX_TOUCH: f64 = 1e-13;
+
 /// A point, edge or triangle of the boundary.
 #[derive(Clone, Debug)]
 struct Simplex<const D: usize> {
@@ -82,6 +88,32 @@ impl<const D: usize> SegmentCutter<D> {
     /// All holes and edges of a mesh.
     pub fn of_mesh(mesh: &Mesh<D>) -> Self {
         Self::new(mesh, &mesh.outer_facets())
+    }
+
+    /// Whether the boundary is that of a convex body with few faces, and all of these points lie in it: then no bond between them leaves it, and none has to be asked about.
+    pub fn is_convex_around(&self, points: &[Vector<D>]) -> bool {
+        let corners = || self.facets.iter().flat_map(|facet| &facet.corners);
+        let size = corners().fold(0.0f64, |most, x| most.max(x.amax()));
+        let touches = CONVEX_TOUCH * size;
+        let mut planes: Vec<(Vector<D>, f64)> = Vec::new();
+        for facet in &self.facets {
+            let offset = facet.normal.dot(&facet.corners[0]);
+            let is_known = planes.iter().any(|(normal, at)| {
+                (normal - facet.normal).amax() < CONVEX_TOUCH && (at - offset).abs() < touches
+            });
+            if is_known {
+                continue;
+            }
+            if planes.len() == MOST_PLANES {
+                return false;
+            }
+            planes.push((facet.normal, offset));
+        }
+        let is_inside = |x: &Vector<D>| {
+            let mut planes = planes.iter();
+            planes.all(|(normal, at)| normal.dot(x) <= at + touches)
+        };
+        !planes.is_empty() && corners().all(is_inside) && points.iter().all(is_inside)
     }
 
     fn in_grid(facets: Vec<Simplex<D>>) -> Self {
@@ -463,6 +495,44 @@ mod tests {
         agrees_with_void::<3>(8, min, max, |grid| {
             grid.simplices();
         });
+    }
+
+    /// Whether no bond of the nodes of a block can leave it, turned by an angle in its first plane: whole, or without a corner.
+    fn convex<const D: usize>(is_cut: bool, is_simplicial: bool, angle: f64) -> bool {
+        let mut grid = Grid::new(std::array::from_fn(|_| axis(8)));
+        if is_cut {
+            grid.cut_out(CutOut {
+                name: "corner".into(),
+                min: Vector::repeat(0.25),
+                max: Vector::repeat(0.5),
+            });
+        }
+        if is_simplicial {
+            grid.simplices();
+        }
+        let mut mesh = grid.mesh().unwrap();
+        for x in &mut mesh.nodes {
+            if D > 1 {
+                let (sine, cosine) = angle.sin_cos();
+                (x[0], x[1]) = (cosine * x[0] - sine * x[1], sine * x[0] + cosine * x[1]);
+            }
+        }
+        let cutter = SegmentCutter::of_mesh(&mesh);
+        let beyond = Vector::repeat(0.75);
+        assert!(!cutter.is_convex_around(&[beyond]));
+        cutter.is_convex_around(&mesh.nodes)
+    }
+
+    #[test]
+    fn no_bond_leaves_a_convex_body() {
+        for is_simplicial in [false, true] {
+            for angle in [0.0, 0.3, 2.0] {
+                assert!(convex::<2>(false, is_simplicial, angle));
+                assert!(convex::<3>(false, is_simplicial, angle));
+                assert!(!convex::<2>(true, is_simplicial, angle));
+                assert!(!convex::<3>(true, is_simplicial, angle));
+            }
+        }
     }
 
     #[test]
