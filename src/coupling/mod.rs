@@ -16,6 +16,7 @@
 //! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
 //! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs`, `bins.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
+//! | `sparse_factors.rs` | factors of the conditions that the fits at a seam have to meet | |
 //! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
 //! | `semidiscrete.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
@@ -56,6 +57,7 @@ pub mod semidiscrete;
 mod shared_body;
 pub mod shared_families;
 mod sites;
+mod sparse_factors;
 pub mod splice;
 pub mod state_transfer;
 pub mod tributary;

@@ -1,14 +1,10 @@
 //! Factors of the normal equations of conditions, and what they cost.
 
-use faer::prelude::Solve;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
 use rayon::prelude::*;
 
 use super::normal::Dense;
+use crate::coupling::sparse_factors::SparseFactors;
 use crate::coupling::truncated::conditions::{Conditions, norm};
 
 /// Conditions from which on their normal equations are factorised: conjugate gradients alone take as many iterations as a long seam has points.
@@ -32,22 +28,17 @@ impl Conditions {
         let Some(normal) = self.normal(|_| true) else {
             return 0.0;
         };
-        let symbolic = factorize_symbolic_cholesky(
-            normal.symbolic(),
-            faer::Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        );
         // the sum of the squares of all columns of the factor is least where they have the same length
-        symbolic.map_or(0.0, |s| (s.len_val() as f64).powi(2) / self.count as f64)
+        let entries = SparseFactors::entries(&normal);
+        entries.map_or(0.0, |n| (n as f64).powi(2) / self.count as f64)
     }
 
     /// The factors of the normal equations of the changes that count, if there are many; rows are those of norm 1.
-    pub(super) fn factors(&self, counts: impl Fn(usize) -> bool + Sync) -> Option<Llt<usize, f64>> {
+    pub(super) fn factors(&self, counts: impl Fn(usize) -> bool + Sync) -> Option<SparseFactors> {
         if self.count < FACTORISED {
             return None;
         }
-        self.normal(counts)?.sp_cholesky(faer::Side::Lower).ok()
+        SparseFactors::new(&self.normal(counts)?)
     }
 
     /// The normal equations of the changes that count.
@@ -95,7 +86,7 @@ impl Conditions {
     ) -> Option<Vec<f64>> {
         let n = self.count;
         if n > DENSE {
-            return Some(solved(&self.factors(is_free)?, gap));
+            return Some(self.factors(is_free)?.solved(gap));
         }
         let mut normal = vec![0.0; n * n];
         for k in (0..self.changes()).filter(|&k| is_free(k)) {
@@ -111,16 +102,4 @@ impl Conditions {
         }
         Some(Dense::new(n, normal)?.solved(gap))
     }
-}
-
-/// What solves the normal equations of all changes, but for what is added to their diagonal.
-pub(super) fn solved(factors: &Llt<usize, f64>, wanted: &[f64]) -> Vec<f64> {
-    let mut solution = wanted.to_vec();
-    let rows = solution.len();
-    factors.solve_in_place(faer::MatMut::from_column_major_slice_mut(
-        &mut solution,
-        rows,
-        1,
-    ));
-    solution
 }

@@ -1,10 +1,9 @@
 //! The smallest change that meets many sparse linear conditions.
 
-use faer::sparse::linalg::solvers::Llt;
 use rayon::prelude::*;
 
 use super::conditions::{Conditions, dot, norm};
-use super::factors::solved;
+use crate::coupling::sparse_factors::SparseFactors;
 
 /// Steps of the dual Newton method.
 const MOST_STEPS: usize = 20;
@@ -423,16 +422,14 @@ impl Conditions {
     /// Corrects changes by the factors of all conditions as long as that gains; what is left, and the changes.
     fn refined(
         &self,
-        factors: &Llt<usize, f64>,
+        factors: &SparseFactors,
         target: &[f64],
         floor: f64,
         (mut reached, mut z): (f64, Vec<f64>),
     ) -> (f64, Vec<f64>) {
         for _ in 0..MOST_CORRECTIONS {
-            let correction = self.transposed(&solved(
-                factors,
-                &self.left(target, &self.lifted(&z, floor)),
-            ));
+            let correction =
+                self.transposed(&factors.solved(&self.left(target, &self.lifted(&z, floor))));
             let next: Vec<f64> = z.iter().zip(correction).map(|(z, c)| z + c).collect();
             let remaining = norm(&self.left(target, &self.lifted(&next, floor)));
             if remaining < STALLED * reached {
@@ -494,11 +491,11 @@ impl Conditions {
         &self,
         gap: &[f64],
         is_free: impl Fn(usize) -> bool,
-        led_by: Option<(&Llt<usize, f64>, usize)>,
+        led_by: Option<(&SparseFactors, usize)>,
     ) -> (Vec<f64>, usize) {
         let most = led_by.map_or(MOST_ITERATIONS, |(_, most)| most);
         let lead = |residual: &[f64]| match led_by {
-            Some((factors, _)) => solved(factors, residual),
+            Some((factors, _)) => factors.solved(residual),
             None => residual.to_vec(),
         };
         let apply = |v: &[f64]| {

@@ -1,13 +1,9 @@
 //! Least squares of a sparse matrix by conjugate gradients on the normal equations (CGLS, \[Bjorck1996\] section 7.4.1), led by the factors of those of other scales.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
 use faer::sparse::{SparseColMat, Triplet};
-use faer::{Conj, MatMut, Par, Side};
 use rayon::prelude::*;
+
+use crate::coupling::sparse_factors::SparseFactors;
 
 /// Columns of a sparse matrix, and once they are all there its rows.
 #[derive(Default)]
@@ -127,7 +123,7 @@ impl Columns {
 const REGULAR: f64 = 1e-8;
 
 /// The inverse of `A S² Aᵀ + damping²`, for the scales that it was made with: the metric in which residuals are measured.
-pub(super) struct Metric(Option<Factors>);
+pub(super) struct Metric(Option<SparseFactors>);
 
 impl Metric {
     /// Rows shorter than the `smallest` need not be met.
@@ -138,62 +134,15 @@ impl Metric {
         (damping, smallest): (f64, f64),
     ) -> Self {
         let normal = a.normal(scale, counts, (damping, smallest));
-        Self(normal.and_then(|normal| Factors::new(&normal)))
+        Self(normal.and_then(|normal| SparseFactors::new(&normal)))
     }
 
     /// The numbers themselves where there are no factors: then conjugate gradients take more iterations.
     fn applied(&self, values: &[f64]) -> Vec<f64> {
-        let mut solution = values.to_vec();
-        if let Some(factors) = &self.0 {
-            factors.solve(&mut solution);
+        match &self.0 {
+            Some(factors) => factors.solved(values),
+            None => values.to_vec(),
         }
-        solution
-    }
-}
-
-/// A Cholesky factorisation on one thread, since its bits would depend on how many there are.
-struct Factors {
-    symbolic: SymbolicCholesky<usize>,
-    values: Vec<f64>,
-}
-
-impl Factors {
-    /// Of the lower half of a matrix; none if it is not positive definite, or there is no memory.
-    fn new(matrix: &SparseColMat<usize, f64>) -> Option<Self> {
-        let symbolic = factorize_symbolic_cholesky(
-            matrix.symbolic(),
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .ok()?;
-        let mut values = Vec::new();
-        values.try_reserve_exact(symbolic.len_val()).ok()?;
-        values.resize(symbolic.len_val(), 0.0);
-        let needed = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                matrix.as_ref(),
-                Side::Lower,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut MemBuffer::try_new(needed).ok()?),
-                Default::default(),
-            )
-            .ok()?;
-        Some(Self { symbolic, values })
-    }
-
-    fn solve(&self, values: &mut [f64]) {
-        let rows = values.len();
-        let needed = self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(values, rows, 1),
-            Par::Seq,
-            MemStack::new(&mut MemBuffer::new(needed)),
-        );
     }
 }
 
