@@ -499,7 +499,7 @@ mod tests {
 
     /// Whether no bond of the nodes of a block can leave it, turned by an angle in its first plane: whole, or without a corner.
     fn convex<const D: usize>(is_cut: bool, is_simplicial: bool, angle: f64) -> bool {
-        let mut grid = Grid::new(std::array::from_fn(|_| axis(8)));
+        let mut grid = Grid::<D>::new(std::array::from_fn(|_| axis(8)));
         if is_cut {
             grid.cut_out(CutOut {
                 name: "corner".into(),
