@@ -147,6 +147,16 @@ impl Explicit<'_> {
         (self.own, self.ghosts) = (own, ghosts);
     }
 
+    /// Collective where processes move their own sites alone: the bonds that others broke are broken here too, where damage at the edge of the zone is then looked for.
+    pub fn learn_breaks_at_edge(&mut self) {
+        if self.shared.as_ref().is_none_or(|shared| shared.is_whole) {
+            return;
+        }
+        if let Some(system) = self.system.shared_steps().filter(|s| s.has_edge()) {
+            system.learn_breaks();
+        }
+    }
+
     /// Collective: what each process exchanged for its steps; none where each moves all sites.
     pub fn traffic(&mut self) -> Option<Vec<Traffic>> {
         self.shared.as_ref()?;
