@@ -20,7 +20,10 @@ fn inner_plate(material: &str, coupling: &str) -> String {
     assert!(text.contains(zone));
     let smaller = "box = { min = [0.0081, 0.0061], max = [0.0321, 0.0141] }";
     let text = text.replace(zone, smaller);
-    match coupling.contains("blending") || coupling.contains("stress") || coupling.contains("balanced") {
+    match coupling.contains("blending")
+        || coupling.contains("stress")
+        || coupling.contains("balanced")
+    {
         true => text + "\n[zones.transition]\naround = 3e-3\n",
         false => text,
     }
@@ -89,9 +92,16 @@ fn cracks_run_alike_at_every_seam() {
 /// The crack meets the end of the zone, where the run stops in a step of which nobody wants a row.
 #[test]
 fn damage_at_the_edge_is_found_in_the_same_step() {
-    for (edge, material) in [("warn", "bond-based"), ("stop", "bond-based"), ("stop", "lps")] {
+    for (edge, material) in [
+        ("warn", "bond-based"),
+        ("stop", "bond-based"),
+        ("stop", "lps"),
+    ] {
         let text = inner_plate(material, "[coupling.splice]")
-            .replace("damage-at-edge = \"warn\"", &format!("damage-at-edge = \"{edge}\""))
+            .replace(
+                "damage-at-edge = \"warn\"",
+                &format!("damage-at-edge = \"{edge}\""),
+            )
             .replace("max = [0.0321, 0.0141]", "max = [0.0181, 0.0141]");
         let one = assert_same(&text, &[2, 3, 7]);
         let rows = String::from_utf8(one["scene_history.csv"].clone()).unwrap();
@@ -102,7 +112,10 @@ fn damage_at_the_edge_is_found_in_the_same_step() {
 #[test]
 fn a_zone_that_follows_the_crack_moves_alike() {
     let text = inner_plate("bond-based", "[coupling.splice]")
-        .replace("damage-at-edge = \"warn\"", "follow = { padding = 2e-3, ahead = 3e-3 }")
+        .replace(
+            "damage-at-edge = \"warn\"",
+            "follow = { padding = 2e-3, ahead = 3e-3 }",
+        )
         .replace("max = [0.0321, 0.0141]", "max = [0.0181, 0.0141]");
     assert_same(&text, &[2, 3]);
 }

@@ -25,8 +25,9 @@ pub(super) struct OwnSteps {
     points: Vec<u32>,
     /// Whether forces of points are those of the sites, in their order.
     is_direct: bool,
-    /// Bonds of own points that others do not know to be broken.
+    /// Bonds of own points that others do not know to be broken, and bonds of a seam.
     untold: Vec<u64>,
+    untold_at_seam: Vec<u64>,
 }
 
 impl Split<'_> {
@@ -81,6 +82,19 @@ impl<const D: usize> SiteForces<'_, D> {
     }
 }
 
+/// Scales the forces of own sites, where rows are scaled.
+fn scale_own<const D: usize>(scale: Option<&[f64]>, own: &[bool], force: &mut [f64]) {
+    let Some(scale) = scale else { return };
+    let factors = scale.iter().zip(own);
+    for (force, (factor, _)) in force
+        .chunks_exact_mut(D)
+        .zip(factors)
+        .filter(|(_, (_, own))| **own)
+    {
+        force.iter_mut().for_each(|f| *f *= factor);
+    }
+}
+
 impl<const D: usize> MovingBody<D> {
     /// The point of each of some sites that take a force from bonds.
     fn points_of(&self, sites: &[u32]) -> Vec<u32> {
@@ -117,6 +131,7 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
             own_points,
             points,
             sites,
+            seam,
         } = self.reached_from(&own);
         let ghosts = Ghosts::new(&split.spread(), &sites, D);
         self.linear.begin_with(ghosts.sent());
@@ -134,8 +149,12 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
                     own: &own_points,
                     known: &points,
                     sent: &sent,
+                    followed: seam.as_ref().map_or(&[], |seam| &seam.followed),
                 });
             }
+        }
+        if let (Some(held), Some(reach)) = (&mut self.seam, seam) {
+            held.reach_only(reach);
         }
         self.own_steps = Some(OwnSteps {
             segments: Segments::of(&own, CHUNK),
@@ -144,6 +163,7 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
             points: known,
             is_direct,
             untold: Vec::new(),
+            untold_at_seam: Vec::new(),
         });
     }
 
@@ -194,7 +214,7 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
             ghosts.end(force);
             return 0;
         };
-        let Some(pass) = pass.own_points() else {
+        let Some(own) = pass.own_points() else {
             return 0;
         };
         forces.bonds_of_site = bonds_of_site;
@@ -202,28 +222,42 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
             Some(shift) => &u[shift * D..][..displacement.len()],
             None => displacement,
         };
-        let broken = match steps.is_direct {
-            true => pass.own_force_into(at, force, update, &mut |force| ghosts.begin(force)),
-            false => {
-                let mut send = |points: &[f64]| {
-                    forces.put_some(ghosts.sent(), (products, points), force);
-                    ghosts.begin(force);
-                };
-                let broken = pass.own_force_into(at, of_points, update, &mut send);
-                linear.multiply_late_into::<D>(u, products);
-                forces.put_all(segments, (products, of_points), force);
-                broken
+        let mut broken;
+        if let Some(seam) = &mut self.seam {
+            // which of its bonds stand is known once the pass is done
+            broken = own.own_force_into(at, of_points, update, &mut |_| ());
+            let follows = own.has_seen_breaks();
+            linear.multiply_late_into::<D>(u, products);
+            let scale = forces.scale.take();
+            forces.put_all(segments, (products, of_points), force);
+            seam.begin_pass();
+            if follows {
+                seam.follow(pass.as_ref());
             }
-        };
+            broken += seam.add_force(u, force, update);
+            steps.untold_at_seam.extend(seam.broken_here());
+            scale_own::<D>(scale, &steps.own, force);
+            ghosts.begin(force);
+        } else if steps.is_direct {
+            broken = own.own_force_into(at, force, update, &mut |force| ghosts.begin(force));
+        } else {
+            let mut send = |points: &[f64]| {
+                forces.put_some(ghosts.sent(), (products, points), force);
+                ghosts.begin(force);
+            };
+            broken = own.own_force_into(at, of_points, update, &mut send);
+            linear.multiply_late_into::<D>(u, products);
+            forces.put_all(segments, (products, of_points), force);
+        }
         ghosts.end(force);
-        if broken > 0 {
-            steps.untold.extend(pass.broken_at_own());
+        if let (true, Some(own)) = (broken > 0, pass.own_points()) {
+            steps.untold.extend(own.broken_at_own());
         }
         broken
     }
 
     fn lost(&self, at: &Halfway<'_>) -> LostToBreaks {
-        self.lost_by_pass(at)
+        self.lost_here(at)
     }
 
     fn spend(&mut self, lost: &LostToBreaks) {
@@ -253,13 +287,19 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
         }
         let untold = std::mem::take(&mut steps.untold);
         let words = split.ranks.gather_words(&untold).concat();
-        if let Some(pass) = self.body.as_mut().and_then(|b| b.pass.own_points()) {
+        let Some(body) = &mut self.body else { return };
+        if let Some(pass) = body.pass.own_points() {
             pass.take_broken(&words);
+        }
+        if let Some(seam) = &mut self.seam {
+            let untold = std::mem::take(&mut steps.untold_at_seam);
+            seam.take_broken(&split.ranks.gather_words(&untold).concat());
+            seam.follow(body.pass.as_ref());
         }
     }
 
     fn has_edge(&self) -> bool {
-        self.body.as_ref().is_some_and(|b| !b.edge.is_empty())
+        self.seam.is_some() || self.body.as_ref().is_some_and(|b| !b.edge.is_empty())
     }
 
     fn traffic(&self) -> Vec<Traffic> {

@@ -4,6 +4,7 @@ use super::CoupledSystem;
 use super::behaviour::NONE;
 use super::body::MovingBody;
 use crate::assembly::Transfer;
+use crate::coupling::truncated::ReachOfSeam;
 
 /// What a process has to know for the forces of its own sites.
 pub(super) struct Reached {
@@ -13,10 +14,12 @@ pub(super) struct Reached {
     pub points: Vec<bool>,
     /// Own sites, and all whose displacements rows and bonds of own sites take.
     pub sites: Vec<bool>,
+    /// What is computed of the bonds of a seam.
+    pub seam: Option<ReachOfSeam>,
 }
 
 impl<const D: usize> CoupledSystem<'_, D> {
-    /// Whether the force of every site comes from linear rows and from bonds of which a pass can leave some to others; nothing else acts, and nothing remembers.
+    /// Whether the force of every site comes from linear rows and from bonds of which a pass can leave some to others; only bonds of a seam act beside, and nothing remembers.
     pub(super) fn may_share_steps(&self) -> bool {
         let passes = |body: &MovingBody<D>| {
             body.contact.is_none()
@@ -25,10 +28,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
                 // an accelerator, which can leave points to others
                 && body.pass.force_states().is_none()
         };
-        self.is_shareable
-            && self.seam.is_none()
-            && self.elements.is_none()
-            && self.body.as_ref().is_none_or(passes)
+        self.is_shareable && self.elements.is_none() && self.body.as_ref().is_none_or(passes)
     }
 
     /// What the forces of `own` sites take.
@@ -43,6 +43,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
                 own_points: Vec::new(),
                 points: Vec::new(),
                 sites,
+                seam: None,
             };
         };
         let mut own_points = vec![false; body.site_of_point.len()];
@@ -50,7 +51,16 @@ impl<const D: usize> CoupledSystem<'_, D> {
         for (&point, _) in of_own.filter(|(point, own)| **own && **point != NONE) {
             own_points[point as usize] = true;
         }
-        let points = self.model.points_reached(&own_points);
+        let mut points = self.model.points_reached(&own_points);
+        let seam = self.seam.as_ref().map(|seam| {
+            let reach = seam.reach_from(own, &body.site_of_point, &mut sites);
+            for &point in &reach.followed {
+                points[point as usize] = true;
+                let family = seam.families().of(point as usize).iter();
+                family.for_each(|&j| points[j as usize] = true);
+            }
+            reach
+        });
         for point in (0..points.len()).filter(|&point| points[point]) {
             match (body.site_of_point[point], &body.transfer) {
                 (NONE, None) => {}
@@ -62,6 +72,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
             own_points,
             points,
             sites,
+            seam,
         }
     }
 }

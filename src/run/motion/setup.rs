@@ -1,8 +1,8 @@
 //! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
-use super::sharing::Sharing;
 use super::saved::Saved;
+use super::sharing::Sharing;
 use super::{RunOptions, StartFrom};
 use std::sync::Arc;
 

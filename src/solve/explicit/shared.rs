@@ -47,9 +47,8 @@ impl Explicit<'_> {
         };
         let update = FailureUpdate::Update;
         outcome.broken = system.force_into(&self.state.u, &mut self.force, update);
-        if outcome.broken > 0 {
-            outcome.lost = system.lost(&self.state.halfway(self.params.step));
-        }
+        // a bond that another process counts may cost something here
+        outcome.lost = system.lost(&self.state.halfway(self.params.step));
         if let Some(shared) = &mut self.shared {
             shared.is_whole = false;
         }
