@@ -46,7 +46,7 @@ fn inner_plate(material: &str, coupling: &str) -> String {
         .iter()
         .any(|c| coupling.contains(c))
     {
-        true => text + "\n[zones.transition]\naround = 2e-3\n",
+        true => text + "\n[zones.transition]\naround = 1e-3\n",
         false => text,
     }
 }

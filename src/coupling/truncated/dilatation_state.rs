@@ -85,23 +85,18 @@ impl<const D: usize> States<D> {
         };
         for (carrier, of) in shares {
             let first = states.own.len();
-            let (mut cell_of, mut taken_back) = (None, 0.0);
+            let mut taken_back = 0.0;
             match carrier {
-                Carrier::Point(i) => {
-                    states.stiffness.push(stiffness_of_point(segments, i));
-                    states.site.push(segments.site[i as usize]);
-                }
+                Carrier::Point(i) => states.stiffness.push(stiffness_of_point(segments, i)),
                 Carrier::Cell(cell) => {
                     let (own, size) = divergence(segments, cell);
-                    (cell_of, taken_back) = (Some(cell), common.bulk / size);
+                    taken_back = common.bulk / size;
                     let size = size + volumes.get(&cell).copied().unwrap_or(0.0);
                     states.stiffness.push(common.bulk / size);
                     states.own.extend(own);
-                    let site = states.own.get(first).map_or(u32::MAX, |e| e.0);
-                    states.site.push(site);
                 }
             }
-            states.push_element(segments, first, cell_of, taken_back);
+            states.push_element(segments, first, &carrier, taken_back);
             states.own_of.push(states.own.len());
             states.shares.extend(of);
             states.shares_of.push(states.shares.len());
@@ -129,14 +124,19 @@ impl<const D: usize> States<D> {
         states
     }
 
-    /// Lets the dilatation whose own part begins at `first` follow the bonds, where elements do.
+    /// Notes the site of the dilatation whose own part begins at `first`, and lets it follow the bonds, where elements do.
     fn push_element(
         &mut self,
         segments: &Segments<'_, D>,
         first: usize,
-        cell: Option<u32>,
+        carrier: &Carrier,
         taken_back: f64,
     ) {
+        let (cell, site) = match carrier {
+            Carrier::Point(i) => (None, Some(segments.site[*i as usize])),
+            Carrier::Cell(cell) => (Some(*cell), self.own.get(first).map(|e| e.0)),
+        };
+        self.site.push(site.unwrap_or(u32::MAX));
         if let Some((elements, all)) = &mut self.elements {
             let sites: Vec<u32> = self.own[first..].iter().map(|e| e.0).collect();
             elements.push(segments, cell, &sites);

@@ -97,10 +97,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         Ok(motion) => {
             let laws = model.local_laws(&rest.local_laws);
             let motion = motion.with_local_laws(&laws)?.with_ranks(start.ranks);
-            let motion = match start.sharing {
-                Sharing::Nothing => motion,
-                Sharing::Steps | Sharing::Families => motion.with_shared_steps(),
-            };
+            let motion = sharing_steps(motion, start.sharing);
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms
@@ -130,6 +127,17 @@ pub(crate) fn dynamic<'a, const D: usize>(
             model, coupling, operator, rest, &error, choices, progress,
         )),
         Err(error) => Err(error.into()),
+    }
+}
+
+/// Lets processes move their own sites each, where these share so much.
+fn sharing_steps<const D: usize>(
+    motion: CoupledSystem<'_, D>,
+    sharing: Sharing,
+) -> CoupledSystem<'_, D> {
+    match sharing {
+        Sharing::Nothing => motion,
+        Sharing::Steps | Sharing::Families => motion.with_shared_steps(),
     }
 }
 
