@@ -162,6 +162,13 @@ pub trait SemiDiscrete: Send + Sync {
         None
     }
 
+    /// `own` sites and all whose displacements the forces of these take, where processes may each move their own; none where each has to have the numbers of all.
+    ///
+    /// Shapes: one entry per site.
+    fn sites_reached(&self, _own: &[bool]) -> Option<Vec<bool>> {
+        None
+    }
+
     /// `y = K x` with the tangent `K` at rest, broken bonds left out.
     fn tangent_into(&self, x: &[f64], y: &mut [f64]);
 

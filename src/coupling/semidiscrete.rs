@@ -33,6 +33,7 @@ mod elements;
 mod energy;
 mod force_states;
 mod own_steps;
+mod reached_sites;
 mod rows;
 mod shared_work;
 mod split;
@@ -57,6 +58,8 @@ pub struct CoupledSystem<'a, const D: usize> {
     elements: Option<LocalElements<D>>,
     /// Who computes which sites, where several processes do.
     split: Option<split::Split<'a>>,
+    /// Whether processes may each move their own sites, by what a run asks of its steps.
+    is_shareable: bool,
     /// What belongs to steps of which each process takes its own, once these have begun.
     own_steps: Option<own_steps::OwnSteps>,
     /// What breaking bonds has cost so far.
@@ -161,6 +164,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             energy,
             elements: None,
             split: None,
+            is_shareable: false,
             own_steps: None,
             spent: Dissipation::default(),
         })
@@ -296,10 +300,15 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     }
 
     fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
-        match self.own_steps.is_some() || self.may_share_steps() {
+        let may_share = || self.split.is_some() && self.may_share_steps();
+        match self.own_steps.is_some() || may_share() {
             true => Some(self),
             false => None,
         }
+    }
+
+    fn sites_reached(&self, own: &[bool]) -> Option<Vec<bool>> {
+        self.may_share_steps().then(|| self.reached_from(own).sites)
     }
 
     fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {

@@ -8,7 +8,8 @@ use crate::coupling::Model;
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
-use crate::run::motion::{may_share, moves_own_sites};
+use crate::run::motion::dynamic_system::{LayoutStart, dynamic};
+use crate::run::motion::{Sharing, may_share, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
 use crate::system::Partition;
@@ -21,7 +22,7 @@ const SCALAR: u64 = 12;
 pub struct ProcessShare {
     /// Sites whose rows it computes.
     pub sites: usize,
-    /// Sites of other processes whose displacements these rows need.
+    /// Sites of other processes whose displacements these rows need, or the forces of these sites where each process moves its own.
     pub ghosts: usize,
     /// Blocks of these rows: bonds, and pairs of nodes of an element; where points alone move in time, bonds.
     pub blocks: usize,
@@ -71,6 +72,19 @@ fn shares<const D: usize>(
             .collect());
     }
     let operator = coupling.operator(&model)?;
+    let system = match &explicit {
+        Some(spec) if moves_own_sites(spec, &rest) => {
+            let start = LayoutStart {
+                sharing: Sharing::Steps,
+                ..LayoutStart::default()
+            };
+            let (coupling, choices) = (coupling.as_ref(), &mut Vec::new());
+            let operator = operator.as_ref();
+            let moving = dynamic(&model, coupling, operator, &rest, start, choices, progress)?;
+            Some(moving.system)
+        }
+        _ => None,
+    };
     let pattern = model.pattern(operator.as_ref(), &[], progress);
     let of_rank = |rank: usize| {
         let own = partition.of(rank);
@@ -79,16 +93,27 @@ fn shares<const D: usize>(
             &pattern.columns[pattern.row_offsets[site]..pattern.row_offsets[site + 1]]
         };
         let blocks = own.iter().map(|site| row(site).len()).sum();
-        let columns = own.iter().flat_map(row).copied();
-        let ghosts: FxHashSet<u32> = columns.filter(|&c| partition.owner(c) != rank).collect();
-        let numbers = match is_static {
-            true => ghosts.len(),
+        let is_foreign = |site: &u32| partition.owner(*site) != rank;
+        let reached = system.as_ref().and_then(|system| {
+            let sites = 0..model.sites.len() as u32;
+            let own: Vec<bool> = sites.map(|site| !is_foreign(&site)).collect();
+            system.sites_reached(&own)
+        });
+        let ghosts = match &reached {
+            Some(reached) => reached.iter().filter(|is_reached| **is_reached).count() - own.len(),
+            None => {
+                let columns = own.iter().flat_map(row).copied();
+                columns.filter(is_foreign).collect::<FxHashSet<u32>>().len()
+            }
+        };
+        let numbers = match is_static || reached.is_some() {
+            true => ghosts,
             // forces are gathered
             false => model.sites.len() - own.len(),
         };
         ProcessShare {
             sites: own.len(),
-            ghosts: ghosts.len(),
+            ghosts,
             blocks,
             stiffness_bytes: match is_static {
                 true => (blocks * D * D) as u64 * SCALAR,

@@ -261,8 +261,9 @@ pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
         let done = scene.run_with(&options, &Silent)?;
         let parts = done.proof.parts.iter();
         let proof: Vec<_> = parts.map(|part| (part.name, &part.line)).collect();
-        let told = format!("{:?} {proof:?} {:?}", done.sizes, done.warnings);
         let motion = done.motion.as_ref();
+        let ended = motion.map(|m| (m.steps, m.broken_bonds, &m.edge_reached));
+        let told = format!("{:?} {proof:?} {:?} {ended:?}", done.sizes, done.warnings);
         let traffic = motion.map_or((Vec::new(), 0), |m| (m.processes.clone(), m.steps));
         Ok((told, traffic))
     };

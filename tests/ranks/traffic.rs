@@ -11,13 +11,13 @@ use crate::memory::{COUNTS, block};
 use crate::threads::{ALONE, Done, How, assert_same, folder, run};
 
 /// What is predicted of some processes.
-fn predicted(text: &str, ranks: usize) -> Vec<ProcessShare> {
+pub fn predicted(text: &str, ranks: usize) -> Vec<ProcessShare> {
     let source = Source::new("scene.toml", text.to_owned());
     let scene = AnyScene::from_source(&source, Path::new("."), "scene").expect("a valid scene");
     processes(scene, ranks, &Silent).expect("a prediction")
 }
 
-fn done(text: &str, ranks: usize) -> Done {
+pub fn done(text: &str, ranks: usize) -> Done {
     run(text, folder().path(), How { ranks, ..ALONE }).expect("a run")
 }
 

@@ -410,6 +410,25 @@ impl<const D: usize> MovingBody<D> {
         }
     }
 
+    /// Sets the displacements of some points by those of the sites, where points do not simply follow one another among these.
+    pub fn spread_some(&mut self, u: &[f64], points: &[u32]) {
+        if self.shift.is_some() {
+            return;
+        }
+        for &point in points {
+            let point = point as usize;
+            let to = &mut self.displacement[point * D..][..D];
+            match (self.site_of_point[point], &self.transfer) {
+                (NONE, None) => {}
+                (NONE, Some(transfer)) => {
+                    let x: Vector<D> = transfer.displacement(point, u);
+                    to.copy_from_slice(x.as_slice());
+                }
+                (site, _) => to.copy_from_slice(&u[site as usize * D..][..D]),
+            }
+        }
+    }
+
     /// The displacement of every point, from those of the sites.
     pub fn spread(&self, u: &[f64], points: &mut [f64]) {
         if let Some(shift) = self.shift {

@@ -10,19 +10,24 @@ use crate::{
 impl<const D: usize> CoupledSystem<'_, D> {
     /// Energy and area of the bonds that the last pass broke, all removed at once.
     pub(super) fn of_last_breaks(&self, at: &Halfway<'_>) -> Dissipation {
-        let lost = self.lost_by_pass(at);
-        let mut spent = Dissipation {
+        let lost = self.lost_here(at);
+        Dissipation {
             energy: lost.energy.value(),
             area: lost.area.value(),
             inelastic: 0.0,
-        };
+        }
+    }
+
+    /// The same of the bonds that are counted here, where processes move their own sites.
+    pub(super) fn lost_here(&self, at: &Halfway<'_>) -> LostToBreaks {
+        let mut lost = self.lost_by_pass(at);
         if let Some(seam) = self.seam.as_ref().filter(|seam| seam.has_broken()) {
-            spent.energy += seam.lost_energy(&at.all());
+            seam.add_lost_energy(&at.all(), &mut lost.energy);
             for (bond, share) in seam.last_own() {
-                spent.area += share * self.area_of(bond);
+                lost.area.add(share * self.area_of(bond));
             }
         }
-        spent
+        lost
     }
 
     /// What a bond leaves of a crack where it breaks.
@@ -35,7 +40,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
     }
 
     /// Energy and area of the bonds that the pass over the body broke last.
-    pub(super) fn lost_by_pass(&self, at: &Halfway<'_>) -> LostToBreaks {
+    fn lost_by_pass(&self, at: &Halfway<'_>) -> LostToBreaks {
         let mut lost = LostToBreaks::default();
         let Some(moving) = &self.body else {
             return lost;

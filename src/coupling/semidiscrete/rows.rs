@@ -31,6 +31,9 @@ pub(super) struct SiteRows {
     is_translation_free: bool,
     /// Whether each chunk of [`ROW_CHUNK`] rows is computed here; all are where others compute none.
     computed: Option<Vec<bool>>,
+    /// Of these, the chunks with rows that other processes wait for, and the others; empty before [`SiteRows::begin_with`].
+    early: Vec<bool>,
+    late: Vec<bool>,
 }
 
 impl SiteRows {
@@ -56,18 +59,38 @@ impl SiteRows {
             is_translation_free: matrix.rows_add_up_to_zero(),
             matrix,
             computed: None,
+            early: Vec::new(),
+            late: Vec::new(),
         }
     }
 
     /// Leaves the products of all but `own` sites to others: those of chunks without any are then anything.
     pub fn compute_only(&mut self, own: impl Fn(usize) -> bool) {
-        let mut computed = vec![false; self.matrix.rows().div_ceil(ROW_CHUNK)];
+        self.computed = Some(self.chunks_of(own));
+    }
+
+    /// Goes on in two parts: the rows that others wait for come first, those of the sites `sent`.
+    pub fn begin_with(&mut self, sent: &[u32]) {
+        let is_sent = |site: usize| sent.binary_search(&(site as u32)).is_ok();
+        self.early = self.chunks_of(is_sent);
+        self.late = match &self.computed {
+            None => self.early.iter().map(|is_early| !is_early).collect(),
+            Some(computed) => {
+                let chunks = computed.iter().zip(&self.early);
+                chunks.map(|(own, is_early)| *own && !is_early).collect()
+            }
+        };
+    }
+
+    /// The chunks with rows of some sites.
+    fn chunks_of(&self, is_wanted: impl Fn(usize) -> bool) -> Vec<bool> {
+        let mut chunks = vec![false; self.matrix.rows().div_ceil(ROW_CHUNK)];
         for (site, &row) in self.row_of_site.iter().enumerate() {
-            if row != NONE && own(site) {
-                computed[row as usize / ROW_CHUNK] = true;
+            if row != NONE && is_wanted(site) {
+                chunks[row as usize / ROW_CHUNK] = true;
             }
         }
-        self.computed = Some(computed);
+        chunks
     }
 
     /// Bytes held.
@@ -84,32 +107,71 @@ impl SiteRows {
         products: &mut Vec<f64>,
         force: &mut [f64],
     ) {
-        products.resize(self.matrix.rows() * D, 0.0);
-        let computed = self.computed.as_deref();
-        if self.is_translation_free {
-            (self.matrix).multiply_differences_of_chunks_into(computed, u, products);
-        } else {
-            self.matrix.multiply_chunks_into(computed, u, products);
-        }
-        let entry = |from: &[f64], of: u32| -> Vector<D> {
-            match of {
-                NONE => Vector::zeros(),
-                of => Vector::from_column_slice(&from[of as usize * D..][..D]),
-            }
-        };
+        self.multiply_chunks_into::<D>(self.computed.as_deref(), u, products);
         force
             .par_chunks_mut(CHUNK * D)
             .enumerate()
             .for_each(|(chunk, force)| {
                 for (k, force) in force.chunks_exact_mut(D).enumerate() {
                     let site = chunk * CHUNK + k;
-                    let mut sum = entry(products, self.row_of_site[site]);
-                    if let Some((point_of, points)) = bonds {
-                        sum += entry(points, point_of[site]);
-                    }
+                    let bonds = bonds.map_or((NONE, &[][..]), |(of, points)| (of[site], points));
+                    let sum: Vector<D> = self.with_bonds(site, products, bonds);
                     force.copy_from_slice(sum.as_slice());
                 }
             });
+    }
+
+    /// The products of the rows that others wait for.
+    pub fn multiply_early_into<const D: usize>(&self, u: &[f64], products: &mut Vec<f64>) {
+        self.multiply_chunks_into::<D>(Some(&self.early), u, products);
+    }
+
+    /// Those of the other rows that are computed here.
+    pub fn multiply_late_into<const D: usize>(&self, u: &[f64], products: &mut Vec<f64>) {
+        self.multiply_chunks_into::<D>(Some(&self.late), u, products);
+    }
+
+    fn multiply_chunks_into<const D: usize>(
+        &self,
+        chunks: Option<&[bool]>,
+        u: &[f64],
+        products: &mut Vec<f64>,
+    ) {
+        products.resize(self.matrix.rows() * D, 0.0);
+        if self.is_translation_free {
+            (self.matrix).multiply_differences_of_chunks_into(chunks, u, products);
+        } else {
+            self.matrix.multiply_chunks_into(chunks, u, products);
+        }
+    }
+
+    /// The product of the row of a site, with the force of a point where it takes one.
+    pub fn with_bonds<const D: usize>(
+        &self,
+        site: usize,
+        products: &[f64],
+        (point, points): (u32, &[f64]),
+    ) -> Vector<D> {
+        let entry = |from: &[f64], of: u32| -> Vector<D> {
+            match of {
+                NONE => Vector::zeros(),
+                of => Vector::from_column_slice(&from[of as usize * D..][..D]),
+            }
+        };
+        entry(products, self.row_of_site[site]) + entry(points, point)
+    }
+
+    /// Whether no site has a row.
+    pub fn is_empty(&self) -> bool {
+        self.matrix.rows() == 0
+    }
+
+    /// The columns of the row of a site; none without a row.
+    pub fn columns(&self, site: usize) -> &[u32] {
+        match self.row_of_site[site] {
+            NONE => &[],
+            row => self.matrix.row(row as usize).0,
+        }
     }
 
     /// Whether a site has a row.

@@ -38,6 +38,13 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self
     }
 
+    /// Lets each process move its own sites, where the forces are such; who looks at a step then asks for all.
+    #[must_use]
+    pub fn with_shared_steps(mut self) -> Self {
+        self.is_shareable = true;
+        self
+    }
+
     /// Overwrites `force` with that of the linear rows and of the bonds, before [`CoupledSystem::finish`]; how many bonds broke.
     pub(super) fn linear_rows_and_bonds_into(
         &mut self,

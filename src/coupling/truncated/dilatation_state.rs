@@ -18,6 +18,8 @@ use crate::{peridynamics::bond_force::Kinematics, tensor::Vector};
 pub(super) struct States<const D: usize> {
     /// κ.
     stiffness: Vec<f64>,
+    /// The site of each dilatation's point, or the first of its element.
+    site: Vec<u32>,
     /// Elements' own parts: site and b, by dilatation.
     own: Vec<(u32, Vector<D>)>,
     own_of: Vec<usize>,
@@ -70,6 +72,7 @@ impl<const D: usize> States<D> {
         let parts = segments.cut.len() + whole.len();
         let mut states = Self {
             stiffness: Vec::new(),
+            site: Vec::new(),
             own: Vec::new(),
             own_of: vec![0],
             shares: Vec::new(),
@@ -82,18 +85,18 @@ impl<const D: usize> States<D> {
         };
         for (carrier, of) in shares {
             let first = states.own.len();
-            let (mut cell_of, mut taken_back) = (None, 0.0);
+            let mut taken_back = 0.0;
             match carrier {
                 Carrier::Point(i) => states.stiffness.push(stiffness_of_point(segments, i)),
                 Carrier::Cell(cell) => {
                     let (own, size) = divergence(segments, cell);
-                    (cell_of, taken_back) = (Some(cell), common.bulk / size);
+                    taken_back = common.bulk / size;
                     let size = size + volumes.get(&cell).copied().unwrap_or(0.0);
                     states.stiffness.push(common.bulk / size);
                     states.own.extend(own);
                 }
             }
-            states.push_element(segments, first, cell_of, taken_back);
+            states.push_element(segments, first, &carrier, taken_back);
             states.own_of.push(states.own.len());
             states.shares.extend(of);
             states.shares_of.push(states.shares.len());
@@ -121,14 +124,19 @@ impl<const D: usize> States<D> {
         states
     }
 
-    /// Lets the dilatation whose own part begins at `first` follow the bonds, where elements do.
+    /// Notes the site of the dilatation whose own part begins at `first`, and lets it follow the bonds, where elements do.
     fn push_element(
         &mut self,
         segments: &Segments<'_, D>,
         first: usize,
-        cell: Option<u32>,
+        carrier: &Carrier,
         taken_back: f64,
     ) {
+        let (cell, site) = match carrier {
+            Carrier::Point(i) => (None, Some(segments.site[*i as usize])),
+            Carrier::Cell(cell) => (Some(*cell), self.own.get(first).map(|e| e.0)),
+        };
+        self.site.push(site.unwrap_or(u32::MAX));
         if let Some((elements, all)) = &mut self.elements {
             let sites: Vec<u32> = self.own[first..].iter().map(|e| e.0).collect();
             elements.push(segments, cell, &sites);
@@ -136,11 +144,18 @@ impl<const D: usize> States<D> {
         }
     }
 
-    fn own_of(&self, f: usize) -> &[(u32, Vector<D>)] {
+    /// The site of a dilatation's point, or the first of its element.
+    pub fn site_of(&self, f: usize) -> u32 {
+        self.site[f]
+    }
+
+    /// The sites of an element's own part of a dilatation, with b.
+    pub fn own_of(&self, f: usize) -> &[(u32, Vector<D>)] {
         &self.own[self.own_of[f]..self.own_of[f + 1]]
     }
 
-    fn shares_of(&self, f: usize) -> &[(u32, f64)] {
+    /// The parts that hand to a dilatation, and how much.
+    pub fn shares_of(&self, f: usize) -> &[(u32, f64)] {
         &self.shares[self.shares_of[f]..self.shares_of[f + 1]]
     }
 
@@ -154,10 +169,18 @@ impl<const D: usize> States<D> {
         self.stiffness.len()
     }
 
-    /// Elements' own parts under a displacement: `Σ b·u`, or with exact bonds what elements have that follow them.
-    pub fn own_parts(&self, u: &[f64], kinematics: Kinematics) -> OwnParts<'_, D> {
+    /// Elements' own parts of the `wanted` dilatations under a displacement: `Σ b·u`, or with exact bonds what elements have that follow them.
+    pub fn own_parts(
+        &self,
+        u: &[f64],
+        kinematics: Kinematics,
+        wanted: impl Fn(usize) -> bool,
+    ) -> OwnParts<'_, D> {
         let at = |site: u32| Vector::<D>::from_column_slice(&u[site as usize * D..][..D]);
-        let linear = |f: usize| self.own_of(f).iter().map(|(s, b)| b.dot(&at(*s))).sum();
+        let linear = |f: usize| match wanted(f) {
+            true => self.own_of(f).iter().map(|(s, b)| b.dot(&at(*s))).sum(),
+            false => 0.0,
+        };
         let Some((elements, _)) =
             (self.elements.as_ref()).filter(|_| kinematics == Kinematics::Exact)
         else {
@@ -169,6 +192,9 @@ impl<const D: usize> States<D> {
         let mut slopes = self.own.clone();
         let values = (0..self.count())
             .map(|f| {
+                if !wanted(f) {
+                    return 0.0;
+                }
                 let own = &mut slopes[self.own_of[f]..self.own_of[f + 1]];
                 let mut found = vec![Vector::zeros(); own.len()];
                 let value = elements.of(f, |k| at(own[k].0), &mut found);
@@ -184,12 +210,20 @@ impl<const D: usize> States<D> {
         }
     }
 
-    /// `κ F` of all dilatations, from the elements' own parts and the elongations of the others.
-    pub fn pressures(&self, own: &OwnParts<'_, D>, elongation: &[f64]) -> Vec<f64> {
+    /// `κ F` of the `wanted` dilatations, from the elements' own parts and the elongations of the others.
+    pub fn pressures(
+        &self,
+        own: &OwnParts<'_, D>,
+        elongation: &[f64],
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<f64> {
         (0..self.count())
             .into_par_iter()
             .with_min_len(64)
             .map(|f| {
+                if !wanted(f) {
+                    return 0.0;
+                }
                 let handed = self.shares_of(f).iter();
                 let handed: f64 = handed.map(|&(p, c)| c * elongation[p as usize]).sum();
                 self.stiffness[f] * (own.values[f] + handed)
@@ -244,6 +278,18 @@ impl<const D: usize> States<D> {
             let linear = self.own_of(f).iter().map(|(s, b)| b.dot(&at(*s))).sum();
             visit(f, stiffness, linear);
         }
+    }
+
+    /// `½ κ F²` of one, from the elements' own part and the elongation of each part.
+    pub fn energy_of(
+        &self,
+        f: usize,
+        own: &OwnParts<'_, D>,
+        elongation: impl Fn(usize) -> f64,
+    ) -> f64 {
+        let handed = self.shares_of(f).iter();
+        let handed: f64 = handed.map(|&(p, c)| c * elongation(p as usize)).sum();
+        0.5 * self.stiffness[f] * (own.values[f] + handed).powi(2)
     }
 
     /// `½ κ F²` of all, and what the rows that take back lack.

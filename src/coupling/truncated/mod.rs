@@ -41,6 +41,7 @@ mod seam;
 mod sparse_least_norm;
 mod squares;
 
+pub(in crate::coupling) use self::nonlinear_bonds::ReachOfSeam;
 pub use self::{affine_fit::SeamConditions, nonlinear_bonds::NonlinearSeam};
 
 use std::sync::Arc;

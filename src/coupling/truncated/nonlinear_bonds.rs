@@ -8,10 +8,13 @@
 
 mod breaking;
 mod construction;
+mod own_bonds;
 
 use rayon::prelude::*;
 
 use breaking::{Breaking, Carrier};
+use own_bonds::OwnBonds;
+pub(in crate::coupling) use own_bonds::ReachOfSeam;
 
 use super::{
     bond_kinematics::Part,
@@ -68,6 +71,8 @@ pub struct NonlinearSeam<const D: usize> {
     elongation: Vec<f64>,
     /// Of each of `sites`, kept between passes.
     sums: Vec<[f64; D]>,
+    /// What is computed here, where several processes move the sites.
+    computed: OwnBonds,
 }
 
 impl<const D: usize> NonlinearSeam<D> {
@@ -101,12 +106,13 @@ impl<const D: usize> NonlinearSeam<D> {
     /// Breaks the bonds that are over the limit; returns how many, each counted once for each direction.
     fn break_bonds(&mut self, u: &[f64]) -> u64 {
         let Some(breaks) = &self.breaks else { return 0 };
-        let over = breaks.over(self.kinematics, |bond| self.stands(bond as u32), u);
+        let may = |bond| self.stands(bond as u32) && self.computed.knows_bond(bond);
+        let over = breaks.over(self.kinematics, may, u);
         for &bond in &over {
             self.intact[bond / 8] &= !(1 << (bond % 8));
             self.last.push(bond as u32);
         }
-        2 * over.len() as u64
+        2 * self.broken_here().len() as u64
     }
 
     /// The families over which the body's own pass runs.
@@ -155,7 +161,7 @@ impl<const D: usize> NonlinearSeam<D> {
                     let p = chunk * CHUNK + k;
                     let part = &self.parts[p];
                     (*pull, *elongation) = ([0.0; D], 0.0);
-                    if self.stands(part.bond) {
+                    if self.stands(part.bond) && self.computed.knows_part(p) {
                         let s = part.strained::<EXACT>(&self.difference.displacement(p, u));
                         (*pull, *elongation) = (s.direction, s.elongation);
                     }
@@ -172,7 +178,9 @@ impl<const D: usize> NonlinearSeam<D> {
     ) -> Vec<f64> {
         let states = self.states.as_ref();
         let pressures = match (states, own) {
-            (Some(states), Some(own)) => states.pressures(own, elongation),
+            (Some(states), Some(own)) => {
+                states.pressures(own, elongation, |f| self.computed.knows_dilatation(f))
+            }
             _ => Vec::new(),
         };
         pulls
@@ -207,7 +215,8 @@ impl<const D: usize> NonlinearSeam<D> {
     /// Elements' own parts of the dilatations, if there are any.
     fn own_parts(&self, u: &[f64], kinematics: Kinematics) -> Option<OwnParts<'_, D>> {
         let states = self.states.as_ref();
-        states.map(|states| states.own_parts(u, kinematics))
+        let is_known = |f| self.computed.knows_dilatation(f);
+        states.map(|states| states.own_parts(u, kinematics, is_known))
     }
 
     /// Adds the internal force; returns how many bonds broke, each counted once for each direction.
@@ -350,34 +359,34 @@ impl<const D: usize> NonlinearSeam<D> {
         !self.ends_at(site).is_empty() || states.is_some_and(|s| !s.of_site(site).is_empty())
     }
 
-    /// Energy of the parts that stand, and of the dilatations of the seam \[J\].
-    pub(in crate::coupling) fn energy(&self, u: &[f64]) -> f64 {
-        self.energy_with(&self.intact, u)
+    /// The elongation of a part, zero if its bond is not `intact`.
+    fn elongation_if_intact(&self, p: usize, u: &[f64], intact: &[u8]) -> f64 {
+        let part = &self.parts[p];
+        if intact[part.bond as usize / 8] >> (part.bond % 8) & 1 == 0 {
+            return 0.0;
+        }
+        let d: Vector<D> = self.difference.displacement(p, u);
+        match self.kinematics {
+            Kinematics::Exact => part.strained::<true>(&d).elongation,
+            Kinematics::Linear => part.strained::<false>(&d).elongation,
+        }
     }
 
-    fn energy_with(&self, intact: &[u8], u: &[f64]) -> f64 {
+    /// Energy of the parts that stand, and of the dilatations of the seam \[J\].
+    pub(in crate::coupling) fn energy(&self, u: &[f64]) -> f64 {
         let elongation: Vec<f64> = (0..self.parts.len())
             .into_par_iter()
             .with_min_len(CHUNK)
-            .map(|p| {
-                let part = &self.parts[p];
-                if intact[part.bond as usize / 8] >> (part.bond % 8) & 1 == 0 {
-                    return 0.0;
-                }
-                let d: Vector<D> = self.difference.displacement(p, u);
-                match self.kinematics {
-                    Kinematics::Exact => part.strained::<true>(&d).elongation,
-                    Kinematics::Linear => part.strained::<false>(&d).elongation,
-                }
-            })
+            .map(|p| self.elongation_if_intact(p, u, &self.intact))
             .collect();
         let parts = self.parts.iter().zip(&elongation);
         let parts: f64 = parts.map(|(part, q)| 0.5 * part.stiffness * q * q).sum();
         let Some(states) = &self.states else {
             return parts;
         };
-        let own = states.own_parts(u, self.kinematics);
-        parts + states.energy(&own, &states.pressures(&own, &elongation), u)
+        let own = states.own_parts(u, self.kinematics, |_| true);
+        let pressures = states.pressures(&own, &elongation, |_| true);
+        parts + states.energy(&own, &pressures, u)
     }
 
     /// Forgets what broke in the last pass.
@@ -388,26 +397,6 @@ impl<const D: usize> NonlinearSeam<D> {
     /// Whether a bond of the seam broke in the last pass.
     pub(in crate::coupling) fn has_broken(&self) -> bool {
         !self.last.is_empty()
-    }
-
-    /// What the seam would store less at a displacement for the bonds that the last pass broke \[J\].
-    pub(in crate::coupling) fn lost_energy(&self, u: &[f64]) -> f64 {
-        let mut before = self.intact.clone();
-        for &bond in &self.last {
-            before[bond as usize / 8] |= 1 << (bond % 8);
-        }
-        self.energy_with(&before, u) - self.energy_with(&self.intact, u)
-    }
-
-    /// Bonds that broke here in the last pass and not in that of the body: their points, and which part of the bond each is.
-    pub(in crate::coupling) fn last_own(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
-        let own = self.last.iter().filter(|bond| (**bond as usize) < self.own);
-        own.map(|&bond| {
-            let bond = bond as usize;
-            let parts = self.first[bond] as usize..self.first[bond + 1] as usize;
-            let share: f64 = self.parts[parts].iter().map(|part| part.length).sum();
-            (self.bonds[bond], share)
-        })
     }
 
     /// Adds to the damage of points, so far that of the bonds that the body's pass knows of, what they lost here; `of_bonds` is the volume that a point's whole bonds reach.

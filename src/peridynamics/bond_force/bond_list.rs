@@ -44,4 +44,6 @@ pub(super) struct List<const D: usize> {
     pub(super) last: Vec<(u32, usize)>,
     /// What is computed of each point, see `own_points.rs`; empty if all is.
     pub(super) parts: Vec<u8>,
+    /// Whether the last force at own points broke bonds of points that are looked at.
+    pub(super) has_seen_breaks: bool,
 }

@@ -65,6 +65,8 @@ pub(super) struct Lattice<const D: usize> {
     pub(super) own: Vec<u8>,
     /// What is known of others where each process moves its own points.
     pub(super) reach: Option<OwnReach>,
+    /// Whether the last force at own points broke bonds of points that are looked at.
+    pub(super) has_seen_breaks: bool,
 }
 
 impl<const D: usize> Lattice<D> {

@@ -225,6 +225,7 @@ impl<const D: usize> Lattice<D> {
             broken: Vec::new(),
             own: Vec::new(),
             reach: None,
+            has_seen_breaks: false,
         };
         lattice.mark_full();
         Ok(lattice)

@@ -176,6 +176,7 @@ impl<const D: usize> List<D> {
             reference: families.neighbours.len() as u64,
             last: Vec::new(),
             parts: Vec::new(),
+            has_seen_breaks: false,
         }
     }
 

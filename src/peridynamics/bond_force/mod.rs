@@ -192,6 +192,9 @@ pub trait OwnPoints {
         breakage: FailureUpdate,
         told: Told<'_>,
     ) -> u64;
+
+    /// Whether the last such force broke bonds of points that are looked at, own ones or not.
+    fn has_seen_breaks(&self) -> bool;
 }
 
 /// What is done once the forces are there that others wait for.
@@ -206,6 +209,8 @@ pub struct Reach<'a> {
     pub known: &'a [bool],
     /// Own points whose forces others wait for.
     pub sent: &'a [u32],
+    /// Points of others whose bonds break here as well, beside those that own forces ask for.
+    pub followed: &'a [u32],
 }
 
 /// What force states tell of a body.

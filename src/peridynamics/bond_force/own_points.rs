@@ -45,12 +45,15 @@ impl<const D: usize> Lattice<D> {
             return;
         };
         let stencil = self.stencil.offsets.len();
+        let mut has_broken = false;
         for b in &mut self.broken {
             let (group, offset) = (b.group as usize, b.offset as usize);
             self.stencil.intact[group * stencil + offset] |= b.lanes & !reach.seen[group];
+            has_broken |= b.lanes & reach.seen[group] != 0;
             b.lanes &= self.own[group];
         }
         self.broken.retain(|b| b.lanes != 0);
+        self.has_seen_breaks = has_broken;
     }
 }
 
@@ -119,6 +122,14 @@ impl<const D: usize> OwnPoints for Lattice<D> {
 
     fn reach_only(&mut self, reach: &Reach<'_>) {
         self.compute_only(reach.own);
+        let mut seen = self.lanes_seen();
+        for place in reach.followed.iter().map(|&p| self.place[p as usize]) {
+            if place != NONE {
+                let group = place as usize / LANES;
+                seen[group] |= 1 << (place as usize % LANES);
+                self.flags[group] &= !IDLE;
+            }
+        }
         let mut is_early = vec![false; self.flags.len()];
         for &p in reach.sent {
             let place = self.place[p as usize];
@@ -137,7 +148,7 @@ impl<const D: usize> OwnPoints for Lattice<D> {
         self.reach = Some(OwnReach {
             own: Segments::of(reach.own, COPY),
             cells: Segments::of(&cells, COPY),
-            seen: self.lanes_seen(),
+            seen,
             sent: reach.sent.to_vec(),
         });
     }
@@ -150,6 +161,10 @@ impl<const D: usize> OwnPoints for Lattice<D> {
         told: Told<'_>,
     ) -> u64 {
         self.pass_at_own(u, force, breakage, told)
+    }
+
+    fn has_seen_breaks(&self) -> bool {
+        self.has_seen_breaks
     }
 }
 
@@ -189,6 +204,10 @@ impl<const D: usize> OwnPoints for List<D> {
 
     fn reach_only(&mut self, reach: &Reach<'_>) {
         self.compute_only(reach.own);
+        for &p in reach.followed {
+            let part = &mut self.parts[p as usize];
+            *part = (*part).max(part::SEEN);
+        }
     }
 
     fn own_force_into(
@@ -201,8 +220,13 @@ impl<const D: usize> OwnPoints for List<D> {
         // points whose bonds are looked at see known displacements only
         self.force_into(u, force, Interval::AT_ONCE, breakage);
         let parts = &self.parts;
+        self.has_seen_breaks = !self.last.is_empty();
         self.last.retain(|(i, _)| parts[*i as usize] == part::OWN);
         told(force);
         self.last.len() as u64
+    }
+
+    fn has_seen_breaks(&self) -> bool {
+        self.has_seen_breaks
     }
 }

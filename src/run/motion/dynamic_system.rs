@@ -14,6 +14,7 @@ use crate::run::equilibrium;
 use crate::run::error::RunError;
 use crate::run::motion::driven_impactors::extend_start;
 use crate::run::motion::material_stretches::{self, stretches_of_materials};
+use crate::run::motion::sharing::Sharing;
 use crate::run::setup::RunSettings;
 use crate::scene::failure::Breaking;
 use crate::scene::initial::InitialKind;
@@ -40,8 +41,8 @@ pub(crate) struct LayoutStart<'a, const D: usize> {
     pub broken: Option<&'a BrokenBonds<D>>,
     /// The processes that compute together, if there are several.
     pub ranks: Option<&'a dyn Ranks>,
-    /// Whether each of them may hold the families of its own sites alone.
-    pub is_shared: bool,
+    /// What each of them has to itself.
+    pub sharing: Sharing,
 }
 
 /// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks.
@@ -96,6 +97,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         Ok(motion) => {
             let laws = model.local_laws(&rest.local_laws);
             let motion = motion.with_local_laws(&laws)?.with_ranks(start.ranks);
+            let motion = sharing_steps(motion, start.sharing);
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms
@@ -125,6 +127,17 @@ pub(crate) fn dynamic<'a, const D: usize>(
             model, coupling, operator, rest, &error, choices, progress,
         )),
         Err(error) => Err(error.into()),
+    }
+}
+
+/// Lets processes move their own sites each, where these share so much.
+fn sharing_steps<const D: usize>(
+    motion: CoupledSystem<'_, D>,
+    sharing: Sharing,
+) -> CoupledSystem<'_, D> {
+    match sharing {
+        Sharing::Nothing => motion,
+        Sharing::Steps | Sharing::Families => motion.with_shared_steps(),
     }
 }
 

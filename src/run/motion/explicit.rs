@@ -91,7 +91,7 @@ pub(crate) fn run<const D: usize>(
     let start = LayoutStart {
         broken: None,
         ranks: options.ranks,
-        is_shared: sharing(&problem, &rest, options),
+        sharing: sharing(&problem, &rest, options),
     };
     loop {
         let (segment, back) = match from {

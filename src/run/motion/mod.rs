@@ -5,6 +5,7 @@
 //! | `setup.rs` | what every run begins with |
 //! | `breaks.rs` | whether bonds may break |
 //! | `dynamic_system.rs` | what moves, its masses, its start |
+//! | `sharing.rs` | what each of several processes has of it |
 //! | `time_dependent_loads.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
 //! | `initial_state.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
@@ -53,7 +54,7 @@ mod way;
 pub mod writer;
 pub(crate) mod zone_monitor;
 
-pub(crate) use sharing::{may_share, moves_own_sites};
+pub(crate) use sharing::{Sharing, may_share, moves_own_sites};
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -2,6 +2,7 @@
 
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
 use super::saved::Saved;
+use super::sharing::Sharing;
 use super::{RunOptions, StartFrom};
 use std::sync::Arc;
 
@@ -99,8 +100,8 @@ pub(crate) fn lay_out<const D: usize, T>(
         mut timings,
         mut watch,
     } = begun;
-    let sharing = start.ranks.filter(|_| start.is_shared);
-    let (model, coupling) = setup::shared_model(problem, rest, sharing, progress)?;
+    let holders = (start.ranks).filter(|_| start.sharing == Sharing::Families);
+    let (model, coupling) = setup::shared_model(problem, rest, holders, progress)?;
     choices.extend(setup::model_choices(&model));
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
@@ -188,7 +189,7 @@ pub fn laid_out<const D: usize, S, T>(
     let start = LayoutStart {
         broken: None,
         ranks,
-        is_shared: false,
+        sharing: Sharing::Nothing,
     };
     let done = lay_out(begun, problem, &rest, start, progress, |laid_out| {
         then(laid_out, ready)

@@ -1,4 +1,4 @@
-//! Which scenes spread the families of their points over processes.
+//! What each of several processes has of a run in time.
 
 use super::RunOptions;
 use crate::coupling::Problem;
@@ -7,6 +7,18 @@ use crate::scene::conditions::Prescribed;
 use crate::scene::solve::Explicit;
 use crate::scene::spec::PrecisionSpec;
 use crate::system::all_say;
+
+/// What each process of a run in time has to itself, where the system lets it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Sharing {
+    /// Nothing: all processes have the numbers of all sites in every step.
+    #[default]
+    Nothing,
+    /// It moves its own sites.
+    Steps,
+    /// It holds the families of its own points, too.
+    Families,
+}
 
 /// Whether each process of a scene in time may hold the families of its own sites alone, by what the scene asks for. What of an output or of a step takes bonds one by one, beside strain and stress of
 /// points in VTU files, asks for those of all.
@@ -32,12 +44,24 @@ pub(crate) fn moves_own_sites<const D: usize>(spec: &Explicit, rest: &RunSetting
         && conditions.all(|c| !matches!(c.prescribed, Prescribed::Spring(_)))
 }
 
-/// Collective: whether families are spread over the processes of a run; not where the scene or one of the processes needs all of them.
+/// Collective: what the processes of a run share; no more than any of them can, and nothing where somebody looks at each step.
 pub(super) fn sharing<const D: usize>(
     problem: &Problem<D>,
     rest: &RunSettings<D>,
     options: &RunOptions<'_>,
-) -> bool {
-    let own = options.observer.is_none() && may_share(problem, rest);
-    options.ranks.is_some_and(|ranks| all_say(ranks, own))
+) -> Sharing {
+    let Some(ranks) = options.ranks else {
+        return Sharing::Nothing;
+    };
+    let own = match may_share(problem, rest) {
+        _ if options.observer.is_some() => Sharing::Nothing,
+        true => Sharing::Families,
+        false => Sharing::Steps,
+    };
+    let all_share = |sharing| all_say(ranks, own >= sharing);
+    match (all_share(Sharing::Steps), all_share(Sharing::Families)) {
+        (_, true) => Sharing::Families,
+        (true, false) => Sharing::Steps,
+        (false, false) => Sharing::Nothing,
+    }
 }

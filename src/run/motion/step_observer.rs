@@ -296,6 +296,11 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         if self.asks_for_all(motion.state().step) {
             motion.gather();
         }
+        let arrived = self.find_damage_at_edge(motion);
+        if arrived {
+            // the run may end here, or look at the zone
+            motion.gather();
+        }
         let moment = moment(motion, self.segment.is_linear);
         if let Some(impact) = &mut self.recorder.impact {
             impact.watch(moment.state, moment.supports.0);
@@ -303,7 +308,6 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         let pace = self.segment.pace;
         let step = moment.state.step;
         let last = step == pace.steps;
-        let arrived = self.find_damage_at_edge(&moment);
         let mut next = self.look_at_zone(&moment, arrived, last);
         let (before, after) = (pace.time(step - 1), pace.time(step));
         let row_is_due = last || is_due(before, after, self.segment.spec.history_interval);
@@ -336,7 +340,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         ControlFlow::Break(())
     }
 
-    /// Whether something asks for all sites after a step, be it on another process: a row, a file, a checkpoint, a look at energies or rotations.
+    /// Whether something asks for all sites after a step, be it on another process: a row, a file, a checkpoint, a look at energies, rotations or the zone.
     fn asks_for_all(&self, step: u64) -> bool {
         let Segment { spec, pace, .. } = *self.segment;
         let (before, after) = (pace.time(step - 1), pace.time(step));
@@ -345,14 +349,18 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             || is_due(spec.history_interval)
             || is_due(spec.output_interval)
             || self.guard.looks_after(step)
+            || (self.monitor.as_ref()).is_some_and(|monitor| monitor.looks_after(step)[0])
             || self.recorder.is_checkpoint_step(step)
     }
 
     /// Looks for damage at the edge of the nonlocal zone where bonds have broken, or may be damaged; says whether it has just come there.
-    fn find_damage_at_edge(&mut self, moment: &Moment<'_>) -> bool {
-        let state = moment.state;
+    fn find_damage_at_edge(&mut self, motion: &mut Explicit<'_>) -> bool {
+        let (step, time, broken) = {
+            let state = motion.state();
+            (state.step, state.time, state.broken)
+        };
         let changes = match self.segment.breaks {
-            Breaks::Possibly => state.broken != self.known_broken,
+            Breaks::Possibly => broken != self.known_broken,
             // damage grows before a bond is damaged through
             Breaks::Gradually => true,
             Breaks::Never | Breaks::Dissipating => false,
@@ -360,10 +368,11 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         if !changes || self.edge.is_some() {
             return false;
         }
-        self.known_broken = state.broken;
-        self.edge = moment.system.damage_at_edge().map(|site| EdgeReached {
-            step: state.step,
-            time: state.time,
+        self.known_broken = broken;
+        motion.learn_breaks_at_edge();
+        self.edge = motion.system().damage_at_edge().map(|site| EdgeReached {
+            step,
+            time,
             site: site as u64,
         });
         self.edge.is_some()

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::surface::{Boundary, FacetKind};
-use crate::assembly::{self, Row};
+use crate::assembly::Row;
 use crate::coupling::{Model, Operator, SiteKind};
 use crate::fem;
 use crate::progress::Silent;
@@ -79,8 +79,24 @@ pub(super) fn stress_errors<const D: usize>(
     if main.is_some() && points.clone().next().is_some() && points.all(|(_, keeps)| *keeps) {
         return None;
     }
-    let rows = rows(around, &list);
-    let (matrix, free) = local(around, &rows, &list, &keeps);
+    let prescribed: Vec<Option<f64>> = (list.iter().zip(&keeps))
+        .flat_map(|(&s, keeps)| {
+            let held = &around.held[s as usize * D..][..D];
+            held.iter().map(|h| (*h || *keeps).then_some(0.0))
+        })
+        .collect();
+    let free = FreeDofs::from_prescribed(&prescribed, D);
+    let displaced = |field: &PatchField<'_, D>, site: u32, place: Option<usize>| {
+        let mut u = field.gradient * (model.sites[site as usize].position - around.centre);
+        for a in place.iter().flat_map(|_| 0..D) {
+            let dof = site as usize * D + a;
+            if around.held[dof] {
+                u[a] += (field.mismatch)(dof);
+            }
+        }
+        u
+    };
+    let Rows { matrix, products } = rows(around, &list, fields, &displaced);
     let positions: Vec<[f64; 3]> = list
         .iter()
         .map(|&s| padded(&model.sites[s as usize].position))
@@ -91,30 +107,22 @@ pub(super) fn stress_errors<const D: usize>(
     };
     let analysis = Analysis::new(&matrix, &free, &positions, Ordering::default()).ok()?;
     let (factor, _) = Factor::new(&matrix, &free, analysis, &params, &Silent).ok()?;
-    let affine = |g: &Tensor<D>| -> Vec<f64> {
-        let mut u = vec![0.0; model.sites.len() * D];
-        u.par_chunks_mut(D)
-            .zip(&model.sites)
-            .for_each(|(u, s)| u.copy_from_slice((g * (s.position - around.centre)).as_slice()));
-        u
-    };
-    let errors = fields.iter().map(|field| {
-        let mut u = affine(&field.gradient);
-        for (local, &s) in list.iter().enumerate() {
-            for a in 0..D {
-                let dof = s as usize * D + a;
-                if around.held[dof] && !free.is_free(local, a) {
-                    u[dof] += (field.mismatch)(dof);
-                }
-            }
-        }
-        let force = rows.multiply(&u);
+    let errors = fields.iter().enumerate().map(|(number, field)| {
         let mut rhs = vec![0.0; count * D];
         for (local, &s) in list.iter().enumerate() {
+            let force = &products[(local * fields.len() + number) * D..][..D];
             for a in (0..D).filter(|&a| free.is_free(local, a)) {
                 let wanted = field.forces.get(s as usize * D + a).copied().unwrap_or(0.0);
-                rhs[local * D + a] = wanted - force[local * D + a];
+                rhs[local * D + a] = wanted - force[a];
             }
+        }
+        let mut u = vec![0.0; model.sites.len() * D];
+        u.par_chunks_mut(D)
+            .enumerate()
+            .for_each(|(s, u)| u.copy_from_slice(displaced(field, s as u32, None).as_slice()));
+        for (local, &s) in list.iter().enumerate() {
+            let of_site = displaced(field, s, Some(local));
+            u[s as usize * D..][..D].copy_from_slice(of_site.as_slice());
         }
         let change = factor.solve(&rhs);
         for (local, &s) in list.iter().enumerate() {
@@ -142,25 +150,101 @@ fn keeps_field<const D: usize>(around: &Around<'_, D>, site: u32, main: Option<u
         || (boundary.near_of(x, around.reach, |f| !lies_in(f)).next()).is_some()
 }
 
+/// The rows of the sites of a patch, as far as they are needed: whole, those of a state-based law have a thousand blocks each.
+struct Rows {
+    /// The part among the sites of the patch, numbered within it.
+    matrix: BlockCsr,
+    /// The products of the whole rows with each field, `D` numbers for each, site by site.
+    products: Vec<f64>,
+}
+
+/// The displacement of a site under a field, with its place in the patch if it is there.
+type Displaced<'a, const D: usize> =
+    &'a (dyn Fn(&PatchField<'_, D>, u32, Option<usize>) -> Vector<D> + Sync);
+
 /// The rows of the sites of a patch.
-fn rows<const D: usize>(around: &Around<'_, D>, list: &[u32]) -> BlockCsr {
-    let (model, sites) = (around.model, around.model.sites.len());
-    let rows_of = |list: &[u32]| {
-        let add_row = |r: usize, row: &mut Row<D>| match around.stiffness {
+fn rows<const D: usize>(
+    around: &Around<'_, D>,
+    list: &[u32],
+    fields: &[PatchField<'_, D>],
+    displaced: Displaced<'_, D>,
+) -> Rows {
+    let Some(spread) = &around.spread else {
+        return own_rows(around, list, list, fields, displaced);
+    };
+    let rank = spread.ranks.rank();
+    let own = list.iter().copied();
+    let own: Vec<u32> = own.filter(|&s| spread.partition.owner(s) == rank).collect();
+    let Rows { matrix, products } = own_rows(around, &own, list, fields, displaced);
+    let some_of_own = |some: &[u32]| {
+        let mut rows = no_rows::<D>();
+        for site in some {
+            let (columns, values) = matrix.row(own.partition_point(|s| s < site));
+            rows.columns.extend(columns);
+            rows.values.extend(values);
+            rows.row_offsets.push(rows.columns.len());
+        }
+        rows
+    };
+    Rows {
+        matrix: spread.gather_rows(list, some_of_own),
+        products: spread.of_sites(list, fields.len() * D, |_| products),
+    }
+}
+
+/// A matrix without rows yet.
+fn no_rows<const D: usize>() -> BlockCsr {
+    BlockCsr {
+        block: D,
+        row_offsets: vec![0],
+        ..BlockCsr::default()
+    }
+}
+
+/// The rows of some sites of a patch, whose sites are `list`.
+fn own_rows<const D: usize>(
+    around: &Around<'_, D>,
+    some: &[u32],
+    list: &[u32],
+    fields: &[PatchField<'_, D>],
+    displaced: Displaced<'_, D>,
+) -> Rows {
+    let model = around.model;
+    let new_row = || Row::<D>::new(model.sites.len());
+    let each = some.par_iter().map_init(new_row, |row, &site| {
+        match around.stiffness {
             Some(stiffness) => {
-                let (columns, values) = stiffness.row(list[r] as usize);
+                let (columns, values) = stiffness.row(site as usize);
                 for (&column, block) in columns.iter().zip(values.chunks_exact(D * D)) {
                     row.add_site(column, &Tensor::from_row_slice(block));
                 }
             }
-            None => model.add_scaled_row(around.operator, list[r] as usize, row),
-        };
-        assembly::assemble_rows::<D>(list.len(), sites, |_| (), add_row)
-    };
-    match &around.spread {
-        Some(spread) => spread.gather_rows(list, rows_of),
-        None => rows_of(list),
+            None => model.add_scaled_row(around.operator, site as usize, row),
+        }
+        let mut products = vec![Vector::<D>::zeros(); fields.len()];
+        let mut within: Vec<(u32, Tensor<D>)> = Vec::new();
+        row.take_blocks(|column, block| {
+            let place = list.binary_search(&column).ok();
+            for (product, field) in products.iter_mut().zip(fields) {
+                *product += block * displaced(field, column, place);
+            }
+            within.extend(place.map(|place| (place as u32, *block)));
+        });
+        within.sort_unstable_by_key(|(place, _)| *place);
+        (within, products)
+    });
+    let each: Vec<_> = each.collect();
+    let (mut matrix, mut products) = (no_rows::<D>(), Vec::new());
+    for (within, of_fields) in each {
+        for (place, block) in within {
+            matrix.columns.push(place);
+            // row by row
+            matrix.values.extend(block.transpose().iter());
+        }
+        matrix.row_offsets.push(matrix.columns.len());
+        products.extend(of_fields.iter().flat_map(|p| p.iter().copied()));
     }
+    Rows { matrix, products }
 }
 
 /// The stresses of some points of the body at a displacement, from the processes that hold their families; empty where all are here.
@@ -182,34 +266,6 @@ fn spread_stresses<const D: usize>(
     });
     let stresses = numbers.chunks_exact(D * D);
     stresses.map(Tensor::from_column_slice).collect()
-}
-
-/// The rows of a patch among its own sites, and which of their dofs are released.
-fn local<const D: usize>(
-    around: &Around<'_, D>,
-    rows: &BlockCsr,
-    list: &[u32],
-    keeps: &[bool],
-) -> (BlockCsr, FreeDofs) {
-    let mut matrix = BlockCsr {
-        block: D,
-        row_offsets: vec![0],
-        ..BlockCsr::default()
-    };
-    let mut prescribed = Vec::with_capacity(list.len() * D);
-    for (r, (&s, keeps)) in list.iter().zip(keeps).enumerate() {
-        let (columns, blocks) = rows.row(r);
-        for (c, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
-            if let Ok(place) = list.binary_search(c) {
-                matrix.columns.push(place as u32);
-                matrix.values.extend(block);
-            }
-        }
-        matrix.row_offsets.push(matrix.columns.len());
-        let held = &around.held[s as usize * D..][..D];
-        prescribed.extend(held.iter().map(|h| (*h || *keeps).then_some(0.0)));
-    }
-    (matrix, FreeDofs::from_prescribed(&prescribed, D))
 }
 
 /// The largest difference of the stress of points and elements of a patch from that of the field.

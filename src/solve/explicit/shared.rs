@@ -47,9 +47,8 @@ impl Explicit<'_> {
         };
         let update = FailureUpdate::Update;
         outcome.broken = system.force_into(&self.state.u, &mut self.force, update);
-        if outcome.broken > 0 {
-            outcome.lost = system.lost(&self.state.halfway(self.params.step));
-        }
+        // a bond that another process counts may cost something here
+        outcome.lost = system.lost(&self.state.halfway(self.params.step));
         if let Some(shared) = &mut self.shared {
             shared.is_whole = false;
         }
@@ -145,6 +144,16 @@ impl Explicit<'_> {
         } = self.energies;
         self.energies = Energies::of(&total(&self.sums), work, work_half);
         (self.own, self.ghosts) = (own, ghosts);
+    }
+
+    /// Collective where processes move their own sites alone: the bonds that others broke are broken here too, where damage at the edge of the zone is then looked for.
+    pub fn learn_breaks_at_edge(&mut self) {
+        if self.shared.as_ref().is_none_or(|shared| shared.is_whole) {
+            return;
+        }
+        if let Some(system) = self.system.shared_steps().filter(|s| s.has_edge()) {
+            system.learn_breaks();
+        }
     }
 
     /// Collective: what each process exchanged for its steps; none where each moves all sites.

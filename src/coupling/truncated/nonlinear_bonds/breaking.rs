@@ -88,6 +88,11 @@ impl<const D: usize> Breaking<D> {
         may.filter(|&bond| is_over(bond)).collect()
     }
 
+    /// What moves the ends of a bond.
+    pub fn carrier(&self, bond: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.difference.row(bond)
+    }
+
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         self.part.len() * (size_of::<Part<D>>() + 17) + self.difference.weight_count() * 12

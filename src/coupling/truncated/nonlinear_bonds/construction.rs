@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashSet;
 
-use super::NonlinearSeam;
+use super::{NonlinearSeam, OwnBonds};
 use crate::{
     assembly::Transfer,
     coupling::{
@@ -80,6 +80,7 @@ impl<const D: usize> NonlinearSeam<D> {
             pulls: Vec::new(),
             elongation: Vec::new(),
             sums: Vec::new(),
+            computed: OwnBonds::default(),
         }
     }
 

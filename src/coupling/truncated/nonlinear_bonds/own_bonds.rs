@@ -1,0 +1,197 @@
+//! Bonds of a seam whose sites are moved by several processes, each its own: which of them a process computes, and what it has to know for these.
+//!
+//! The force on a site takes the parts that end there and the dilatations to which these hand their elongation, hence all parts of such a dilatation. A bond of which a part is known breaks wherever it is, by the same
+//! numbers; its cost is counted by the process of its first point, that of a dilatation by the process of its point, or of the first node of its element.
+
+use super::NonlinearSeam;
+use crate::system::ExactSum;
+
+/// What a process computes of a seam.
+#[derive(Debug, Default)]
+pub(super) struct OwnBonds {
+    /// Parts whose elongation is known.
+    parts: Vec<bool>,
+    /// Dilatations that are known.
+    dilatations: Vec<bool>,
+    /// Bonds that break here, where they are over their limit.
+    bonds: Vec<bool>,
+    /// Those of them whose cost is counted here.
+    counted_bonds: Vec<bool>,
+    /// Dilatations whose energy is counted here.
+    counted_dilatations: Vec<bool>,
+}
+
+/// Whether a place is marked; all are where there are no marks.
+fn is_marked(marks: &[bool], place: usize) -> bool {
+    marks.get(place).is_none_or(|is_marked| *is_marked)
+}
+
+impl OwnBonds {
+    pub fn knows_part(&self, part: usize) -> bool {
+        is_marked(&self.parts, part)
+    }
+
+    pub fn knows_dilatation(&self, f: usize) -> bool {
+        is_marked(&self.dilatations, f)
+    }
+
+    pub fn knows_bond(&self, bond: usize) -> bool {
+        is_marked(&self.bonds, bond)
+    }
+
+    fn counts_bond(&self, bond: usize) -> bool {
+        is_marked(&self.counted_bonds, bond)
+    }
+
+    fn counts_dilatation(&self, f: usize) -> bool {
+        is_marked(&self.counted_dilatations, f)
+    }
+}
+
+/// What the seam adds to what a process has to know.
+pub(in crate::coupling) struct ReachOfSeam {
+    own: OwnBonds,
+    /// Points whose bonds in the body's pass are followed.
+    pub followed: Vec<u32>,
+}
+
+impl<const D: usize> NonlinearSeam<D> {
+    /// What the forces of `own` sites take of the seam; marks the `sites` whose displacements that takes.
+    pub(in crate::coupling) fn reach_from(
+        &self,
+        own: &[bool],
+        site_of_point: &[u32],
+        sites: &mut [bool],
+    ) -> ReachOfSeam {
+        let is_own = |site: u32| own.get(site as usize).is_some_and(|own| *own);
+        let mut parts = vec![false; self.parts.len()];
+        for (s, _) in self.sites.iter().enumerate().filter(|(_, s)| is_own(**s)) {
+            let ends = self.ends[self.offsets[s]..self.offsets[s + 1]].iter();
+            ends.for_each(|(part, _)| parts[*part as usize] = true);
+        }
+        let counts = |ends: &[u32; 2]| {
+            let mut ends = ends.iter().map(|&p| site_of_point[p as usize]);
+            // a point that is no site has no process
+            ends.find(|&site| (site as usize) < own.len())
+                .is_some_and(is_own)
+        };
+        let counted_bonds: Vec<bool> = self.bonds.iter().map(counts).collect();
+        for bond in (0..self.bonds.len()).filter(|&bond| counted_bonds[bond]) {
+            parts[self.parts_of(bond)].fill(true);
+        }
+        let count = self.states.as_ref().map_or(0, |states| states.count());
+        let (mut dilatations, mut counted_dilatations) = (vec![false; count], vec![false; count]);
+        if let Some(states) = &self.states {
+            for f in 0..count {
+                counted_dilatations[f] = is_own(states.site_of(f));
+                dilatations[f] = counted_dilatations[f]
+                    || states.own_of(f).iter().any(|(site, _)| is_own(*site));
+            }
+            for part in (0..parts.len()).filter(|&part| parts[part]) {
+                let of_part = states.of_part(part).iter();
+                of_part.for_each(|(f, _)| dilatations[*f as usize] = true);
+            }
+            for f in (0..count).filter(|&f| dilatations[f]) {
+                let shares = states.shares_of(f).iter();
+                shares.for_each(|(part, _)| parts[*part as usize] = true);
+                states
+                    .own_of(f)
+                    .iter()
+                    .for_each(|(site, _)| sites[*site as usize] = true);
+            }
+        }
+        let mut bonds = vec![false; self.bonds.len()];
+        for part in (0..parts.len()).filter(|&part| parts[part]) {
+            bonds[self.parts[part].bond as usize] = true;
+            let ends = self.difference.row(part);
+            ends.for_each(|(site, _)| sites[site as usize] = true);
+        }
+        if let Some(breaks) = &self.breaks {
+            let known = (0..self.own).filter(|&bond| bonds[bond]);
+            known.for_each(|bond| {
+                let carrier = breaks.carrier(bond);
+                carrier.for_each(|(site, _)| sites[site as usize] = true);
+            });
+        }
+        let whole = (self.own..self.bonds.len()).filter(|&bond| bonds[bond]);
+        let mut followed: Vec<u32> = whole.map(|bond| self.bonds[bond][0]).collect();
+        followed.sort_unstable();
+        followed.dedup();
+        ReachOfSeam {
+            own: OwnBonds {
+                parts,
+                dilatations,
+                bonds,
+                counted_bonds,
+                counted_dilatations,
+            },
+            followed,
+        }
+    }
+
+    /// Goes on with what is known of the seam alone: forces of own sites, and breaks of bonds that these know.
+    pub(in crate::coupling) fn reach_only(&mut self, reach: ReachOfSeam) {
+        self.computed = reach.own;
+    }
+
+    /// The parts of a bond.
+    fn parts_of(&self, bond: usize) -> std::ops::Range<usize> {
+        self.first[bond] as usize..self.first[bond + 1] as usize
+    }
+
+    /// Adds what the seam would store less at a displacement for the bonds that the last pass broke \[J\], of bonds and dilatations that are counted here.
+    pub(in crate::coupling) fn add_lost_energy(&self, u: &[f64], lost: &mut ExactSum) {
+        let mut before = self.intact.clone();
+        for &bond in &self.last {
+            before[bond as usize / 8] |= 1 << (bond % 8);
+        }
+        let mut of = Vec::new();
+        for &bond in &self.last {
+            for p in self.parts_of(bond as usize) {
+                if self.computed.counts_bond(bond as usize) {
+                    let q = self.elongation_if_intact(p, u, &before);
+                    lost.add(0.5 * self.parts[p].stiffness * q * q);
+                }
+                let states = self.states.iter();
+                of.extend(states.flat_map(|s| s.of_part(p).iter().map(|e| e.0)));
+            }
+        }
+        let Some(states) = &self.states else { return };
+        of.sort_unstable();
+        of.dedup();
+        of.retain(|&f| self.computed.counts_dilatation(f as usize));
+        let own = states.own_parts(u, self.kinematics, |f| {
+            of.binary_search(&(f as u32)).is_ok()
+        });
+        for &f in &of {
+            let with = |intact: &[u8]| {
+                let q = |p: usize| self.elongation_if_intact(p, u, intact);
+                states.energy_of(f as usize, &own, q)
+            };
+            lost.add(with(&before) - with(&self.intact));
+        }
+    }
+
+    /// Bonds that the last pass broke here and not in that of the body, of those that are counted here.
+    pub(in crate::coupling) fn broken_here(&self) -> Vec<u64> {
+        let own = self.last.iter().filter(|bond| (**bond as usize) < self.own);
+        let counted = own.filter(|bond| self.computed.counts_bond(**bond as usize));
+        counted.map(|&bond| u64::from(bond)).collect()
+    }
+
+    /// Breaks bonds that others broke.
+    pub(in crate::coupling) fn take_broken(&mut self, bonds: &[u64]) {
+        for &bond in bonds {
+            self.intact[bond as usize / 8] &= !(1 << (bond % 8));
+        }
+    }
+
+    /// Bonds that broke here in the last pass and not in that of the body, of those that are counted here: their points, and which part of the bond each is.
+    pub(in crate::coupling) fn last_own(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
+        self.broken_here().into_iter().map(|bond| {
+            let bond = bond as usize;
+            let parts = &self.parts[self.parts_of(bond)];
+            (self.bonds[bond], parts.iter().map(|part| part.length).sum())
+        })
+    }
+}
