@@ -8,12 +8,13 @@
 
 mod breaking;
 mod construction;
+mod counted_bonds;
 mod own_bonds;
 
 use rayon::prelude::*;
 
 use breaking::{Breaking, Carrier};
-use own_bonds::OwnBonds;
+use counted_bonds::OwnBonds;
 pub(in crate::coupling) use own_bonds::ReachOfSeam;
 
 use super::{

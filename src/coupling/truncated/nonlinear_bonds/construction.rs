@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashSet;
 
-use super::{NonlinearSeam, OwnBonds};
+use super::{NonlinearSeam, counted_bonds::OwnBonds};
 use crate::{
     assembly::Transfer,
     coupling::{

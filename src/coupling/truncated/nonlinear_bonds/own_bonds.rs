@@ -3,50 +3,8 @@
 //! The force on a site takes the parts that end there and the dilatations to which these hand their elongation, hence all parts of such a dilatation. A bond of which a part is known breaks wherever it is, by the same
 //! numbers; its cost is counted by the process of its first point, that of a dilatation by the process of its point, or of the first node of its element.
 
-use super::NonlinearSeam;
+use super::{NonlinearSeam, counted_bonds::OwnBonds};
 use crate::system::ExactSum;
-
-/// What a process computes of a seam.
-#[derive(Debug, Default)]
-pub(super) struct OwnBonds {
-    /// Parts whose elongation is known.
-    parts: Vec<bool>,
-    /// Dilatations that are known.
-    dilatations: Vec<bool>,
-    /// Bonds that break here, where they are over their limit.
-    bonds: Vec<bool>,
-    /// Those of them whose cost is counted here.
-    counted_bonds: Vec<bool>,
-    /// Dilatations whose energy is counted here.
-    counted_dilatations: Vec<bool>,
-}
-
-/// Whether a place is marked; all are where there are no marks.
-fn is_marked(marks: &[bool], place: usize) -> bool {
-    marks.get(place).is_none_or(|is_marked| *is_marked)
-}
-
-impl OwnBonds {
-    pub fn knows_part(&self, part: usize) -> bool {
-        is_marked(&self.parts, part)
-    }
-
-    pub fn knows_dilatation(&self, f: usize) -> bool {
-        is_marked(&self.dilatations, f)
-    }
-
-    pub fn knows_bond(&self, bond: usize) -> bool {
-        is_marked(&self.bonds, bond)
-    }
-
-    fn counts_bond(&self, bond: usize) -> bool {
-        is_marked(&self.counted_bonds, bond)
-    }
-
-    fn counts_dilatation(&self, f: usize) -> bool {
-        is_marked(&self.counted_dilatations, f)
-    }
-}
 
 /// What the seam adds to what a process has to know.
 pub(in crate::coupling) struct ReachOfSeam {
