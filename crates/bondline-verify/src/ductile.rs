@@ -14,7 +14,7 @@ const MESH: &str = include_str!("../../../meshes/notched_bar.msh");
 const COUPLED: &str = include_str!("../../../examples/notched_bar_coupled.toml");
 const COUPLED_MESH: &str = include_str!("../../../meshes/notched_bar_ends.msh");
 
-/// The mesh with edges of 1.5 mm where both models meet, for fine points: theirs are to be no longer than four spacings.
+/// The mesh with edges of 1.5 mm where both models meet, three spacings of the finer points.
 const FINE_COUPLED_MESH: &str = include_str!("../../../meshes/notched_bar_ends_fine.msh");
 
 /// Load of the bar without failure \[kN\] over its nominal strain: axisymmetric elements of second order in large strains, CalculiX 2.20 (`tests/fixtures/plasticity/notched_bar.py`).
