@@ -78,6 +78,11 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
+    /// Whether elements follow the bonds, [`Model::follow_bonds`].
+    pub fn follows_bonds(&self) -> bool {
+        !self.cauchy_born.is_empty()
+    }
+
     /// The local law of elements of a material by its number: that of the bonds, where [`Model::follow_bonds`] gave one, and otherwise that of those `typed`.
     pub fn local_law<'a>(
         &'a self,

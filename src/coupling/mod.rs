@@ -9,6 +9,7 @@
 //! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
 //! | `truncated_families/` | the same of laws whose points have a stress: symmetric, patch-exact at any strain, in equilibrium | `docs/truncated.md` |
 //! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
+//! | `exact_stresses.rs` | partial stresses of geometrically exact bonds | eq. (2.19) |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `sites.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
 //! | `shared_families.rs`, `shared_body.rs` | families that are spread over processes | |
@@ -36,6 +37,7 @@ mod bond_cutting;
 mod cauchy_born;
 mod completed_lattice;
 pub mod error_indicator;
+mod exact_stresses;
 pub mod field_evaluation;
 pub mod impact;
 mod interface_interpolation;
@@ -69,6 +71,7 @@ pub mod zone_distance;
 pub use balanced::Balanced;
 pub use bins::Bins;
 pub use blending::{Blending, BlendingFunction};
+pub use exact_stresses::ExactStresses;
 pub use field_evaluation::{Carrier, Sampler};
 pub use impact::{ContactPatch, Impact, ImpactedSystem, ImpactorShape, RigidImpactor};
 pub use least_squares_gradient::FitDegree;
@@ -224,6 +227,11 @@ pub trait Operator<const D: usize>: Sync {
 
     /// Adds what is left of the row of a site without its bonds, for an operator that has [`Operator::seam_bonds`].
     fn add_row_without_bonds(&self, _site: usize, _row: &mut Row<D>) {}
+
+    /// The partial stresses that rows of sites have, where the operator has such: of geometrically exact bonds a motion adds what is not linear in them.
+    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
+        None
+    }
 
     /// What shows that the energy behind symmetric rows is never negative.
     fn definiteness(&self) -> Definiteness {

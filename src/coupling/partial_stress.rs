@@ -2,7 +2,7 @@
 
 use crate::{
     assembly::Row,
-    coupling::{CellRole, Coupling, Model, ModelError, Operator, Reach, Rows, Zone},
+    coupling::{CellRole, Coupling, ExactStresses, Model, ModelError, Operator, Reach, Rows, Zone},
     dimension,
     mesh::Mesh,
     peridynamics::{Influence, LinearForceState, PdBody},
@@ -83,7 +83,7 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
         if self.model.zone_of_point(i) == Zone::Nonlocal {
             body.add_force_row(i, |_| 1.0, row);
         } else {
-            self.add_divergence_row(body, i, row);
+            body.add_partial_stresses(self.divergence(body, i), row);
         }
     }
 
@@ -100,10 +100,21 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
             None => 0.0,
         }
     }
+
+    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
+        let of_site = |site: usize| match self.model.point_of(site) {
+            Some((body, i)) if self.model.zone_of_point(i) != Zone::Nonlocal => {
+                self.divergence(body, i)
+            }
+            _ => Vec::new(),
+        };
+        ExactStresses::new(self.model, None, of_site, |_| Vec::new())
+    }
 }
 
 impl<const D: usize> Meshfree<'_, D> {
-    fn add_divergence_row(&self, body: &PdBody<D>, i: usize, row: &mut Row<D>) {
+    /// The points whose stresses the divergence at a transition point takes, with their weights.
+    fn divergence(&self, body: &PdBody<D>, i: usize) -> Vec<(usize, Vector<D>)> {
         let horizon = body.cloud.horizon.of(i);
         let weigh = |j: usize, xi: &Vector<D>| {
             self.influence.value(xi.norm(), horizon) * body.cloud.volume[j]
@@ -115,7 +126,7 @@ impl<const D: usize> Meshfree<'_, D> {
         }
         // a family whose law could be evaluated has a regular shape tensor (checked in `operator`'s model)
         let Some(inverse) = shape.try_inverse() else {
-            return;
+            return Vec::new();
         };
         let mut own = Vector::zeros();
         let mut on: Vec<(usize, Vector<D>)> = Vec::new();
@@ -130,6 +141,6 @@ impl<const D: usize> Meshfree<'_, D> {
         if own.amax() > 1e-15 * body.cloud.volume[i] / horizon {
             on.push((i, own));
         }
-        body.add_partial_stresses(on, row);
+        on
     }
 }

@@ -1,10 +1,15 @@
 //! Partial stress in finite elements: transition cells whose stress is the partial stress of peridynamic points at their Gauss points.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use crate::{
     assembly::Row,
-    coupling::{CellRole, Coupling, FitDegree, Interface, Model, ModelError, Operator, Rows, Zone},
+    coupling::{
+        CellRole, Coupling, ExactStresses, FitDegree, Interface, Model, ModelError, Operator, Rows,
+        Zone,
+    },
     dimension,
     fem::{self, QuadraturePoint},
     mesh::Mesh,
@@ -81,7 +86,7 @@ impl PartialStressElements {
 struct Elements<'a, const D: usize> {
     model: &'a Model<D>,
     /// Points of the peridynamic zone, then Gauss points.
-    body: PdBody<D>,
+    body: Arc<PdBody<D>>,
     /// First Gauss point of each cell in `body`; `u32::MAX` for a cell that is no stress element.
     first: Vec<u32>,
 }
@@ -141,6 +146,7 @@ impl<'a, const D: usize> Elements<'a, D> {
             Ends::Alike,
         )
         .map_err(ModelError::gauss_point)?;
+        let body = Arc::new(body);
         Ok(Self { model, body, first })
     }
 
@@ -324,15 +330,10 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
 const WIDENING: f64 = 1.25;
 const WIDEST: f64 = 1.9;
 
-impl<const D: usize> Operator<D> for Elements<'_, D> {
-    fn add_row(&self, site: usize, row: &mut Row<D>) {
-        if let Some((body, i)) = self.model.point_of(site) {
-            body.add_force_row(i, |_| 1.0, row);
-            return;
-        }
-        self.model.add_element_rows(site, row);
-        let mut quadrature = Vec::new();
-        let mut on: Vec<(usize, Vector<D>)> = Vec::new();
+impl<const D: usize> Elements<'_, D> {
+    /// The Gauss points whose stresses the force of a node takes, with the weighted gradients of its shape function; none for a point.
+    fn stresses_on(&self, site: usize) -> Vec<(usize, Vector<D>)> {
+        let (mut on, mut quadrature) = (Vec::new(), Vec::new());
         for (c, local) in self.model.cells_of_site(site) {
             if self.first[c] == u32::MAX {
                 continue;
@@ -342,7 +343,41 @@ impl<const D: usize> Operator<D> for Elements<'_, D> {
                 on.push((self.first[c] as usize + q, g.gradient[local] * g.weight));
             }
         }
-        self.body.add_partial_stresses(on, row);
+        on
+    }
+}
+
+impl<const D: usize> Operator<D> for Elements<'_, D> {
+    fn add_row(&self, site: usize, row: &mut Row<D>) {
+        if let Some((body, i)) = self.model.point_of(site) {
+            body.add_force_row(i, |_| 1.0, row);
+            return;
+        }
+        self.model.add_element_rows(site, row);
+        self.body.add_partial_stresses(self.stresses_on(site), row);
+    }
+
+    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
+        let mut gradients = vec![Vec::new(); self.body.cloud.position.len()];
+        let mut quadrature = Vec::new();
+        for (c, &first) in self
+            .first
+            .iter()
+            .enumerate()
+            .filter(|(_, f)| **f != u32::MAX)
+        {
+            fem::quadrature(&self.model.mesh, c, &mut quadrature);
+            for (q, g) in quadrature.iter().enumerate() {
+                let nodes = self.model.mesh.cell(c).iter().copied();
+                gradients[first as usize + q] = nodes.zip(g.gradient).collect();
+            }
+        }
+        ExactStresses::new(
+            self.model,
+            Some(Arc::clone(&self.body)),
+            |site| self.stresses_on(site),
+            |j| gradients[j].clone(),
+        )
     }
 
     fn is_body_row(&self, site: usize) -> bool {

@@ -14,7 +14,7 @@ use self::{
     rows::SiteRows,
 };
 use crate::{
-    coupling::{Model, NonlinearSeam, Operator},
+    coupling::{ExactStresses, Model, NonlinearSeam, Operator},
     material::LocalLaw,
     peridynamics::bond_force::{BondPass, Kinematics},
     system::{
@@ -53,6 +53,8 @@ pub struct CoupledSystem<'a, const D: usize> {
     body: Option<MovingBody<D>>,
     /// Bonds of the seam, if they are exact or break; the rows are those of the finite elements alone then.
     seam: Option<NonlinearSeam<D>>,
+    /// What partial stresses of exact bonds have beyond the rows, where elements follow the bonds.
+    stresses: Option<ExactStresses<D>>,
     energy: ElementEnergy,
     /// Elements whose law is not linear, if there are any.
     elements: Option<LocalElements<D>>,
@@ -161,6 +163,10 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             products: Vec::new(),
             body,
             seam,
+            stresses: match behaviour.kinematics {
+                Kinematics::Exact if model.follows_bonds() => operator.exact_stresses(),
+                _ => None,
+            },
             energy,
             elements: None,
             split: None,
@@ -262,6 +268,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                 b.pass.memory_bytes() + (b.displacement.len() + b.force.len()) * 8
             })
             + self.seam.as_ref().map_or(0, NonlinearSeam::memory_bytes)
+            + (self.stresses.as_ref()).map_or(0, ExactStresses::memory_bytes)
             + self
                 .elements
                 .as_ref()

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use super::bond_force::{Kinematics, stretch::psi};
 use crate::{
     material::{LocalLaw, LocalResponse, central_differences},
-    peridynamics::{Accelerator, DeformedFamily, EnergyDensity, Law, Past, Present, StatePart},
+    peridynamics::{Accelerator, EnergyDensity, Law, StatePart, WholeFamily},
     tensor::{Tensor, Tensor4, Vector, determinant},
 };
 
@@ -191,63 +191,19 @@ impl<const D: usize> CauchyBorn<D> {
     /// The stress `P` and the energy by the force state of the law.
     fn by_states(&self, gradient: &Tensor<D>) -> (Tensor<D>, EnergyDensity) {
         let half = &self.half;
-        let bonds = half.bonds.len();
+        let Some(states) = self.law.force_state() else {
+            return (Tensor::zeros(), EnergyDensity::default());
+        };
         let difference: Vec<Vector<D>> = half.bonds.iter().map(|xi| gradient * xi).collect();
-        let (mut extension, mut direction) = (vec![0.0; bonds], half.bonds.clone());
-        for (k, eta) in difference.iter().enumerate() {
-            let xi = &half.bonds[k];
-            let length = xi.norm();
-            let cross = 2.0 * xi.dot(eta);
-            match self.kinematics {
-                Kinematics::Exact => {
-                    let t = (cross + eta.norm_squared()) / (length * length);
-                    let psi = psi(t);
-                    extension[k] = length * t * (1.0 - (1.0 + t) * psi);
-                    direction[k] = (xi + eta) * ((1.0 - t * psi) / length);
-                }
-                Kinematics::Linear => {
-                    extension[k] = 0.5 * cross / length;
-                    direction[k] /= length;
-                }
-            }
-        }
-        let mut force = vec![Vector::zeros(); bonds];
-        let family = DeformedFamily {
+        let family = WholeFamily {
             bonds: &half.bonds,
             volumes: &half.volumes,
             pair: &half.pair,
             omega: &half.omega,
             state: half.state.as_ref(),
-            difference: &difference,
-            extension: &extension,
-            direction: &direction,
-            is_whole: true,
-            damage: 0.0,
-            carried: None,
-            keeps_damage: false,
             material: self.material,
-            kinematics: self.kinematics,
         };
-        let past = Past {
-            point: &[],
-            bonds: &[],
-        };
-        let present = Present {
-            point: &mut [],
-            bonds: &mut [],
-            principal_stress: None,
-        };
-        let energy = self
-            .law
-            .force_state()
-            .map_or(EnergyDensity::default(), |states| {
-                states.respond(&family, 0.0, past, present, &mut force)
-            });
-        let forces = force.iter().zip(&half.bonds).zip(&half.volumes);
-        let stress = forces.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
-            sum + force * xi.transpose() * *volume
-        });
-        (stress, energy)
+        family.stress(states, self.kinematics, &difference)
     }
 }
 

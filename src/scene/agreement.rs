@@ -26,13 +26,16 @@ pub(crate) fn balanced_seam<const D: usize>(
     let material = &materials[peridynamic as usize];
     let balances = matches!(coupling, CouplingSpec::Truncated(_))
         || matches!(joining.zones, ZonesNeeded::Everywhere(_));
-    // a splice gives both sides the stress of one local law
+    // a splice gives both sides the stress of one local law, and of the bonds; partial stress that of the bonds
     let is_same = |m: &u16| std::ptr::eq(material, &raw const materials[*m as usize]);
     let elements = spec.peridynamics.as_ref().and_then(|p| p.elements.as_ref());
     let follows_bonds = elements.is_some_and(|e| *e.get_ref() == ElementsSpec::CauchyBorn);
-    let agrees = matches!(coupling, CouplingSpec::Splice(_))
-        && (material.law.local_law().is_some() || follows_bonds)
-        && cell_material.iter().all(is_same);
+    let has_one_stress = match coupling {
+        CouplingSpec::Splice(_) => material.law.local_law().is_some() || follows_bonds,
+        CouplingSpec::PartialStress(_) => follows_bonds,
+        _ => false,
+    };
+    let agrees = has_one_stress && cell_material.iter().all(is_same);
     // elements are linear, and damage at their edge is found
     if balances || agrees || material.law.is_linear_until_damaged() {
         return Ok(());

@@ -51,7 +51,7 @@ fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn La
         (ZonesNeeded::Everywhere(_), _) => {
             Some(("there are no elements".to_owned(), "remove this"))
         }
-        (_, CouplingSpec::Splice(_)) => None,
+        (_, CouplingSpec::Splice(_) | CouplingSpec::PartialStress(_)) => None,
         (_, CouplingSpec::Truncated(typed)) => {
             let why = truncated_bonds(typed.cut_bonds, law).err()?;
             let help =
@@ -63,7 +63,7 @@ fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn La
                 "the rows of coupling `{}` at the seam are linear: elements and points would rotate, and the seam would not",
                 joining.name
             ),
-            "use coupling = \"splice\" or \"truncated\", or elements = \"linear\" for rotations below 2 degrees",
+            "use coupling = \"splice\", \"partial-stress\" or \"truncated\", or elements = \"linear\" for rotations below 2 degrees",
         )),
     }
 }

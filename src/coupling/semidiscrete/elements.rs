@@ -33,12 +33,18 @@ impl<const D: usize> LocalElements<D> {
         if laws.iter().all(Option::is_none) {
             return Ok(None);
         }
+        // where elements follow the bonds, those with partial stresses have the stress of the bonds under their own gradient
+        let takes =
+            |cell: usize| model.roles[cell] != CellRole::StressElement || model.follows_bonds();
         let mut in_rows = vec![false; model.mesh.cell_count()];
         for site in 0..model.sites.len() {
             for (cell, _) in model.cells_of_site(site) {
-                in_rows[cell] |=
-                    model.roles[cell] != CellRole::StressElement && model.node_takes(cell);
+                in_rows[cell] |= takes(cell) && model.node_takes(cell);
             }
+        }
+        for (cell, in_rows) in in_rows.iter_mut().enumerate() {
+            // all nodes may follow points: it has an energy
+            *in_rows |= takes(cell) && model.roles[cell] == CellRole::StressElement;
         }
         let cells = (0..in_rows.len()).filter(|&c| in_rows[c]);
         let cells = cells.map(|c| (c, model.is_element(c)));

@@ -28,7 +28,10 @@ impl<const D: usize> CoupledSystem<'_, D> {
                 // an accelerator, which can leave points to others
                 && body.pass.force_states().is_none()
         };
-        self.is_shareable && self.elements.is_none() && self.body.as_ref().is_none_or(passes)
+        self.is_shareable
+            && self.elements.is_none()
+            && self.stresses.is_none()
+            && self.body.as_ref().is_none_or(passes)
     }
 
     /// What the forces of `own` sites take.

@@ -70,6 +70,9 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                 }
             }
         }
+        if let Some(stresses) = &self.stresses {
+            stresses.add_force(self.model, u, force);
+        }
         broken
     }
 

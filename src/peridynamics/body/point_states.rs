@@ -17,8 +17,24 @@ impl<const D: usize> PdBody<D> {
 
     /// The partial stress of point `j` under displacements `u` of the sites.
     pub fn partial_stress(&self, j: usize, u: &[f64]) -> Tensor<D> {
-        let state = self.state(j).map(|s| s.shape);
-        self.stress_of(j, u, |_| true, state)
+        self.partial_stress_under(j, self.differences(j, u))
+    }
+
+    /// The partial stress of point `j` where the displacement of its neighbour `l` differs from its own by `difference(l)`.
+    pub fn partial_stress_under(
+        &self,
+        j: usize,
+        difference: impl Fn(usize) -> Vector<D>,
+    ) -> Tensor<D> {
+        let shape = self.state(j).map(|s| s.shape);
+        self.stress_of(j, difference, |_| true, shape)
+    }
+
+    /// The displacements of neighbours of point `j` less its own, under displacements `u` of the sites.
+    fn differences(&self, j: usize, u: &[f64]) -> impl Fn(usize) -> Vector<D> {
+        let transfer = &self.cloud.transfer;
+        let here: Vector<D> = transfer.displacement(j, u);
+        move |l| transfer.displacement::<D>(l, u) - here
     }
 
     /// The partial stress of point `j` by the bonds to neighbours that `stands` names, zero without any: force states keep the weights of the whole family, as in motion.
@@ -37,7 +53,7 @@ impl<const D: usize> PdBody<D> {
                 shape + xi * xi.transpose() * (omega * self.cloud.volume[l])
             })
         });
-        self.stress_of(j, u, is_intact, shape)
+        self.stress_of(j, self.differences(j, u), is_intact, shape)
     }
 
     /// The energy density of point `j` under displacements `u` of the sites, by the bonds to neighbours that `stands` names: that whose derivative the linear force state is \[J/m^D\].
@@ -77,13 +93,11 @@ impl<const D: usize> PdBody<D> {
     fn stress_of(
         &self,
         j: usize,
-        u: &[f64],
+        difference: impl Fn(usize) -> Vector<D>,
         stands: impl Fn(usize) -> bool,
         shape: Option<Tensor<D>>,
     ) -> Tensor<D> {
-        let transfer = &self.cloud.transfer;
         let (pair, omega) = self.kernel(j);
-        let here: Vector<D> = transfer.displacement(j, u);
         let mut stress = Tensor::zeros();
         let mut gradient = Tensor::zeros();
         for (k, &l) in self.families.of(j).iter().enumerate() {
@@ -92,7 +106,7 @@ impl<const D: usize> PdBody<D> {
                 continue;
             }
             let xi = self.bond(j, l);
-            let eta = transfer.displacement::<D>(l, u) - here;
+            let eta = difference(l);
             let v = self.cloud.volume[l];
             stress += xi * xi.transpose() * (pair[k] * xi.dot(&eta) * v);
             if !self.pairwise {

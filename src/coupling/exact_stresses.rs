@@ -1,0 +1,183 @@
+//! Partial stresses of geometrically exact bonds, as what they have beyond the linear ones.
+//!
+//! ```text
+//!   f_s = Σ_j ν_j a_sj ,     ν_j = Σ T⟨ξ⟩ ⊗ ξ V
+//! ```
+//!
+//! Source: [SAND2015-7998] eq. (2.19) and (2.29): `a_sj` are the weights of a divergence, or gradients of shape functions at Gauss points. The rows of a seam have ν to first order in the displacement;
+//! this is the rest, so that everything that needs a stiffness at rest finds it in the rows.
+//!
+//! The family of a Gauss point is not that of a lattice point: its weights are fitted to fourth moments, which give the right stress to first order only.
+//! So the stress at a Gauss point is that of the element's own law at the gradient G of the element, and the force state gives what the family's deformation has beyond G:
+//!
+//! ```text
+//!   ν = P(G) + ν⟨η⟩ − ν⟨G ξ⟩ .
+//! ```
+//!
+//! The first term is that of the elements, which have `P(G) − C : G`; to first order the sum is `ν⟨η⟩`, for the fit makes `ν⟨G ξ⟩ = C : G`. Every uniform deformation has the stress of the elements, and a rotation turns ν.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::model::Model;
+use crate::{
+    peridynamics::{Law, PdBody, WholeFamily, bond_force::Kinematics},
+    tensor::{Tensor, Vector},
+};
+
+/// Points, or sites, whose forces are computed by one thread at a time.
+const CHUNK: usize = 64;
+
+/// A shape function's gradient at a Gauss point, by the node of the mesh.
+pub type NodeGradient<const D: usize> = (u32, Vector<D>);
+
+/// The points whose partial stress sites feel, and the weights of these stresses.
+pub struct ExactStresses<const D: usize> {
+    /// What the points are numbered in; none for the model's own body.
+    body: Option<Arc<PdBody<D>>>,
+    law: Arc<dyn Law<D>>,
+    /// The points, ascending.
+    points: Vec<u32>,
+    /// For each point where its `gradients` begin; those of points without are empty.
+    first_gradient: Vec<usize>,
+    gradients: Vec<NodeGradient<D>>,
+    /// For each site where its `weights` begin.
+    first_weight: Vec<usize>,
+    /// A place in `points`, and a.
+    weights: Vec<(u32, Vector<D>)>,
+    /// Whether the displacement of a place of the cloud is asked for.
+    is_asked: Vec<bool>,
+}
+
+impl<const D: usize> ExactStresses<D> {
+    /// Of the points that `weights` names for each site, in `body` or in that of the model; `gradients` are those of the shape functions at a Gauss point, none at another point.
+    ///
+    /// None where there are no points.
+    pub fn new(
+        model: &Model<D>,
+        body: Option<Arc<PdBody<D>>>,
+        weights: impl Fn(usize) -> Vec<(usize, Vector<D>)>,
+        gradients: impl Fn(usize) -> Vec<NodeGradient<D>>,
+    ) -> Option<Self> {
+        let law = Arc::clone(&model.peridynamics.as_ref()?.law);
+        let of = body.as_deref().or_else(|| model.body())?;
+        let (mut first_weight, mut all) = (vec![0], Vec::new());
+        for site in 0..model.sites.len() {
+            all.extend(weights(site).into_iter().map(|(j, a)| (j as u32, a)));
+            first_weight.push(all.len());
+        }
+        let mut points: Vec<u32> = all.iter().map(|(j, _)| *j).collect();
+        points.sort_unstable();
+        points.dedup();
+        let mut is_asked = vec![false; of.cloud.position.len()];
+        for &j in &points {
+            is_asked[j as usize] = true;
+            let family = of.families.of(j as usize).iter();
+            family.for_each(|&l| is_asked[l as usize] = true);
+        }
+        let (mut first_gradient, mut held) = (vec![0], Vec::new());
+        for &j in &points {
+            held.extend(gradients(j as usize));
+            first_gradient.push(held.len());
+        }
+        for (j, _) in &mut all {
+            // every one is among them
+            *j = points.partition_point(|p| p < j) as u32;
+        }
+        (!points.is_empty()).then_some(Self {
+            body,
+            law,
+            points,
+            first_gradient,
+            gradients: held,
+            first_weight,
+            weights: all,
+            is_asked,
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.points.len() * 4
+            + self.gradients.len() * size_of::<NodeGradient<D>>()
+            + (self.first_weight.len() + self.first_gradient.len()) * 8
+            + self.weights.len() * size_of::<(u32, Vector<D>)>()
+            + self.is_asked.len()
+    }
+
+    /// Adds to the force of each site what the stresses have beyond the linear ones.
+    pub fn add_force(&self, model: &Model<D>, u: &[f64], force: &mut [f64]) {
+        let Some(body) = self.body.as_deref().or_else(|| model.body()) else {
+            return;
+        };
+        let places: Vec<Vector<D>> = (self.is_asked.par_iter().enumerate())
+            .with_min_len(CHUNK)
+            .map(|(place, is_asked)| match is_asked {
+                true => body.cloud.transfer.displacement(place, u),
+                false => Vector::zeros(),
+            })
+            .collect();
+        let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
+        let stress: Vec<Tensor<D>> = (0..self.points.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|k| self.beyond(body, k, &places, nodes))
+            .collect();
+        let chunks = force.par_chunks_mut(CHUNK * D).enumerate();
+        chunks.for_each(|(chunk, force)| {
+            for (k, force) in force.chunks_exact_mut(D).enumerate() {
+                let site = chunk * CHUNK + k;
+                let own = self.first_weight[site]..self.first_weight[site + 1];
+                let sum = (self.weights[own].iter()).fold(Vector::<D>::zeros(), |sum, (j, a)| {
+                    sum + stress[*j as usize] * a
+                });
+                force.iter_mut().zip(sum.iter()).for_each(|(f, x)| *f += x);
+            }
+        });
+    }
+
+    /// What the stress of a point has beyond the linear one, without what the element around a Gauss point has of its own.
+    fn beyond(
+        &self,
+        body: &PdBody<D>,
+        k: usize,
+        places: &[Vector<D>],
+        nodes: impl Fn(u32) -> Vector<D>,
+    ) -> Tensor<D> {
+        let Some(states) = self.law.force_state() else {
+            return Tensor::zeros();
+        };
+        let j = self.points[k] as usize;
+        let neighbours = body.families.of(j);
+        let (pair, omega) = body.kernel(j);
+        let of = |l: &u32| body.bond(j, *l as usize);
+        let bonds: Vec<Vector<D>> = neighbours.iter().map(of).collect();
+        let volume = |l: &u32| body.cloud.volume[*l as usize];
+        let volumes: Vec<f64> = neighbours.iter().map(volume).collect();
+        let family = WholeFamily {
+            bonds: &bonds,
+            volumes: &volumes,
+            pair,
+            omega,
+            state: body.state(j),
+            material: body.cloud.material.get(j).copied().unwrap_or(0),
+        };
+        let exact = |difference: &[Vector<D>]| {
+            let (stress, _) = family.stress(states, Kinematics::Exact, difference);
+            stress
+        };
+        let apart = |l: usize| places[l] - places[j];
+        let differences: Vec<Vector<D>> = neighbours.iter().map(|&l| apart(l as usize)).collect();
+        let gradients = &self.gradients[self.first_gradient[k]..self.first_gradient[k + 1]];
+        if gradients.is_empty() {
+            return exact(&differences) - body.partial_stress_under(j, apart);
+        }
+        let gradient = (gradients.iter()).fold(Tensor::<D>::zeros(), |sum, (node, gradient)| {
+            sum + nodes(*node) * gradient.transpose()
+        });
+        let uniform: Vec<Vector<D>> = bonds.iter().map(|xi| gradient * xi).collect();
+        let rest = |l: usize| apart(l) - gradient * body.bond(j, l);
+        exact(&differences) - exact(&uniform) - body.partial_stress_under(j, rest)
+    }
+}

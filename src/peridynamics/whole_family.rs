@@ -1,0 +1,88 @@
+//! The force state of one whole family of a law without memory.
+
+use super::bond_force::{Kinematics, stretch::psi};
+use crate::{
+    peridynamics::{DeformedFamily, EnergyDensity, ForceState, Past, Present, StatePart},
+    tensor::{Tensor, Vector},
+};
+
+/// A family of which no bond is broken, with the coefficients of its linearised law.
+///
+/// Shapes: one entry per bond; `omega` is not read by a pairwise law. Units: ξ \[m\], V \[m^D\].
+#[derive(Clone, Copy, Debug)]
+pub struct WholeFamily<'a, const D: usize> {
+    /// Bond vectors ξ.
+    pub bonds: &'a [Vector<D>],
+    /// Volumes V of their far points.
+    pub volumes: &'a [f64],
+    /// `p` of the linearised law.
+    pub pair: &'a [f64],
+    /// `ω` of the linearised law.
+    pub omega: &'a [f64],
+    /// Its state part.
+    pub state: Option<&'a StatePart<D>>,
+    /// The material of the point, 0 in a body of one.
+    pub material: u16,
+}
+
+impl<const D: usize> WholeFamily<'_, D> {
+    /// The partial stress `Σ T⟨ξ⟩ ⊗ ξ V` \[Pa\], [SAND2015-7998] eq. (2.19), and the energies, where the displacements of the far points differ from that of the point by `difference` \[m\].
+    pub fn stress(
+        &self,
+        law: &dyn ForceState<D>,
+        kinematics: Kinematics,
+        difference: &[Vector<D>],
+    ) -> (Tensor<D>, EnergyDensity) {
+        let bonds = self.bonds.len();
+        let (mut extension, mut direction) = (vec![0.0; bonds], self.bonds.to_vec());
+        for (k, eta) in difference.iter().enumerate() {
+            let xi = &self.bonds[k];
+            let length = xi.norm();
+            let cross = 2.0 * xi.dot(eta);
+            match kinematics {
+                Kinematics::Exact => {
+                    let t = (cross + eta.norm_squared()) / (length * length);
+                    let psi = psi(t);
+                    extension[k] = length * t * (1.0 - (1.0 + t) * psi);
+                    direction[k] = (xi + eta) * ((1.0 - t * psi) / length);
+                }
+                Kinematics::Linear => {
+                    extension[k] = 0.5 * cross / length;
+                    direction[k] /= length;
+                }
+            }
+        }
+        let mut force = vec![Vector::zeros(); bonds];
+        let family = DeformedFamily {
+            bonds: self.bonds,
+            volumes: self.volumes,
+            pair: self.pair,
+            omega: self.omega,
+            state: self.state,
+            difference,
+            extension: &extension,
+            direction: &direction,
+            is_whole: true,
+            damage: 0.0,
+            carried: None,
+            keeps_damage: false,
+            material: self.material,
+            kinematics,
+        };
+        let past = Past {
+            point: &[],
+            bonds: &[],
+        };
+        let present = Present {
+            point: &mut [],
+            bonds: &mut [],
+            principal_stress: None,
+        };
+        let energy = law.respond(&family, 0.0, past, present, &mut force);
+        let forces = force.iter().zip(self.bonds).zip(self.volumes);
+        let stress = forces.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
+            sum + force * xi.transpose() * *volume
+        });
+        (stress, energy)
+    }
+}
