@@ -86,17 +86,11 @@ pub(super) fn stress_errors<const D: usize>(
         })
         .collect();
     let free = FreeDofs::from_prescribed(&prescribed, D);
-    let displaced = |field: &PatchField<'_, D>, site: u32, place: Option<usize>| {
-        let mut u = field.gradient * (model.sites[site as usize].position - around.centre);
-        for a in place.iter().flat_map(|_| 0..D) {
-            let dof = site as usize * D + a;
-            if around.held[dof] {
-                u[a] += (field.mismatch)(dof);
-            }
-        }
-        u
+    let of_field = |field: &PatchField<'_, D>| -> Mismatches<D> {
+        list.iter().map(|&s| around.mismatch(field, s)).collect()
     };
-    let Rows { matrix, products } = rows(around, &list, fields, &displaced);
+    let mismatches: Vec<Mismatches<D>> = fields.iter().map(of_field).collect();
+    let Rows { matrix, products } = rows(around, &list, fields, &mismatches);
     let positions: Vec<[f64; 3]> = list
         .iter()
         .map(|&s| padded(&model.sites[s as usize].position))
@@ -117,17 +111,15 @@ pub(super) fn stress_errors<const D: usize>(
             }
         }
         let mut u = vec![0.0; model.sites.len() * D];
-        u.par_chunks_mut(D)
-            .enumerate()
-            .for_each(|(s, u)| u.copy_from_slice(displaced(field, s as u32, None).as_slice()));
-        for (local, &s) in list.iter().enumerate() {
-            let of_site = displaced(field, s, Some(local));
-            u[s as usize * D..][..D].copy_from_slice(of_site.as_slice());
-        }
+        u.par_chunks_mut(D).enumerate().for_each(|(s, u)| {
+            let x = model.sites[s].position - around.centre;
+            u.copy_from_slice((field.gradient * x).as_slice());
+        });
         let change = factor.solve(&rhs);
         for (local, &s) in list.iter().enumerate() {
+            let mismatch = &mismatches[number][local];
             for a in 0..D {
-                u[s as usize * D + a] += change[local * D + a];
+                u[s as usize * D + a] += mismatch[a] + change[local * D + a];
             }
         }
         largest(around, &list, &keeps, &field.gradient, &u)
@@ -150,6 +142,9 @@ fn keeps_field<const D: usize>(around: &Around<'_, D>, site: u32, main: Option<u
         || (boundary.near_of(x, around.reach, |f| !lies_in(f)).next()).is_some()
 }
 
+/// [`Around::mismatch`] of each site of a patch: a search among the facets, so once for each.
+type Mismatches<const D: usize> = Vec<Vector<D>>;
+
 /// The rows of the sites of a patch, as far as they are needed: whole, those of a state-based law have a thousand blocks each.
 struct Rows {
     /// The part among the sites of the patch, numbered within it.
@@ -158,24 +153,33 @@ struct Rows {
     products: Vec<f64>,
 }
 
-/// The displacement of a site under a field, with its place in the patch if it is there.
-type Displaced<'a, const D: usize> =
-    &'a (dyn Fn(&PatchField<'_, D>, u32, Option<usize>) -> Vector<D> + Sync);
+impl<const D: usize> Around<'_, D> {
+    /// What the held dofs of a site have beyond the field.
+    fn mismatch(&self, field: &PatchField<'_, D>, site: u32) -> Vector<D> {
+        Vector::from_fn(|a, _| {
+            let dof = site as usize * D + a;
+            match self.held[dof] {
+                true => (field.mismatch)(dof),
+                false => 0.0,
+            }
+        })
+    }
+}
 
 /// The rows of the sites of a patch.
 fn rows<const D: usize>(
     around: &Around<'_, D>,
     list: &[u32],
     fields: &[PatchField<'_, D>],
-    displaced: Displaced<'_, D>,
+    mismatches: &[Mismatches<D>],
 ) -> Rows {
     let Some(spread) = &around.spread else {
-        return own_rows(around, list, list, fields, displaced);
+        return own_rows(around, list, list, fields, mismatches);
     };
     let rank = spread.ranks.rank();
     let own = list.iter().copied();
     let own: Vec<u32> = own.filter(|&s| spread.partition.owner(s) == rank).collect();
-    let Rows { matrix, products } = own_rows(around, &own, list, fields, displaced);
+    let Rows { matrix, products } = own_rows(around, &own, list, fields, mismatches);
     let some_of_own = |some: &[u32]| {
         let mut rows = no_rows::<D>();
         for site in some {
@@ -207,7 +211,7 @@ fn own_rows<const D: usize>(
     some: &[u32],
     list: &[u32],
     fields: &[PatchField<'_, D>],
-    displaced: Displaced<'_, D>,
+    mismatches: &[Mismatches<D>],
 ) -> Rows {
     let model = around.model;
     let new_row = || Row::<D>::new(model.sites.len());
@@ -221,16 +225,27 @@ fn own_rows<const D: usize>(
             }
             None => model.add_scaled_row(around.operator, site as usize, row),
         }
-        let mut products = vec![Vector::<D>::zeros(); fields.len()];
+        // Σ K x_c, by which the row of any gradient G is Σ_c (Σ K x_c) G_c: whatever the number of fields
+        let mut moments = [Tensor::<D>::zeros(); D];
         let mut within: Vec<(u32, Tensor<D>)> = Vec::new();
         row.take_blocks(|column, block| {
-            let place = list.binary_search(&column).ok();
-            for (product, field) in products.iter_mut().zip(fields) {
-                *product += block * displaced(field, column, place);
+            let x = model.sites[column as usize].position - around.centre;
+            (moments.iter_mut().zip(x.iter())).for_each(|(moment, x)| *moment += block * *x);
+            if let Ok(place) = list.binary_search(&column) {
+                within.push((place as u32, *block));
             }
-            within.extend(place.map(|place| (place as u32, *block)));
         });
         within.sort_unstable_by_key(|(place, _)| *place);
+        let product = |(field, mismatches): (&PatchField<'_, D>, &Mismatches<D>)| {
+            let of_gradient = (moments.iter().enumerate())
+                .fold(Vector::<D>::zeros(), |sum, (c, moment)| {
+                    sum + moment * field.gradient.column(c)
+                });
+            within.iter().fold(of_gradient, |sum, (place, block)| {
+                sum + block * mismatches[*place as usize]
+            })
+        };
+        let products: Vec<Vector<D>> = fields.iter().zip(mismatches).map(product).collect();
         (within, products)
     });
     let each: Vec<_> = each.collect();
