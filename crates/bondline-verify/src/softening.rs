@@ -13,13 +13,16 @@ pub const ENERGY_LIMIT: f64 = 0.05;
 /// Strength \[MPa\], fracture energy \[N/mm\] and ligament \[mm\] of the strip.
 const STRIP: (f64, f64, f64) = (3.0, 0.01, 12.0);
 
-/// A strip with a softening, by the spacing of its points \[mm\] at a horizon of 4.5 mm, pulled until it is open by `opening` \[mm\].
-fn strip(softening: &str, opening: f64, spacing: f64) -> Result<Seen, String> {
+/// Largest change of the peak load where the spacing is halved.
+pub const PEAK_LIMIT: f64 = 0.05;
+
+/// A strip with a softening, by the spacing of its points \[mm\] at a horizon of 4.5 mm, in 30 steps up to a `time` of at most 1, when it is open by `opening` \[mm\].
+fn strip(softening: &str, opening: f64, spacing: f64, time: f64) -> Result<Seen, String> {
     let (strength, energy, ligament) = STRIP;
     let cells = (30.0 / spacing).round();
     let (first, tip) = (0.5 * spacing - 15.0, 0.5 * ligament);
     run_scene(&format!(
-        "kinematics = \"plane-stress\"\ncoupling = \"nonlocal\"\n[mesh.rectangle]\nmin = [-15, -15]\nmax = [15, 15]\nx = {{ cells = {cells} }}\ny = {{ cells = {cells} }}\n[materials.m.softening-bond]\nyoungs-modulus = 30e3\ntensile-strength = {strength}\nfracture-energy = {energy}\nsoftening = \"{softening}\"\n[peridynamics]\nhorizon = 4.5\npoints.lattice = {{ spacing = {spacing}, origin = [{first}, {first}] }}\n[cracks.upper]\npolyline = [[0, {tip}], [0, 16]]\n[cracks.lower]\npolyline = [[0, -16], [0, -{tip}]]\n[no-fail]\nleft.box = {{ min = [-16, -16], max = [-5, 16] }}\nright.box = {{ min = [5, -16], max = [16, 16] }}\n[conditions.left.displacement]\ninside.box = {{ min = [-16, -16], max = [-7.5, 16] }}\nx = \"-{opening}*t^2/2\"\ny = 0\n[conditions.right.displacement]\ninside.box = {{ min = [7.5, -16], max = [16, 16] }}\nx = \"{opening}*t^2/2\"\ny = 0\n[solve.quasi-static]\nduration = 1\nsteps = 30\n[output]\nvtu = false\n"
+        "kinematics = \"plane-stress\"\ncoupling = \"nonlocal\"\n[mesh.rectangle]\nmin = [-15, -15]\nmax = [15, 15]\nx = {{ cells = {cells} }}\ny = {{ cells = {cells} }}\n[materials.m.softening-bond]\nyoungs-modulus = 30e3\ntensile-strength = {strength}\nfracture-energy = {energy}\nsoftening = \"{softening}\"\n[peridynamics]\nhorizon = 4.5\npoints.lattice = {{ spacing = {spacing}, origin = [{first}, {first}] }}\n[cracks.upper]\npolyline = [[0, {tip}], [0, 16]]\n[cracks.lower]\npolyline = [[0, -16], [0, -{tip}]]\n[no-fail]\nleft.box = {{ min = [-16, -16], max = [-5, 16] }}\nright.box = {{ min = [5, -16], max = [16, 16] }}\n[conditions.left.displacement]\ninside.box = {{ min = [-16, -16], max = [-7.5, 16] }}\nx = \"-{opening}*t^2/2\"\ny = 0\n[conditions.right.displacement]\ninside.box = {{ min = [7.5, -16], max = [16, 16] }}\nx = \"{opening}*t^2/2\"\ny = 0\n[solve.quasi-static]\nduration = {time}\nsteps = 30\n[output]\nvtu = false\n"
     ))
 }
 
@@ -44,11 +47,10 @@ fn strips(effort: Effort, progress: &dyn Progress) -> Table {
         Effort::Full => &[1.5, 0.75],
     };
     for (softening, opening) in [("bilinear", 0.015), ("exponential", 0.04)] {
-        let mut peaks = Vec::new();
         for &spacing in spacings {
             progress.advance(1);
             let case = format!("{softening}, spacing {spacing} mm");
-            let seen = strip(softening, opening, spacing);
+            let seen = strip(softening, opening, spacing, 1.0);
             let run = seen.as_ref().map_err(Clone::clone);
             match run.and_then(|seen| found(seen, "right_reaction_x").ok_or("no rows".to_owned())) {
                 Ok([largest, last, work, spent]) => {
@@ -80,7 +82,6 @@ fn strips(effort: Effort, progress: &dyn Progress) -> Table {
                         "largest nominal stress over the strength",
                         peak,
                     ));
-                    peaks.push(peak);
                 }
                 Err(why) => table.push(
                     Row::at_most(case, "energy per area, deviation", f64::NAN, ENERGY_LIMIT)
@@ -88,12 +89,36 @@ fn strips(effort: Effort, progress: &dyn Progress) -> Table {
                 ),
             }
         }
-        if let [coarse, fine] = peaks[..] {
-            table.push(Row::info(
-                softening,
-                "largest load, half the spacing over the whole",
-                fine / coarse,
-            ));
+    }
+    table
+}
+
+/// The largest load at a fixed horizon, in steps fine enough for it, with a spacing and half of it.
+fn peaks(progress: &dyn Progress) -> Table {
+    let (strength, _, ligament) = STRIP;
+    let mut table = Table::new(
+        "The same strip up to its largest load, spacings of 1 and 0.5 mm: largest nominal stress over the strength",
+        Columns::Full,
+    );
+    for (softening, opening, time) in [("bilinear", 0.015, 0.45), ("exponential", 0.04, 0.3)] {
+        let peak = |spacing: f64| -> Result<f64, String> {
+            progress.advance(1);
+            let seen = strip(softening, opening, spacing, time)?;
+            let rows = found(&seen, "right_reaction_x").ok_or("no rows".to_owned())?;
+            Ok(rows[0] / ligament / strength)
+        };
+        let both = peak(1.0).and_then(|coarse| Ok((coarse, peak(0.5)?)));
+        let quantity = "half the spacing over the whole, less 1";
+        match both {
+            Ok((coarse, fine)) => {
+                table.push(Row::info(softening, "spacing 1 mm", coarse));
+                table.push(Row::info(softening, "spacing 0.5 mm", fine));
+                let change = (fine / coarse - 1.0).abs();
+                table.push(Row::at_most(softening, quantity, change, PEAK_LIMIT));
+            }
+            Err(why) => {
+                table.push(Row::at_most(softening, quantity, f64::NAN, PEAK_LIMIT).because(why));
+            }
         }
     }
     table
@@ -137,9 +162,10 @@ fn beam(progress: &dyn Progress) -> Table {
 
 /// The suite `softening`.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    progress.stage("softening bonds", Some(5));
+    progress.stage("softening bonds", Some(9));
     let mut tables = vec![strips(effort, progress)];
     if effort == Effort::Full {
+        tables.push(peaks(progress));
         tables.push(beam(progress));
     }
     progress.finish();
