@@ -97,11 +97,11 @@ impl Ranks for ThreadRank {
         })
     }
 
-    fn solver(
-        &self,
-        rows: &RankRows<'_>,
+    fn solver<'a>(
+        &'a self,
+        rows: RankRows<'a>,
         _: RankSolverKind,
-    ) -> Result<Box<dyn RankSolver>, String> {
+    ) -> Result<Box<dyn RankSolver + 'a>, String> {
         // every thread has all rows, and factorises them as one matrix
         let (d, partition) = (rows.matrix.block, rows.partition);
         let mut own = Vec::new();
