@@ -8,6 +8,7 @@ use rayon::prelude::*;
 mod element_tangent;
 mod exact_sum;
 mod ghosts;
+mod neighbour_springs;
 pub mod ranks;
 mod segments;
 mod shared_blocks;
@@ -19,6 +20,7 @@ pub(crate) mod wrapped;
 pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
+pub(crate) use neighbour_springs::share_long_rows;
 pub use ranks::{
     Exchange, Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread,
 };

@@ -329,6 +329,9 @@ fn shares(law: &str, solve: &str, count: usize) -> Vec<[u64; 4]> {
     let found: Value = serde_json::from_slice(&output).unwrap();
     let all = found["processes"].as_array().unwrap().iter();
     let number = |share: &Value, key: &str| share[key].as_u64().unwrap();
+    for share in found["processes"].as_array().unwrap() {
+        assert!(share["memory_bytes"].as_u64() > share["stiffness_bytes"].as_u64());
+    }
     let keys = ["sites", "ghosts", "stiffness_bytes", "received_bytes"];
     all.map(|share| keys.map(|key| number(share, key)))
         .collect()

@@ -62,15 +62,27 @@ impl<const D: usize> Model<D> {
     ///
     /// Bonds without a weight count, for they break too.
     pub fn points_reached(&self, own: &[bool]) -> Vec<bool> {
-        let mut reached = own.to_vec();
-        let (Some(p), Some(body)) = (&self.peridynamics, self.body()) else {
-            return reached;
-        };
-        let layers = match p.accelerator() {
+        let layers = match self.peridynamics.as_ref().and_then(|p| p.accelerator()) {
             Some(Accelerator::Solid { .. }) => 2,
             _ => 1,
         };
-        for _ in 0..layers {
+        self.within_families(own, layers)
+    }
+
+    /// Own points and all whose families their process holds where families are spread over processes: neighbours as well, if a law asks for these.
+    pub fn points_held(&self, own: &[bool]) -> Vec<bool> {
+        let law = self.peridynamics.as_ref().map(|p| p.law.linearised());
+        let is_pairwise = law.is_none_or(|law| law.is_pairwise());
+        self.within_families(own, usize::from(!is_pairwise))
+    }
+
+    /// Points, and those in their families, so many times.
+    fn within_families(&self, of: &[bool], times: usize) -> Vec<bool> {
+        let mut reached = of.to_vec();
+        let Some(body) = self.body() else {
+            return reached;
+        };
+        for _ in 0..times {
             let inner = reached.clone();
             let points = inner.iter().enumerate().filter(|(_, is_inner)| **is_inner);
             for &j in points.flat_map(|(i, _)| body.families.of(i)) {

@@ -53,6 +53,7 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
         factor_nonzeros: 0,
         operations: 0.0,
         peak_memory_bytes: counts.peak(),
+        base_bytes: counts.base(),
         memory: counts.memory(),
         total_seconds: timings.total(),
         timings,

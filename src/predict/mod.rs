@@ -10,18 +10,20 @@
 //! | `display.rs` | a prediction, as people read it |
 //! | `error_prediction.rs` | an error, predicted |
 //! | `processes.rs` | what each of several processes will have |
+//! | `process_memory.rs` | the memory of each |
 
 pub mod counted;
 mod display;
 mod error_prediction;
 mod motion_estimate;
 pub mod output_cost;
+mod process_memory;
 mod processes;
 mod resource_estimate;
 mod solver_estimate;
 
 pub use error_prediction::{ErrorPrediction, ErrorReference};
-pub use processes::{ProcessShare, processes};
+pub use processes::{ProcessShare, Processes, processes};
 pub use resource_estimate::{MotionPrediction, Prediction};
 
 use crate::progress::Progress;

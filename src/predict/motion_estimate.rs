@@ -93,6 +93,7 @@ fn prediction<const D: usize>(
         Files::Some => output_bytes(&sizes, &laid_out.rest.output),
         Files::None => 0,
     };
+    let peak = peak_memory_bytes().unwrap_or(0);
     let share = |name, bytes| Share { name, bytes };
     let mut memory = vec![
         share("model", laid_out.bytes),
@@ -115,9 +116,9 @@ fn prediction<const D: usize>(
         unknowns: sizes.dofs - held,
         factor_nonzeros: 0,
         operations: 0.0,
-        peak_memory_bytes: (resident_memory_bytes().unwrap_or(0) + output)
-            .max(peak_memory_bytes().unwrap_or(0)),
+        peak_memory_bytes: (resident_memory_bytes().unwrap_or(0) + output).max(peak),
         memory,
+        base_bytes: peak,
         total_seconds: laid_out.timings.total(),
         timings: laid_out.timings.clone(),
         choices,

@@ -4,15 +4,20 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 use serde::Serialize;
 
-use crate::coupling::Model;
+use super::process_memory::{Spreading, divide, per_bond};
+use super::resource_estimate::Prediction;
+use crate::assembly::Pattern;
+use crate::coupling::{Coupling, Model};
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
+use crate::run::equilibrium;
 use crate::run::motion::dynamic_system::{LayoutStart, dynamic};
 use crate::run::motion::{Sharing, may_share, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
-use crate::system::Partition;
+use crate::solve::statics::Method;
+use crate::system::{Partition, SemiDiscrete, Symmetry, share_long_rows};
 
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
 const SCALAR: u64 = 12;
@@ -26,13 +31,39 @@ pub struct ProcessShare {
     pub ghosts: usize,
     /// Blocks of these rows: bonds, and pairs of nodes of an element; where points alone move in time, bonds.
     pub blocks: usize,
-    /// What its part of the stiffness takes \[bytes\], without factors or coarse levels; zero of a scene in time, which assembles none.
+    /// Bonds whose families it holds: those of all points, or of its own, and of these points' neighbours where a law asks for them.
+    pub bonds: usize,
+    /// What its part of the stiffness takes in PETSc \[bytes\], or of the springs that precondition it where rows are shared, without factors or coarse levels; zero of a scene in time, which assembles none.
     pub stiffness_bytes: u64,
     /// What it receives for each product with the stiffness, or for each step in time \[bytes\]: the numbers of its ghosts, or of all sites that others have.
     pub received_bytes: u64,
+    /// Most memory that it will hold \[bytes\].
+    pub memory_bytes: u64,
 }
 
-/// What each of `count` processes will have of a scene, by their number.
+/// What processes have of a scene, their memory aside.
+#[derive(Clone, Debug)]
+pub struct Processes {
+    shares: Vec<ProcessShare>,
+    spreading: Spreading,
+    /// Bytes of each bond of a family.
+    per_bond: f64,
+}
+
+impl Processes {
+    /// What each has, by their number; its memory is zero.
+    pub fn shares(&self) -> &[ProcessShare] {
+        &self.shares
+    }
+
+    /// The same with the memory of each, where one process would need `alone`.
+    pub fn with_memory(mut self, alone: &Prediction) -> Vec<ProcessShare> {
+        divide(&mut self.shares, self.spreading, self.per_bond, alone);
+        self.shares
+    }
+}
+
+/// What `count` processes will have of a scene.
 ///
 /// # Errors
 /// [`RunError`] if the model cannot be built, as a run would.
@@ -40,7 +71,7 @@ pub fn processes(
     scene: AnyScene,
     count: usize,
     progress: &dyn Progress,
-) -> Result<Vec<ProcessShare>, RunError> {
+) -> Result<Processes, RunError> {
     scene.fits()?;
     match scene {
         AnyScene::Bar(s) => with_choice(s.scene, |s| shares(s, count, progress)),
@@ -53,7 +84,7 @@ fn shares<const D: usize>(
     scene: Scene<D>,
     count: usize,
     progress: &dyn Progress,
-) -> Result<Vec<ProcessShare>, RunError> {
+) -> Result<Processes, RunError> {
     let is_static = scene.solve == Solve::Static;
     let explicit = match &scene.solve {
         Solve::Explicit(spec) => Some(spec.clone()),
@@ -64,12 +95,22 @@ fn shares<const D: usize>(
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let partition = model.partition(count, is_shared);
     let ranks = (0..partition.ranks()).into_par_iter();
-    let moves_own = |spec| model.can_spread_families() && moves_own_sites(spec, &rest);
-    if is_shared && explicit.as_ref().is_some_and(moves_own) {
+    let mut spreading = match is_shared && model.can_spread_families() {
+        true => Spreading::Families,
+        // forces that are not linear are solved for by every process, with all rows
+        false if is_static && rest.nonlinear(&model).is_none() => Spreading::Rows,
+        false => Spreading::Work,
+    };
+    let per_bond = per_bond(&model);
+    let moves_own = |spec| moves_own_sites(spec, &rest);
+    if spreading == Spreading::Families && explicit.as_ref().is_some_and(moves_own) {
         progress.finish();
-        return Ok(ranks
-            .map(|rank| of_points(&model, &partition, rank))
-            .collect());
+        let all = ranks.map(|rank| of_points(&model, &partition, rank));
+        return Ok(Processes {
+            shares: all.collect(),
+            spreading,
+            per_bond,
+        });
     }
     let operator = coupling.operator(&model)?;
     let system = match &explicit {
@@ -86,62 +127,129 @@ fn shares<const D: usize>(
         _ => None,
     };
     let pattern = model.pattern(operator.as_ref(), &[], progress);
+    if spreading == Spreading::Rows {
+        spreading = of_statics(&model, coupling.as_ref(), &pattern, rest.solver.method);
+    }
     let of_rank = |rank: usize| {
-        let own = partition.of(rank);
-        let row = |site: &u32| {
-            let site = *site as usize;
-            &pattern.columns[pattern.row_offsets[site]..pattern.row_offsets[site + 1]]
-        };
-        let blocks = own.iter().map(|site| row(site).len()).sum();
-        let is_foreign = |site: &u32| partition.owner(*site) != rank;
-        let reached = system.as_ref().and_then(|system| {
-            let sites = 0..model.sites.len() as u32;
-            let own: Vec<bool> = sites.map(|site| !is_foreign(&site)).collect();
-            system.sites_reached(&own)
-        });
-        let ghosts = match &reached {
-            Some(reached) => reached.iter().filter(|is_reached| **is_reached).count() - own.len(),
-            None => {
-                let columns = own.iter().flat_map(row).copied();
-                columns.filter(is_foreign).collect::<FxHashSet<u32>>().len()
-            }
-        };
-        let numbers = match is_static || reached.is_some() {
-            true => ghosts,
-            // forces are gathered
-            false => model.sites.len() - own.len(),
-        };
+        let system = system.as_deref();
+        let share = of_rows(&model, &partition, rank, (&pattern, system, is_static));
         ProcessShare {
-            sites: own.len(),
-            ghosts,
-            blocks,
-            stiffness_bytes: match is_static {
-                true => (blocks * D * D) as u64 * SCALAR,
-                false => 0,
+            bonds: match spreading {
+                Spreading::Families => bonds_held(&model, &own_points(&partition, rank)),
+                _ => model.bond_count(),
             },
-            received_bytes: (numbers * D * 8) as u64,
+            stiffness_bytes: match spreading {
+                Spreading::Products => (share.sites * 3usize.pow(D as u32) * D * D) as u64 * SCALAR,
+                _ => share.stiffness_bytes,
+            },
+            ..share
         }
     };
-    let all = ranks.map(of_rank).collect();
+    let shares = ranks.map(of_rank).collect();
     progress.finish();
-    Ok(all)
+    Ok(Processes {
+        shares,
+        spreading,
+        per_bond,
+    })
+}
+
+/// What PETSc has of a static scene with linear forces.
+fn of_statics<const D: usize>(
+    model: &Model<D>,
+    coupling: &dyn Coupling<D>,
+    pattern: &Pattern,
+    method: Method,
+) -> Spreading {
+    let sites = model.sites.len();
+    let is_point = |site: usize| model.point_of(site).is_some();
+    let counts = [sites, pattern.stored, pattern.distinct].map(|n| n as f64);
+    let symmetry = equilibrium::symmetry(coupling, || pattern.asymmetry, &mut Vec::new());
+    match method {
+        Method::Direct => Spreading::Factors,
+        _ if symmetry == Symmetry::Symmetric
+            && model.is_lattice()
+            && (0..sites).all(is_point)
+            && share_long_rows(D, counts) =>
+        {
+            Spreading::Products
+        }
+        _ => Spreading::Rows,
+    }
+}
+
+/// What a process has whose rows are those of its own sites, of a system that moves by them if there is one.
+fn of_rows<const D: usize>(
+    model: &Model<D>,
+    partition: &Partition,
+    rank: usize,
+    (pattern, system, is_static): (&Pattern, Option<&dyn SemiDiscrete>, bool),
+) -> ProcessShare {
+    let own = partition.of(rank);
+    let row = |site: &u32| {
+        let site = *site as usize;
+        &pattern.columns[pattern.row_offsets[site]..pattern.row_offsets[site + 1]]
+    };
+    let blocks: usize = own.iter().map(|site| row(site).len()).sum();
+    let reached = system.and_then(|system| system.sites_reached(&own_points(partition, rank)));
+    let ghosts = match &reached {
+        Some(reached) => reached.iter().filter(|is_reached| **is_reached).count() - own.len(),
+        None => {
+            let columns = own.iter().flat_map(row).copied();
+            let foreign = columns.filter(|site| partition.owner(*site) != rank);
+            foreign.collect::<FxHashSet<u32>>().len()
+        }
+    };
+    let numbers = match is_static || reached.is_some() {
+        true => ghosts,
+        // forces are gathered
+        false => model.sites.len() - own.len(),
+    };
+    ProcessShare {
+        sites: own.len(),
+        ghosts,
+        blocks,
+        bonds: 0,
+        stiffness_bytes: match is_static {
+            true => (blocks * D * D) as u64 * SCALAR,
+            false => 0,
+        },
+        received_bytes: (numbers * D * 8) as u64,
+        memory_bytes: 0,
+    }
+}
+
+fn own_points(partition: &Partition, rank: usize) -> Vec<bool> {
+    let sites = 0..partition.sites() as u32;
+    sites.map(|site| partition.owner(site) == rank).collect()
+}
+
+fn bonds_of<const D: usize>(model: &Model<D>, point: usize) -> usize {
+    model.body().map_or(0, |b| b.families.of(point).len())
+}
+
+/// Bonds of the families that a process with these points holds where families are spread over processes.
+fn bonds_held<const D: usize>(model: &Model<D>, own: &[bool]) -> usize {
+    let held = model.points_held(own);
+    let held = (0..held.len()).filter(|&i| held[i]);
+    held.map(|i| bonds_of(model, i)).sum()
 }
 
 /// The same where each process moves its own points, and knows those of others whose displacements their forces take.
 fn of_points<const D: usize>(model: &Model<D>, partition: &Partition, rank: usize) -> ProcessShare {
-    let points = 0..partition.sites() as u32;
-    let own: Vec<bool> = points.map(|i| partition.owner(i) == rank).collect();
-    let reached = model.points_reached(&own).into_iter().zip(own);
-    let ghosts = reached.filter(|(is_reached, is_own)| *is_reached && !is_own);
+    let own = own_points(partition, rank);
+    let reached = model.points_reached(&own).into_iter().zip(&own);
+    let ghosts = reached.filter(|(is_reached, is_own)| *is_reached && !**is_own);
     let ghosts = ghosts.count();
     let sites = partition.of(rank);
-    let bonds = |i: &u32| model.body().map_or(0, |b| b.families.of(*i as usize).len());
     ProcessShare {
         sites: sites.len(),
         ghosts,
-        blocks: sites.iter().map(bonds).sum(),
+        blocks: sites.iter().map(|&i| bonds_of(model, i as usize)).sum(),
+        bonds: bonds_held(model, &own),
         stiffness_bytes: 0,
         received_bytes: (ghosts * D * 8) as u64,
+        memory_bytes: 0,
     }
 }
 
@@ -166,6 +274,7 @@ pub(super) fn table(shares: &[ProcessShare]) -> Vec<Vec<String>> {
     grid.push(line("sites", &|s| s.sites as u64, &plain));
     grid.push(line("ghosts", &|s| s.ghosts as u64, &plain));
     grid.push(line("blocks", &|s| s.blocks as u64, &plain));
+    grid.push(line("bonds held", &|s| s.bonds as u64, &plain));
     if shares.iter().any(|s| s.stiffness_bytes > 0) {
         grid.push(line("stiffness", &|s| s.stiffness_bytes, &bytes_text));
         grid.push(line(
@@ -176,5 +285,6 @@ pub(super) fn table(shares: &[ProcessShare]) -> Vec<Vec<String>> {
     } else {
         grid.push(line("received per step", &|s| s.received_bytes, &kibibytes));
     }
+    grid.push(line("peak memory", &|s| s.memory_bytes, &bytes_text));
     grid
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::error_prediction::ErrorPrediction;
 use super::output_cost::{made_up, output_seconds};
-use super::solver_estimate::Planned;
+use super::solver_estimate::{PROGRAM, Planned};
 use crate::assembly::Pattern;
 use crate::coupling::zone_distance::Edge;
 use crate::coupling::{Coupling, Model, Operator, PointSource, SiteKind, Zone};
@@ -66,6 +66,9 @@ pub struct Prediction {
     pub peak_memory_bytes: u64,
     /// What holds memory; not all of it at the same time.
     pub memory: Vec<Share>,
+    /// What of the peak is there beside stiffness, solver and output \[bytes\].
+    #[serde(skip)]
+    pub base_bytes: u64,
     /// Seconds per stage: up to the ordering measured here, of the others from parts of them that were tried here.
     pub timings: Timings,
     /// Seconds of all stages.
@@ -159,6 +162,7 @@ pub(crate) fn predict<const D: usize>(
     choices.extend(weights_decisions(&model));
 
     let (memory, peak) = plan.memory(laid_out, &sizes, &rest.output);
+    let base = laid_out + PROGRAM;
     plan.add_seconds(symmetry, nonzeros, &mut timings);
     timings.add(
         "output",
@@ -177,6 +181,7 @@ pub(crate) fn predict<const D: usize>(
         operations: plan.operations(),
         peak_memory_bytes: peak.max(layout_peak),
         memory,
+        base_bytes: base,
         total_seconds: timings.total(),
         timings,
         choices,

@@ -59,7 +59,7 @@ const LU: f64 = 1.1;
 const HIERARCHY: f64 = 2.1;
 
 /// Bytes of program and buffers that a run touches after its model is laid out; measured.
-const PROGRAM: u64 = 3_700_000;
+pub(crate) const PROGRAM: u64 = 3_700_000;
 
 /// How a stiffness that is not assembled yet will be solved with.
 pub(crate) struct Planned {

@@ -245,6 +245,13 @@ impl Counts {
         list
     }
 
+    /// What of them is there beside stiffness and solver.
+    pub fn base(&self) -> u64 {
+        let shares = self.memory().into_iter();
+        let base = shares.filter(|s| !["stiffness", "solver"].contains(&s.name));
+        base.map(|s| s.bytes).sum()
+    }
+
     /// Bytes that the counts ask for together.
     pub fn peak(&self) -> u64 {
         self.memory().iter().map(|s| s.bytes).sum()
@@ -262,9 +269,9 @@ const PER_PLACE: f64 = 2.0;
 /// Bytes of a bond that the search finds: the number of its end.
 const PER_SEARCHED: f64 = 4.0;
 /// Bytes of a bond of the body: the number of its end once more, and its weight.
-const PER_BOND: f64 = 12.0;
+pub(crate) const PER_BOND: f64 = 12.0;
 /// Bytes more of a state-based bond: influence, and the way back from its end.
-const PER_STATE_BOND: f64 = 20.0;
+pub(crate) const PER_STATE_BOND: f64 = 20.0;
 /// Bytes of a bond of a lattice that is passed over.
 const PER_LATTICE_PASS: f64 = 1.3;
 /// Bytes of a listed bond that is passed over.

@@ -35,11 +35,11 @@ pub trait Ranks: Send + Sync + std::fmt::Debug {
     ///
     /// # Errors
     /// In words, if there is no such solver, or it cannot be set up for this matrix.
-    fn solver(
-        &self,
-        rows: &RankRows<'_>,
+    fn solver<'a>(
+        &'a self,
+        rows: RankRows<'a>,
         kind: RankSolverKind,
-    ) -> Result<Box<dyn RankSolver>, String>;
+    ) -> Result<Box<dyn RankSolver + 'a>, String>;
 }
 
 /// Brings blocks of numbers from the processes that have them to those that want them, again and again.

@@ -1,7 +1,7 @@
 //! Scenes of finite elements and points on several processes: each receives what its own sites and the seam ask for, and the results are those of one.
 
-use crate::threads::{Done, assert_same};
-use crate::traffic::{done, predicted};
+use crate::threads::{Done, assert_same, predicted};
+use crate::traffic::done;
 use crate::{killed_and_resumed, plate};
 
 /// Couplings beside which a crack of this plate runs; at a partial stress it has modes that grow faster than the crack.
@@ -78,9 +78,10 @@ fn inner_plate(material: &str, coupling: &str) -> String {
 fn assert_predicted(text: &str, found: &Done, ranks: usize, name: &str) {
     let (traffic, steps) = &found.traffic;
     let shares = predicted(text, ranks);
+    let shares = shares.shares();
     assert_eq!([traffic.len(), shares.len()], [ranks; 2], "{name}");
     let sites: u64 = traffic.iter().map(|t| t.sites).sum();
-    for (rank, (t, share)) in traffic.iter().zip(&shares).enumerate() {
+    for (rank, (t, share)) in traffic.iter().zip(shares).enumerate() {
         let name = format!("{name}, process {rank} of {ranks}");
         assert_eq!(
             [share.sites as u64, share.ghosts as u64],

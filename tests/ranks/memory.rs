@@ -12,7 +12,7 @@ use bondline::run::{AnyScene, setup};
 use bondline::scene::Source;
 use bondline::system::{FailureUpdate, Interval, Ranks, SemiDiscrete};
 
-use crate::threads::{folder, on_processes};
+use crate::threads::{alone, folder, on_processes, predicted};
 
 thread_local! {
     /// Bytes that the thread has and the most that it had. What another thread frees stays with it: the threads here share little.
@@ -201,6 +201,11 @@ fn processes_tell_of_bonds_what_one_does() {
 
 /// Directed bonds of the points of some layers across the long axis, beyond those of a horizon of two spacings.
 fn bonds(layers: std::ops::Range<i64>) -> f64 {
+    (bonds_within(layers.clone(), 9) - bonds_within(layers, 4)) as f64
+}
+
+/// Directed bonds of the points of some layers across the long axis, whose length has at most this square.
+fn bonds_within(layers: std::ops::Range<i64>, most: i64) -> i64 {
     let mut count = 0;
     for x in layers {
         for (i, j, k) in
@@ -209,12 +214,12 @@ fn bonds(layers: std::ops::Range<i64>) -> f64 {
             let square = i * i + j * j + k * k;
             // points whose neighbour lies in the block
             let across = (COUNTS[1] - j.abs()) * (COUNTS[2] - k.abs());
-            if square > 4 && square <= 9 && (0..COUNTS[0]).contains(&(x + i)) {
+            if square > 0 && square <= most && (0..COUNTS[0]).contains(&(x + i)) {
                 count += across;
             }
         }
     }
-    count as f64
+    count
 }
 
 /// What the bonds beyond two spacings take: bytes of each process.
@@ -244,12 +249,16 @@ fn a_process_holds_the_families_of_its_own_points_and_ghosts() {
     for (material, ghosts) in [("bond-based", 0), ("lps", 3)] {
         let one = bytes_of_bonds(material, 0)[0];
         assert!(one > 10.0 * all, "{material}: {one} bytes of {all} bonds");
+        let text = block(material, 3, COUNTS) + "[output]\nvtu = false\n";
+        let alone = alone(&text);
+        let whole = &predicted(&text, 1).with_memory(&alone)[0];
         for ranks in [2, 4] {
             let layers = COUNTS[0] / ranks;
+            let shares = predicted(&text, ranks as usize).with_memory(&alone);
             for (rank, found) in bytes_of_bonds(material, ranks as usize).iter().enumerate() {
                 let first = rank as i64 * layers;
                 let held = (first - ghosts).max(0)..(first + layers + ghosts).min(COUNTS[0]);
-                let wanted = one * bonds(held) / all;
+                let wanted = one * bonds(held.clone()) / all;
                 println!(
                     "{material} process {rank} of {ranks}: {:.1} bytes for each bond, {:.3} of its share",
                     found / all,
@@ -258,6 +267,19 @@ fn a_process_holds_the_families_of_its_own_points_and_ghosts() {
                 assert!(
                     *found < 1.2 * wanted,
                     "{material}: process {rank} of {ranks} holds {found} bytes, {wanted} are its share of {one}"
+                );
+                let (share, held) = (&shares[rank], bonds_within(held, 9));
+                assert_eq!(
+                    share.bonds as i64, held,
+                    "{material}: process {rank} of {ranks}"
+                );
+                // what is predicted to be saved for each bond that others hold; real processes save 32 bytes of LPS, threads count less
+                let saved = (whole.memory_bytes - share.memory_bytes) as f64;
+                let per_bond = saved / (whole.bonds - share.bonds) as f64;
+                let found = one / all;
+                assert!(
+                    (0.9 * found..1.6 * found).contains(&per_bond),
+                    "{material}: {per_bond} bytes for each bond are predicted, {found} found"
                 );
             }
         }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
 
 use bondline::observe::checkpoint::Pace;
+use bondline::predict::{Prediction, Processes, predict, processes};
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, RunError, RunOptions, StartFrom};
 use bondline::scene::Source;
@@ -97,11 +98,11 @@ impl Ranks for ThreadRank {
         })
     }
 
-    fn solver(
-        &self,
-        rows: &RankRows<'_>,
+    fn solver<'a>(
+        &'a self,
+        rows: RankRows<'a>,
         _: RankSolverKind,
-    ) -> Result<Box<dyn RankSolver>, String> {
+    ) -> Result<Box<dyn RankSolver + 'a>, String> {
         // every thread has all rows, and factorises them as one matrix
         let (d, partition) = (rows.matrix.block, rows.partition);
         let mut own = Vec::new();
@@ -387,4 +388,20 @@ pub fn assert_same(text: &str, ranks: &[usize]) -> BTreeMap<String, Vec<u8>> {
         assert_eq!(sizes.is_empty(), ranks == 1, "on {ranks} processes");
     }
     wanted
+}
+
+fn scene(text: &str, folder: &Path) -> AnyScene {
+    let source = Source::new("scene.toml", text.to_owned());
+    AnyScene::from_source(&source, folder, "scene").expect("a valid scene")
+}
+
+/// What is predicted of one process.
+pub fn alone(text: &str) -> Prediction {
+    let folder = folder();
+    predict(scene(text, folder.path()), &Silent).expect("a prediction")
+}
+
+/// What is predicted of some processes.
+pub fn predicted(text: &str, ranks: usize) -> Processes {
+    processes(scene(text, Path::new(".")), ranks, &Silent).expect("a prediction")
 }

@@ -1,21 +1,7 @@
 //! What processes exchange in steps that they share: their ghosts, as predicted, and nothing of all sites.
 
-use std::path::Path;
-
-use bondline::predict::{ProcessShare, processes};
-use bondline::progress::Silent;
-use bondline::run::AnyScene;
-use bondline::scene::Source;
-
 use crate::memory::{COUNTS, block};
-use crate::threads::{ALONE, Done, How, assert_same, folder, run};
-
-/// What is predicted of some processes.
-pub fn predicted(text: &str, ranks: usize) -> Vec<ProcessShare> {
-    let source = Source::new("scene.toml", text.to_owned());
-    let scene = AnyScene::from_source(&source, Path::new("."), "scene").expect("a valid scene");
-    processes(scene, ranks, &Silent).expect("a prediction")
-}
+use crate::threads::{ALONE, Done, How, assert_same, folder, predicted, run};
 
 pub fn done(text: &str, ranks: usize) -> Done {
     run(text, folder().path(), How { ranks, ..ALONE }).expect("a run")
@@ -41,9 +27,10 @@ fn ghosts_are_layers_and_bytes_are_as_predicted() {
             let found = done(&text, ranks);
             let (traffic, steps) = &found.traffic;
             let shares = predicted(&text, ranks);
+            let shares = shares.shares();
             assert_eq!([traffic.len(), shares.len()], [ranks; 2]);
             assert!(*steps > 5, "{steps}");
-            for (rank, (t, share)) in traffic.iter().zip(&shares).enumerate() {
+            for (rank, (t, share)) in traffic.iter().zip(shares).enumerate() {
                 let sides = if ranks == 1 {
                     0
                 } else {

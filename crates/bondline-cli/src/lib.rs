@@ -98,7 +98,7 @@ enum Command {
         /// Seconds that runs with other spacings may take, which the error is predicted from; by default a second, or 0.15 of the predicted time.
         #[arg(long, value_name = "SECONDS", value_parser = seconds)]
         pilots: Option<f64>,
-        /// Tell what each of so many processes would have.
+        /// Tell what each of so many processes would have: sites, ghosts, memory.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
         processes: Option<u32>,
         /// Print the prediction as JSON.
@@ -381,7 +381,8 @@ fn check(
     if let Some(count) = processes {
         // lays the model out even where a check alone would count it from volumes
         let count = count as usize;
-        let found = bondline_study::processes(&scene.scene, &scene.overrides, count, &progress);
+        let (path, overrides) = (&scene.scene, &scene.overrides);
+        let found = bondline_study::processes(path, overrides, count, &prediction, &progress);
         prediction.processes = found.map_err(told)?;
     }
     Ok(prediction)

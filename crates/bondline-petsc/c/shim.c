@@ -93,11 +93,17 @@ int bl_ghosts_end(Vec v, int mine, double *wanted, int n) {
 
 void bl_ghosts_free(Vec v) { VecDestroy(&v); }
 
+/* overwrites y with the own rows times x, both of this rank; collective */
+typedef void (*Product)(void *of, const double *x, double *y);
+
+/* `a` is what is preconditioned with, and what is solved with where there is no product */
 typedef struct {
-  Mat a;
+  Mat a, shell;
   Vec b, x;
   KSP ksp;
   int bs, mine;
+  Product product;
+  void *of;
 } Bl;
 
 void bl_free(Bl *s) {
@@ -105,6 +111,7 @@ void bl_free(Bl *s) {
   KSPDestroy(&s->ksp);
   VecDestroy(&s->b);
   VecDestroy(&s->x);
+  MatDestroy(&s->shell);
   MatDestroy(&s->a);
   free(s);
 }
@@ -143,6 +150,47 @@ int bl_row(Bl *s, long long row, int n, const long long *columns, const double *
   return e;
 }
 
+static PetscErrorCode multiply(Mat m, Vec x, Vec y) {
+  Bl *s;
+  const PetscScalar *p;
+  PetscScalar *q;
+  OK(MatShellGetContext(m, &s));
+  OK(VecGetArrayRead(x, &p));
+  OK(VecGetArray(y, &q));
+  s->product(s->of, p, q);
+  OK(VecRestoreArray(y, &q));
+  return VecRestoreArrayRead(x, &p);
+}
+
+/* solves with a product, whose matrix is no one's */
+int bl_shell(Bl *s, Product product, void *of) {
+  PetscInt n = (PetscInt)s->bs * s->mine;
+  s->product = product;
+  s->of = of;
+  OK(MatCreateShell(PETSC_COMM_WORLD, n, n, PETSC_DETERMINE, PETSC_DETERMINE, s, &s->shell));
+  OK(MatSetBlockSize(s->shell, s->bs));
+  OK(MatSetOption(s->shell, MAT_SYMMETRIC, PETSC_TRUE));
+  return (int)MatShellSetOperation(s->shell, MATOP_MULT, (void (*)(void))multiply);
+}
+
+/* the finest level goes by the product, coarser ones by the matrix */
+static int smooth_by_product(Bl *s) {
+  PC pc;
+  KSP smoother;
+  PetscBool is_mg;
+  PetscInt levels;
+  OK(KSPGetPC(s->ksp, &pc));
+  OK(PetscObjectTypeCompare((PetscObject)pc, PCGAMG, &is_mg));
+  if (!is_mg) return 0;
+  OK(PCMGGetLevels(pc, &levels));
+  if (levels < 2) return 0;
+  OK(PCMGGetSmoother(pc, levels - 1, &smoother));
+  OK(KSPSetOperators(smoother, s->shell, s->a));
+  OK(KSPChebyshevEstEigSet(smoother, PETSC_DECIDE, PETSC_DECIDE, PETSC_DECIDE, PETSC_DECIDE));
+  OK(KSPSetUp(smoother));
+  return (int)PCMGSetResidual(pc, levels - 1, PCMGResidualDefault, s->shell);
+}
+
 /* an option that is not typed already, in PETSC_OPTIONS or a file */
 static int option(const char *name, const char *value) {
   PetscBool typed;
@@ -159,7 +207,7 @@ int bl_finish(Bl *s, const double *xyz, int direct, int symmetric) {
   OK(MatAssemblyEnd(s->a, MAT_FINAL_ASSEMBLY));
   OK(MatCreateVecs(s->a, &s->x, &s->b));
   OK(KSPCreate(PETSC_COMM_WORLD, &s->ksp));
-  OK(KSPSetOperators(s->ksp, s->a, s->a));
+  OK(KSPSetOperators(s->ksp, s->shell ? s->shell : s->a, s->a));
   if (direct) {
     PC pc;
     OK(KSPSetType(s->ksp, KSPPREONLY));
@@ -190,7 +238,8 @@ int bl_finish(Bl *s, const double *xyz, int direct, int symmetric) {
   OK(KSPSetType(s->ksp, symmetric ? KSPCG : KSPFGMRES));
   OK(KSPGMRESSetRestart(s->ksp, 100));
   OK(KSPSetFromOptions(s->ksp));
-  return (int)KSPSetUp(s->ksp);
+  OK(KSPSetUp(s->ksp));
+  return s->shell ? smooth_by_product(s) : 0;
 }
 
 int bl_solve(Bl *s, const double *b, double *x, double tolerance, int most, int *iterations, const char **why) {

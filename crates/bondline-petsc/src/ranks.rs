@@ -4,10 +4,10 @@ use std::process::exit;
 use std::time::Duration;
 
 use bondline::system::{
-    Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Symmetry,
+    Exchange, Ghosts, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread, Symmetry,
 };
 
-use crate::shim::{self, GhostVector, System};
+use crate::shim::{self, GhostVector, Product, System};
 
 /// Variables by which the starters of OpenMPI, MPICH, Intel MPI and PMIx tell a process that it is one of several.
 const STARTED: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMI_RANK", "PMIX_RANK"];
@@ -119,12 +119,32 @@ impl Ranks for PetscRanks {
         Box::new(PetscExchange { vector, ranks })
     }
 
-    fn solver(
-        &self,
-        rows: &RankRows<'_>,
+    fn solver<'a>(
+        &'a self,
+        rows: RankRows<'a>,
         kind: RankSolverKind,
-    ) -> Result<Box<dyn RankSolver>, String> {
-        Ok(Box::new(solver(rows, kind, self.rank)?))
+    ) -> Result<Box<dyn RankSolver + 'a>, String> {
+        let springs = match kind {
+            RankSolverKind::Krylov => rows.neighbour_springs(self),
+            RankSolverKind::Direct => None,
+        };
+        let system = match &springs {
+            Some(springs) => {
+                let near = RankRows {
+                    matrix: springs,
+                    ..rows
+                };
+                solver(&near, kind, self.rank, Some(product(rows, self)))?
+            }
+            None => solver(&rows, kind, self.rank, None)?,
+        };
+        Ok(Box::new(RowSolver {
+            rows,
+            kind,
+            rank: self.rank,
+            is_by_product: springs.is_some(),
+            system,
+        }))
     }
 }
 
@@ -145,8 +165,59 @@ impl Exchange for PetscExchange {
     }
 }
 
-/// The matrix of the rows, and what solves with it.
-fn solver(rows: &RankRows<'_>, kind: RankSolverKind, rank: usize) -> Result<System, String> {
+/// Products of the rows that a process has, which share their blocks; unknowns that are prescribed keep their numbers.
+fn product<'a>(rows: RankRows<'a>, ranks: &'a PetscRanks) -> Box<Product<'a>> {
+    let (matrix, d) = (rows.matrix, rows.matrix.block);
+    let spread = Spread {
+        ranks,
+        partition: rows.partition,
+    };
+    let own = spread.own();
+    let mut needed = vec![false; rows.partition.sites()];
+    (matrix.columns.iter()).for_each(|&c| needed[c as usize] = true);
+    let mut ghosts = Ghosts::new(&spread, &needed, d);
+    let mut all = vec![0.0; rows.prescribed.len()];
+    let held = held_stiffness(&rows, own);
+    Box::new(move |x, y| {
+        for (x, &site) in x.chunks_exact(d).zip(own) {
+            for (a, x) in x.iter().enumerate() {
+                let dof = site as usize * d + a;
+                all[dof] = if rows.prescribed[dof] { 0.0 } else { *x };
+            }
+        }
+        ghosts.begin(&all);
+        ghosts.end(&mut all);
+        matrix.multiply_into(&all, y);
+        for ((x, y), held) in x.iter().zip(y).zip(&held) {
+            if let Some(stiffness) = held {
+                *y = stiffness * x;
+            }
+        }
+    })
+}
+
+/// The diagonal of each unknown of the own sites that is prescribed.
+fn held_stiffness(rows: &RankRows<'_>, own: &[u32]) -> Vec<Option<f64>> {
+    let (matrix, d) = (rows.matrix, rows.matrix.block);
+    let of_dof = |k: usize| {
+        let (r, site) = (k / d, own[k / d]);
+        if !rows.prescribed[site as usize * d + k % d] {
+            return None;
+        }
+        let (columns, blocks) = matrix.row(r);
+        let place = columns.binary_search(&site).ok();
+        Some(place.map_or(1.0, |e| diagonal(&blocks[e * d * d..], d, k % d)))
+    };
+    (0..own.len() * d).map(of_dof).collect()
+}
+
+/// The matrix of the rows, and what solves with it: with the matrix, or with a product that it preconditions.
+fn solver<'a>(
+    rows: &RankRows<'_>,
+    kind: RankSolverKind,
+    rank: usize,
+    product: Option<Box<Product<'a>>>,
+) -> Result<System<'a>, String> {
     let (matrix, partition) = (rows.matrix, rows.partition);
     let own = partition.of(rank);
     let d = matrix.block;
@@ -199,6 +270,9 @@ fn solver(rows: &RankRows<'_>, kind: RankSolverKind, rank: usize) -> Result<Syst
         .iter()
         .flat_map(|&s| rows.positions[s as usize].into_iter().take(d));
     let xyz: Vec<f64> = positions.collect();
+    if let Some(product) = product {
+        system.multiply_by(product)?;
+    }
     system.finish(&xyz, kind == RankSolverKind::Direct, is_symmetric)?;
     Ok(system)
 }
@@ -209,7 +283,16 @@ fn diagonal(block: &[f64], d: usize, a: usize) -> f64 {
     if own > 0.0 { own } else { 1.0 }
 }
 
-impl RankSolver for System {
+/// A solver of the rows; by products of them, until these do not converge.
+struct RowSolver<'a> {
+    rows: RankRows<'a>,
+    kind: RankSolverKind,
+    rank: usize,
+    is_by_product: bool,
+    system: System<'a>,
+}
+
+impl RankSolver for RowSolver<'_> {
     fn solve_into(
         &mut self,
         b: &[f64],
@@ -217,18 +300,47 @@ impl RankSolver for System {
         tolerance: f64,
         max_iterations: usize,
     ) -> RankSolve {
-        match self.solve(b, x, tolerance, max_iterations) {
-            Ok((iterations, failure)) => RankSolve {
-                iterations,
-                failure,
-            },
+        let done = solve_into(&mut self.system, b, x, tolerance, max_iterations);
+        if done.failure.is_none() || !self.is_by_product {
+            return done;
+        }
+        self.is_by_product = false;
+        match solver(&self.rows, self.kind, self.rank, None) {
+            Ok(system) => self.system = system,
             Err(message) => {
-                // an error inside of a collective call leaves the ranks apart
-                x.fill(f64::NAN);
-                RankSolve {
-                    iterations: 0,
+                return RankSolve {
                     failure: Some(message),
-                }
+                    ..done
+                };
+            }
+        }
+        let left = max_iterations.saturating_sub(done.iterations);
+        let again = solve_into(&mut self.system, b, x, tolerance, left);
+        RankSolve {
+            iterations: done.iterations + again.iterations,
+            ..again
+        }
+    }
+}
+
+fn solve_into(
+    system: &mut System<'_>,
+    b: &[f64],
+    x: &mut [f64],
+    tolerance: f64,
+    max_iterations: usize,
+) -> RankSolve {
+    match system.solve(b, x, tolerance, max_iterations) {
+        Ok((iterations, failure)) => RankSolve {
+            iterations,
+            failure,
+        },
+        Err(message) => {
+            // an error inside of a collective call leaves the ranks apart
+            x.fill(f64::NAN);
+            RankSolve {
+                iterations: 0,
+                failure: Some(message),
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The functions of `c/shim.c`, each behind a safe one that checks lengths.
 
-use std::ffi::{CStr, c_char, c_double, c_int, c_longlong, c_ulonglong};
+use std::ffi::{CStr, c_char, c_double, c_int, c_longlong, c_ulonglong, c_void};
 use std::ptr::{NonNull, null, null_mut};
 
 /// A matrix with its solver, on the side of C.
@@ -60,6 +60,11 @@ unsafe extern "C" {
         n: c_int,
         columns: *const c_longlong,
         strip: *const c_double,
+    ) -> c_int;
+    fn bl_shell(
+        s: *mut Bl,
+        product: extern "C" fn(*mut c_void, *const c_double, *mut c_double),
+        of: *mut c_void,
     ) -> c_int;
     fn bl_finish(s: *mut Bl, xyz: *const c_double, direct: c_int, symmetric: c_int) -> c_int;
     fn bl_solve(
@@ -232,17 +237,37 @@ impl Drop for GhostVector {
     }
 }
 
+/// Overwrites the second with the own rows times the first, numbers of this rank; collective.
+pub type Product<'a> = dyn FnMut(&[f64], &mut [f64]) + 'a;
+
+/// What PETSc calls for a product.
+struct Callback<'a> {
+    dofs: usize,
+    product: Box<Product<'a>>,
+}
+
+extern "C" fn multiply(of: *mut c_void, x: *const c_double, y: *mut c_double) {
+    // SAFETY: `of` is the callback that its system keeps, and nobody else uses it while PETSc solves
+    let callback = unsafe { &mut *of.cast::<Callback<'_>>() };
+    // SAFETY: vectors of the shell have as many numbers of this rank
+    let x = unsafe { std::slice::from_raw_parts(x, callback.dofs) };
+    // SAFETY: as `x`, and another vector
+    let y = unsafe { std::slice::from_raw_parts_mut(y, callback.dofs) };
+    (callback.product)(x, y);
+}
+
 /// A matrix with its solver.
-#[derive(Debug)]
-pub struct System {
+pub struct System<'a> {
     bl: NonNull<Bl>,
+    /// Made by `Box::into_raw`: PETSc has the address.
+    callback: Option<NonNull<Callback<'a>>>,
     /// Numbers of this rank.
     dofs: usize,
     rows: usize,
     block: usize,
 }
 
-impl System {
+impl<'a> System<'a> {
     /// A matrix of blocks with so many entries in each row, in columns of this rank and of others.
     pub fn new(
         block: usize,
@@ -267,6 +292,7 @@ impl System {
         let bl = NonNull::new(out).ok_or("no memory for a matrix")?;
         let system = Self {
             bl,
+            callback: None,
             dofs: block * own.len(),
             rows: own.len(),
             block,
@@ -292,6 +318,16 @@ impl System {
                 strip.as_ptr(),
             )
         })
+    }
+
+    /// Solves with a product, and preconditions with the matrix.
+    pub fn multiply_by(&mut self, product: Box<Product<'a>>) -> Result<(), String> {
+        assert!(self.callback.is_none(), "one product");
+        let dofs = self.dofs;
+        let callback = Box::into_raw(Box::new(Callback { dofs, product }));
+        self.callback = NonNull::new(callback);
+        // SAFETY: the callback lives until the matrix is freed
+        told(unsafe { bl_shell(self.bl.as_ptr(), multiply, callback.cast()) })
     }
 
     /// Ends the matrix and sets its solver up; `xyz` has the coordinates of the own sites, as many as unknowns.
@@ -343,9 +379,13 @@ impl System {
     }
 }
 
-impl Drop for System {
+impl Drop for System<'_> {
     fn drop(&mut self) {
         // SAFETY: made by `new`, freed once
         unsafe { bl_free(self.bl.as_ptr()) };
+        if let Some(callback) = self.callback {
+            // SAFETY: made by `Box::into_raw`, and PETSc no longer has it
+            drop(unsafe { Box::from_raw(callback.as_ptr()) });
+        }
     }
 }

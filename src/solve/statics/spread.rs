@@ -243,7 +243,7 @@ fn refine(
         positions: problem.positions,
         prescribed: &prescribed,
     };
-    let solver = spread.ranks.solver(&rows, kind);
+    let solver = spread.ranks.solver(rows, kind);
     let mut solver = solver.map_err(|message| StaticError::Ranks { message })?;
     info.factor_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();

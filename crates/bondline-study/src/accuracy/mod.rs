@@ -85,7 +85,7 @@ pub fn check(
     check_source(&source, directory, &name, pilots, progress)
 }
 
-/// What each of `count` processes will have of a scene file.
+/// What each of `count` processes will have of a scene file; `alone` is what one process will need.
 ///
 /// # Errors
 /// [`CheckError`], each with place and remedy.
@@ -93,13 +93,14 @@ pub fn processes(
     path: &Path,
     overrides: &[String],
     count: usize,
+    alone: &Prediction,
     progress: &dyn Progress,
 ) -> Result<Vec<ProcessShare>, CheckError> {
     let (source, directory, name) = read(path, overrides)?;
     let chosen = completed(&source, directory)?;
     let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
     let scene = AnyScene::complete(complete, directory, &name)?;
-    Ok(bondline::predict::processes(scene, count, progress)?)
+    Ok(bondline::predict::processes(scene, count, progress)?.with_memory(alone))
 }
 
 /// As [`check`], of a scene whose relative paths start in `directory` and whose files are named `name` by default.
