@@ -131,7 +131,6 @@ pub(crate) fn predict<const D: usize>(
     let layout_peak = peak_memory_bytes().unwrap_or(0);
     let pattern = affine_pattern(&model, operator.as_ref(), progress);
     watch.lap(&mut timings, "assembly");
-
     loads::loads(&model, &rest.conditions, 0.0)?;
     let free = free_dofs(&model, &rest)?;
     let proof = proved(
@@ -162,7 +161,6 @@ pub(crate) fn predict<const D: usize>(
     choices.extend(weights_decisions(&model));
 
     let (memory, peak) = plan.memory(laid_out, &sizes, &rest.output);
-    let base = laid_out + PROGRAM;
     plan.add_seconds(symmetry, nonzeros, &mut timings);
     timings.add(
         "output",
@@ -181,7 +179,7 @@ pub(crate) fn predict<const D: usize>(
         operations: plan.operations(),
         peak_memory_bytes: peak.max(layout_peak),
         memory,
-        base_bytes: base,
+        base_bytes: laid_out + PROGRAM,
         total_seconds: timings.total(),
         timings,
         choices,
