@@ -37,16 +37,25 @@ use crate::scene::{Scene, Solve};
 /// [`RunError`], each with place and remedy.
 pub fn predict(scene: AnyScene, progress: &dyn Progress) -> Result<Prediction, RunError> {
     scene.fits()?;
-    let unused = scene.unused().to_vec();
     let counted = match &scene {
         AnyScene::Bar(s) => counted::counted(s),
         AnyScene::Plane(s) => counted::counted(s),
         AnyScene::Solid(s) => counted::counted(s),
     };
     if let Some(mut prediction) = counted {
-        prediction.warnings.extend(unused);
+        prediction.warnings.extend(scene.unused().to_vec());
         return Ok(prediction);
     }
+    laid_out(scene, progress)
+}
+
+/// As [`predict`], of the model laid out, however long that takes.
+///
+/// # Errors
+/// [`RunError`], each with place and remedy.
+pub fn laid_out(scene: AnyScene, progress: &dyn Progress) -> Result<Prediction, RunError> {
+    scene.fits()?;
+    let unused = scene.unused().to_vec();
     let mut prediction = match scene {
         AnyScene::Bar(s) => with_choice(s.scene, |s| predicted(s, progress)),
         AnyScene::Plane(s) => with_choice(s.scene, |s| predicted(s, progress)),

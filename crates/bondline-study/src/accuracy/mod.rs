@@ -99,8 +99,13 @@ pub fn processes(
     let (source, directory, name) = read(path, overrides)?;
     let chosen = completed(&source, directory)?;
     let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
-    let scene = AnyScene::complete(complete, directory, &name)?;
-    Ok(bondline::predict::processes(scene, count, progress)?.with_memory(alone))
+    let scene = || AnyScene::complete(complete, directory, &name);
+    let shares = bondline::predict::processes(scene()?, count, progress)?;
+    Ok(match alone.counted {
+        None => shares.with_memory(alone),
+        // what is counted from volumes is too little to take shares from
+        Some(_) => shares.with_memory(&bondline::predict::laid_out(scene()?, progress)?),
+    })
 }
 
 /// As [`check`], of a scene whose relative paths start in `directory` and whose files are named `name` by default.
