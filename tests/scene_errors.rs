@@ -430,6 +430,19 @@ fn wrong_overrides() {
 }
 
 #[test]
+fn a_shape_in_the_place_of_a_set_is_told_its_key() {
+    let e = error(
+        "[conditions.bottom.displacement]",
+        "[conditions.shape.displacement]\non = { box = { min = [0, 0], max = [1, 1] } }\nx = 0\n[conditions.bottom.displacement]",
+    );
+    assert_eq!(e.kind(), SceneErrorKind::WrongType);
+    assert!(
+        e.remedy().unwrap().contains("is written as `inside`"),
+        "{e}"
+    );
+}
+
+#[test]
 fn the_schema_knows_every_choice() {
     let schema = serde_json::to_string(&bondline::scene::schema()).unwrap();
     for word in [

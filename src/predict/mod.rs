@@ -10,6 +10,7 @@
 //! | `display.rs` | a prediction, as people read it |
 //! | `error_prediction.rs` | an error, predicted |
 //! | `processes.rs` | what each of several processes will have |
+//! | `process_share.rs` | the same in numbers |
 //! | `process_memory.rs` | the memory of each |
 
 pub mod counted;
@@ -18,12 +19,14 @@ mod error_prediction;
 mod motion_estimate;
 pub mod output_cost;
 mod process_memory;
+mod process_share;
 mod processes;
 mod resource_estimate;
 mod solver_estimate;
 
 pub use error_prediction::{ErrorPrediction, ErrorReference};
-pub use processes::{ProcessShare, Processes, processes};
+pub use process_share::ProcessShare;
+pub use processes::{Processes, processes};
 pub use resource_estimate::{MotionPrediction, Prediction};
 
 use crate::progress::Progress;

@@ -1,6 +1,6 @@
 //! What each of several processes will hold: what one process holds alone, less what others have of it, and what MPI and PETSc add.
 
-use super::processes::ProcessShare;
+use super::process_share::ProcessShare;
 use super::resource_estimate::Prediction;
 use crate::coupling::Model;
 use crate::run::budget::{PER_BOND, PER_STATE_BOND};

@@ -36,7 +36,7 @@ use crate::solve::FreeDofs;
 use crate::solve::statics::MethodUsed;
 use crate::system::Symmetry;
 
-use super::ProcessShare;
+use super::process_share::ProcessShare;
 
 /// What a run will need.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -52,9 +52,12 @@ impl Place {
     }
 
     /// What to write instead of something of another type.
-    fn belongs_here(&self, expected: &str) -> String {
-        match self.dotted().as_str() {
-            "mesh.file" => "write mesh.file.path = \"part.msh\"".to_owned(),
+    fn belongs_here(&self, expected: &str, found: &str) -> String {
+        match (self.dotted().as_str(), found) {
+            ("mesh.file", _) => "write mesh.file.path = \"part.msh\"".to_owned(),
+            (at, "map") if at.ends_with(".on") => {
+                "`on` is the name of a set of the mesh; a shape is written as `inside`, for displacements, velocities, rotations and springs: tractions and pressures act on sets of facets".to_owned()
+            }
             _ => format!("write {expected} here"),
         }
     }
@@ -120,7 +123,7 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
             format!("{at} is {}", plain(found)),
         )
         .label(span, format!("not {}", plain(expected)))
-        .help(place.belongs_here(&plain(expected)));
+        .help(place.belongs_here(&plain(expected), found));
     }
     if message.starts_with("wanted") {
         let path: Vec<&str> = place.path.iter().map(String::as_str).collect();
