@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """processes.py PROGRAM [CELLS] [STEPS]: what a block of points takes on one program and on 1, 2 and 4 processes under mpirun.
-processes.py --speed PROGRAM [CELLS] [STEPS] [ROUNDS]: how fast its steps are on 1 and 2 processes, and on 2 with a block twice as long.
+processes.py --speed PROGRAM [CELLS] [STEPS] [ROUNDS] [COUNTS...]: how fast its steps are on 1 process, on COUNTS (2) processes, and on these with a block as many times as long.
 
 The block has CELLS (48) points along each edge, three spacings in a horizon, bond-based and LPS. For each run: the peak memory of each process, the same less that of a block with the
 same points and one spacing in a horizon, which is what bonds take, and the user and system seconds of each process. Times are those of a machine on which nothing else runs, or none.
@@ -8,17 +8,20 @@ PROGRAM is built with the feature petsc; every process has one thread.
 
 A table of speed is that of STEPS (100) steps, ROUNDS (3) times in turn, of a block of CELLS (56, which has 2e7 bonds) points along each edge: the run with so many steps less that
 with two, over the steps between, the least of all rounds. So set-up, files and the energies of the last row are left out. Seconds are those of the clock in steps, as the first process
-tells, and of the processor (user and system, waiting included) of each process. "Speed" is the bonds that pass in a second over those of one process: 2 is the most. Ghosts and bytes
-of a step are those of each process, counted in the run; it fails where `bondline check --processes` predicts others.
+tells, and of the processor (user and system, waiting included) of the process that takes most. "Speed" is the bonds that pass in a second over those of one process: at most the number
+of processes. "apart" are as many programs at once, each with a block of its own, which have nothing to do with each other: what cores, caches and memory of the machine allow. Ghosts
+and bytes of a step are the most that a process has, counted in the run; it fails where `bondline check --processes` predicts others.
 """
 
 import json
+import math
 import os
 import pathlib
 import resource
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 
 SCENE = """
 kinematics = "solid"
@@ -109,13 +112,20 @@ def memory(program, n=48, steps=4):
 
 
 def of_steps(runs):
-    """Seconds of a step by the clock, and by the processor of each process, from two runs of few and of many steps."""
+    """Seconds of a step by the clock, and by the processor of the process that takes most, from two runs of few and of many steps."""
     (few, first), (many, last) = runs
     steps = [summary["motion"]["steps"] for summary in (first, last)]
     clock = [sum(stage["seconds"] for stage in summary["timings"] if stage["name"] == "steps") for summary in (first, last)]
     between = steps[1] - steps[0]
-    used = [(b[1] + b[2] - a[1] - a[2]) / between for a, b in zip(few, many)]
-    return (clock[1] - clock[0]) / between, used
+    used = max(b[1] + b[2] - a[1] - a[2] for a, b in zip(few, many))
+    return (clock[1] - clock[0]) / between, used / between
+
+
+def apart(program, scene, folder, count):
+    """As many programs at once: the slowest of them."""
+    with ThreadPoolExecutor(count) as pool:
+        runs = list(pool.map(lambda k: run(program, scene, f"{folder}{k}", None), range(count)))
+    return max(runs, key=lambda one: sum(stage["seconds"] for stage in one[1]["timings"] if stage["name"] == "steps"))
 
 
 def predicted(program, scene, count):
@@ -125,34 +135,41 @@ def predicted(program, scene, count):
     return [(share["sites"], share["ghosts"], share["received_bytes"]) for share in shares]
 
 
-def speed(program, n=56, steps=100, rounds=3):
-    print("| law | points along an edge | bonds | processes | clock [ms/step] | processor [ms/step] | speed | ghosts | received [kB/step] |\n|---|---|---|---|---|---|---|---|---|")
-    cases = [(1, 1), (2, 1), (2, 2)]
+def speed(program, n=56, steps=100, rounds=3, *counts):
+    counts = counts or (2,)
+    cases = [(1, 1, run)] + [(count, *how) for count in counts for how in ((1, run), (count, run), (1, apart))]
+    print("| law | points along the edges | bonds | processes | clock [ms/step] | processor [ms/step] | speed | ghosts | received [kB/step] |\n|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         scene = os.path.join(folder, "block.toml")
         for law, more in LAWS:
             least, told = {}, {}
             for _ in range(rounds):
-                for count, times in cases:
+                for case in cases:
+                    count, times, how = case
                     runs = []
                     for length in (2, steps):
                         pathlib.Path(scene).write_text(text_of(law, more, n, length, times=times))
-                        runs.append(run(program, scene, os.path.join(folder, "out"), count))
-                    found = of_steps(runs)
-                    held = least.setdefault((count, times), found)
-                    least[count, times] = min(held[0], found[0]), [min(pair) for pair in zip(held[1], found[1])]
-                    told[count, times] = runs[1][1]
-            for count, times in cases:
+                        runs.append(how(program, scene, os.path.join(folder, "out"), count))
+                    least[case] = [min(pair) for pair in zip(least.get(case, (math.inf,) * 2), of_steps(runs))]
+                    told[case] = runs[1][1]
+            for case in cases:
+                count, times, how = case
                 pathlib.Path(scene).write_text(text_of(law, more, n, steps, times=times))
-                motion, bonds = told[count, times]["motion"], told[count, times]["sizes"]["bonds"]
-                of_step = [(p["sites"], p["ghosts"], p["received_bytes"] // motion["steps"]) for p in motion["processes"]]
-                if of_step != predicted(program, scene, count) or any(p["exchanges"] != motion["steps"] for p in motion["processes"]):
-                    sys.exit(f"{law}, {count} processes: {motion['processes']} is not what was predicted: {predicted(program, scene, count)}")
-                (clock, used), alone = least[count, times], least[1, 1][0]
-                rate = (bonds / clock) / (told[1, 1]["sizes"]["bonds"] / alone)
-                words = [law, f"{n * times} × {n} × {n}", f"{bonds:.3g}", str(count), f"{1e3 * clock:.1f}", " ".join(f"{1e3 * x:.1f}" for x in used), f"{rate:.2f}"]
-                words += [" ".join(str(ghosts) for _, ghosts, _ in of_step), " ".join(f"{1e-3 * received:.0f}" for _, _, received in of_step)]
-                print("| " + " | ".join(words) + " |", flush=True)
+                motion, bonds = told[case]["motion"], told[case]["sizes"]["bonds"]
+                exchanged = ("", "") if how is apart else exchanges(program, scene, count, motion)
+                bodies = count if how is apart else 1
+                clock, used = least[case]
+                rate = (bodies * bonds / clock) / (told[cases[0]]["sizes"]["bonds"] / least[cases[0]][0])
+                words = [law, f"{n * times} × {n} × {n}", f"{bonds:.3g}", f"{count} apart" if how is apart else str(count), f"{1e3 * clock:.1f}", f"{1e3 * used:.1f}", f"{rate:.2f}"]
+                print("| " + " | ".join([*words, *exchanged]) + " |", flush=True)
+
+
+def exchanges(program, scene, count, motion):
+    """The most ghosts of a process and kB that it receives in a step, which are those predicted."""
+    of_step = [(p["sites"], p["ghosts"], p["received_bytes"] // motion["steps"]) for p in motion["processes"]]
+    if of_step != predicted(program, scene, count) or any(p["exchanges"] != motion["steps"] for p in motion["processes"]):
+        sys.exit(f"{scene}, {count} processes: {motion['processes']} is not what was predicted: {predicted(program, scene, count)}")
+    return [str(max(ghosts for _, ghosts, _ in of_step)), f"{1e-3 * max(received for _, _, received in of_step):.0f}"]
 
 
 if __name__ == "__main__":
