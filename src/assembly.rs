@@ -1,8 +1,7 @@
 //! Sparse rows: transfer rows that express a place through sites, and the accumulator of one stiffness row.
 
-use rayon::prelude::*;
-
 use crate::{
+    parallel,
     system::{BlockCsr, RowBatch, SharedRows},
     tensor::{Tensor, Vector},
 };
@@ -300,26 +299,26 @@ pub fn assemble_rows<const D: usize>(
     let mut gathered = SharedRows::gather(D, rows);
     let chunks = rows.div_ceil(CHUNK);
     for wave in (0..chunks).step_by(WAVE) {
-        let parts: Vec<RowBatch> = (wave..(wave + WAVE).min(chunks))
-            .into_par_iter()
-            .map_init(
-                || (Row::<D>::new(sites), Vec::new(), Vec::new()),
-                |(row, columns, values), chunk| {
-                    let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(rows);
-                    let mut batch = RowBatch::new(D);
-                    let count = range.len() as u64;
-                    for site in range {
-                        add_row(site, row);
-                        row.drain_into(columns, values);
-                        batch.push(columns, values);
-                        columns.clear();
-                        values.clear();
-                    }
-                    advance(count);
-                    batch
-                },
-            )
-            .collect();
+        let parts: Vec<RowBatch> = parallel::map_with(
+            (wave + WAVE).min(chunks) - wave,
+            1,
+            || (Row::<D>::new(sites), Vec::new(), Vec::new()),
+            |(row, columns, values), k| {
+                let chunk = wave + k;
+                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(rows);
+                let mut batch = RowBatch::new(D);
+                let count = range.len() as u64;
+                for site in range {
+                    add_row(site, row);
+                    row.drain_into(columns, values);
+                    batch.push(columns, values);
+                    columns.clear();
+                    values.clear();
+                }
+                advance(count);
+                batch
+            },
+        );
         parts.into_iter().for_each(|batch| gathered.append(batch));
     }
     gathered.finish()
@@ -421,30 +420,29 @@ pub fn pattern<const D: usize>(
     advance: impl Fn(u64) + Sync,
     add_row: impl Fn(usize, &mut Row<D>) + Sync,
 ) -> Pattern {
-    let parts: Vec<(Vec<usize>, Vec<u32>, Dropped)> = (0..sites.div_ceil(CHUNK))
-        .into_par_iter()
-        .map_init(
-            || Row::<D>::new(sites),
-            |row, chunk| {
-                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(sites);
-                let (mut ends, mut columns) = (Vec::new(), Vec::new());
-                let mut sums = Dropped {
-                    products: vec![Vec::new(); fields.len()],
-                    ..Dropped::default()
-                };
-                let count = range.len() as u64;
-                for site in range {
-                    add_row(site, row);
-                    let before = sums.stored;
-                    let mark = row.drain_pattern(site as u32, fields, &mut columns, &mut sums);
-                    sums.marks.push((mark, sums.stored - before));
-                    ends.push(columns.len());
-                }
-                advance(count);
-                (ends, columns, sums)
-            },
-        )
-        .collect();
+    let parts: Vec<(Vec<usize>, Vec<u32>, Dropped)> = parallel::map_with(
+        sites.div_ceil(CHUNK),
+        1,
+        || Row::<D>::new(sites),
+        |row, chunk| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(sites);
+            let (mut ends, mut columns) = (Vec::new(), Vec::new());
+            let mut sums = Dropped {
+                products: vec![Vec::new(); fields.len()],
+                ..Dropped::default()
+            };
+            let count = range.len() as u64;
+            for site in range {
+                add_row(site, row);
+                let before = sums.stored;
+                let mark = row.drain_pattern(site as u32, fields, &mut columns, &mut sums);
+                sums.marks.push((mark, sums.stored - before));
+                ends.push(columns.len());
+            }
+            advance(count);
+            (ends, columns, sums)
+        },
+    );
     let mut pattern = Pattern {
         row_offsets: vec![0],
         products: vec![Vec::new(); fields.len()],

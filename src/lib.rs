@@ -191,6 +191,7 @@ pub mod fem;
 pub mod material;
 pub mod mesh;
 pub mod observe;
+mod parallel;
 pub mod peridynamics;
 pub mod predict;
 pub mod progress;

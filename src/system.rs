@@ -3,7 +3,7 @@
 //! A solver sees sites with positions, a block-sparse stiffness `K` with `K u = f`, and whether `K` is symmetric.
 //! It never learns that coupling exists.
 
-use rayon::prelude::*;
+use crate::parallel;
 
 mod element_tangent;
 mod exact_sum;
@@ -457,7 +457,7 @@ impl BlockCsr {
     /// Whether every row gives nothing for an `x` that is the same at all sites, to 1e-12 of the sizes of its entries.
     pub fn rows_add_up_to_zero(&self) -> bool {
         let d = self.block;
-        (0..self.rows()).into_par_iter().all(|i| {
+        parallel::all(self.rows(), 1, |i| {
             let blocks = self.row(i).1;
             let size: f64 = blocks.iter().fold(0.0, |m, k| m.max(k.abs()));
             (0..d * d).all(|e| {
@@ -549,14 +549,11 @@ impl BlockCsr {
             (diff, norm)
         };
         // by fixed chunks, so that the sum has the same bits on any number of threads
-        let parts: Vec<(f64, f64)> = (0..self.rows().div_ceil(1024))
-            .into_par_iter()
-            .map(|chunk| {
-                (chunk * 1024..((chunk + 1) * 1024).min(self.rows()))
-                    .map(of_row)
-                    .fold((0.0, 0.0), |s, r| (s.0 + r.0, s.1 + r.1))
-            })
-            .collect();
+        let parts: Vec<(f64, f64)> = parallel::map(self.rows().div_ceil(1024), 1, |chunk| {
+            (chunk * 1024..((chunk + 1) * 1024).min(self.rows()))
+                .map(of_row)
+                .fold((0.0, 0.0), |s, r| (s.0 + r.0, s.1 + r.1))
+        });
         let (diff, norm) = parts
             .into_iter()
             .fold((0.0, 0.0), |s, r| (s.0 + r.0, s.1 + r.1));

@@ -1,7 +1,5 @@
 //! Force-based blending of peridynamics and classical elasticity.
 
-use rayon::prelude::*;
-
 use crate::{
     assembly::Row,
     coupling::{
@@ -11,6 +9,7 @@ use crate::{
     },
     dimension,
     mesh::Mesh,
+    parallel,
     peridynamics::PdBody,
     tensor::{Tensor, Vector},
 };
@@ -187,26 +186,23 @@ impl<'a, const D: usize> Blended<'a, D> {
                 remedy: "give one horizon, or use splice or partial-stress",
             });
         }
-        let derivatives = (0..body.cloud.position.len())
-            .into_par_iter()
-            .map(|i| {
-                let family = body.families.of(i);
-                if family.iter().all(|&j| beta[i] + beta[j as usize] == 2.0) {
-                    return Ok(None);
-                }
-                let neighbours: Vec<(u32, Vector<D>)> = family
-                    .iter()
-                    .map(|&j| (j, body.bond(i, j as usize)))
-                    .collect();
-                match least_squares_gradient::quadratic(model.spacing(), &neighbours) {
-                    Some(weights) => Ok(Some(weights)),
-                    None => Err(ModelError::Derivative {
-                        position: body.cloud.position[i].iter().copied().collect(),
-                        bonds: family.len(),
-                    }),
-                }
-            })
-            .collect::<Result<_, _>>()?;
+        let derivatives = parallel::try_map(body.cloud.position.len(), 1, |i| {
+            let family = body.families.of(i);
+            if family.iter().all(|&j| beta[i] + beta[j as usize] == 2.0) {
+                return Ok(None);
+            }
+            let neighbours: Vec<(u32, Vector<D>)> = family
+                .iter()
+                .map(|&j| (j, body.bond(i, j as usize)))
+                .collect();
+            match least_squares_gradient::quadratic(model.spacing(), &neighbours) {
+                Some(weights) => Ok(Some(weights)),
+                None => Err(ModelError::Derivative {
+                    position: body.cloud.position[i].iter().copied().collect(),
+                    bonds: family.len(),
+                }),
+            }
+        })?;
         Ok(Self {
             model,
             body,

@@ -1,11 +1,11 @@
 //! Bonds that voids, cracks and holes cut, and the weights of those of a lattice.
 
-use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use crate::{
     coupling::{ModelError, Peridynamics, PointSource, point_cloud::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, visibility::SegmentCutter},
+    parallel,
     peridynamics::{
         BondWeights, Families, Family, LatticeBonds, LinearForceState, PartialVolume, StatePart,
         TIE_TOLERANCE, collapsed_tensor, isotropic_shell_factors, offset_table::OffsetTable,
@@ -35,10 +35,9 @@ pub(super) fn cut<const D: usize>(
     // a bond crosses a facet only if both of its ends are within its length of it
     let facets = surface.filter(|_| cutter.is_some());
     let bins = facets.map(|facets| NearBins::new(mesh, &facets, reach));
-    let near: Vec<bool> = position
-        .par_iter()
-        .map(|x| barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x)))
-        .collect();
+    let near: Vec<bool> = parallel::map_slice(position, |x| {
+        barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x))
+    });
     families.retain_of(
         |i| near[i],
         |i, j| {

@@ -24,6 +24,7 @@ use rayon::prelude::*;
 use crate::{
     fem::{self, Rule},
     mesh::{CellShape, Mesh},
+    parallel,
     tensor::{Tensor, Tensor4, Vector, strain},
 };
 
@@ -122,21 +123,15 @@ impl<const D: usize> Criteria<'_, D> {
         let strains = self.strains(&node_cells, &displacement);
         let neighbours = self.neighbours(&node_cells);
         let centre: Vec<Vector<D>> = (0..count).map(|c| mesh.centroid(c)).collect();
-        let volume: Vec<f64> = (0..count)
-            .into_par_iter()
-            .map(|c| mesh.cell_volume(c).abs())
-            .collect();
+        let volume: Vec<f64> = parallel::map(count, 1, |c| mesh.cell_volume(c).abs());
         let energy = |c: usize, e: &Tensor<D>| {
             let tensor = &self.tensors[self.cell_material[c] as usize];
             volume[c] * tensor.contract(e).dot(e)
         };
-        let own: Vec<f64> = (0..count)
-            .into_par_iter()
-            .map(|c| match self.cut[c] {
-                true => 0.0,
-                false => energy(c, &strains[c]),
-            })
-            .collect();
+        let own: Vec<f64> = parallel::map(count, 1, |c| match self.cut[c] {
+            true => 0.0,
+            false => energy(c, &strains[c]),
+        });
         let around = Around {
             criteria: self,
             kind: kinds(&neighbours, &centre, &volume),
@@ -146,7 +141,8 @@ impl<const D: usize> Criteria<'_, D> {
             volume: &volume,
         };
         let mut wrong = vec![0.0; count];
-        wrong.par_chunks_mut(CHUNK).enumerate().for_each_init(
+        parallel::for_each_with(
+            wrong.par_chunks_mut(CHUNK).enumerate(),
             || Reached {
                 from: NONE,
                 radius: 0.0,
@@ -165,13 +161,12 @@ impl<const D: usize> Criteria<'_, D> {
                 }
             },
         );
-        let largest: Vec<f64> = (0..count)
-            .into_par_iter()
-            .map(|c| match self.stretch.is_some() && self.is_candidate(c) {
+        let largest: Vec<f64> = parallel::map(count, 1, |c| {
+            match self.stretch.is_some() && self.is_candidate(c) {
                 true => largest_strain(mesh, c, &displacement),
                 false => 0.0,
-            })
-            .collect();
+            }
+        });
         let whole = own.iter().sum();
         let (error, all_local, remaining) = worst(&wrong, whole, self.tolerance);
         let is_known = all_local > 0.0;
@@ -208,68 +203,61 @@ impl<const D: usize> Criteria<'_, D> {
         displacement: &(impl Fn(usize) -> Vector<D> + Sync),
     ) -> Vec<Tensor<D>> {
         let mesh = self.mesh;
-        let raw: Vec<Tensor<D>> = (0..mesh.cell_count())
-            .into_par_iter()
-            .map(|c| strain(&fem::displacement_gradient_at_centre(mesh, c, displacement)))
-            .collect();
+        let raw: Vec<Tensor<D>> = parallel::map(mesh.cell_count(), 1, |c| {
+            strain(&fem::displacement_gradient_at_centre(mesh, c, displacement))
+        });
         if !mesh.shapes.iter().any(|s| is_simplex(*s)) {
             return raw;
         }
-        (0..mesh.cell_count())
-            .into_par_iter()
-            .map(|c| {
-                if !is_simplex(mesh.shapes[c]) || !self.is_candidate(c) {
-                    return raw[c];
-                }
-                let mut near: Vec<u32> = mesh
-                    .cell(c)
-                    .iter()
-                    .flat_map(|&n| cells_of(node_cells, n))
-                    .copied()
-                    .filter(|&k| self.is_candidate(k as usize))
-                    .collect();
-                near.sort_unstable();
-                near.dedup();
-                let x = mesh.centroid(c);
-                let places = near.iter().map(|&k| {
-                    let k = k as usize;
-                    (mesh.centroid(k) - x, mesh.cell_volume(k).abs())
-                });
-                let mut weights = Vec::new();
-                level(places, &mut weights);
-                if weights.is_empty() {
-                    return raw[c];
-                }
-                let values = near.iter().map(|&k| raw[k as usize]);
-                values.zip(&weights).map(|(e, w)| e * *w).sum()
-            })
-            .collect()
+        parallel::map(mesh.cell_count(), 1, |c| {
+            if !is_simplex(mesh.shapes[c]) || !self.is_candidate(c) {
+                return raw[c];
+            }
+            let mut near: Vec<u32> = mesh
+                .cell(c)
+                .iter()
+                .flat_map(|&n| cells_of(node_cells, n))
+                .copied()
+                .filter(|&k| self.is_candidate(k as usize))
+                .collect();
+            near.sort_unstable();
+            near.dedup();
+            let x = mesh.centroid(c);
+            let places = near.iter().map(|&k| {
+                let k = k as usize;
+                (mesh.centroid(k) - x, mesh.cell_volume(k).abs())
+            });
+            let mut weights = Vec::new();
+            level(places, &mut weights);
+            if weights.is_empty() {
+                return raw[c];
+            }
+            let values = near.iter().map(|&k| raw[k as usize]);
+            values.zip(&weights).map(|(e, w)| e * *w).sum()
+        })
     }
 
     /// The candidates that share a facet with each candidate; `NONE` fills the rest.
     fn neighbours(&self, node_cells: &(Vec<u32>, Vec<u32>)) -> Vec<[u32; 6]> {
         let mesh = self.mesh;
-        (0..mesh.cell_count())
-            .into_par_iter()
-            .map(|c| {
-                let mut found = [NONE; 6];
-                if !self.is_candidate(c) {
-                    return found;
-                }
-                let nodes = mesh.corners(c);
-                let facets = mesh.shapes[c].linear().facets();
-                for (slot, facet) in found.iter_mut().zip(facets) {
-                    let other = cells_of(node_cells, nodes[facet[0]]).iter().find(|&&k| {
-                        let theirs = mesh.cell(k as usize);
-                        k as usize != c
-                            && self.is_candidate(k as usize)
-                            && facet[1..].iter().all(|&i| theirs.contains(&nodes[i]))
-                    });
-                    *slot = other.copied().unwrap_or(NONE);
-                }
-                found
-            })
-            .collect()
+        parallel::map(mesh.cell_count(), 1, |c| {
+            let mut found = [NONE; 6];
+            if !self.is_candidate(c) {
+                return found;
+            }
+            let nodes = mesh.corners(c);
+            let facets = mesh.shapes[c].linear().facets();
+            for (slot, facet) in found.iter_mut().zip(facets) {
+                let other = cells_of(node_cells, nodes[facet[0]]).iter().find(|&&k| {
+                    let theirs = mesh.cell(k as usize);
+                    k as usize != c
+                        && self.is_candidate(k as usize)
+                        && facet[1..].iter().all(|&i| theirs.contains(&nodes[i]))
+                });
+                *slot = other.copied().unwrap_or(NONE);
+            }
+            found
+        })
     }
 }
 
@@ -359,10 +347,7 @@ fn kinds<const D: usize>(
                     (n, m) => n == m + 1 && (of(n, c) - of(m, c - 1)).amax() <= ALIKE * size,
                 })
     };
-    let new: Vec<bool> = (0..neighbours.len())
-        .into_par_iter()
-        .map(|c| c == 0 || !is_alike(c))
-        .collect();
+    let new: Vec<bool> = parallel::map(neighbours.len(), 1, |c| c == 0 || !is_alike(c));
     let mut number = 0;
     let count = |is_new: bool| {
         number += u32::from(is_new);

@@ -18,10 +18,9 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::model::Model;
 use crate::{
+    parallel,
     peridynamics::{Law, PdBody, WholeFamily, bond_force::Kinematics},
     tensor::{Tensor, Vector},
 };
@@ -111,21 +110,17 @@ impl<const D: usize> ExactStresses<D> {
         let Some(body) = self.body.as_deref().or_else(|| model.body()) else {
             return;
         };
-        let places: Vec<Vector<D>> = (self.is_asked.par_iter().enumerate())
-            .with_min_len(CHUNK)
-            .map(|(place, is_asked)| match is_asked {
+        let places = parallel::map(self.is_asked.len(), CHUNK, |place| {
+            match self.is_asked[place] {
                 true => body.cloud.transfer.displacement(place, u),
                 false => Vector::zeros(),
-            })
-            .collect();
+            }
+        });
         let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
-        let stress: Vec<Tensor<D>> = (0..self.points.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|k| self.beyond(body, k, &places, nodes))
-            .collect();
-        let chunks = force.par_chunks_mut(CHUNK * D).enumerate();
-        chunks.for_each(|(chunk, force)| {
+        let stress: Vec<Tensor<D>> = parallel::map(self.points.len(), CHUNK, |k| {
+            self.beyond(body, k, &places, nodes)
+        });
+        parallel::for_each_chunk(force, CHUNK * D, 1, |chunk, force| {
             for (k, force) in force.chunks_exact_mut(D).enumerate() {
                 let site = chunk * CHUNK + k;
                 let own = self.first_weight[site]..self.first_weight[site + 1];

@@ -22,8 +22,8 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::coupling::Model;
 use crate::tensor::Vector;
+use crate::{coupling::Model, parallel};
 
 mod clearance;
 mod shape;
@@ -175,11 +175,9 @@ impl<const D: usize> Impact<D> {
         let dofs = self.sites() * D;
         let (u, moved) = u.split_at(dofs);
         let (force, on_impactors) = force.split_at_mut(dofs);
-        let touched: Vec<Vec<Touch<D>>> = force
-            .par_chunks_mut(CHUNK * D)
-            .zip(u.par_chunks(CHUNK * D))
-            .enumerate()
-            .map(|(chunk, (force, u))| {
+        let both = force.par_chunks_mut(CHUNK * D).zip(u.par_chunks(CHUNK * D));
+        let touched: Vec<Vec<Touch<D>>> =
+            parallel::map_each(both.enumerate(), |(chunk, (force, u))| {
                 let mut found: Vec<Touch<D>> = Vec::new();
                 self.each(chunk, u, moved, |i, impactor, k, depth, out| {
                     let push = out * (k * depth);
@@ -195,8 +193,7 @@ impl<const D: usize> Impact<D> {
                     }
                 });
                 found
-            })
-            .collect();
+            });
         for touch in touched.iter().flatten() {
             let own = &mut on_impactors[touch.impactor * D..][..D];
             own.iter_mut()
@@ -208,17 +205,14 @@ impl<const D: usize> Impact<D> {
     /// Energy stored in the contact, `½ k g²` of each pair that touches \[J\].
     pub fn energy(&self, u: &[f64]) -> f64 {
         let (u, moved) = u.split_at(self.sites() * D);
-        let parts: Vec<f64> = u
-            .par_chunks(CHUNK * D)
-            .enumerate()
-            .map(|(chunk, u)| {
+        let parts: Vec<f64> =
+            parallel::map_each(u.par_chunks(CHUNK * D).enumerate(), |(chunk, u)| {
                 let mut sum = 0.0;
                 self.each(chunk, u, moved, |_, _, k, depth, _| {
                     sum += 0.5 * k * depth * depth;
                 });
                 sum
-            })
-            .collect();
+            });
         parts.iter().sum()
     }
 
@@ -227,10 +221,8 @@ impl<const D: usize> Impact<D> {
     /// The width is taken across the way out and, of a cylinder, across its axis.
     pub fn contact(&self, u: &[f64], impactor: usize) -> ContactPatch {
         let (u, moved) = u.split_at(self.sites() * D);
-        let touched: Vec<Vec<(usize, Vector<D>)>> = u
-            .par_chunks(CHUNK * D)
-            .enumerate()
-            .map(|(chunk, u)| {
+        let touched: Vec<Vec<(usize, Vector<D>)>> =
+            parallel::map_each(u.par_chunks(CHUNK * D).enumerate(), |(chunk, u)| {
                 let mut found = Vec::new();
                 self.each(chunk, u, moved, |i, k, _, _, out| {
                     if k == impactor {
@@ -238,8 +230,7 @@ impl<const D: usize> Impact<D> {
                     }
                 });
                 found
-            })
-            .collect();
+            });
         let touched = touched.concat();
         if touched.is_empty() {
             return ContactPatch::default();

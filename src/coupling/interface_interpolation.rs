@@ -1,7 +1,5 @@
 //! Nodes at the seam that are no sites, expressed through the sites around them.
 
-use rayon::prelude::*;
-
 use crate::{
     assembly::Transfer,
     coupling::{
@@ -9,6 +7,7 @@ use crate::{
         least_squares_gradient, point_cloud::PointCloud, seam_order::Ties,
     },
     mesh::Mesh,
+    parallel,
     shape::Barriers,
     tensor::Vector,
 };
@@ -65,66 +64,63 @@ pub(super) fn fit_nodes<const D: usize>(
         .collect();
     let positions: Vec<Vector<D>> = data.iter().map(|d| d.1).collect();
     let bins = Bins::new(&positions, 2.0 * cloud.spacing);
-    let rows = (0..at.mesh.nodes.len())
-        .into_par_iter()
-        .map(|n| {
-            if at.node_site[n] != NONE {
-                return Ok(vec![(at.node_site[n], 1.0)]);
-            }
-            if let Some(row) = at.ties.row(n as u32, at.node_site) {
-                return Ok(row);
-            }
-            if !wanted[n] {
-                return Ok(vec![]);
-            }
-            let x = at.mesh.nodes[n];
-            let distance = |k: &usize| (positions[*k] - x).norm();
-            let widest = (6.0 * cloud.spacing).max(3.0 * largest);
-            let all_within = |radius: f64| -> Vec<usize> {
-                let mut found: Vec<usize> = bins
-                    .around(&x, radius)
-                    .filter(|k| distance(k) <= radius)
-                    .collect();
-                found.sort_unstable();
-                found
-            };
-            if let Some(&k) = all_within(1e-9 * cloud.spacing).first() {
-                return Ok(vec![(data[k].0, 1.0)]);
-            }
-            let is_beside = at.barriers.near(&x, widest);
-            let hidden = |k: &usize| is_beside && at.barriers.cuts(&x, &positions[*k]);
-            // on the crack itself a node has no side
-            let is_on = is_beside && all_within(widest).iter().all(hidden);
-            let within = |radius: f64| {
-                let mut found = all_within(radius);
-                found.retain(|k| is_on || !hidden(k));
-                found
-            };
-            let start = if with_nodes {
-                largest
-            } else {
-                1.8 * cloud.spacing
-            };
-            for degree in [degree, FitDegree::Affine] {
-                for factor in [1.0, 1.3, 1.7, 2.2, 3.0] {
-                    let radius = start * factor * (1.0 + 1e-9);
-                    let chosen = within(radius.min(widest));
-                    let seen: Vec<Vector<D>> = chosen.iter().map(|&k| positions[k]).collect();
-                    if let Some(weights) = least_squares_gradient::fit(&x, &seen, degree) {
-                        return Ok(chosen
-                            .iter()
-                            .zip(weights)
-                            .map(|(&k, w)| (data[k].0, w))
-                            .collect());
-                    }
+    let rows = parallel::try_map(at.mesh.nodes.len(), 1, |n| {
+        if at.node_site[n] != NONE {
+            return Ok(vec![(at.node_site[n], 1.0)]);
+        }
+        if let Some(row) = at.ties.row(n as u32, at.node_site) {
+            return Ok(row);
+        }
+        if !wanted[n] {
+            return Ok(vec![]);
+        }
+        let x = at.mesh.nodes[n];
+        let distance = |k: &usize| (positions[*k] - x).norm();
+        let widest = (6.0 * cloud.spacing).max(3.0 * largest);
+        let all_within = |radius: f64| -> Vec<usize> {
+            let mut found: Vec<usize> = bins
+                .around(&x, radius)
+                .filter(|k| distance(k) <= radius)
+                .collect();
+            found.sort_unstable();
+            found
+        };
+        if let Some(&k) = all_within(1e-9 * cloud.spacing).first() {
+            return Ok(vec![(data[k].0, 1.0)]);
+        }
+        let is_beside = at.barriers.near(&x, widest);
+        let hidden = |k: &usize| is_beside && at.barriers.cuts(&x, &positions[*k]);
+        // on the crack itself a node has no side
+        let is_on = is_beside && all_within(widest).iter().all(hidden);
+        let within = |radius: f64| {
+            let mut found = all_within(radius);
+            found.retain(|k| is_on || !hidden(k));
+            found
+        };
+        let start = if with_nodes {
+            largest
+        } else {
+            1.8 * cloud.spacing
+        };
+        for degree in [degree, FitDegree::Affine] {
+            for factor in [1.0, 1.3, 1.7, 2.2, 3.0] {
+                let radius = start * factor * (1.0 + 1e-9);
+                let chosen = within(radius.min(widest));
+                let seen: Vec<Vector<D>> = chosen.iter().map(|&k| positions[k]).collect();
+                if let Some(weights) = least_squares_gradient::fit(&x, &seen, degree) {
+                    return Ok(chosen
+                        .iter()
+                        .zip(weights)
+                        .map(|(&k, w)| (data[k].0, w))
+                        .collect());
                 }
             }
-            Err(ModelError::Fit {
-                node: n as u32,
-                position: x.iter().copied().collect(),
-                found: within(widest).len(),
-            })
+        }
+        Err(ModelError::Fit {
+            node: n as u32,
+            position: x.iter().copied().collect(),
+            found: within(widest).len(),
         })
-        .collect::<Result<Vec<_>, _>>()?;
+    })?;
     Ok(Transfer::from_rows(rows))
 }

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use crate::{
     assembly::Row,
     coupling::{
@@ -13,6 +11,7 @@ use crate::{
     dimension,
     fem::{self, QuadraturePoint},
     mesh::Mesh,
+    parallel,
     peridynamics::{
         Bound, Cloud, Conditions, Ends, Factors, Families, Family, LinearForceState, PdBody,
         PdError, StressFit, TIE_TOLERANCE,
@@ -127,14 +126,11 @@ impl<'a, const D: usize> Elements<'a, D> {
         let centres: Vec<usize> = (points..cloud.position.len()).collect();
         let shapes = shapes(&cloud, &families, &centres, |i| horizon[i - points]);
         let first_alike = alike::first_alike(&shapes);
-        let fitted: Vec<Result<Vec<f64>, PdError>> = shapes
-            .par_iter()
-            .enumerate()
-            .map(|(k, shape)| match first_alike[k] == k {
-                true => fit.factors(&shape.bonds, shape.horizon),
+        let fitted: Vec<Result<Vec<f64>, PdError>> =
+            parallel::map(shapes.len(), 1, |k| match first_alike[k] == k {
+                true => fit.factors(&shapes[k].bonds, shapes[k].horizon),
                 false => Ok(Vec::new()),
-            })
-            .collect();
+            });
         let factors = |i: usize| fitted[first_alike[i - points]].clone();
         cloud.horizon = cloud.horizon.followed_by(points, &horizon);
         let fitted = fit.fitted_law();
@@ -177,13 +173,9 @@ impl<'a, const D: usize> Elements<'a, D> {
             model.cut_bonds(&cloud.position, &mut families);
             let shapes = shapes(cloud, &families, &candidates, |i| horizon[i - points]);
             let first_alike = alike::first_alike(&shapes);
-            let lacks: Vec<bool> = (0..shapes.len())
-                .into_par_iter()
-                .map(|k| {
-                    first_alike[k] == k
-                        && !fit.is_met_by_positive(&shapes[k].bonds, shapes[k].horizon)
-                })
-                .collect();
+            let lacks: Vec<bool> = parallel::map(shapes.len(), 1, |k| {
+                first_alike[k] == k && !fit.is_met_by_positive(&shapes[k].bonds, shapes[k].horizon)
+            });
             let mut of_candidates = first_alike.iter().map(|&k| lacks[k]);
             candidates.retain(|_| of_candidates.next() == Some(true));
             if candidates.is_empty() || widened > WIDEST {
@@ -204,20 +196,17 @@ fn shapes<const D: usize>(
     points: &[usize],
     horizon: impl Fn(usize) -> f64 + Sync,
 ) -> Vec<Shape<D>> {
-    points
-        .par_iter()
-        .map(|&i| Shape {
-            bonds: families
-                .of(i)
-                .iter()
-                .map(|&j| {
-                    let j = j as usize;
-                    (cloud.position[j] - cloud.position[i], cloud.volume[j])
-                })
-                .collect(),
-            horizon: horizon(i),
-        })
-        .collect()
+    parallel::map_slice(points, |&i| Shape {
+        bonds: families
+            .of(i)
+            .iter()
+            .map(|&j| {
+                let j = j as usize;
+                (cloud.position[j] - cloud.position[i], cloud.volume[j])
+            })
+            .collect(),
+        horizon: horizon(i),
+    })
 }
 
 /// Bonds of a whole family with their volumes, and the moments that they have.

@@ -1,7 +1,5 @@
 //! Where peridynamic points lie: in the cells that hold them and, as far as families reach, in the finite elements around.
 
-use rayon::prelude::*;
-
 use crate::{
     coupling::{
         CellRole, ModelError, Peridynamics, PointSource, Reach, Zone,
@@ -12,6 +10,7 @@ use crate::{
     },
     fem::{self, Locator},
     mesh::Mesh,
+    parallel,
     peridynamics::Horizon,
     tensor::{Tensor, Vector},
 };
@@ -39,13 +38,11 @@ pub(super) fn place<const D: usize>(
         .map(|c| p.reach(p.horizon.at(&mesh.centroid(c))))
         .fold(0.0, f64::max);
     let placement = |mine: Vec<bool>, horizon: Option<f64>| {
-        let region = (0..mesh.cell_count())
-            .into_par_iter()
-            .filter(|&c| mine[c])
-            .map(|c| fem::cell_volume(mesh, c))
-            .collect::<Vec<_>>()
-            .iter()
-            .sum();
+        let region = parallel::filter_map(mesh.cell_count(), 1, |c| {
+            mine[c].then(|| fem::cell_volume(mesh, c))
+        })
+        .iter()
+        .sum();
         let nodes: Vec<u32> = (0..mesh.cell_count())
             .filter(|&c| mine[c] || roles[c] == CellRole::StressElement)
             .flat_map(|c| mesh.cell(c).iter().copied())
@@ -160,10 +157,10 @@ impl<const D: usize> Placement<'_, D> {
 
     fn on_lattice(&self, h: f64, origin: Vector<D>) -> Result<PointCloud<D>, ModelError> {
         let sampler = LatticeSampler::new(self, LatticeBox::new(&self.low, &self.high, origin, h)?);
-        let found: Vec<(Vec<Found<D>>, f64)> = (0..sampler.lattice.total().div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|block| sampler.block(block))
-            .collect();
+        let found: Vec<(Vec<Found<D>>, f64)> =
+            parallel::map(sampler.lattice.total().div_ceil(BLOCK), 1, |block| {
+                sampler.block(block)
+            });
         Ok(self.cloud_of(found, h))
     }
 

@@ -1,10 +1,9 @@
 //! The materials of points, in a body of several.
 
-use rayon::prelude::*;
-
 use crate::{
     coupling::{CellRole, Interface, Model, ModelError, bins::Bins, point_cloud::PointCloud},
     fem::Locator,
+    parallel,
     peridynamics::{Law, Mixture},
     tensor::Vector,
 };
@@ -58,30 +57,27 @@ impl<const D: usize> Model<D> {
             let mut holders = (locators.iter()).filter(|(_, l)| l.holds(&self.mesh, x, TOLERANCE));
             (holders.next().map(|(m, _)| *m), holders.next().is_some())
         };
-        let places = cloud.position.par_iter().zip(&cloud.element);
-        let found: Vec<(Option<u16>, bool)> = places
-            .map(|(x, element)| match element {
-                None => holders(x),
-                Some(_) if self.interface == Interface::Faces => (None, false),
-                Some((cell, _)) => {
-                    let material = self.cell_material[*cell as usize];
-                    let is_known = several.used().contains(&material);
-                    (is_known.then_some(material), false)
-                }
-            })
-            .collect();
+        let found = parallel::map(cloud.position.len(), 1, |i| match &cloud.element[i] {
+            None => holders(&cloud.position[i]),
+            Some(_) if self.interface == Interface::Faces => (None, false),
+            Some((cell, _)) => {
+                let material = self.cell_material[*cell as usize];
+                let is_known = several.used().contains(&material);
+                (is_known.then_some(material), false)
+            }
+        });
         let sites =
             (0..found.len()).filter(|&i| cloud.element[i].is_none() && found[i].0.is_some());
         let sites: Vec<(Vector<D>, u16)> = sites
             .filter_map(|i| Some((cloud.position[i], found[i].0?)))
             .collect();
         let nearest = NearestSite::new(&sites, cloud.spacing);
-        let of_point = (0..found.len()).into_par_iter().map(|i| {
+        let of_point = parallel::map(found.len(), 1, |i| {
             let known = found[i].0.or_else(|| nearest.material(&cloud.position[i]));
             known.unwrap_or_else(|| several.used()[0])
         });
         PointMaterials {
-            of_point: of_point.collect(),
+            of_point,
             on_border: found.iter().filter(|f| f.1).count(),
         }
     }

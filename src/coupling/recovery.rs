@@ -16,6 +16,7 @@ use crate::{
         least_squares_gradient, point_cloud::PointCloud,
     },
     mesh::Mesh,
+    parallel,
     peridynamics::alike::{Shape, first_alike},
     tensor::Vector,
 };
@@ -85,13 +86,10 @@ fn rows<const D: usize>(
     patches: &FxHashMap<u32, Patch<D>>,
     site: impl Fn(usize) -> u32 + Sync,
 ) -> Transfer {
-    let rows: Vec<_> = (0..cloud.position.len())
-        .into_par_iter()
-        .map(|i| match &cloud.element[i] {
-            None => vec![(site(i), 1.0)],
-            Some((cell, shape)) => row(mesh, of_node, patches, *cell, shape, &cloud.position[i]),
-        })
-        .collect();
+    let rows: Vec<_> = parallel::map(cloud.position.len(), 1, |i| match &cloud.element[i] {
+        None => vec![(site(i), 1.0)],
+        Some((cell, shape)) => row(mesh, of_node, patches, *cell, shape, &cloud.position[i]),
+    });
     Transfer::from_rows(rows)
 }
 
@@ -219,9 +217,8 @@ impl<const D: usize> Around<'_, D> {
         sharing: usize,
         patches: &mut FxHashMap<u32, Patch<D>>,
     ) {
-        let places: Vec<(Vec<u32>, Shape<D>)> = sought
-            .par_iter_mut()
-            .map(|(cell, cells)| {
+        let places: Vec<(Vec<u32>, Shape<D>)> =
+            parallel::map_each(sought.par_iter_mut(), |(cell, cells)| {
                 let (centre, size) = centre_and_size(self.at, *cell);
                 self.grow(cells, sharing);
                 let sites = self.sites_of(cells, &centre, size);
@@ -237,20 +234,15 @@ impl<const D: usize> Around<'_, D> {
                         horizon: 1.0,
                     },
                 )
-            })
-            .collect();
+            });
         let (sites, shapes): (Vec<_>, Vec<_>) = places.into_iter().unzip();
         let first_alike = first_alike(&shapes);
-        let found: Vec<Option<Vec<Vec<f64>>>> = shapes
-            .par_iter()
-            .enumerate()
-            .map(|(k, shape)| {
-                let data: Vec<Vector<D>> = shape.bonds.iter().map(|b| b.0).collect();
-                (first_alike[k] == k)
-                    .then(|| least_squares_gradient::second_derivatives(&data))
-                    .flatten()
-            })
-            .collect();
+        let found: Vec<Option<Vec<Vec<f64>>>> = parallel::map(shapes.len(), 1, |k| {
+            let data: Vec<Vector<D>> = shapes[k].bonds.iter().map(|b| b.0).collect();
+            (first_alike[k] == k)
+                .then(|| least_squares_gradient::second_derivatives(&data))
+                .flatten()
+        });
         let mut k = 0;
         let mut sites = sites.into_iter();
         sought.retain(|(cell, _)| {

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::{FitDegree, Model, SiteKind, bins::Bins, least_squares_gradient};
-use crate::{assembly::Transfer, fem::Locator, tensor::Vector};
+use crate::{assembly::Transfer, fem::Locator, parallel, tensor::Vector};
 
 #[cfg(test)]
 #[path = "state_transfer_tests.rs"]
@@ -177,18 +177,16 @@ impl<const D: usize> Carried<D> {
             .map(|&s| self.position[s as usize])
             .collect();
         let bins = Bins::new(&at, 2.0 * self.spacing.max(f64::MIN_POSITIVE));
-        let fresh: Vec<Vec<(u32, f64)>> = new
-            .par_iter()
-            .map(|&site| {
-                let x = model.sites[site as usize].position;
-                if matches!(model.sites[site as usize].kind, SiteKind::Point(_))
-                    && let Some(located) = locator.locate(&model.mesh, &x, 1e-9)
-                {
-                    return Ok(gradients.row(model, &x, located.cell, &located.shape));
-                }
-                self.fitted(&x, &at, &bins)
-            })
-            .collect::<Result<_, _>>()?;
+        let fresh: Vec<Vec<(u32, f64)>> = parallel::try_map(new.len(), 1, |k| {
+            let site = new[k];
+            let x = model.sites[site as usize].position;
+            if matches!(model.sites[site as usize].kind, SiteKind::Point(_))
+                && let Some(located) = locator.locate(&model.mesh, &x, 1e-9)
+            {
+                return Ok(gradients.row(model, &x, located.cell, &located.shape));
+            }
+            self.fitted(&x, &at, &bins)
+        })?;
         let mut fresh = fresh.into_iter();
         let rows = Transfer::from_rows(stayed.iter().map(|old| match old {
             Some(site) => vec![(*site, 1.0)],

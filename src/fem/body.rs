@@ -1,16 +1,14 @@
 //! A whole finite-element body: checks, stiffness, internal force.
 
-use rayon::prelude::*;
-
 use super::cell::{MAX_NODES, Rule};
 use super::element::{
     QuadraturePoint, displacement_gradient, for_each_point, jacobian, quadrature, reference,
     relative_nodes, row_at,
 };
-use crate::material::LocalLaw;
 use crate::mesh::{CellShape, Mesh};
 use crate::system::BlockCsr;
 use crate::tensor::{Tensor, Tensor4, Vector, determinant};
+use crate::{material::LocalLaw, parallel};
 
 /// Rows per task. Fixed, so that the result has the same bits for any number of threads; cells that reach into
 /// several tasks' rows are evaluated in each, which at 256 rows costs a 3D hexahedral mesh about three evaluations
@@ -65,10 +63,9 @@ pub fn check<const D: usize>(
     mesh: &Mesh<D>,
     selected: impl Fn(usize) -> bool + Sync,
 ) -> Result<(), FemError> {
-    let fault = (0..mesh.cell_count())
-        .into_par_iter()
-        .filter(|&c| selected(c))
-        .find_map_first(|c| check_cell(mesh, c).err());
+    let fault = parallel::find_first(mesh.cell_count(), 1, |c| {
+        selected(c).then(|| check_cell(mesh, c).err()).flatten()
+    });
     match fault {
         Some(error) => Err(error),
         None => Ok(()),
@@ -118,19 +115,16 @@ fn columns_of_rows<'a, const D: usize>(
     is_part: impl Fn(u32) -> bool + Sync,
 ) -> (Vec<usize>, Vec<u32>) {
     let count = mesh.nodes.len();
-    let columns: Vec<Vec<u32>> = (0..count)
-        .into_par_iter()
-        .map(|n| {
-            let mut columns: Vec<u32> = cells_of(n)
-                .iter()
-                .filter(|&&c| is_part(c))
-                .flat_map(|&c| mesh.cell(c as usize).iter().copied())
-                .collect();
-            columns.sort_unstable();
-            columns.dedup();
-            columns
-        })
-        .collect();
+    let columns: Vec<Vec<u32>> = parallel::map(count, 1, |n| {
+        let mut columns: Vec<u32> = cells_of(n)
+            .iter()
+            .filter(|&&c| is_part(c))
+            .flat_map(|&c| mesh.cell(c as usize).iter().copied())
+            .collect();
+        columns.sort_unstable();
+        columns.dedup();
+        columns
+    });
     let mut row_offsets = vec![0usize; count + 1];
     for n in 0..count {
         row_offsets[n + 1] = row_offsets[n] + columns[n].len();
@@ -167,7 +161,7 @@ pub fn assemble<'a, const D: usize>(
         tasks.push((first, task));
         rest = after;
     }
-    tasks.into_par_iter().for_each(|(first, values)| {
+    parallel::for_each_task(tasks, 1, |_, (first, values)| {
         let last = (first + ROWS_PER_TASK).min(count);
         let mut near: Vec<u32> = (first..last)
             .flat_map(|n| cells_of(n).iter().copied())

@@ -22,6 +22,7 @@ use super::element::{displacement_gradient, for_each_point};
 use crate::{
     material::LocalLaw,
     mesh::Mesh,
+    parallel,
     tensor::{Tensor, Vector},
 };
 
@@ -239,10 +240,9 @@ impl<const D: usize> NonlinearElements<D> {
         displacement: &(impl Fn(u32) -> Vector<D> + Sync),
         wanted: impl Fn(&Element) -> bool + Sync,
     ) -> Vec<(u32, Excess<D>)> {
-        self.elements
-            .par_iter()
-            .filter(|element| wanted(element))
-            .map(|element| {
+        parallel::filter_map(self.elements.len(), 1, |e| {
+            let element = &self.elements[e];
+            wanted(element).then(|| {
                 let law = self.laws[element.law as usize].as_ref();
                 let mut points = 0;
                 let cell = element.cell as usize;
@@ -255,7 +255,7 @@ impl<const D: usize> NonlinearElements<D> {
                 let found = excess(mesh, element, law, displacement, 0.0, past, into);
                 (element.cell, found)
             })
-            .collect()
+        })
     }
 
     /// What was remembered of each cell, by name: means over its volume, the names in the order of the laws.

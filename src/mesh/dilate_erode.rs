@@ -4,10 +4,8 @@
 
 use std::collections::HashMap;
 
-use rayon::prelude::*;
-
 use super::Mesh;
-use crate::tensor::Vector;
+use crate::{parallel, tensor::Vector};
 
 impl<const D: usize> Mesh<D> {
     /// The cells of a set and those within `by(c)` of it, a distance of centroids along the axis where it is largest \[length\].
@@ -28,27 +26,24 @@ impl<const D: usize> Mesh<D> {
             let x = self.centroid(c);
             bins.entry(bin(&x)).or_default().push(x);
         }
-        (0..self.cell_count())
-            .into_par_iter()
-            .map(|c| {
-                if cells[c] {
-                    return true;
-                }
-                let x = self.centroid(c);
-                let limit = distances[c] * (1.0 + 1e-9);
-                let middle = bin(&x);
-                (0..3usize.pow(D as u32)).any(|index| {
-                    let mut rest = index;
-                    let key = std::array::from_fn(|i| {
-                        let k = rest % 3;
-                        rest /= 3;
-                        middle[i] + k as i64 - 1
-                    });
-                    bins.get(&key)
-                        .is_some_and(|near| near.iter().any(|y| (x - y).amax() <= limit))
-                })
+        parallel::map(self.cell_count(), 1, |c| {
+            if cells[c] {
+                return true;
+            }
+            let x = self.centroid(c);
+            let limit = distances[c] * (1.0 + 1e-9);
+            let middle = bin(&x);
+            (0..3usize.pow(D as u32)).any(|index| {
+                let mut rest = index;
+                let key = std::array::from_fn(|i| {
+                    let k = rest % 3;
+                    rest /= 3;
+                    middle[i] + k as i64 - 1
+                });
+                bins.get(&key)
+                    .is_some_and(|near| near.iter().any(|y| (x - y).amax() <= limit))
             })
-            .collect()
+        })
     }
 
     /// The cells of a set without those within `by(c)` of the cells outside of it; the boundary of the mesh takes none.

@@ -5,9 +5,9 @@
 
 use std::io::Write;
 
+use crate::parallel;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression as Level, write::ZlibEncoder};
-use rayon::prelude::*;
 
 /// How arrays are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,14 +68,12 @@ pub(super) fn encoded<T: Number>(
         all.extend(bytes(numbers));
         return Ok(STANDARD.encode(all));
     }
-    let blocks: Vec<Vec<u8>> = numbers
-        .par_chunks(block)
-        .map(|numbers| {
-            let mut encoder = ZlibEncoder::new(Vec::new(), Level::new(LEVEL));
-            encoder.write_all(&bytes(numbers))?;
-            encoder.finish()
-        })
-        .collect::<std::io::Result<_>>()?;
+    let blocks: Vec<Vec<u8>> = parallel::try_map(numbers.len().div_ceil(block), 1, |k| {
+        let end = ((k + 1) * block).min(numbers.len());
+        let mut encoder = ZlibEncoder::new(Vec::new(), Level::new(LEVEL));
+        encoder.write_all(&bytes(&numbers[k * block..end]))?;
+        encoder.finish()
+    })?;
     let last = numbers.chunks(block).next_back().map_or(0, size_of_val);
     let header = [blocks.len() as u64, BLOCK as u64, last as u64];
     let sizes = blocks.iter().map(|b| b.len() as u64);

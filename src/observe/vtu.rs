@@ -7,14 +7,15 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use rayon::prelude::*;
-
 use super::ObserveError;
 use super::atomic_file::write_whole;
 pub use super::data_array::Compression;
 use super::data_array::{Number, encoded};
-use crate::mesh::{CellShape, Mesh};
 use crate::tensor::{Tensor, Vector, padded};
+use crate::{
+    mesh::{CellShape, Mesh},
+    parallel,
+};
 
 /// Values of a field.
 #[derive(Clone, Debug, PartialEq)]
@@ -311,7 +312,7 @@ fn arrays(fields: &[Field], compression: Compression) -> std::io::Result<Vec<Str
         };
         Ok(element(&field.attributes(), &text?))
     };
-    fields.par_iter().map(text).collect()
+    parallel::try_map(fields.len(), 1, |k| text(&fields[k]))
 }
 
 /// The attributes that say which of some fields a reader takes for vectors and for identifiers.

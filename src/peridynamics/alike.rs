@@ -2,10 +2,9 @@
 
 use std::hash::{Hash, Hasher};
 
-use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHasher};
 
-use crate::tensor::Vector;
+use crate::{parallel, tensor::Vector};
 
 /// Part of the horizon by which bonds of families that are alike may differ, and part by which volumes may.
 const ALIKE: f64 = 1e-13;
@@ -49,7 +48,7 @@ impl<const D: usize> Shape<D> {
 
 /// For each family the first one of the list that is alike; the same for any number of threads.
 pub fn first_alike<const D: usize>(families: &[Shape<D>]) -> Vec<usize> {
-    let marks: Vec<u64> = families.par_iter().map(Shape::mark).collect();
+    let marks: Vec<u64> = parallel::map_slice(families, Shape::mark);
     let mut known: FxHashMap<u64, Vec<usize>> = FxHashMap::default();
     families
         .iter()

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::{
     assembly::{Row, Transfer},
+    parallel,
     peridynamics::{
         Bound, Families, Family, FamilyMaterials, Horizon, LinearForceState, PdError, PointError,
         Reversed, StatePart, collapsed_tensor, moment_fitted_weights,
@@ -140,11 +141,10 @@ impl<const D: usize> PdBody<D> {
         } else {
             split_rows(&mut omega, &families.offsets)
         };
-        let state: Vec<Option<StatePart<D>>> = pair_rows
-            .par_iter_mut()
-            .zip(omega_rows.par_iter_mut())
-            .enumerate()
-            .map_init(Scratch::default, |of, (i, (pair, omega))| {
+        let rows = pair_rows.par_iter_mut().zip(omega_rows.par_iter_mut());
+        let coefficients =
+            |of: &mut Scratch<D>,
+             (i, (pair, omega)): (usize, (&mut &mut [f64], &mut &mut [f64]))| {
                 if pair.is_empty() {
                     return Ok(None);
                 }
@@ -184,8 +184,8 @@ impl<const D: usize> PdBody<D> {
                     omega,
                 )
                 .map_err(at)
-            })
-            .collect::<Result<_, _>>()?;
+            };
+        let state = parallel::try_map_with(rows.enumerate(), Scratch::default, coefficients)?;
         let reversed = match ends {
             Ends::Alike if pairwise => None,
             _ => Some(families.reversed(points)),

@@ -3,10 +3,8 @@
 //! Points are counting-sorted into cells of half the largest horizon. Along the last axis the points of neighbouring cells lie side by
 //! side, so a query reads a few contiguous runs.
 
-use rayon::prelude::*;
-
 use super::families::{Families, FamilyError};
-use crate::tensor::Vector;
+use crate::{parallel, tensor::Vector};
 
 /// Two points nearer than this fraction of the horizon coincide.
 const COINCIDENCE: f64 = 1e-9;
@@ -108,7 +106,7 @@ impl<const D: usize> Grid<D> {
             points: Vec::new(),
             numbers: vec![0; cloud.len()],
         };
-        let cells: Vec<u32> = cloud.par_iter().map(|x| grid.cell_of(x) as u32).collect();
+        let cells: Vec<u32> = parallel::map_slice(cloud, |x| grid.cell_of(x) as u32);
         for &c in &cells {
             grid.starts[c as usize + 1] += 1;
         }
@@ -121,11 +119,7 @@ impl<const D: usize> Grid<D> {
             grid.numbers[*slot as usize] = i as u32;
             *slot += 1;
         }
-        grid.points = grid
-            .numbers
-            .par_iter()
-            .map(|&i| cloud[i as usize])
-            .collect();
+        grid.points = parallel::map_slice(&grid.numbers, |&i| cloud[i as usize]);
         Ok(grid)
     }
 
@@ -189,15 +183,11 @@ impl<const D: usize> Grid<D> {
             });
             twin
         };
-        let counted: Vec<(usize, Option<u32>)> = (0..rows)
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|row| {
-                let mut count = 0;
-                let twin = each(row, &mut |_| count += 1);
-                (count, twin)
-            })
-            .collect();
+        let counted: Vec<(usize, Option<u32>)> = parallel::map(rows, 64, |row| {
+            let mut count = 0;
+            let twin = each(row, &mut |_| count += 1);
+            (count, twin)
+        });
         if coincidence == Coincidence::Refused
             && let Some((row, twin)) = counted
                 .iter()

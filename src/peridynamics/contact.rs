@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::tensor::Vector;
+use crate::{parallel, tensor::Vector};
 
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
@@ -147,12 +147,15 @@ impl<const D: usize> Contact<D> {
     fn update(&mut self, u: &[f64]) {
         let square = 0.25 * self.skin * self.skin;
         let near = self.listed.len() == u.len()
-            && u.par_chunks_exact(D)
-                .zip(self.listed.par_chunks_exact(D))
-                .with_min_len(4 * BLOCK)
-                .all(|(u, v)| {
+            && parallel::all(u.len().div_ceil(4 * BLOCK * D), 1, |block| {
+                let start = block * 4 * BLOCK * D;
+                let end = (start + 4 * BLOCK * D).min(u.len());
+                let (u, v) = (&u[start..end], &self.listed[start..end]);
+                let mut both = u.chunks_exact(D).zip(v.chunks_exact(D));
+                both.all(|(u, v)| {
                     u.iter().zip(v).map(|(u, v)| (u - v) * (u - v)).sum::<f64>() <= square
-                });
+                })
+            });
         if !near {
             self.list(u);
             self.listed.clear();
@@ -173,41 +176,37 @@ impl<const D: usize> Contact<D> {
             .map(|i| (cell(&y[i]), i as u32))
             .collect();
         order.par_sort_unstable();
-        let found: Vec<Vec<u32>> = (0..points)
-            .into_par_iter()
-            .with_min_len(BLOCK)
-            .map(|i| {
-                let mut others = Vec::new();
-                if !self.rows[i] {
-                    return others;
+        let found: Vec<Vec<u32>> = parallel::map(points, BLOCK, |i| {
+            let mut others = Vec::new();
+            if !self.rows[i] {
+                return others;
+            }
+            let here = cell(&y[i]);
+            for n in 0..3usize.pow(D as u32 - 1) {
+                // the last axis varies fastest in the order: three cells along it lie side by side
+                let mut low = here;
+                let mut rest = n;
+                for c in &mut low[..D - 1] {
+                    *c += (rest % 3) as i64 - 1;
+                    rest /= 3;
                 }
-                let here = cell(&y[i]);
-                for n in 0..3usize.pow(D as u32 - 1) {
-                    // the last axis varies fastest in the order: three cells along it lie side by side
-                    let mut low = here;
-                    let mut rest = n;
-                    for c in &mut low[..D - 1] {
-                        *c += (rest % 3) as i64 - 1;
-                        rest /= 3;
+                let mut high = low;
+                low[D - 1] -= 1;
+                high[D - 1] += 1;
+                let first = order.partition_point(|(c, _)| *c < low);
+                for (c, j) in &order[first..] {
+                    if *c > high {
+                        break;
                     }
-                    let mut high = low;
-                    low[D - 1] -= 1;
-                    high[D - 1] += 1;
-                    let first = order.partition_point(|(c, _)| *c < low);
-                    for (c, j) in &order[first..] {
-                        if *c > high {
-                            break;
-                        }
-                        let k = *j as usize;
-                        if k != i && distance(&y[i], &y[k]) < self.reach(i, k) + self.skin {
-                            others.push(*j);
-                        }
+                    let k = *j as usize;
+                    if k != i && distance(&y[i], &y[k]) < self.reach(i, k) + self.skin {
+                        others.push(*j);
                     }
                 }
-                others.sort_unstable();
-                others
-            })
-            .collect();
+            }
+            others.sort_unstable();
+            others
+        });
         self.others.clear();
         for (i, others) in found.iter().enumerate() {
             self.others.extend_from_slice(others);
@@ -243,34 +242,26 @@ impl<const D: usize> Contact<D> {
     pub fn add_force(&mut self, u: &[f64], bonded: &Bonded<'_>, force: &mut [f64]) {
         self.update(u);
         let this = &*self;
-        force
-            .par_chunks_exact_mut(D)
-            .with_min_len(BLOCK)
-            .enumerate()
-            .for_each(|(i, force)| {
-                this.each(u, i, bonded, |j, gap, direction| {
-                    let f = this.stiffness * gap * this.volume[i] * this.volume[j];
-                    for a in 0..D {
-                        force[a] += f * direction[a];
-                    }
-                });
+        parallel::for_each_chunk(force, D, BLOCK, |i, force| {
+            this.each(u, i, bonded, |j, gap, direction| {
+                let f = this.stiffness * gap * this.volume[i] * this.volume[j];
+                for a in 0..D {
+                    force[a] += f * direction[a];
+                }
             });
+        });
     }
 
     /// Energy of the contact, `½ k (d − r)² V_i V_j` per pair \[J\].
     pub fn energy(&mut self, u: &[f64], bonded: &Bonded<'_>) -> f64 {
         self.update(u);
-        let energies: Vec<f64> = (0..self.position.len())
-            .into_par_iter()
-            .with_min_len(BLOCK)
-            .map(|i| {
-                let mut sum = 0.0;
-                self.each(u, i, bonded, |j, gap, _| {
-                    sum += 0.25 * self.stiffness * gap * gap * self.volume[i] * self.volume[j];
-                });
-                sum
-            })
-            .collect();
+        let energies: Vec<f64> = parallel::map(self.position.len(), BLOCK, |i| {
+            let mut sum = 0.0;
+            self.each(u, i, bonded, |j, gap, _| {
+                sum += 0.25 * self.stiffness * gap * gap * self.volume[i] * self.volume[j];
+            });
+            sum
+        });
         energies.iter().sum()
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The result does not depend on the number of threads. The search itself is in `cell_list.rs`.
 
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Relative tolerance by which a bond may be longer than the horizon and still belong to the family.
 ///
@@ -109,10 +109,7 @@ impl Families {
             rows.push(row);
             rest = tail;
         }
-        rows.into_par_iter()
-            .with_min_len(64)
-            .enumerate()
-            .for_each(|(i, row)| fill(i, row));
+        parallel::for_each_task(rows, 64, fill);
         Self {
             offsets,
             neighbours,
@@ -153,16 +150,12 @@ impl Families {
         keep: impl Fn(usize, u32) -> bool + Sync,
     ) -> usize {
         let before = self.neighbours.len();
-        let kept: Vec<Option<Vec<u32>>> = (0..self.len())
-            .into_par_iter()
-            .with_min_len(256)
-            .map(|i| {
-                let row = self.of(i);
-                let rest = || row.iter().copied().filter(|&j| keep(i, j));
-                let loses = may_lose(i) && !row.iter().all(|&j| keep(i, j));
-                loses.then(|| rest().collect())
-            })
-            .collect();
+        let kept: Vec<Option<Vec<u32>>> = parallel::map(self.len(), 256, |i| {
+            let row = self.of(i);
+            let rest = || row.iter().copied().filter(|&j| keep(i, j));
+            let loses = may_lose(i) && !row.iter().all(|&j| keep(i, j));
+            loses.then(|| rest().collect())
+        });
         let mut end = 0;
         for (i, row) in kept.iter().enumerate() {
             let own = self.offsets[i]..self.offsets[i + 1];
@@ -214,7 +207,7 @@ impl Families {
 
     /// The first bond `(i, j)` without a bond `(j, i)`, where rows and cloud points are the same list; `None` if families are mutual.
     pub fn one_sided(&self) -> Option<(u32, u32)> {
-        (0..self.len()).into_par_iter().find_map_first(|i| {
+        parallel::find_first(self.len(), 1, |i| {
             self.of(i)
                 .iter()
                 .find(|&&j| {

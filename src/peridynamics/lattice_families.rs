@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::families::Families;
-use crate::tensor::Vector;
+use crate::{parallel, tensor::Vector};
 
 /// How far from its place a point may lie, in spacings: far less than lengths of bonds may differ from the horizon and still count as that.
 const OFF_LATTICE: f64 = 1e-9;
@@ -118,7 +118,7 @@ impl Families {
             Some(false) => 0,
             _ => of(place).count(),
         };
-        let sizes: Vec<usize> = places.par_iter().enumerate().map(size).collect();
+        let sizes: Vec<usize> = parallel::map(places.len(), 1, |i| size((i, &places[i])));
         Some(Self::filled(sizes.into_iter(), |i, row| {
             row.iter_mut().zip(of(places[i])).for_each(|(n, j)| *n = j);
             if !row.is_sorted() {

@@ -1,8 +1,7 @@
 //! The tearing parameter: how close a ductile material is to failure, by plastic flow under tension.
 
-use rayon::prelude::*;
-
 use super::{Families, Horizon};
+use crate::parallel;
 
 /// The tearing parameter `P` of every point, averaged over families, and what of it breaks bonds.
 ///
@@ -145,20 +144,19 @@ impl TearingParameter {
     ) {
         // what each point adds to the sums of the families that it is in; a point without a family has no flow of its own
         let surface = &self.surface;
-        let share_of = |(j, share): (usize, &mut Share)| {
+        let share_of = |j: usize, share: &mut Share| {
             let flows = surface[j] > 0.0 && !families.of(j).is_empty();
             *share = match flows {
                 true => Share::of(flow(j), volume[j], surface[j]),
                 false => Share::default(),
             };
         };
-        let shares = self.share.par_iter_mut().enumerate();
-        shares.with_min_len(64).for_each(share_of);
+        parallel::for_each_mut(&mut self.share, 64, share_of);
         let shares = &self.share;
         if shares.iter().all(|share| share.strained == 0.0) {
             return;
         }
-        let grow = |(i, value): (usize, &mut f64)| {
+        let grow = |i: usize, value: &mut f64| {
             let family = families.of(i);
             if family.is_empty() {
                 return;
@@ -174,8 +172,7 @@ impl TearingParameter {
                 *value += (sum.tensile / sum.flowed).powi(4) * sum.strained / sum.volume;
             }
         };
-        let values = self.value.par_iter_mut().enumerate();
-        values.with_min_len(64).for_each(grow);
+        parallel::for_each_mut(&mut self.value, 64, grow);
     }
 }
 

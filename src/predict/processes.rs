@@ -1,12 +1,10 @@
 //! What each of several processes will have of a scene.
 
-use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::process_memory::{Spreading, divide, per_bond};
 use super::process_share::ProcessShare;
 use super::resource_estimate::Prediction;
-use crate::assembly::Pattern;
 use crate::coupling::{Coupling, Model};
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
@@ -18,6 +16,7 @@ use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
 use crate::solve::statics::Method;
 use crate::system::{Partition, SemiDiscrete, Symmetry, share_long_rows};
+use crate::{assembly::Pattern, parallel};
 
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
 const SCALAR: u64 = 12;
@@ -75,7 +74,6 @@ fn shares<const D: usize>(
     let is_shared = explicit.is_some() && may_share(&problem, &rest);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let partition = model.partition(count, is_shared);
-    let ranks = (0..partition.ranks()).into_par_iter();
     let mut spreading = match is_shared && model.can_spread_families() {
         true => Spreading::Families,
         // forces that are not linear are solved for by every process, with all rows
@@ -86,9 +84,11 @@ fn shares<const D: usize>(
     let moves_own = |spec| moves_own_sites(spec, &rest);
     if spreading == Spreading::Families && explicit.as_ref().is_some_and(moves_own) {
         progress.finish();
-        let all = ranks.map(|rank| of_points(&model, &partition, rank));
+        let shares = parallel::map(partition.ranks(), 1, |rank| {
+            of_points(&model, &partition, rank)
+        });
         return Ok(Processes {
-            shares: all.collect(),
+            shares,
             spreading,
             per_bond,
         });
@@ -126,7 +126,7 @@ fn shares<const D: usize>(
             ..share
         }
     };
-    let shares = ranks.map(of_rank).collect();
+    let shares = parallel::map(partition.ranks(), 1, of_rank);
     progress.finish();
     Ok(Processes {
         shares,

@@ -2,9 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
-use crate::coupling::tributary::{Detail, Parts};
 use crate::coupling::{CellRole, Model, SiteKind};
 use crate::fem;
 use crate::mesh::boundary::BoundaryFacet;
@@ -14,6 +11,10 @@ use crate::run::error::RunError;
 use crate::scene::conditions::{Components, Condition, Prescribed, Support};
 use crate::scene::region::Region;
 use crate::tensor::Vector;
+use crate::{
+    coupling::tributary::{Detail, Parts},
+    parallel,
+};
 
 /// How far from a set a peridynamic point may lie, in its own spacings, to be held with the set in any case.
 ///
@@ -42,26 +43,23 @@ fn first_layer<const D: usize>(model: &Model<D>, nodes: &[u32], facets: &[Facet]
         lo = lo.inf(&mesh.nodes[n as usize]);
         hi = hi.sup(&mesh.nodes[n as usize]);
     }
-    (0..model.sites.len())
-        .into_par_iter()
-        .filter_map(|site| {
-            let s = &model.sites[site];
-            let (body, point) = model.point_of(site)?;
-            let reach = FIRST_LAYER * body.cloud.volume[point].powf(1.0 / D as f64);
-            let x = &s.position;
-            if (0..D).any(|k| x[k] < lo[k] - reach || x[k] > hi[k] + reach) {
-                return None;
-            }
-            let near = if facets.is_empty() {
-                nodes
-                    .iter()
-                    .any(|&n| (mesh.nodes[n as usize] - x).norm() <= reach)
-            } else {
-                facets.iter().any(|f| mesh.distance_to_facet(x, f) <= reach)
-            };
-            near.then_some(site)
-        })
-        .collect()
+    parallel::filter_map(model.sites.len(), 1, |site| {
+        let s = &model.sites[site];
+        let (body, point) = model.point_of(site)?;
+        let reach = FIRST_LAYER * body.cloud.volume[point].powf(1.0 / D as f64);
+        let x = &s.position;
+        if (0..D).any(|k| x[k] < lo[k] - reach || x[k] > hi[k] + reach) {
+            return None;
+        }
+        let near = if facets.is_empty() {
+            nodes
+                .iter()
+                .any(|&n| (mesh.nodes[n as usize] - x).norm() <= reach)
+        } else {
+            facets.iter().any(|f| mesh.distance_to_facet(x, f) <= reach)
+        };
+        near.then_some(site)
+    })
 }
 
 /// The points nearest to a set where it bounds the peridynamic zone: of each piece of its facets, a spacing wide, or of each node of a set without facets, the nearest of the points that it follows.

@@ -1,15 +1,17 @@
 //! A solution at places between its nodes and points: tables along lines and at probes.
 
-use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::solution::Solved;
 use super::stresses::{KnownStresses, Place, names};
-use crate::coupling::{Carrier, Sampler, SiteKind, Zone};
 use crate::fem::{self, Locator};
 use crate::scene::spec::StressSpec;
 use crate::shape::Shape;
 use crate::tensor::{Tensor, Vector, strain};
+use crate::{
+    coupling::{Carrier, Sampler, SiteKind, Zone},
+    parallel,
+};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -101,7 +103,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
 
     /// The rows of a table along positions, with the columns of [`table_header`]; none for a position outside of the body.
     pub fn rows(&self, positions: &[Vector<D>]) -> Vec<Vec<f64>> {
-        let samples: Vec<Option<Sample<D>>> = positions.par_iter().map(|x| self.at(x)).collect();
+        let samples: Vec<Option<Sample<D>>> = parallel::map_slice(positions, |x| self.at(x));
         let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
             // a line may cross a slit: there is nothing to tell in it
             let sample = sample?;

@@ -1,12 +1,13 @@
 //! Stresses that fall off from a free surface faster than families resolve.
 
-use rayon::prelude::*;
-
-use crate::coupling::{Model, SiteKind};
 use crate::material::Kinematics;
 use crate::observe::report::number;
 use crate::shape::Barrier;
 use crate::tensor::{Tensor, Vector, inverse};
+use crate::{
+    coupling::{Model, SiteKind},
+    parallel,
+};
 
 use super::stresses::{principal, von_mises};
 
@@ -61,8 +62,7 @@ pub(super) fn missed_peak<const D: usize>(
         };
         Some(von_mises(&principal(&stress, across)))
     };
-    let points = (0..u.len()).into_par_iter().with_min_len(64);
-    let stresses: Vec<f64> = points.map(|p| stress_of(p).unwrap_or(0.0)).collect();
+    let stresses = parallel::map(u.len(), 64, |p| stress_of(p).unwrap_or(0.0));
     // points within elements complete the families of others, and no output has their stress
     let shown = model.sites.iter().filter_map(|site| match site.kind {
         SiteKind::Point(p) => Some(p as usize),

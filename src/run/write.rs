@@ -14,7 +14,6 @@ use super::sections;
 use super::solution::Solved;
 use super::solution_samples::{Intact, SampledSolution, label, table_header};
 use super::stresses::{KnownStresses, Place};
-use crate::coupling::{SiteKind, Zone};
 use crate::fem;
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
@@ -27,6 +26,10 @@ use crate::scene::spec::PointOutputSpec;
 use crate::scene::validated::Output;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, padded, strain};
+use crate::{
+    coupling::{SiteKind, Zone},
+    parallel,
+};
 
 /// Writes what the scene asks for; returns the files.
 ///
@@ -194,8 +197,7 @@ pub(super) fn energy_densities<const D: usize>(
         let told = solved.system.and_then(|system| system.energy_densities(u));
         told.unwrap_or_else(|| {
             let intact = Intact::of(solved);
-            let sites = (0..solved.model.sites.len()).into_par_iter();
-            sites.map(|site| of_site(&intact, site)).collect()
+            parallel::map(solved.model.sites.len(), 1, |site| of_site(&intact, site))
         })
     })
 }
@@ -319,16 +321,15 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         let cells = PointCells::of(model);
         let intact = Intact::of(solved);
         let known = &self.known;
-        let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> = (0..model.sites.len())
-            .into_par_iter()
-            .filter(|&site| {
-                shown.includes_site(site) && matches!(model.sites[site].kind, SiteKind::Point(_))
-            })
-            .map(|site| {
-                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
-                (site, strain(&solved.point_gradient(site, &intact)), stress)
-            })
-            .collect();
+        let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> =
+            parallel::filter_map(model.sites.len(), 1, |site| {
+                let is_shown = shown.includes_site(site)
+                    && matches!(model.sites[site].kind, SiteKind::Point(_));
+                is_shown.then(|| {
+                    let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
+                    (site, strain(&solved.point_gradient(site, &intact)), stress)
+                })
+            });
         for (site, e, stress) in on_points {
             let Some((body, p)) = model.point_of(site) else {
                 continue;
@@ -427,8 +428,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         let derived: Vec<Vec<f64>> = match self.solved.has_derived() {
             true => {
                 let each = self.stresses.par_iter().zip(&self.places);
-                each.map(|(s, place)| self.solved.derived(s, *place))
-                    .collect()
+                parallel::map_each(each, |(s, place)| self.solved.derived(s, *place))
             }
             false => Vec::new(),
         };

@@ -1,7 +1,5 @@
 //! The model of each cell: local, transition or nonlocal.
 
-use rayon::prelude::*;
-
 use super::bounds_checks;
 use super::conditions::extent;
 use super::default_horizon::horizon_of;
@@ -9,10 +7,10 @@ use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
 use super::source::Span;
 use super::spec::{CouplingSpec, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
-use crate::coupling::Zone;
 use crate::mesh::Mesh;
 use crate::scene::selected_coupling::SelectedCoupling;
 use crate::tensor::{Vector, padded};
+use crate::{coupling::Zone, parallel};
 
 /// The nonlocal zone that a scene needs.
 #[derive(Clone, Debug)]
@@ -238,19 +236,16 @@ fn around<const D: usize>(
         // a set has no shape: measure from the facets of its boundary
         None => mesh.boundary_facets((0..mesh.cell_count() as u32).filter(|&c| inner[c as usize])),
     };
-    (0..mesh.cell_count())
-        .into_par_iter()
-        .map(|c| {
-            let x = mesh.centroid(c);
-            if inner[c] {
-                return false;
-            }
-            match nonlocal.distance(&x) {
-                Some(d) => d <= width,
-                None => facets
-                    .iter()
-                    .any(|f| mesh.distance_to_facet(&x, &f.nodes) <= width),
-            }
-        })
-        .collect()
+    parallel::map(mesh.cell_count(), 1, |c| {
+        let x = mesh.centroid(c);
+        if inner[c] {
+            return false;
+        }
+        match nonlocal.distance(&x) {
+            Some(d) => d <= width,
+            None => facets
+                .iter()
+                .any(|f| mesh.distance_to_facet(&x, &f.nodes) <= width),
+        }
+    })
 }

@@ -1,10 +1,9 @@
 //! Aggregation, prolongation and coarse matrices of the multigrid hierarchy.
 
-use crate::solve::FreeDofs;
 use crate::solve::singularity_diagnosis::rigid_modes;
 use crate::solve::smoother::BlockJacobi;
 use crate::system::BlockCsr;
-use rayon::prelude::*;
+use crate::{parallel, solve::FreeDofs};
 
 const NONE: u32 = u32::MAX;
 
@@ -73,23 +72,20 @@ impl Aggregates {
             }
         }
         let roots = of_site.clone();
-        let joined: Vec<u32> = (0..n)
-            .into_par_iter()
-            .map(|i| {
-                if !active(i) || roots[i] != NONE {
-                    return roots[i];
+        let joined: Vec<u32> = parallel::map(n, 1, |i| {
+            if !active(i) || roots[i] != NONE {
+                return roots[i];
+            }
+            let (columns, blocks) = matrix.row(i);
+            let mut best = (0.0, NONE);
+            for (e, &c) in columns.iter().enumerate() {
+                let s = strength(blocks, e);
+                if roots[c as usize] != NONE && s > best.0 {
+                    best = (s, roots[c as usize]);
                 }
-                let (columns, blocks) = matrix.row(i);
-                let mut best = (0.0, NONE);
-                for (e, &c) in columns.iter().enumerate() {
-                    let s = strength(blocks, e);
-                    if roots[c as usize] != NONE && s > best.0 {
-                        best = (s, roots[c as usize]);
-                    }
-                }
-                best.1
-            })
-            .collect();
+            }
+            best.1
+        });
         of_site = joined;
         for i in 0..n {
             if active(i) && of_site[i] == NONE {
@@ -138,23 +134,20 @@ impl Aggregates {
         for (i, &g) in self.of_site.iter().enumerate().filter(|&(_, &g)| g != NONE) {
             members[g as usize].push(i);
         }
-        let per_aggregate: Vec<(Vec<f64>, Vec<f64>)> = members
-            .par_iter()
-            .map(|sites| {
-                let mut q: Vec<Vec<f64>> = (0..modes)
-                    .map(|m| {
-                        sites
-                            .iter()
-                            .flat_map(|&i| {
-                                (0..d).map(move |a| near_null.values[(i * d + a) * modes + m])
-                            })
-                            .collect()
-                    })
-                    .collect();
-                let r = orthonormalise(&mut q);
-                (interleave(&q), r)
-            })
-            .collect();
+        let per_aggregate: Vec<(Vec<f64>, Vec<f64>)> = parallel::map_slice(&members, |sites| {
+            let mut q: Vec<Vec<f64>> = (0..modes)
+                .map(|m| {
+                    sites
+                        .iter()
+                        .flat_map(|&i| {
+                            (0..d).map(move |a| near_null.values[(i * d + a) * modes + m])
+                        })
+                        .collect()
+                })
+                .collect();
+            let r = orthonormalise(&mut q);
+            (interleave(&q), r)
+        });
         let mut tentative = vec![0.0; self.of_site.len() * d * modes];
         let mut coarse = Vec::with_capacity(self.count * modes * modes);
         for (sites, (q, r)) in members.iter().zip(per_aggregate) {
@@ -293,47 +286,45 @@ pub(crate) fn smoothed(
 ) -> Prolongation {
     let d = matrix.block;
     let size = d * modes;
-    let rows: Rows = (0..matrix.rows())
-        .into_par_iter()
-        .with_min_len(64)
-        .map_init(
-            || {
-                (
-                    Gather::new(aggregates.count, size),
-                    Gather::new(aggregates.count, size),
-                )
-            },
-            |(product, row), i| {
-                if free.count_of_site(i) == 0 {
-                    return (Vec::new(), Vec::new());
+    let rows: Rows = parallel::map_with(
+        matrix.rows(),
+        64,
+        || {
+            (
+                Gather::new(aggregates.count, size),
+                Gather::new(aggregates.count, size),
+            )
+        },
+        |(product, row), i| {
+            if free.count_of_site(i) == 0 {
+                return (Vec::new(), Vec::new());
+            }
+            let (columns, blocks) = matrix.row(i);
+            for (e, &c) in columns.iter().enumerate() {
+                let g = aggregates.of_site[c as usize];
+                if g != NONE {
+                    let t = &tentative[c as usize * size..(c as usize + 1) * size];
+                    let k = &blocks[e * d * d..(e + 1) * d * d];
+                    fixed_product(product.block(g), k, t, (d, modes));
                 }
-                let (columns, blocks) = matrix.row(i);
-                for (e, &c) in columns.iter().enumerate() {
-                    let g = aggregates.of_site[c as usize];
-                    if g != NONE {
-                        let t = &tentative[c as usize * size..(c as usize + 1) * size];
-                        let k = &blocks[e * d * d..(e + 1) * d * d];
-                        fixed_product(product.block(g), k, t, (d, modes));
-                    }
-                }
-                let (columns, products) = product.take();
-                for (&g, p) in columns.iter().zip(products.chunks(size)) {
-                    add_product(
-                        row.block(g),
-                        -omega,
-                        jacobi.inverse_of_site(i),
-                        p,
-                        (d, d, modes),
-                    );
-                }
-                let own = row.block(aggregates.of_site[i]);
-                own.iter_mut()
-                    .zip(&tentative[i * size..(i + 1) * size])
-                    .for_each(|(p, t)| *p += t);
-                row.take()
-            },
-        )
-        .collect();
+            }
+            let (columns, products) = product.take();
+            for (&g, p) in columns.iter().zip(products.chunks(size)) {
+                add_product(
+                    row.block(g),
+                    -omega,
+                    jacobi.inverse_of_site(i),
+                    p,
+                    (d, d, modes),
+                );
+            }
+            let own = row.block(aggregates.of_site[i]);
+            own.iter_mut()
+                .zip(&tentative[i * size..(i + 1) * size])
+                .for_each(|(p, t)| *p += t);
+            row.take()
+        },
+    );
     Prolongation::new(d, modes, aggregates.count, rows)
 }
 
@@ -392,17 +383,14 @@ impl Prolongation {
     pub fn prolong(&self, x: &[f64]) -> Vec<f64> {
         let (d, m) = (self.block, self.modes);
         let mut y = vec![0.0; (self.offsets.len() - 1) * d];
-        y.par_chunks_mut(d)
-            .enumerate()
-            .with_min_len(256)
-            .for_each(|(i, y)| {
-                for e in self.offsets[i]..self.offsets[i + 1] {
-                    let x = &x[self.columns[e] as usize * m..][..m];
-                    for (y, row) in y.iter_mut().zip(self.entry(e).chunks(m)) {
-                        *y += row.iter().zip(x).map(|(p, x)| p * x).sum::<f64>();
-                    }
+        parallel::for_each_chunk(&mut y, d, 256, |i, y| {
+            for e in self.offsets[i]..self.offsets[i + 1] {
+                let x = &x[self.columns[e] as usize * m..][..m];
+                for (y, row) in y.iter_mut().zip(self.entry(e).chunks(m)) {
+                    *y += row.iter().zip(x).map(|(p, x)| p * x).sum::<f64>();
                 }
-            });
+            }
+        });
         y
     }
 
@@ -410,7 +398,7 @@ impl Prolongation {
     pub fn restrict(&self, x: &[f64]) -> Vec<f64> {
         let (d, m) = (self.block, self.modes);
         let mut y = vec![0.0; (self.transposed_offsets.len() - 1) * m];
-        y.par_chunks_mut(m).enumerate().for_each(|(g, y)| {
+        parallel::for_each_chunk(&mut y, m, 1, |g, y| {
             for &(i, e) in
                 &self.transposed[self.transposed_offsets[g]..self.transposed_offsets[g + 1]]
             {
@@ -428,57 +416,53 @@ impl Prolongation {
 pub(crate) fn coarse_matrix(matrix: &BlockCsr, free: &FreeDofs, p: &Prolongation) -> BlockCsr {
     let (d, m) = (p.block, p.modes);
     let coarse = p.transposed_offsets.len() - 1;
-    let product: Rows = (0..matrix.rows())
-        .into_par_iter()
-        .with_min_len(64)
-        .map_init(
-            || Gather::new(coarse, d * m),
-            |row, i| {
-                if free.count_of_site(i) == 0 {
-                    return (Vec::new(), Vec::new());
+    let product: Rows = parallel::map_with(
+        matrix.rows(),
+        64,
+        || Gather::new(coarse, d * m),
+        |row, i| {
+            if free.count_of_site(i) == 0 {
+                return (Vec::new(), Vec::new());
+            }
+            let (columns, blocks) = matrix.row(i);
+            for (e, &c) in columns.iter().enumerate() {
+                let k = &blocks[e * d * d..(e + 1) * d * d];
+                for f in p.offsets[c as usize]..p.offsets[c as usize + 1] {
+                    fixed_product(row.block(p.columns[f]), k, p.entry(f), (d, m));
                 }
-                let (columns, blocks) = matrix.row(i);
-                for (e, &c) in columns.iter().enumerate() {
-                    let k = &blocks[e * d * d..(e + 1) * d * d];
-                    for f in p.offsets[c as usize]..p.offsets[c as usize + 1] {
-                        fixed_product(row.block(p.columns[f]), k, p.entry(f), (d, m));
-                    }
-                }
-                row.take()
-            },
-        )
-        .collect();
-    let rows: Rows = (0..coarse)
-        .into_par_iter()
-        .with_min_len(8)
-        .map_init(
-            || Gather::new(coarse, m * m),
-            |row, g| {
-                for &(i, e) in &p.transposed[p.transposed_offsets[g]..p.transposed_offsets[g + 1]] {
-                    let own = p.entry(e as usize);
-                    let (columns, values) = &product[i as usize];
-                    for (&c, v) in columns.iter().zip(values.chunks(d * m)) {
-                        let target = row.block(c);
-                        for a in 0..d {
-                            for k in 0..m {
-                                let f = own[a * m + k];
-                                for l in 0..m {
-                                    target[k * m + l] += f * v[a * m + l];
-                                }
+            }
+            row.take()
+        },
+    );
+    let rows: Rows = parallel::map_with(
+        coarse,
+        8,
+        || Gather::new(coarse, m * m),
+        |row, g| {
+            for &(i, e) in &p.transposed[p.transposed_offsets[g]..p.transposed_offsets[g + 1]] {
+                let own = p.entry(e as usize);
+                let (columns, values) = &product[i as usize];
+                for (&c, v) in columns.iter().zip(values.chunks(d * m)) {
+                    let target = row.block(c);
+                    for a in 0..d {
+                        for k in 0..m {
+                            let f = own[a * m + k];
+                            for l in 0..m {
+                                target[k * m + l] += f * v[a * m + l];
                             }
                         }
                     }
                 }
-                let own = row.block(g as u32);
-                for k in 0..m {
-                    if own[k * m + k] == 0.0 {
-                        own[k * m + k] = 1.0;
-                    }
+            }
+            let own = row.block(g as u32);
+            for k in 0..m {
+                if own[k * m + k] == 0.0 {
+                    own[k * m + k] = 1.0;
                 }
-                row.take()
-            },
-        )
-        .collect();
+            }
+            row.take()
+        },
+    );
     let mut result = BlockCsr {
         block: m,
         row_offsets: vec![0],

@@ -5,7 +5,7 @@
 //! thread, so that the factors have the same bits on any machine with the same instruction set. Progress is told of
 //! every tile of columns: a large front takes seconds, and a listener may end the computation there.
 
-use crate::progress::Progress;
+use crate::{parallel, progress::Progress};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor as llt;
 use faer::linalg::lu::partial_pivoting::factor as lu;
@@ -70,34 +70,29 @@ pub(crate) fn cholesky(
             });
         }
         let head = &head[k * height..];
-        tail.par_chunks_mut(TILE * height)
-            .enumerate()
-            .for_each(|(t, columns)| {
-                let start = k + width + t * TILE;
-                let count = columns.len() / height;
-                let factor = view(head, height, width);
-                let target = view_mut(columns, height, count);
-                subtract_lower(
-                    target.split_at_row_mut(start).1,
-                    factor.split_at_row(start).1,
-                );
-            });
+        parallel::for_each_chunk(tail, TILE * height, 1, |t, columns| {
+            let start = k + width + t * TILE;
+            let count = columns.len() / height;
+            let factor = view(head, height, width);
+            let target = view_mut(columns, height, count);
+            subtract_lower(
+                target.split_at_row_mut(start).1,
+                factor.split_at_row(start).1,
+            );
+        });
     }
     if r > 0 && p > 0 {
         let factor = view(panel, height, p).split_at_row(p).1;
-        schur
-            .par_chunks_mut(TILE * r)
-            .enumerate()
-            .for_each(|(t, columns)| {
-                progress.advance(0);
-                let start = t * TILE;
-                let count = columns.len() / r;
-                let target = view_mut(columns, r, count);
-                subtract_lower(
-                    target.split_at_row_mut(start).1,
-                    factor.split_at_row(start).1,
-                );
-            });
+        parallel::for_each_chunk(schur, TILE * r, 1, |t, columns| {
+            progress.advance(0);
+            let start = t * TILE;
+            let count = columns.len() / r;
+            let target = view_mut(columns, r, count);
+            subtract_lower(
+                target.split_at_row_mut(start).1,
+                factor.split_at_row(start).1,
+            );
+        });
     }
     Ok(())
 }
@@ -230,14 +225,14 @@ pub(crate) fn lu(
         for (i, &from) in forward.iter().enumerate() {
             permutation[k + i] = moved[from as usize];
         }
-        left.par_chunks_mut(TILE * height).for_each(|columns| {
+        parallel::for_each_chunk(left, TILE * height, 1, |_, columns| {
             let mut scratch = Vec::with_capacity(size);
             columns
                 .chunks_mut(height)
                 .for_each(|column| exchange(column, &mut scratch));
         });
         let factor = view(current, height, width);
-        right.par_chunks_mut(TILE * height).for_each(|columns| {
+        parallel::for_each_chunk(right, TILE * height, 1, |_, columns| {
             let mut scratch = Vec::with_capacity(size);
             columns
                 .chunks_mut(height)

@@ -2,7 +2,7 @@
 //!
 //! All reductions run over fixed chunks, so that results have the same bits on any number of threads.
 
-use crate::progress::Progress;
+use crate::{parallel, progress::Progress};
 use rayon::prelude::*;
 
 /// A linear map `y = A x` on vectors of one length.
@@ -250,8 +250,9 @@ pub fn gmres(
             if residual <= params.tolerance || size <= 1e-14 * before {
                 break;
             }
-            w.par_chunks_mut(CHUNK)
-                .for_each(|w| w.iter_mut().for_each(|w| *w /= size));
+            parallel::for_each_chunk(&mut w, CHUNK, 1, |_, w| {
+                w.iter_mut().for_each(|w| *w /= size)
+            });
             basis.push(w);
         }
         let mut combination = vec![0.0; n];

@@ -3,8 +3,8 @@
 //! Everything here works on sites, not on dofs: a block matrix has the fill of its site graph, which has `D²` times
 //! fewer edges.
 
-use crate::solve::FreeDofs;
 use crate::system::BlockCsr;
+use crate::{parallel, solve::FreeDofs};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
@@ -111,19 +111,16 @@ impl SiteGraph {
         for (v, &i) in sites.iter().enumerate() {
             vertex[i as usize] = v as u32;
         }
-        let rows: Vec<Vec<u32>> = sites
-            .par_iter()
-            .map(|&i| {
-                (row_offsets[i as usize]..row_offsets[i as usize + 1])
-                    .filter(|&e| {
-                        columns[e] != i
-                            && vertex[columns[e] as usize] != u32::MAX
-                            && joins(i as usize, e)
-                    })
-                    .map(|e| vertex[columns[e] as usize])
-                    .collect()
-            })
-            .collect();
+        let rows: Vec<Vec<u32>> = parallel::map_slice(&sites, |&i| {
+            (row_offsets[i as usize]..row_offsets[i as usize + 1])
+                .filter(|&e| {
+                    columns[e] != i
+                        && vertex[columns[e] as usize] != u32::MAX
+                        && joins(i as usize, e)
+                })
+                .map(|e| vertex[columns[e] as usize])
+                .collect()
+        });
         let missing: Vec<Vec<u32>> = {
             // an edge stored in one direction only is missing in the other row
             let lone: Vec<(u32, u32)> = rows
@@ -216,18 +213,15 @@ fn coordinate_nested_dissection(graph: &SiteGraph, positions: &[[f64; 3]]) -> Ve
     let n = graph.len();
     let at: Vec<[f64; 3]> = graph.sites.iter().map(|&i| positions[i as usize]).collect();
     // how far each vertex reaches along each axis: only those that reach over a cut need their edges read
-    let reach: Vec<[f64; 3]> = (0..n)
-        .into_par_iter()
-        .map(|v| {
-            let mut r = [0.0_f64; 3];
-            for &w in graph.neighbours_of(v) {
-                for k in 0..3 {
-                    r[k] = r[k].max((at[w as usize][k] - at[v][k]).abs());
-                }
+    let reach: Vec<[f64; 3]> = parallel::map(n, 1, |v| {
+        let mut r = [0.0_f64; 3];
+        for &w in graph.neighbours_of(v) {
+            for k in 0..3 {
+                r[k] = r[k].max((at[w as usize][k] - at[v][k]).abs());
             }
-            r
-        })
-        .collect();
+        }
+        r
+    });
     let part: Vec<AtomicU32> = (0..n).map(|_| AtomicU32::new(0)).collect();
     let mut order: Vec<u32> = (0..n as u32).collect();
     let cut = Dissection {

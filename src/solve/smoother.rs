@@ -1,8 +1,8 @@
 //! Block-Jacobi and the Chebyshev smoother built on it.
 
-use crate::solve::FreeDofs;
 use crate::solve::krylov::{LinearMap, add_scaled, norm};
 use crate::system::BlockCsr;
+use crate::{parallel, solve::FreeDofs};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -21,31 +21,27 @@ impl BlockJacobi {
     /// The first site whose block is missing or singular.
     pub fn new(matrix: &BlockCsr, free: &FreeDofs) -> Result<BlockJacobi, usize> {
         let d = matrix.block;
-        let blocks: Vec<Vec<f64>> = (0..matrix.rows())
-            .into_par_iter()
-            .map(|i| {
-                let (columns, values) = matrix.row(i);
-                let dofs: Vec<usize> = free.of_site(i).collect();
-                let mut inverse = vec![0.0; d * d];
-                if dofs.is_empty() {
-                    return Ok(inverse);
+        let blocks: Vec<Vec<f64>> = parallel::try_map(matrix.rows(), 1, |i| -> Result<_, usize> {
+            let (columns, values) = matrix.row(i);
+            let dofs: Vec<usize> = free.of_site(i).collect();
+            let mut inverse = vec![0.0; d * d];
+            if dofs.is_empty() {
+                return Ok(inverse);
+            }
+            let e = columns.binary_search(&(i as u32)).map_err(|_| i)?;
+            let own = &values[e * d * d..(e + 1) * d * d];
+            let small = DMatrix::from_fn(dofs.len(), dofs.len(), |a, b| own[dofs[a] * d + dofs[b]]);
+            let small = small
+                .try_inverse()
+                .filter(|m| m.iter().all(|v| v.is_finite()))
+                .ok_or(i)?;
+            for (ka, &a) in dofs.iter().enumerate() {
+                for (kb, &b) in dofs.iter().enumerate() {
+                    inverse[a * d + b] = small[(ka, kb)];
                 }
-                let e = columns.binary_search(&(i as u32)).map_err(|_| i)?;
-                let own = &values[e * d * d..(e + 1) * d * d];
-                let small =
-                    DMatrix::from_fn(dofs.len(), dofs.len(), |a, b| own[dofs[a] * d + dofs[b]]);
-                let small = small
-                    .try_inverse()
-                    .filter(|m| m.iter().all(|v| v.is_finite()))
-                    .ok_or(i)?;
-                for (ka, &a) in dofs.iter().enumerate() {
-                    for (kb, &b) in dofs.iter().enumerate() {
-                        inverse[a * d + b] = small[(ka, kb)];
-                    }
-                }
-                Ok(inverse)
-            })
-            .collect::<Result<_, usize>>()?;
+            }
+            Ok(inverse)
+        })?;
         Ok(BlockJacobi {
             block: d,
             inverse: blocks.concat(),

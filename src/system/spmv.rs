@@ -3,13 +3,15 @@
 //! Along a run of rows that share their blocks (see [`super::SharedRows`]) a product is a stencil: for each block, a stretch of the argument is added to a
 //! stretch of the result, which the compiler turns into vector instructions, chosen by `pulp` for the machine at hand. Sums are taken in the same order as row by row.
 
-use rayon::prelude::*;
-
 use super::BlockCsr;
+use crate::parallel;
 
 /// Rows per task: some tasks may be left out.
 pub const ROW_CHUNK: usize = 256;
 const ROWS: usize = ROW_CHUNK;
+
+/// Sites of a task that copies a number of each.
+const SITES: usize = 4096;
 
 /// Whether a task is to be done.
 fn is_marked(marked: Option<&[bool]>, chunk: usize) -> bool {
@@ -38,14 +40,14 @@ pub(super) fn multiply_differences_into(
 }
 
 fn of_differences<const D: usize>(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y: &mut [f64]) {
-    y.par_chunks_mut(ROWS * D)
-        .enumerate()
-        .filter(|(chunk, _)| is_marked(marked, *chunk))
-        .for_each(|(chunk, y)| {
-            for (i, y) in y.chunks_exact_mut(D).enumerate() {
-                y.copy_from_slice(&of_row_differences::<D>(k, chunk * ROWS + i, x));
-            }
-        });
+    parallel::for_each_chunk(y, ROWS * D, 1, |chunk, y| {
+        if !is_marked(marked, chunk) {
+            return;
+        }
+        for (i, y) in y.chunks_exact_mut(D).enumerate() {
+            y.copy_from_slice(&of_row_differences::<D>(k, chunk * ROWS + i, x));
+        }
+    });
 }
 
 /// Row `i` times the differences of `x` from that of its middle column.
@@ -82,7 +84,7 @@ pub(super) fn multiply_into(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y:
         2 => of_block::<2>(k, marked, x, y),
         3 => of_block::<3>(k, marked, x, y),
         6 => of_block::<6>(k, marked, x, y),
-        d => y.par_chunks_mut(d.max(1)).enumerate().for_each(|(i, yi)| {
+        d => parallel::for_each_chunk(y, d.max(1), 1, |i, yi| {
             yi.fill(0.0);
             let (columns, blocks) = k.row(i);
             for (&c, block) in columns.iter().zip(blocks.chunks_exact(d * d)) {
@@ -100,36 +102,35 @@ pub(super) fn multiply_into(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y:
 /// The product with blocks of a size known to the compiler, which unrolls them.
 fn of_block<const D: usize>(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y: &mut [f64]) {
     let Some(follows) = runs(k) else {
-        y.par_chunks_mut(ROWS * D)
-            .enumerate()
-            .filter(|(chunk, _)| is_marked(marked, *chunk))
-            .for_each(|(chunk, y)| {
-                for (i, y) in y.chunks_exact_mut(D).enumerate() {
-                    y.copy_from_slice(&of_row::<D>(k, chunk * ROWS + i, x));
-                }
-            });
+        parallel::for_each_chunk(y, ROWS * D, 1, |chunk, y| {
+            if !is_marked(marked, chunk) {
+                return;
+            }
+            for (i, y) in y.chunks_exact_mut(D).enumerate() {
+                y.copy_from_slice(&of_row::<D>(k, chunk * ROWS + i, x));
+            }
+        });
         return;
     };
     // component by component, so that neighbouring rows read neighbouring numbers
     let planes: [Vec<f64>; D] = std::array::from_fn(|b| {
         let mut plane = vec![0.0; x.len() / D];
-        plane
-            .par_iter_mut()
-            .zip(x.par_chunks_exact(D))
-            .with_min_len(4096)
-            .for_each(|(p, x)| *p = x[b]);
+        parallel::for_each_chunk(&mut plane, SITES, 1, |chunk, plane| {
+            let x = x[chunk * SITES * D..].chunks_exact(D);
+            plane.iter_mut().zip(x).for_each(|(p, x)| *p = x[b]);
+        });
         plane
     });
     let arch = pulp::Arch::new();
-    y.par_chunks_mut(ROWS * D)
-        .enumerate()
-        .filter(|(chunk, _)| is_marked(marked, *chunk))
-        .for_each(|(chunk, y)| {
-            arch.dispatch(
-                #[inline(always)]
-                || of_rows::<D>(k, follows, chunk * ROWS, x, &planes, y),
-            );
-        });
+    parallel::for_each_chunk(y, ROWS * D, 1, |chunk, y| {
+        if !is_marked(marked, chunk) {
+            return;
+        }
+        arch.dispatch(
+            #[inline(always)]
+            || of_rows::<D>(k, follows, chunk * ROWS, x, &planes, y),
+        );
+    });
 }
 
 /// Rows from `first` on, as many as `y` holds: runs in tiles, the rest row by row.

@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 use imports::{Imports, ItemPath};
 
 /// Modules of the library and, above them, the other crates, the lowest first.
-const FLOORS: [&str; 24] = [
+const FLOORS: [&str; 25] = [
     "dimension",
     "tensor",
+    "parallel",
     "progress",
     "regular_file",
     "system",

@@ -2,13 +2,12 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rayon::prelude::*;
-
 use super::split::Split;
 use crate::coupling::semidiscrete::behaviour::{BondBehaviour, CHUNK, Critical, NONE, SystemError};
 use crate::{
     assembly::{Row, Transfer},
     coupling::{Model, NonlinearSeam, Operator, SharedFamilies, SiteKind},
+    parallel,
     peridynamics::{
         Accelerator, Families, Law, PdBody,
         bond_force::{
@@ -280,10 +279,9 @@ impl<const D: usize> MovingBody<D> {
         for &foot in &model.feet {
             has_force[foot as usize] = true;
         }
-        let no_fail: Vec<bool> = (0..points)
-            .into_par_iter()
-            .map(|i| !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i]))
-            .collect();
+        let no_fail: Vec<bool> = parallel::map(points, 1, |i| {
+            !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i])
+        });
         let passed = match seam {
             None => passed_families(model, operator, body, &own_row),
             Some(_) => None,
@@ -435,23 +433,20 @@ impl<const D: usize> MovingBody<D> {
             points.copy_from_slice(&u[shift * D..][..points.len()]);
             return;
         }
-        points
-            .par_chunks_mut(CHUNK * D)
-            .enumerate()
-            .for_each(|(chunk, values)| {
-                for (k, value) in values.chunks_exact_mut(D).enumerate() {
-                    let point = chunk * CHUNK + k;
-                    match self.site_of_point[point] {
-                        NONE => {
-                            if let Some(transfer) = &self.transfer {
-                                let x: Vector<D> = transfer.displacement(point, u);
-                                value.copy_from_slice(x.as_slice());
-                            }
+        parallel::for_each_chunk(points, CHUNK * D, 1, |chunk, values| {
+            for (k, value) in values.chunks_exact_mut(D).enumerate() {
+                let point = chunk * CHUNK + k;
+                match self.site_of_point[point] {
+                    NONE => {
+                        if let Some(transfer) = &self.transfer {
+                            let x: Vector<D> = transfer.displacement(point, u);
+                            value.copy_from_slice(x.as_slice());
                         }
-                        site => value.copy_from_slice(&u[site as usize * D..][..D]),
                     }
+                    site => value.copy_from_slice(&u[site as usize * D..][..D]),
                 }
-            });
+            }
+        });
     }
 }
 

@@ -2,14 +2,13 @@
 
 use std::sync::{Arc, OnceLock};
 
-use rayon::prelude::*;
-
 use super::behaviour::CHUNK;
 use super::tangent_pattern::TangentPattern;
 use crate::{
     coupling::{CellRole, Model, SiteKind},
     fem::{CellBandError, NonlinearElements},
     material::LocalLaw,
+    parallel,
     system::{ElementTangent, Symmetry},
     tensor::{Tensor, Vector},
 };
@@ -60,8 +59,7 @@ impl<const D: usize> LocalElements<D> {
     pub fn add_force(&mut self, model: &Model<D>, u: &[f64], step: f64, force: &mut [f64]) {
         let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
         self.elements.respond(&model.mesh, nodes, step);
-        let chunks = force.par_chunks_mut(CHUNK * D).enumerate();
-        chunks.for_each(|(chunk, force)| {
+        parallel::for_each_chunk(force, CHUNK * D, 1, |chunk, force| {
             for (k, force) in force.chunks_exact_mut(D).enumerate() {
                 if let SiteKind::Node(n) = model.sites[chunk * CHUNK + k].kind {
                     let mut own: Vector<D> = self.elements.force(n);

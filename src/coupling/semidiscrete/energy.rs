@@ -7,6 +7,7 @@ use crate::coupling::semidiscrete::behaviour::CHUNK;
 use crate::{
     assembly::{self, Transfer},
     coupling::{CellRole, Model, SiteKind},
+    parallel,
     system::BlockCsr,
     tensor::Vector,
 };
@@ -55,23 +56,19 @@ impl ElementEnergy {
     }
 
     pub fn of<const D: usize>(&self, linear: &SiteRows, nodes: &Transfer, u: &[f64]) -> f64 {
-        let inner: f64 = self
-            .inner
-            .par_chunks(CHUNK)
-            .map(|sites| {
-                sites
-                    .iter()
-                    .map(|&site| {
-                        let force: Vector<D> = linear.product(site as usize, u);
-                        (0..D)
-                            .map(|k| force[k] * u[site as usize * D + k])
-                            .sum::<f64>()
-                    })
-                    .sum::<f64>()
-            })
-            .collect::<Vec<_>>()
-            .iter()
-            .sum();
+        let inner: f64 = parallel::map_each(self.inner.par_chunks(CHUNK), |sites| {
+            sites
+                .iter()
+                .map(|&site| {
+                    let force: Vector<D> = linear.product(site as usize, u);
+                    (0..D)
+                        .map(|k| force[k] * u[site as usize * D + k])
+                        .sum::<f64>()
+                })
+                .sum::<f64>()
+        })
+        .iter()
+        .sum();
         let seam: f64 = self
             .seam
             .iter()

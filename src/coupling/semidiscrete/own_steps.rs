@@ -3,17 +3,15 @@
 //! The force on a site takes the displacements of the columns of its row and of its neighbours, of a state-based law also those of their neighbours, for its dilatations; points between elements take those of the sites that
 //! they follow. These sites are the ghosts. Forces of own sites that others have as ghosts are computed first, and travel while the others are. Bonds that break are told to all once somebody asks.
 
-use rayon::prelude::*;
-
 use super::behaviour::CHUNK;
 use super::reached_sites::Reached;
 use super::rows::SiteRows;
 use super::{CoupledSystem, behaviour::NONE, body::MovingBody, split::Split};
-use crate::peridynamics::bond_force::Reach;
 use crate::system::{
     FailureUpdate, Ghosts, Halfway, LostToBreaks, Segments, SharedSteps, Spread, Traffic,
 };
 use crate::tensor::Vector;
+use crate::{parallel, peridynamics::bond_force::Reach};
 
 /// What belongs to steps that processes share.
 pub(super) struct OwnSteps {
@@ -72,8 +70,7 @@ impl<const D: usize> SiteForces<'_, D> {
 
     /// Overwrites the forces of the sites of `segments`.
     fn put_all(&self, segments: &Segments, from: (&[f64], &[f64]), force: &mut [f64]) {
-        let chunks = force.par_chunks_mut(CHUNK * D).enumerate();
-        chunks.for_each(|(chunk, force)| {
+        parallel::for_each_chunk(force, CHUNK * D, 1, |chunk, force| {
             for k in segments.of_chunk(chunk).flatten() {
                 let of_site = self.of(chunk * CHUNK + k, from);
                 force[k * D..][..D].copy_from_slice(of_site.as_slice());

@@ -1,11 +1,10 @@
 //! Rows of some of the sites, and the force of all of them together with that of the bonds.
 
-use rayon::prelude::*;
-
 use crate::coupling::semidiscrete::behaviour::{CHUNK, NONE};
 use crate::{
     assembly::{self, Row},
     coupling::Model,
+    parallel,
     system::{BlockCsr, ROW_CHUNK},
     tensor::{Tensor, Vector},
 };
@@ -108,17 +107,14 @@ impl SiteRows {
         force: &mut [f64],
     ) {
         self.multiply_chunks_into::<D>(self.computed.as_deref(), u, products);
-        force
-            .par_chunks_mut(CHUNK * D)
-            .enumerate()
-            .for_each(|(chunk, force)| {
-                for (k, force) in force.chunks_exact_mut(D).enumerate() {
-                    let site = chunk * CHUNK + k;
-                    let bonds = bonds.map_or((NONE, &[][..]), |(of, points)| (of[site], points));
-                    let sum: Vector<D> = self.with_bonds(site, products, bonds);
-                    force.copy_from_slice(sum.as_slice());
-                }
-            });
+        parallel::for_each_chunk(force, CHUNK * D, 1, |chunk, force| {
+            for (k, force) in force.chunks_exact_mut(D).enumerate() {
+                let site = chunk * CHUNK + k;
+                let bonds = bonds.map_or((NONE, &[][..]), |(of, points)| (of[site], points));
+                let sum: Vector<D> = self.with_bonds(site, products, bonds);
+                force.copy_from_slice(sum.as_slice());
+            }
+        });
     }
 
     /// The products of the rows that others wait for.

@@ -1,12 +1,10 @@
 //! What a coupled system tells of bonds one by one, of families that may be spread over processes: each tells of its own, and all learn it.
 
-use rayon::prelude::*;
-
 use super::CoupledSystem;
 use super::behaviour::NONE;
-use crate::assembly;
 use crate::coupling::NonlinearSeam;
 use crate::system::{BlockCsr, Spread};
+use crate::{assembly, parallel};
 
 impl<const D: usize> CoupledSystem<'_, D> {
     /// The sites over processes, where families are.
@@ -93,19 +91,16 @@ impl<const D: usize> CoupledSystem<'_, D> {
             return Vec::new();
         };
         let site = |p: usize| moving.site_of_point[p];
-        (0..moving.site_of_point.len())
-            .into_par_iter()
-            .filter(|&i| site(i) != NONE && moving.pass.is_damaged(i))
-            .flat_map_iter(|i| {
-                let family = body.families.of(i).iter();
-                family
-                    .filter(move |&&j| {
-                        !moving.pass.bonded(i, j as usize)
-                            && site(j as usize) != NONE
-                            && self.is_passed_over(i, j)
-                    })
-                    .map(move |&j| (site(i), site(j as usize)))
-            })
-            .collect()
+        parallel::listed(moving.site_of_point.len(), 1, |i, all| {
+            if site(i) == NONE || !moving.pass.is_damaged(i) {
+                return;
+            }
+            let lost = body.families.of(i).iter().filter(|&&j| {
+                !moving.pass.bonded(i, j as usize)
+                    && site(j as usize) != NONE
+                    && self.is_passed_over(i, j)
+            });
+            all.extend(lost.map(|&j| (site(i), site(j as usize))));
+        })
     }
 }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{CoupledSystem, behaviour::CHUNK, body::MovingBody};
 use crate::{
+    parallel,
     system::{SemiDiscrete, Symmetry},
     tensor::Vector,
 };
@@ -30,10 +31,9 @@ impl<const D: usize> CoupledSystem<'_, D> {
     pub(super) fn energy_of_linear_elements_and_bonds(&self, u: &[f64]) -> f64 {
         let of_rows = || {
             let rows = |site: usize| self.linear.product::<D>(site, u);
-            let sites = (0..self.mass.len()).into_par_iter().with_min_len(CHUNK);
-            let elements: Vec<f64> = sites
-                .map(|s| 0.5 * rows(s).dot(&Vector::from_column_slice(&u[s * D..][..D])))
-                .collect();
+            let elements = parallel::map(self.mass.len(), CHUNK, |s| {
+                0.5 * rows(s).dot(&Vector::from_column_slice(&u[s * D..][..D]))
+            });
             elements.iter().sum::<f64>()
         };
         if let Some(seam) = &self.seam {
@@ -52,11 +52,9 @@ impl<const D: usize> CoupledSystem<'_, D> {
             // rows have whole bonds too: the energy of all is known to first order in the stretch of exact bonds
             let mut force = vec![0.0; u.len()];
             self.tangent_into(u, &mut force);
-            let products: Vec<f64> = u
-                .par_chunks(CHUNK)
-                .zip(force.par_chunks(CHUNK))
-                .map(|(u, f)| u.iter().zip(f).map(|(u, f)| u * f).sum())
-                .collect();
+            let both = u.par_chunks(CHUNK).zip(force.par_chunks(CHUNK));
+            let products: Vec<f64> =
+                parallel::map_each(both, |(u, f)| u.iter().zip(f).map(|(u, f)| u * f).sum());
             return 0.5 * products.iter().sum::<f64>();
         }
         let elements = self

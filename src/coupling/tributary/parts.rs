@@ -2,8 +2,6 @@
 
 use std::cell::OnceCell;
 
-use rayon::prelude::*;
-
 use super::found::{Detail, Found, FoundCells};
 use super::{
     around::{Around, centroid_sites},
@@ -15,6 +13,7 @@ use crate::{
     coupling::{Model, PointSource, SiteKind},
     fem,
     mesh::boundary::{BoundaryFacet, normal_area},
+    parallel,
     shape::Shape,
     tensor::{Tensor, Vector},
 };
@@ -66,10 +65,8 @@ fn pieces_of<const D: usize>(
     voids: &[Shape<D>],
     detail: Detail,
 ) -> FoundCells<D> {
-    let pieces: Vec<Vec<([i32; D], Found<D>)>> = own
-        .par_iter()
-        .map(|&c| marks.pieces(model, c, voids, detail))
-        .collect();
+    let pieces: Vec<Vec<([i32; D], Found<D>)>> =
+        parallel::map_slice(&own, |&c| marks.pieces(model, c, voids, detail));
     let mut found = FoundCells::default();
     for (index, piece) in pieces.into_iter().flatten() {
         found.entry(index).or_default().take_in(piece);
@@ -397,21 +394,18 @@ impl<const D: usize> Parts<D> {
         order.sort_unstable();
         let h = grid.cells.spacing;
         let mut found = found;
-        let places: Vec<(Vector<D>, Vec<Follows<D>>)> = order
-            .par_iter()
-            .map(|index| {
-                let piece = &found[index];
-                let offset = piece.moment / piece.size.max(f64::MIN_POSITIVE);
-                let middle = grid.cells.centre(index);
-                let is_whole = (piece.size / whole - 1.0).abs() < 1e-12;
-                match grid.site(index) {
-                    Some(site) if is_whole && offset.norm() < 1e-10 * h => {
-                        (middle, grid.own(index, site))
-                    }
-                    _ => (middle + offset, grid.place(&(middle + offset))),
+        let places: Vec<(Vector<D>, Vec<Follows<D>>)> = parallel::map_slice(&order, |index| {
+            let piece = &found[index];
+            let offset = piece.moment / piece.size.max(f64::MIN_POSITIVE);
+            let middle = grid.cells.centre(index);
+            let is_whole = (piece.size / whole - 1.0).abs() < 1e-12;
+            match grid.site(index) {
+                Some(site) if is_whole && offset.norm() < 1e-10 * h => {
+                    (middle, grid.own(index, site))
                 }
-            })
-            .collect();
+                _ => (middle + offset, grid.place(&(middle + offset))),
+            }
+        });
         for (index, (x, follows)) in order.iter().zip(places) {
             if let Some(piece) = found.remove(index)
                 && piece.size > 0.0

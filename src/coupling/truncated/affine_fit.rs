@@ -8,7 +8,6 @@
 //!
 //! Where the seam follows the lattice nothing is missing, and nothing is changed.
 
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::bond_segments::{End, Segments};
@@ -18,7 +17,7 @@ use super::squares::fit_factors;
 use crate::coupling::truncated::conditions::Conditions;
 use crate::{
     coupling::{ModelError, SiteKind},
-    fem,
+    fem, parallel,
     peridynamics::StatePart,
     tensor::{Tensor4, Vector},
 };
@@ -300,13 +299,10 @@ pub(super) fn loaded_nodes<const D: usize>(
         let is_node = matches!(model.sites[site].kind, SiteKind::Node(_));
         is_node && at_face[site] && !is_dropped[site]
     };
-    let sites = (0..model.sites.len()).into_par_iter();
-    sites
-        .filter(|&site| is_loaded(site))
-        .map(|site| (site as u32, integral(site)))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .collect()
+    let loads = parallel::filter_map(model.sites.len(), 1, |site| {
+        is_loaded(site).then(|| (site as u32, integral(site)))
+    });
+    loads.into_iter().collect()
 }
 
 /// The fourth moments of the lattice's pairwise part.

@@ -1,12 +1,12 @@
 //! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and what they hand to dilatations.
 
-use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::seam::{Course, Foot, Piece, Seam};
 use crate::{
     assembly::{Row, Transfer},
     coupling::{Model, SiteKind, multi_lattice::ContinuedLattice},
+    parallel,
     peridynamics::{Mixture, PdBody},
     tensor::{Tensor, Vector},
 };
@@ -94,16 +94,13 @@ impl<'a, const D: usize> Segments<'a, D> {
             passing,
             several: model.several(),
         };
-        let found: Vec<Cut> = (0..cloud.position.len())
-            .into_par_iter()
-            .map(|i| {
-                let seam = &seams[usize::from(passing.of_point[i])];
-                match seam.is_around(&cloud.position[i]) {
-                    true => ends.cut(seam, i),
-                    false => Cut::default(),
-                }
-            })
-            .collect();
+        let found: Vec<Cut> = parallel::map(cloud.position.len(), 1, |i| {
+            let seam = &seams[usize::from(passing.of_point[i])];
+            match seam.is_around(&cloud.position[i]) {
+                true => ends.cut(seam, i),
+                false => Cut::default(),
+            }
+        });
         let mut cut = Vec::with_capacity(found.iter().map(|f| f.segments.len()).sum());
         let mut broken = FxHashSet::default();
         let mut at_seam = vec![false; site.len()];

@@ -5,14 +5,12 @@
 
 use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 
-use rayon::prelude::*;
-
 use super::{
     bond_segments::{BySite, Segments},
     dilatation::{Carrier, Functional, LpsConstants, carried, divergence, stiffness_of_point},
     element_dilatation::ElementDilatations,
 };
-use crate::{peridynamics::bond_force::Kinematics, tensor::Vector};
+use crate::{parallel, peridynamics::bond_force::Kinematics, tensor::Vector};
 
 /// The dilatations of the points at the seam and of the elements behind it.
 pub(super) struct States<const D: usize> {
@@ -217,18 +215,14 @@ impl<const D: usize> States<D> {
         elongation: &[f64],
         wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<f64> {
-        (0..self.count())
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|f| {
-                if !wanted(f) {
-                    return 0.0;
-                }
-                let handed = self.shares_of(f).iter();
-                let handed: f64 = handed.map(|&(p, c)| c * elongation[p as usize]).sum();
-                self.stiffness[f] * (own.values[f] + handed)
-            })
-            .collect()
+        parallel::map(self.count(), 64, |f| {
+            if !wanted(f) {
+                return 0.0;
+            }
+            let handed = self.shares_of(f).iter();
+            let handed: f64 = handed.map(|&(p, c)| c * elongation[p as usize]).sum();
+            self.stiffness[f] * (own.values[f] + handed)
+        })
     }
 
     /// What the pressures make a part pull with, per elongation.

@@ -1,11 +1,10 @@
 //! Factors of the normal equations of conditions, and what they cost.
 
 use faer::sparse::{SparseColMat, Triplet};
-use rayon::prelude::*;
 
 use super::normal::Dense;
-use crate::coupling::sparse_factors::SparseFactors;
 use crate::coupling::truncated::conditions::{Conditions, norm};
+use crate::{coupling::sparse_factors::SparseFactors, parallel};
 
 /// Conditions from which on their normal equations are factorised: conjugate gradients alone take as many iterations as a long seam has points.
 const FACTORISED: usize = 300;
@@ -50,12 +49,14 @@ impl Conditions {
             }
         }
         // a row at a time: a change of a trace has a hundred entries, and its square ten thousand
-        let rows = of_row.par_iter().enumerate().map_init(
+        let entries = parallel::map_with(
+            self.count,
+            1,
             || vec![0.0; self.count],
-            |sums, (r, of)| {
+            |sums: &mut Vec<f64>, r| {
                 let mut touched = vec![r];
                 sums[r] = REGULAR;
-                for &(k, v) in of {
+                for &(k, v) in &of_row[r] {
                     for (s, w) in self.column(k).filter(|&(s, _)| s <= r) {
                         if sums[s] == 0.0 {
                             touched.push(s);
@@ -71,8 +72,7 @@ impl Conditions {
                 row.collect::<Vec<_>>()
             },
         );
-        let entries: Vec<Vec<Triplet<usize, usize, f64>>> = rows.collect();
-        let entries = entries.concat();
+        let entries: Vec<Triplet<usize, usize, f64>> = entries.concat();
         // without factors all goes as before, and takes longer
         SparseColMat::try_new_from_triplets(self.count, self.count, &entries).ok()
     }

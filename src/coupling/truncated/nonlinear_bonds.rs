@@ -25,6 +25,7 @@ use super::{
 use crate::{
     assembly::{Row, Transfer},
     coupling::Model,
+    parallel,
     peridynamics::{
         Families, PdBody,
         bond_force::{BondPass, Kinematics, pack, unpack},
@@ -153,21 +154,20 @@ impl<const D: usize> NonlinearSeam<D> {
         pulls: &mut [[f64; D]],
         elongation: &mut [f64],
     ) {
-        pulls
+        let both = pulls
             .par_chunks_mut(CHUNK)
-            .zip(elongation.par_chunks_mut(CHUNK))
-            .enumerate()
-            .for_each(|(chunk, (pulls, elongation))| {
-                for (k, (pull, elongation)) in pulls.iter_mut().zip(elongation).enumerate() {
-                    let p = chunk * CHUNK + k;
-                    let part = &self.parts[p];
-                    (*pull, *elongation) = ([0.0; D], 0.0);
-                    if self.stands(part.bond) && self.computed.knows_part(p) {
-                        let s = part.strained::<EXACT>(&self.difference.displacement(p, u));
-                        (*pull, *elongation) = (s.direction, s.elongation);
-                    }
+            .zip(elongation.par_chunks_mut(CHUNK));
+        parallel::for_each(both.enumerate(), |(chunk, (pulls, elongation))| {
+            for (k, (pull, elongation)) in pulls.iter_mut().zip(elongation).enumerate() {
+                let p = chunk * CHUNK + k;
+                let part = &self.parts[p];
+                (*pull, *elongation) = ([0.0; D], 0.0);
+                if self.stands(part.bond) && self.computed.knows_part(p) {
+                    let s = part.strained::<EXACT>(&self.difference.displacement(p, u));
+                    (*pull, *elongation) = (s.direction, s.elongation);
                 }
-            });
+            }
+        });
     }
 
     /// Makes pulls of directions; returns what the dilatations press with.
@@ -184,17 +184,14 @@ impl<const D: usize> NonlinearSeam<D> {
             }
             _ => Vec::new(),
         };
-        pulls
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .for_each(|(chunk, pulls)| {
-                for (k, pull) in pulls.iter_mut().enumerate() {
-                    let p = chunk * CHUNK + k;
-                    let f = self.parts[p].stiffness * elongation[p]
-                        + states.map_or(0.0, |s| s.tension(p, &pressures));
-                    *pull = pull.map(|x| f * x);
-                }
-            });
+        parallel::for_each_chunk(pulls, CHUNK, 1, |chunk, pulls| {
+            for (k, pull) in pulls.iter_mut().enumerate() {
+                let p = chunk * CHUNK + k;
+                let f = self.parts[p].stiffness * elongation[p]
+                    + states.map_or(0.0, |s| s.tension(p, &pressures));
+                *pull = pull.map(|x| f * x);
+            }
+        });
         pressures
     }
 
@@ -250,17 +247,14 @@ impl<const D: usize> NonlinearSeam<D> {
 
     fn scatter(&self, pulls: &[[f64; D]], sums: &mut Vec<[f64; D]>, force: &mut [f64]) {
         sums.resize(self.sites.len(), [0.0; D]);
-        sums.par_iter_mut()
-            .with_min_len(CHUNK / 8)
-            .enumerate()
-            .for_each(|(s, sum)| {
-                *sum = [0.0; D];
-                for &(part, w) in &self.ends[self.offsets[s]..self.offsets[s + 1]] {
-                    for (sum, pull) in sum.iter_mut().zip(&pulls[part as usize]) {
-                        *sum += w * pull;
-                    }
+        parallel::for_each_mut(sums, CHUNK / 8, |s, sum| {
+            *sum = [0.0; D];
+            for &(part, w) in &self.ends[self.offsets[s]..self.offsets[s + 1]] {
+                for (sum, pull) in sum.iter_mut().zip(&pulls[part as usize]) {
+                    *sum += w * pull;
                 }
-            });
+            }
+        });
         for (&site, sum) in self.sites.iter().zip(&*sums) {
             for (f, sum) in force[site as usize * D..][..D].iter_mut().zip(sum) {
                 *f += sum;
@@ -375,11 +369,9 @@ impl<const D: usize> NonlinearSeam<D> {
 
     /// Energy of the parts that stand, and of the dilatations of the seam \[J\].
     pub(in crate::coupling) fn energy(&self, u: &[f64]) -> f64 {
-        let elongation: Vec<f64> = (0..self.parts.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|p| self.elongation_if_intact(p, u, &self.intact))
-            .collect();
+        let elongation: Vec<f64> = parallel::map(self.parts.len(), CHUNK, |p| {
+            self.elongation_if_intact(p, u, &self.intact)
+        });
         let parts = self.parts.iter().zip(&elongation);
         let parts: f64 = parts.map(|(part, q)| 0.5 * part.stiffness * q * q).sum();
         let Some(states) = &self.states else {

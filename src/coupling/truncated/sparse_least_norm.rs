@@ -1,9 +1,7 @@
 //! The smallest change that meets many sparse linear conditions.
 
-use rayon::prelude::*;
-
 use super::conditions::{Conditions, dot, norm};
-use crate::coupling::sparse_factors::SparseFactors;
+use crate::{coupling::sparse_factors::SparseFactors, parallel};
 
 /// Steps of the dual Newton method.
 const MOST_STEPS: usize = 20;
@@ -275,11 +273,9 @@ impl Conditions {
     }
 
     fn transposed(&self, multiplier: &[f64]) -> Vec<f64> {
-        (0..self.changes())
-            .into_par_iter()
-            .with_min_len(512)
-            .map(|k| self.column(k).map(|(r, v)| v * multiplier[r]).sum())
-            .collect()
+        parallel::map(self.changes(), 512, |k| {
+            self.column(k).map(|(r, v)| v * multiplier[r]).sum()
+        })
     }
 
     /// Minimises `½ Σ x²` subject to `A x = missing` and `x ≥ floor`.

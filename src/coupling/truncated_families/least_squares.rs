@@ -1,9 +1,8 @@
 //! Least squares of a sparse matrix by conjugate gradients on the normal equations (CGLS, \[Bjorck1996\] section 7.4.1), led by the factors of those of other scales.
 
 use faer::sparse::{SparseColMat, Triplet};
-use rayon::prelude::*;
 
-use crate::coupling::sparse_factors::SparseFactors;
+use crate::{coupling::sparse_factors::SparseFactors, parallel};
 
 /// Columns of a sparse matrix, and once they are all there its rows.
 #[derive(Default)]
@@ -58,12 +57,10 @@ impl Columns {
         counts: &[bool],
         number: impl Fn(&[(u32, f64)]) -> f64 + Sync,
     ) -> Vec<f64> {
-        let rows = (0..self.rows).into_par_iter().with_min_len(64);
-        let of_row = |r: usize| match counts[r] {
+        parallel::map(self.rows, 64, |r| match counts[r] {
             true => number(&self.by_rows[self.of_rows[r]..self.of_rows[r + 1]]),
             false => 0.0,
-        };
-        rows.map(of_row).collect()
+        })
     }
 
     /// `A x`, of the rows that count.
@@ -75,12 +72,10 @@ impl Columns {
 
     /// `S Aᵀ y`.
     fn transposed(&self, scale: &[f64], y: &[f64]) -> Vec<f64> {
-        let columns = scale.par_iter().enumerate().with_min_len(256);
-        let product = |(k, scale): (usize, &f64)| {
+        parallel::map(scale.len(), 256, |k| {
             let column = self.entries[self.offsets[k]..self.offsets[k + 1]].iter();
-            scale * column.map(|(row, a)| a * y[*row as usize]).sum::<f64>()
-        };
-        columns.map(product).collect()
+            scale[k] * column.map(|(row, a)| a * y[*row as usize]).sum::<f64>()
+        })
     }
 
     /// The lower half of `A S² Aᵀ`, of the rows that count, with `damping²` and a little more on its diagonal, of short rows a part of the square of the `smallest`.
@@ -112,9 +107,7 @@ impl Columns {
             let entry = |s: usize| Triplet::new(r, s, std::mem::take(&mut sums[s]));
             touched.into_iter().map(entry).collect::<Vec<_>>()
         };
-        let rows = (0..self.rows).into_par_iter();
-        let rows = rows.map_init(|| vec![0.0; self.rows], row);
-        let entries: Vec<Vec<_>> = rows.collect();
+        let entries = parallel::map_with(self.rows, 1, || vec![0.0; self.rows], row);
         SparseColMat::try_new_from_triplets(self.rows, self.rows, &entries.concat()).ok()
     }
 }

@@ -23,9 +23,9 @@ use crate::{
     },
     material::LocalLaw,
     mesh::Mesh,
+    parallel,
     tensor::{Tensor, Tensor4, Vector},
 };
-use rayon::prelude::*;
 
 /// Elements whose tangents are held at a time.
 const CHUNK: usize = 512;
@@ -47,13 +47,10 @@ impl<const D: usize> NonlinearElements<D> {
         mut visit: impl FnMut(usize, &[Tensor<D>]),
     ) {
         for elements in self.elements.chunks(CHUNK) {
-            let found: Vec<Vec<Tensor<D>>> = elements
-                .par_iter()
-                .map(|element| {
-                    let law = self.laws[element.law as usize].as_ref();
-                    tangent(mesh, element, law, &displacement, step, &self.past)
-                })
-                .collect();
+            let found: Vec<Vec<Tensor<D>>> = parallel::map_slice(elements, |element| {
+                let law = self.laws[element.law as usize].as_ref();
+                tangent(mesh, element, law, &displacement, step, &self.past)
+            });
             for (element, blocks) in elements.iter().zip(&found) {
                 visit(element.cell as usize, blocks);
             }

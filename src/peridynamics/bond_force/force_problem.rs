@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::kinematics::Kinematics;
 use crate::{
+    parallel,
     peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
     system::Ranks,
     tensor::Vector,
@@ -322,8 +321,7 @@ impl<const D: usize> BondSetup<'_, D> {
         &self,
         fault: impl Fn(usize) -> Option<KernelError> + Sync + Send,
     ) -> Result<(), KernelError> {
-        let points = (0..self.position.len()).into_par_iter().with_min_len(256);
-        points.find_map_first(fault).map_or(Ok(()), Err)
+        parallel::find_first(self.position.len(), 256, fault).map_or(Ok(()), Err)
     }
 
     fn fault(&self, i: usize) -> Option<KernelError> {

@@ -15,6 +15,7 @@ use super::{
     point_state::PointForces,
 };
 use crate::{
+    parallel,
     peridynamics::{
         DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, KeptDamage, Law, Past,
         PdBody, Present, StatePart, body::split_rows, tearing_parameter::Flow,
@@ -324,36 +325,35 @@ impl<const D: usize> Generic<D> {
         let forces = split_rows(&mut force, offsets);
         let of_bonds = split_rows(&mut present.bonds, &scaled(kept[1]));
         let of_points = split_rows(&mut present.point, &points);
-        forces
+        let families = forces
             .into_par_iter()
             .zip(of_bonds)
             .zip(of_points)
-            .zip(&mut outcome)
-            .enumerate()
-            .with_min_len(16)
-            .for_each_init(
-                Scratch::default,
-                |s, (i, (((force, bonds), point), outcome))| {
-                    let range = self.range(i);
-                    if range.is_empty() {
-                        return;
-                    }
-                    let displaced = |j: usize| at(u, j);
-                    let intact = |bond: usize| self.intact[bond];
-                    s.carried = self.carried_of(i).copied();
-                    let energy = self.respond(i, &displaced, intact, step, &self.past, s);
-                    outcome.dissipated = energy.dissipated * self.volume[i];
-                    outcome.flow = self.flow(i, s);
-                    force.fill(Vector::zeros());
-                    point.copy_from_slice(&s.point);
-                    for (e, &bond) in s.of.iter().enumerate() {
-                        let k = bond - range.start;
-                        force[k] = s.force[e];
-                        bonds[k * kept[1]..(k + 1) * kept[1]]
-                            .copy_from_slice(&s.present[e * kept[1]..(e + 1) * kept[1]]);
-                    }
-                },
-            );
+            .zip(&mut outcome);
+        parallel::for_each_with(
+            families.enumerate().with_min_len(16),
+            Scratch::default,
+            |s, (i, (((force, bonds), point), outcome))| {
+                let range = self.range(i);
+                if range.is_empty() {
+                    return;
+                }
+                let displaced = |j: usize| at(u, j);
+                let intact = |bond: usize| self.intact[bond];
+                s.carried = self.carried_of(i).copied();
+                let energy = self.respond(i, &displaced, intact, step, &self.past, s);
+                outcome.dissipated = energy.dissipated * self.volume[i];
+                outcome.flow = self.flow(i, s);
+                force.fill(Vector::zeros());
+                point.copy_from_slice(&s.point);
+                for (e, &bond) in s.of.iter().enumerate() {
+                    let k = bond - range.start;
+                    force[k] = s.force[e];
+                    bonds[k * kept[1]..(k + 1) * kept[1]]
+                        .copy_from_slice(&s.present[e * kept[1]..(e + 1) * kept[1]]);
+                }
+            },
+        );
         self.force_state = force;
         self.present = present;
         self.outcome = outcome;
@@ -361,24 +361,20 @@ impl<const D: usize> Generic<D> {
 
     /// `−V_i Σ V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)` of the points with rows; without a family at the far end a pairwise law has the same bond there, any other no energy.
     pub(super) fn gather(&self, states: &[Vector<D>], force: &mut [f64]) {
-        force
-            .par_chunks_exact_mut(D)
-            .with_min_len(64)
-            .enumerate()
-            .for_each(|(i, force)| {
-                let mut sum = Vector::<D>::zeros();
-                if self.row[i] {
-                    for bond in self.range(i) {
-                        let back = match self.reverse[bond] {
-                            NONE if self.law.linearised().is_pairwise() => -states[bond],
-                            NONE => Vector::zeros(),
-                            back => states[back as usize],
-                        };
-                        sum += (states[bond] - back) * self.volume[self.neighbour(bond)];
-                    }
+        parallel::for_each_chunk(force, D, 64, |i, force| {
+            let mut sum = Vector::<D>::zeros();
+            if self.row[i] {
+                for bond in self.range(i) {
+                    let back = match self.reverse[bond] {
+                        NONE if self.law.linearised().is_pairwise() => -states[bond],
+                        NONE => Vector::zeros(),
+                        back => states[back as usize],
+                    };
+                    sum += (states[bond] - back) * self.volume[self.neighbour(bond)];
                 }
-                force.copy_from_slice((sum * -self.volume[i]).as_slice());
-            });
+            }
+            force.copy_from_slice((sum * -self.volume[i]).as_slice());
+        });
     }
 
     /// Energy of a point \[J\] at once, from a history.
@@ -488,11 +484,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             s.carried = self.carried_of(i).copied();
             self.energy_of(i, &|j| at(u, j), |bond| self.intact[bond], &self.past, s)
         };
-        let energies: Vec<f64> = (0..self.position.len())
-            .into_par_iter()
-            .with_min_len(64)
-            .map_init(Scratch::default, of_point)
-            .collect();
+        let energies: Vec<f64> =
+            parallel::map_with(self.position.len(), 64, Scratch::default, of_point);
         energies.iter().sum()
     }
 

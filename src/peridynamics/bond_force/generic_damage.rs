@@ -1,10 +1,11 @@
 //! Damage of bonds in the generic pass: what laws keep of it ([`crate::peridynamics::HistoryLayout::damage`]) beside bonds that broke by their stretch.
 
-use rayon::prelude::*;
-
 use super::BondSetup;
 use super::generic::{Generic, NONE};
-use crate::peridynamics::{KeptDamage, PdBody};
+use crate::{
+    parallel,
+    peridynamics::{KeptDamage, PdBody},
+};
 
 impl<const D: usize> Generic<D> {
     /// The damage φ of a bond at its own end, 1 of a broken one, as committed; without what is kept of the point.
@@ -27,17 +28,13 @@ impl<const D: usize> Generic<D> {
             return Vec::new();
         };
         let is_one = |bond: usize| self.present.bonds[bond * self.layout.bond.len() + place] == 1.0;
-        (0..self.position.len())
-            .into_par_iter()
-            .with_min_len(64)
-            .flat_map_iter(|i| {
-                let new = self.range(i).filter(move |&bond| {
-                    let back = self.reverse[bond];
-                    is_one(bond) && (back == NONE || is_one(back as usize)) && self.stands(bond)
-                });
-                new.map(move |bond| (i as u32, bond))
-            })
-            .collect()
+        parallel::listed(self.position.len(), 64, |i, all| {
+            let new = self.range(i).filter(|&bond| {
+                let back = self.reverse[bond];
+                is_one(bond) && (back == NONE || is_one(back as usize)) && self.stands(bond)
+            });
+            all.extend(new.map(|bond| (i as u32, bond)));
+        })
     }
 
     /// Counts them among the bonds that the last pass broke, without an energy: they held no force any more.

@@ -1,13 +1,12 @@
 //! Failure in the generic pass: which bonds break, what they stored, and how that is saved.
 
-use rayon::prelude::*;
-
 use super::{
     bond_failure::BondFailure,
     carried_deformation::CarriedDeformation,
     generic::{Generic, Scratch, at},
 };
 use crate::{
+    parallel,
     peridynamics::{
         force_state::PLASTIC_STRAIN,
         tearing_parameter::{Flow, tension},
@@ -56,22 +55,18 @@ impl<const D: usize> Generic<D> {
             (BondFailure::Tearing(tearing), Some(least)) => tearing.values()[i] >= least,
             _ => true,
         };
-        let points = (0..self.position.len()).into_par_iter().with_min_len(64);
-        let looked_at = points.filter_map(|i| {
+        parallel::listed(self.position.len(), 64, |i, failing| {
             let is_flattened = self.is_flattened(i, u);
-            (is_flattened || may(i)).then_some((i, is_flattened))
-        });
-        looked_at
-            .flat_map_iter(|(i, is_flattened)| {
-                let free = self.range(i).filter(move |_| !self.no_fail[i]);
-                free.filter(move |&bond| {
-                    self.intact[bond]
-                        && !self.no_fail[self.neighbour(bond)]
-                        && (is_flattened || fails(i, bond))
-                })
-                .map(move |bond| (i as u32, bond))
-            })
-            .collect()
+            if self.no_fail[i] || !(is_flattened || may(i)) {
+                return;
+            }
+            let found = self.range(i).filter(|&bond| {
+                self.intact[bond]
+                    && !self.no_fail[self.neighbour(bond)]
+                    && (is_flattened || fails(i, bond))
+            });
+            failing.extend(found.map(|bond| (i as u32, bond)));
+        })
     }
 
     /// Plastic flow of a point in a response that lies in the scratch, where a criterion asks for it.

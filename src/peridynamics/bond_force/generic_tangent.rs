@@ -1,9 +1,8 @@
 //! The tangent at rest of the generic pass, [SAND2015-7998] eq. (2.5) with the linear force state of [`crate::peridynamics::linear_force_state`].
 
-use rayon::prelude::*;
-
 use super::generic::{Generic, NONE, at};
 use crate::{
+    parallel,
     peridynamics::{StatePart, ZeroEnergyControl, body::split_rows},
     tensor::{Tensor, Vector, inverse},
 };
@@ -12,11 +11,10 @@ impl<const D: usize> Generic<D> {
     /// `y = K x` with the tangent at rest, broken bonds left out.
     pub(super) fn tangent_product(&self, x: &[f64], y: &mut [f64]) {
         let mut states = vec![Vector::<D>::zeros(); self.families.neighbours.len()];
-        split_rows(&mut states, &self.families.offsets)
-            .into_par_iter()
-            .with_min_len(64)
-            .enumerate()
-            .for_each(|(i, states)| {
+        parallel::for_each_task(
+            split_rows(&mut states, &self.families.offsets),
+            64,
+            |i, states| {
                 let start = self.range(i).start;
                 let here: Vector<D> = at(x, i);
                 let intact = || self.range(i).filter(|&bond| self.intact[bond]);
@@ -49,7 +47,8 @@ impl<const D: usize> Generic<D> {
                     }
                     states[bond - start] = t;
                 }
-            });
+            },
+        );
         self.gather(&states, y);
     }
 
@@ -103,14 +102,13 @@ impl<const D: usize> Generic<D> {
         let points = self.position.len();
         let sums: Vec<[f64; D]> = match self.omega.is_empty() {
             true => Vec::new(),
-            false => (0..points)
-                .into_par_iter()
-                .map(|i| self.gradient_sums(i))
-                .collect(),
+            false => parallel::map(points, 1, |i| self.gradient_sums(i)),
         };
         let mut result = vec![0.0; points * D];
-        let rows = result.par_chunks_exact_mut(D).with_min_len(64).enumerate();
-        rows.filter(|(i, _)| self.row[*i]).for_each(|(i, row)| {
+        parallel::for_each_chunk(&mut result, D, 64, |i, row| {
+            if !self.row[i] {
+                return;
+            }
             let mut own = Tensor::<D>::zeros();
             let mut first = Vector::<D>::zeros();
             let mut second = Vector::<D>::zeros();

@@ -8,7 +8,10 @@ use super::{
     simd::LANES,
     stencil::{NONE, Stencil},
 };
-use crate::system::{ExactSum, FailureUpdate, Interval, Segments};
+use crate::{
+    parallel,
+    system::{ExactSum, FailureUpdate, Interval, Segments},
+};
 
 /// Groups of eight points per task; a constant, so that no result depends on the number of threads.
 pub(super) const TASK: usize = 64;
@@ -140,9 +143,9 @@ impl<const D: usize> Lattice<D> {
 }
 
 pub(super) fn ones(bits: &[u8]) -> u64 {
-    bits.par_chunks(COPY)
-        .map(|c| c.iter().map(|b| u64::from(b.count_ones())).sum::<u64>())
-        .sum()
+    let of_chunk = |c: &[u8]| c.iter().map(|b| u64::from(b.count_ones())).sum::<u64>();
+    let counts = parallel::map_each(bits.par_chunks(COPY), of_chunk);
+    counts.iter().sum()
 }
 
 impl<const D: usize> BondPass<D> for Lattice<D> {
@@ -207,71 +210,67 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
             }
         ];
         if let Some(solid) = &self.solid {
-            dilatations
-                .par_chunks_mut(LANES)
-                .zip(&solid.group_of)
-                .filter(|(_, g)| **g != NONE)
-                .for_each(|(to, &g)| {
-                    for lane in 0..LANES {
-                        let (mut own, mut others) = ([0.0; D], 0.0);
-                        self.each(bits, g as usize, lane, |o, there| {
-                            let w = offsets[o].weight * self.volume[there];
-                            for (own, x) in own.iter_mut().zip(offsets[o].xi) {
-                                *own += w * x;
-                                others += (w * x).abs();
-                            }
-                        });
-                        to[lane] = (others + own.iter().map(|x| x.abs()).sum::<f64>())
-                            * solid.dilatation[g as usize][lane];
-                    }
-                });
-        }
-        let mut result = vec![0.0; self.points() * D];
-        result
-            .par_chunks_exact_mut(D)
-            .with_min_len(TASK)
-            .enumerate()
-            .for_each(|(p, row)| {
-                let volume = self.scale.get(p).copied().unwrap_or(self.unit);
-                if self.place[p] == NONE || volume == 0.0 {
+            parallel::for_each_chunk(&mut dilatations, LANES, 1, |group, to| {
+                let g = solid.group_of[group];
+                if g == NONE {
                     return;
                 }
-                let (g, lane) = (
-                    self.place[p] as usize / LANES,
-                    self.place[p] as usize % LANES,
-                );
-                let here = self.stencil.groups[g] as usize + lane;
-                let (mut own, mut first) = ([[0.0; D]; D], [0.0; D]);
-                self.each(bits, g, lane, |o, there| {
-                    let o = &offsets[o];
-                    let w = o.weight * self.volume[there] * volume;
-                    let mut stiffness = w / o.square;
-                    if let Some(s) = &self.solid {
-                        stiffness *= s.deviatoric[here] + s.deviatoric[there];
-                    }
-                    for a in 0..D {
-                        for b in 0..D {
-                            let k = stiffness * o.xi[a] * o.xi[b];
-                            own[a][b] += k;
-                            row[a] += k.abs();
+                for lane in 0..LANES {
+                    let (mut own, mut others) = ([0.0; D], 0.0);
+                    self.each(bits, g as usize, lane, |o, there| {
+                        let w = offsets[o].weight * self.volume[there];
+                        for (own, x) in own.iter_mut().zip(offsets[o].xi) {
+                            *own += w * x;
+                            others += (w * x).abs();
                         }
-                        if let Some(s) = &self.solid {
-                            first[a] += w * o.xi[a];
-                            let g = s.group_of[there / LANES];
-                            if g != NONE {
-                                let modulus = s.volumetric[g as usize][there % LANES];
-                                row[a] += (w * o.xi[a] * modulus).abs() * dilatations[there];
-                            }
-                        }
-                    }
-                });
+                    });
+                    to[lane] = (others + own.iter().map(|x| x.abs()).sum::<f64>())
+                        * solid.dilatation[g as usize][lane];
+                }
+            });
+        }
+        let mut result = vec![0.0; self.points() * D];
+        parallel::for_each_chunk(&mut result, D, TASK, |p, row| {
+            let volume = self.scale.get(p).copied().unwrap_or(self.unit);
+            if self.place[p] == NONE || volume == 0.0 {
+                return;
+            }
+            let (g, lane) = (
+                self.place[p] as usize / LANES,
+                self.place[p] as usize % LANES,
+            );
+            let here = self.stencil.groups[g] as usize + lane;
+            let (mut own, mut first) = ([[0.0; D]; D], [0.0; D]);
+            self.each(bits, g, lane, |o, there| {
+                let o = &offsets[o];
+                let w = o.weight * self.volume[there] * volume;
+                let mut stiffness = w / o.square;
+                if let Some(s) = &self.solid {
+                    stiffness *= s.deviatoric[here] + s.deviatoric[there];
+                }
                 for a in 0..D {
-                    row[a] += own[a].iter().map(|k| k.abs()).sum::<f64>();
+                    for b in 0..D {
+                        let k = stiffness * o.xi[a] * o.xi[b];
+                        own[a][b] += k;
+                        row[a] += k.abs();
+                    }
                     if let Some(s) = &self.solid {
-                        row[a] += (first[a] * s.volumetric[g][lane]).abs() * dilatations[here];
+                        first[a] += w * o.xi[a];
+                        let g = s.group_of[there / LANES];
+                        if g != NONE {
+                            let modulus = s.volumetric[g as usize][there % LANES];
+                            row[a] += (w * o.xi[a] * modulus).abs() * dilatations[there];
+                        }
                     }
                 }
             });
+            for a in 0..D {
+                row[a] += own[a].iter().map(|k| k.abs()).sum::<f64>();
+                if let Some(s) = &self.solid {
+                    row[a] += (first[a] * s.volumetric[g][lane]).abs() * dilatations[here];
+                }
+            }
+        });
         result
     }
 
@@ -283,31 +282,27 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
     }
 
     fn damage_into(&self, damage: &mut [f64]) {
-        damage
-            .par_iter_mut()
-            .with_min_len(TASK)
-            .enumerate()
-            .for_each(|(p, damage)| {
-                *damage = 0.0;
-                // most points are whole, which their group's words say at once
-                if !self.is_damaged(p) {
-                    return;
-                }
-                let (g, lane) = (
-                    self.place[p] as usize / LANES,
-                    self.place[p] as usize % LANES,
-                );
-                let (mut all, mut left) = (0.0, 0.0);
-                self.each(&self.stencil.reference, g, lane, |_, there| {
-                    all += self.volume[there]
-                });
-                self.each(&self.stencil.intact, g, lane, |_, there| {
-                    left += self.volume[there]
-                });
-                if left != all {
-                    *damage = 1.0 - left / all;
-                }
+        parallel::for_each_mut(damage, TASK, |p, damage| {
+            *damage = 0.0;
+            // most points are whole, which their group's words say at once
+            if !self.is_damaged(p) {
+                return;
+            }
+            let (g, lane) = (
+                self.place[p] as usize / LANES,
+                self.place[p] as usize % LANES,
+            );
+            let (mut all, mut left) = (0.0, 0.0);
+            self.each(&self.stencil.reference, g, lane, |_, there| {
+                all += self.volume[there]
             });
+            self.each(&self.stencil.intact, g, lane, |_, there| {
+                left += self.volume[there]
+            });
+            if left != all {
+                *damage = 1.0 - left / all;
+            }
+        });
     }
 
     fn is_damaged(&self, i: usize) -> bool {

@@ -11,7 +11,10 @@ use super::{
     simd::{LANES, Source, dispatch},
     stencil::NONE,
 };
-use crate::system::{FailureUpdate, Segments};
+use crate::{
+    parallel,
+    system::{FailureUpdate, Segments},
+};
 
 impl<const D: usize> Lattice<D> {
     /// Displacements by cell, of some cells or of all.
@@ -30,16 +33,14 @@ impl<const D: usize> Lattice<D> {
                     }
                 }
             };
-            to.par_chunks_mut(COPY)
-                .zip(point_of.par_chunks(COPY))
-                .enumerate()
-                .for_each(|(chunk, (to, points))| match cells {
-                    None => copy(to, points),
-                    Some(cells) => {
-                        let some = cells.of_chunk(chunk);
-                        some.for_each(|cells| copy(&mut to[cells.clone()], &points[cells]));
-                    }
-                });
+            let points = |chunk: usize| &point_of[chunk * COPY..];
+            parallel::for_each_chunk(to, COPY, 1, |chunk, to| match cells {
+                None => copy(to, points(chunk)),
+                Some(cells) => {
+                    let some = cells.of_chunk(chunk);
+                    some.for_each(|cells| copy(&mut to[cells.clone()], &points(chunk)[cells]));
+                }
+            });
         }
     }
 
@@ -80,23 +81,22 @@ impl<const D: usize> Lattice<D> {
     ) {
         let stencil = self.stencil.offsets.len().max(1);
         let vectors = if JOB == job::MOMENTS { 2 } else { D };
-        self.stencil
-            .groups
-            .par_chunks(TASK)
+        let groups = self.stencil.groups.par_chunks(TASK);
+        let tasks = groups
             .zip(self.stencil.intact.par_chunks(TASK * stencil))
             .zip(flags.par_chunks_mut(TASK))
-            .zip(sums.par_chunks_mut(TASK * vectors))
-            .for_each(|(((groups, bits), flags), sums)| {
-                dispatch(Task::<D, EXACT, JOB> {
-                    field,
-                    first: 0,
-                    skip,
-                    groups,
-                    bits: Bits::Held(bits),
-                    flags,
-                    sums,
-                });
+            .zip(sums.par_chunks_mut(TASK * vectors));
+        parallel::for_each(tasks, |(((groups, bits), flags), sums)| {
+            dispatch(Task::<D, EXACT, JOB> {
+                field,
+                first: 0,
+                skip,
+                groups,
+                bits: Bits::Held(bits),
+                flags,
+                sums,
             });
+        });
     }
 
     /// One sweep that may break bonds; returns which.
@@ -110,14 +110,14 @@ impl<const D: usize> Lattice<D> {
     ) -> Vec<Broken> {
         let stencil = self.stencil.offsets.len().max(1);
         let vectors = if JOB == job::MOMENTS { 2 } else { D };
-        self.stencil
-            .groups
-            .par_chunks(TASK)
+        let groups = self.stencil.groups.par_chunks(TASK);
+        let tasks = groups
             .zip(intact.par_chunks_mut(TASK * stencil))
             .zip(flags.par_chunks_mut(TASK))
-            .zip(sums.par_chunks_mut(TASK * vectors))
-            .enumerate()
-            .map(|(task, (((groups, bits), flags), sums))| {
+            .zip(sums.par_chunks_mut(TASK * vectors));
+        parallel::list_each(
+            tasks.enumerate(),
+            |(task, (((groups, bits), flags), sums))| {
                 dispatch(Task::<D, EXACT, JOB> {
                     field,
                     first: task * TASK,
@@ -127,12 +127,8 @@ impl<const D: usize> Lattice<D> {
                     flags,
                     sums,
                 })
-            })
-            // in the order of the tasks; lists without an entry take no memory
-            .reduce(Vec::new, |mut all, more| {
-                all.extend(more);
-                all
-            })
+            },
+        )
     }
 
     /// What the dilatations of a sweep make of `pull`, but for groups that are idle.
@@ -143,17 +139,19 @@ impl<const D: usize> Lattice<D> {
         sums: &[[f64; LANES]],
         pull: &mut [f64],
     ) {
-        pull.par_chunks_mut(LANES)
-            .with_min_len(COPY / LANES)
-            .zip(&solid.group_of)
-            .filter(|(_, g)| **g != NONE && flags[**g as usize] & IDLE == 0)
-            .for_each(|(pull, &g)| {
+        parallel::for_each_chunk(pull, COPY, 1, |chunk, pull| {
+            let groups = &solid.group_of[chunk * (COPY / LANES)..];
+            for (pull, &g) in pull.chunks_mut(LANES).zip(groups) {
+                if g == NONE || flags[g as usize] & IDLE != 0 {
+                    continue;
+                }
                 let g = g as usize;
                 for lane in 0..LANES {
                     let theta = solid.dilatation[g][lane] * sums[2 * g][lane];
                     pull[lane] = solid.volumetric[g][lane] * theta;
                 }
-            });
+            }
+        });
     }
 
     /// The force on a point.
@@ -172,22 +170,19 @@ impl<const D: usize> Lattice<D> {
     /// Forces by point, of own points where processes move theirs.
     pub(super) fn collect(&self, sums: &[[f64; LANES]], force: &mut [f64]) {
         let own = self.reach.as_ref().map(|reach| &reach.own);
-        force
-            .par_chunks_mut(COPY * D)
-            .enumerate()
-            .for_each(|(chunk, force)| {
-                let count = force.len() / D;
-                let mut copy = |points: Range<usize>| {
-                    let of = force[points.start * D..points.end * D].chunks_exact_mut(D);
-                    for (k, force) in points.zip(of) {
-                        force.copy_from_slice(&self.force_of(chunk * COPY + k, sums));
-                    }
-                };
-                match own {
-                    None => copy(0..count),
-                    Some(own) => own.of_chunk(chunk).for_each(copy),
+        parallel::for_each_chunk(force, COPY * D, 1, |chunk, force| {
+            let count = force.len() / D;
+            let mut copy = |points: Range<usize>| {
+                let of = force[points.start * D..points.end * D].chunks_exact_mut(D);
+                for (k, force) in points.zip(of) {
+                    force.copy_from_slice(&self.force_of(chunk * COPY + k, sums));
                 }
-            });
+            };
+            match own {
+                None => copy(0..count),
+                Some(own) => own.of_chunk(chunk).for_each(copy),
+            }
+        });
     }
 
     /// Forces of the points for which others wait.

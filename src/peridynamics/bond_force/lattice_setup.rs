@@ -1,7 +1,5 @@
 //! Makes the lattice pass from a cloud or from a block.
 
-use rayon::prelude::*;
-
 use super::{
     BlockSetup, BondForce, BondSetup, Kinematics,
     lattice::{Lattice, Solid, TASK, ones},
@@ -9,6 +7,7 @@ use super::{
     simd::LANES,
     stencil::{NONE, Stencil},
 };
+use crate::parallel;
 
 fn most_common(volume: &[f64]) -> f64 {
     let mut sorted = volume.to_vec();
@@ -201,11 +200,7 @@ impl<const D: usize> Lattice<D> {
                 })
             })
         };
-        let flags = (0..groups)
-            .into_par_iter()
-            .with_min_len(TASK)
-            .map(|g| if even(g) { EVEN } else { 0 })
-            .collect();
+        let flags = parallel::map(groups, TASK, |g| if even(g) { EVEN } else { 0 });
         let limit = offsets.iter().fold(f64::INFINITY, |m, o| m.min(o.limit));
         let reference = ones(&stencil.reference);
         let mut lattice = Self {

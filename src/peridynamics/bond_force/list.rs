@@ -10,7 +10,10 @@ use super::{
     list_simd::{self, Sum},
     stretch::psi,
 };
-use crate::system::{ExactSum, FailureUpdate, Interval};
+use crate::{
+    parallel,
+    system::{ExactSum, FailureUpdate, Interval},
+};
 
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
@@ -86,7 +89,7 @@ fn fill<T: Copy + Default + Send>(
         blocks.push((start..end, head));
         rest = tail;
     }
-    blocks.into_par_iter().for_each(|(range, numbers)| {
+    parallel::for_each_task(blocks, 1, |_, (range, numbers)| {
         let first = offsets[range.start];
         for i in range {
             for bond in offsets[i]..offsets[i + 1] {
@@ -215,16 +218,9 @@ impl<const D: usize> List<D> {
             };
             blocks.push((start..end, own, sums));
         }
-        blocks
-            .into_par_iter()
-            .map(|(points, bits, sums)| {
-                list_simd::add_up::<D, EXACT>(self, points, u, sum, bits, sums)
-            })
-            // in the order of the blocks
-            .reduce(Vec::new, |mut all, more| {
-                all.extend(more);
-                all
-            })
+        parallel::list_each(blocks.into_par_iter(), |(points, bits, sums)| {
+            list_simd::add_up::<D, EXACT>(self, points, u, sum, bits, sums)
+        })
     }
 
     /// The sum over intact bonds of point `i` of `f(bond, j, ξ, t, direction)`.
@@ -271,17 +267,20 @@ impl<const D: usize> List<D> {
                     Bits::Held(all) => (extension(Bits::Held(all), theta), all),
                     Bits::Breaking(all) => (extension(Bits::Breaking(all), theta), &*all),
                 };
-                let factors = theta.par_iter_mut().zip(&c.dilatation);
-                factors.for_each(|(theta, factor)| *theta *= factor);
+                parallel::for_each_chunk(theta, BLOCK, 1, |block, theta| {
+                    let factors = &c.dilatation[block * BLOCK..];
+                    let both = theta.iter_mut().zip(factors);
+                    both.for_each(|(theta, factor)| *theta *= factor);
+                });
                 self.add_up::<EXACT>(u, Sum::State(theta), Bits::Held(left), force);
                 broken
             }
         };
-        force
-            .par_chunks_exact_mut(D)
-            .with_min_len(BLOCK)
-            .zip(&self.volume)
-            .for_each(|(force, volume)| force.iter_mut().for_each(|f| *f *= -volume));
+        parallel::for_each_chunk(force, BLOCK * D, 1, |block, force| {
+            let volumes = &self.volume[block * BLOCK..];
+            let both = force.chunks_exact_mut(D).zip(volumes);
+            both.for_each(|(force, volume)| force.iter_mut().for_each(|f| *f *= -volume));
+        });
         broken
     }
 
@@ -310,35 +309,31 @@ impl<const D: usize> List<D> {
     }
 
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
-        let energies: Vec<f64> = (0..self.points())
-            .into_par_iter()
-            .with_min_len(BLOCK)
-            .map(|i| {
-                if !self.row[i] {
-                    return 0.0;
-                }
-                let mut sum = 0.0;
-                self.each::<EXACT>(i, u, |bond, j, s| {
-                    let e = extension::<EXACT>(s.t());
-                    sum += self.weights.get(bond) * self.volume[j] * e * e * s.length;
-                });
-                // pairwise: 2 p r² e² r² / 4; state-based: B ω e² r² / 2
-                self.volume[i]
-                    * match &self.solid {
-                        None => 0.25 * sum,
-                        Some(c) => {
-                            let theta = self.dilatation::<EXACT>(c, i, u);
-                            // (k − (D+2) μ/D) = A m/D
-                            let a = if c.dilatation[i] == 0.0 {
-                                0.0
-                            } else {
-                                c.volumetric[i] / c.dilatation[i]
-                            };
-                            0.5 * (a * theta * theta + c.deviatoric[i] * sum)
-                        }
+        let energies: Vec<f64> = parallel::map(self.points(), BLOCK, |i| {
+            if !self.row[i] {
+                return 0.0;
+            }
+            let mut sum = 0.0;
+            self.each::<EXACT>(i, u, |bond, j, s| {
+                let e = extension::<EXACT>(s.t());
+                sum += self.weights.get(bond) * self.volume[j] * e * e * s.length;
+            });
+            // pairwise: 2 p r² e² r² / 4; state-based: B ω e² r² / 2
+            self.volume[i]
+                * match &self.solid {
+                    None => 0.25 * sum,
+                    Some(c) => {
+                        let theta = self.dilatation::<EXACT>(c, i, u);
+                        // (k − (D+2) μ/D) = A m/D
+                        let a = if c.dilatation[i] == 0.0 {
+                            0.0
+                        } else {
+                            c.volumetric[i] / c.dilatation[i]
+                        };
+                        0.5 * (a * theta * theta + c.deviatoric[i] * sum)
                     }
-            })
-            .collect();
+                }
+        });
         energies.iter().sum()
     }
 }
@@ -379,67 +374,59 @@ impl<const D: usize> BondPass<D> for List<D> {
         // Σ_l |∂θ_i/∂u_l| in the maximum norm over components
         let sums: Vec<f64> = match &self.solid {
             None => Vec::new(),
-            Some(c) => (0..points)
-                .into_par_iter()
-                .with_min_len(BLOCK)
-                .map(|i| {
-                    let (mut own, mut others) = ([0.0; D], 0.0);
-                    for bond in self.offsets[i]..self.offsets[i + 1] {
-                        if self.is_intact(i, bond - self.offsets[i]) {
-                            let j = self.neighbours.get(i, bond);
-                            let w = self.weights.get(bond) * self.volume[j];
-                            for (own, x) in own.iter_mut().zip(self.xi(i, j)) {
-                                *own += w * x;
-                                others += (w * x).abs();
-                            }
+            Some(c) => parallel::map(points, BLOCK, |i| {
+                let (mut own, mut others) = ([0.0; D], 0.0);
+                for bond in self.offsets[i]..self.offsets[i + 1] {
+                    if self.is_intact(i, bond - self.offsets[i]) {
+                        let j = self.neighbours.get(i, bond);
+                        let w = self.weights.get(bond) * self.volume[j];
+                        for (own, x) in own.iter_mut().zip(self.xi(i, j)) {
+                            *own += w * x;
+                            others += (w * x).abs();
                         }
                     }
-                    (others + own.iter().map(|x| x.abs()).sum::<f64>()) * c.dilatation[i]
-                })
-                .collect(),
+                }
+                (others + own.iter().map(|x| x.abs()).sum::<f64>()) * c.dilatation[i]
+            }),
         };
         let mut result = vec![0.0; points * D];
-        result
-            .par_chunks_exact_mut(D)
-            .with_min_len(BLOCK)
-            .enumerate()
-            .for_each(|(i, row)| {
-                if !self.row[i] {
-                    return;
+        parallel::for_each_chunk(&mut result, D, BLOCK, |i, row| {
+            if !self.row[i] {
+                return;
+            }
+            let mut own = [[0.0; D]; D];
+            let mut first = [0.0; D];
+            for bond in self.offsets[i]..self.offsets[i + 1] {
+                if !self.is_intact(i, bond - self.offsets[i]) {
+                    continue;
                 }
-                let mut own = [[0.0; D]; D];
-                let mut first = [0.0; D];
-                for bond in self.offsets[i]..self.offsets[i + 1] {
-                    if !self.is_intact(i, bond - self.offsets[i]) {
-                        continue;
-                    }
-                    let j = self.neighbours.get(i, bond);
-                    let xi = self.xi(i, j);
-                    let length: f64 = xi.iter().map(|x| x * x).sum();
-                    let w = self.weights.get(bond) * self.volume[i] * self.volume[j];
-                    let stiffness = match &self.solid {
-                        None => w / length,
-                        Some(c) => (c.deviatoric[i] + c.deviatoric[j]) * w / length,
-                    };
-                    for a in 0..D {
-                        for b in 0..D {
-                            let k = stiffness * xi[a] * xi[b];
-                            own[a][b] += k;
-                            row[a] += k.abs();
-                        }
-                        if let Some(c) = &self.solid {
-                            first[a] += w * xi[a];
-                            row[a] += (w * xi[a] * c.volumetric[j]).abs() * sums[j];
-                        }
-                    }
-                }
+                let j = self.neighbours.get(i, bond);
+                let xi = self.xi(i, j);
+                let length: f64 = xi.iter().map(|x| x * x).sum();
+                let w = self.weights.get(bond) * self.volume[i] * self.volume[j];
+                let stiffness = match &self.solid {
+                    None => w / length,
+                    Some(c) => (c.deviatoric[i] + c.deviatoric[j]) * w / length,
+                };
                 for a in 0..D {
-                    row[a] += own[a].iter().map(|k| k.abs()).sum::<f64>();
+                    for b in 0..D {
+                        let k = stiffness * xi[a] * xi[b];
+                        own[a][b] += k;
+                        row[a] += k.abs();
+                    }
                     if let Some(c) = &self.solid {
-                        row[a] += (first[a] * c.volumetric[i]).abs() * sums[i];
+                        first[a] += w * xi[a];
+                        row[a] += (w * xi[a] * c.volumetric[j]).abs() * sums[j];
                     }
                 }
-            });
+            }
+            for a in 0..D {
+                row[a] += own[a].iter().map(|k| k.abs()).sum::<f64>();
+                if let Some(c) = &self.solid {
+                    row[a] += (first[a] * c.volumetric[i]).abs() * sums[i];
+                }
+            }
+        });
         result
     }
 
@@ -451,26 +438,22 @@ impl<const D: usize> BondPass<D> for List<D> {
     }
 
     fn damage_into(&self, damage: &mut [f64]) {
-        damage
-            .par_iter_mut()
-            .with_min_len(1024)
-            .enumerate()
-            .for_each(|(i, damage)| {
-                *damage = 0.0;
-                // most points are whole
-                if !self.is_damaged(i) {
-                    return;
+        parallel::for_each_mut(damage, 1024, |i, damage| {
+            *damage = 0.0;
+            // most points are whole
+            if !self.is_damaged(i) {
+                return;
+            }
+            let (mut all, mut lost) = (0.0, 0.0);
+            for bond in self.offsets[i]..self.offsets[i + 1] {
+                let v = self.volume[self.neighbours.get(i, bond)];
+                all += v;
+                if !self.is_intact(i, bond - self.offsets[i]) {
+                    lost += v;
                 }
-                let (mut all, mut lost) = (0.0, 0.0);
-                for bond in self.offsets[i]..self.offsets[i + 1] {
-                    let v = self.volume[self.neighbours.get(i, bond)];
-                    all += v;
-                    if !self.is_intact(i, bond - self.offsets[i]) {
-                        lost += v;
-                    }
-                }
-                *damage = lost / all;
-            });
+            }
+            *damage = lost / all;
+        });
     }
 
     fn is_damaged(&self, i: usize) -> bool {
@@ -478,13 +461,9 @@ impl<const D: usize> BondPass<D> for List<D> {
     }
 
     fn broken(&self) -> u64 {
-        let standing: u64 = self
-            .intact
-            .par_iter()
-            .with_min_len(4096)
-            .map(|b| u64::from(b.count_ones()))
-            .sum();
-        self.reference - standing
+        let of_chunk = |c: &[u8]| c.iter().map(|b| u64::from(b.count_ones())).sum();
+        let standing: Vec<u64> = parallel::map_each(self.intact.par_chunks(4096), of_chunk);
+        self.reference - standing.iter().sum::<u64>()
     }
 
     fn last_broken(&self) -> Vec<(u32, u32)> {

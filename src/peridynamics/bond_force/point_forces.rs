@@ -18,6 +18,7 @@ use super::{
 };
 use crate::{
     material::LocalResponse,
+    parallel,
     peridynamics::{
         KeptDamage, StatePart,
         body::split_rows,
@@ -166,7 +167,7 @@ impl<const D: usize> Generic<D> {
         let flows = flows.filter(|_| matches!(self.failure, BondFailure::Tearing(_)));
         let all = given.by_points(D).zip(strength).zip(gradient).zip(own);
         let all = all.zip(histories).zip(&mut outcome).enumerate();
-        all.with_min_len(16).for_each(|(i, point)| {
+        parallel::for_each(all.with_min_len(16), |(i, point)| {
             let (((((given, strength), gradient), own), present), outcome) = point;
             given.fill(0.0);
             (*strength, *own, *outcome) = (0.0, Vector::zeros(), Outcome::default());
@@ -254,8 +255,7 @@ impl<const D: usize> Generic<D> {
 
     /// `−V_i Σ V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)` of the points with rows.
     pub(super) fn gather_points(&self, points: &PointForces<D>, u: &[f64], force: &mut [f64]) {
-        let rows = force.par_chunks_exact_mut(D).with_min_len(64).enumerate();
-        rows.for_each(|(i, force)| {
+        parallel::for_each_chunk(force, D, 64, |i, force| {
             force.fill(0.0);
             if !self.row[i] {
                 return;

@@ -6,7 +6,10 @@
 use rayon::prelude::*;
 
 use super::simd::{Lanes, Work, dispatch};
-use crate::tensor::{Tensor, Vector};
+use crate::{
+    parallel,
+    tensor::{Tensor, Vector},
+};
 
 /// Numbers of a padded vector of so many components.
 const fn width(components: usize) -> usize {
@@ -17,6 +20,9 @@ const fn width(components: usize) -> usize {
 const fn components(width: usize) -> usize {
     if width == 4 { 3 } else { width }
 }
+
+/// Points that a task pads.
+const POINTS: usize = 256;
 
 /// Position, displacement and, for a drag, velocity of every point.
 #[derive(Default)]
@@ -35,15 +41,23 @@ impl Sites {
         let (width, each) = (width(D), 2 + usize::from(velocity.is_some()));
         self.has_velocity = velocity.is_some();
         self.padded.resize(position.len() * each * width, 0.0);
-        let sites = self.padded.par_chunks_exact_mut(each * width).enumerate();
-        sites.with_min_len(256).for_each(|(i, site)| {
-            let of = |all: &'_ [f64]| -> [f64; D] { std::array::from_fn(|a| all[i * D + a]) };
-            site[..D].copy_from_slice(position[i].as_slice());
-            site[width..][..D].copy_from_slice(&of(u));
-            if let Some(velocity) = velocity {
-                site[2 * width..][..D].copy_from_slice(&of(velocity));
-            }
-        });
+        parallel::for_each_chunk(
+            &mut self.padded,
+            POINTS * each * width,
+            1,
+            |chunk, sites| {
+                for (k, site) in sites.chunks_exact_mut(each * width).enumerate() {
+                    let i = chunk * POINTS + k;
+                    let of =
+                        |all: &'_ [f64]| -> [f64; D] { std::array::from_fn(|a| all[i * D + a]) };
+                    site[..D].copy_from_slice(position[i].as_slice());
+                    site[width..][..D].copy_from_slice(&of(u));
+                    if let Some(velocity) = velocity {
+                        site[2 * width..][..D].copy_from_slice(&of(velocity));
+                    }
+                }
+            },
+        );
     }
 
     pub(super) fn memory_bytes(&self) -> usize {

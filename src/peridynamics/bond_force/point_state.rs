@@ -1,13 +1,15 @@
 //! What the pass over points that have a stress keeps, and what a drag remembers.
 
-use rayon::prelude::*;
-
 use super::point_loops::{Given, Sites};
 use crate::{
+    parallel,
     peridynamics::{ForceState, zero_energy::ZeroEnergyControl},
     system::Interval,
     tensor::{Tensor, Vector},
 };
+
+/// Numbers of a task that makes velocities.
+const NUMBERS: usize = 4096;
 
 /// What a family has whatever its deformation, by its intact bonds.
 #[derive(Clone, Copy)]
@@ -105,11 +107,13 @@ impl Drag {
         self.present.copy_from_slice(u);
         match interval.length > 0.0 {
             true => {
-                let moved = u.par_iter().zip(&self.before);
-                let velocities = self.present_velocity.par_iter_mut().with_min_len(4096);
-                velocities
-                    .zip(moved)
-                    .for_each(|(v, (now, before))| *v = (now - before) / interval.length);
+                parallel::for_each_chunk(&mut self.present_velocity, NUMBERS, 1, |chunk, v| {
+                    let start = chunk * NUMBERS;
+                    let moved = u[start..].iter().zip(&self.before[start..]);
+                    for (v, (now, before)) in v.iter_mut().zip(moved) {
+                        *v = (now - before) / interval.length;
+                    }
+                });
             }
             false => self.present_velocity.clone_from(&self.velocity),
         }

@@ -5,7 +5,7 @@ use super::{
     simd::LANES,
     stencil_numbers::{Numbers, numbers},
 };
-use crate::{peridynamics::offset_table::OffsetTable, tensor::Vector};
+use crate::{parallel, peridynamics::offset_table::OffsetTable, tensor::Vector};
 use rayon::prelude::*;
 
 /// Largest distance of a point from its lattice site, in parts of the spacing.
@@ -234,28 +234,27 @@ impl<const D: usize> LaneSites<'_, D> {
         let with_family = |p: u32| p != NONE && !setup.families.of(p as usize).is_empty();
         let mut reference = vec![0u8; self.groups.len() * stencil];
         let mut intact = reference.clone();
-        reference
+        let bits = reference
             .par_chunks_mut(stencil.max(1))
-            .zip(intact.par_chunks_mut(stencil.max(1)))
-            .zip(self.groups)
-            .for_each(|((reference, intact), &cell)| {
-                for lane in 0..LANES {
-                    let i = self.point_of[cell as usize + lane];
-                    if !with_family(i) {
+            .zip(intact.par_chunks_mut(stencil.max(1)));
+        parallel::for_each(bits.zip(self.groups), |((reference, intact), &cell)| {
+            for lane in 0..LANES {
+                let i = self.point_of[cell as usize + lane];
+                if !with_family(i) {
+                    continue;
+                }
+                let i = i as usize;
+                for &j in setup.families.of(i) {
+                    let Some(o) = self.position.of(&step(i, j)) else {
                         continue;
-                    }
-                    let i = i as usize;
-                    for &j in setup.families.of(i) {
-                        let Some(o) = self.position.of(&step(i, j)) else {
-                            continue;
-                        };
-                        reference[o] |= 1 << lane;
-                        if !setup.precracked.is_some_and(|cut| cut(i, j as usize)) {
-                            intact[o] |= 1 << lane;
-                        }
+                    };
+                    reference[o] |= 1 << lane;
+                    if !setup.precracked.is_some_and(|cut| cut(i, j as usize)) {
+                        intact[o] |= 1 << lane;
                     }
                 }
-            });
+            }
+        });
         (reference, intact)
     }
 
@@ -411,10 +410,11 @@ impl<const D: usize> Stencil<D> {
                 })
             })
         };
-        self.reference
-            .par_chunks(count.max(1))
-            .zip(&self.groups)
-            .any(|(bits, &cell)| is_one_sided(cell as usize, bits))
+        count > 0
+            && !parallel::all(self.groups.len(), 1, |g| {
+                let bits = &self.reference[g * count..][..count];
+                !is_one_sided(self.groups[g] as usize, bits)
+            })
     }
 }
 
@@ -505,19 +505,17 @@ impl<const D: usize> BlockSetup<'_, D> {
         }
         let groups: Vec<u32> = cells.groups().map(|c| c as u32).collect();
         let mut reference = vec![0u8; groups.len() * offsets.len()];
-        reference
-            .par_chunks_mut(offsets.len().max(1))
-            .zip(&groups)
-            .for_each(|(bits, &cell)| {
-                for (bits, o) in bits.iter_mut().zip(&offsets) {
-                    for lane in 0..LANES {
-                        let here = cell as usize + lane;
-                        let there = (here as isize + o.delta) as usize;
-                        let stands = point_of[here] != NONE && point_of[there] != NONE;
-                        *bits |= u8::from(stands) << lane;
-                    }
+        parallel::for_each_chunk(&mut reference, offsets.len().max(1), 1, |group, bits| {
+            let cell = groups[group];
+            for (bits, o) in bits.iter_mut().zip(&offsets) {
+                for lane in 0..LANES {
+                    let here = cell as usize + lane;
+                    let there = (here as isize + o.delta) as usize;
+                    let stands = point_of[here] != NONE && point_of[there] != NONE;
+                    *bits |= u8::from(stands) << lane;
                 }
-            });
+            }
+        });
         Stencil {
             offsets,
             point_of,

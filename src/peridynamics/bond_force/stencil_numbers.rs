@@ -1,9 +1,7 @@
 //! Weights and limits of the bonds of a lattice, by their steps.
 
-use rayon::prelude::*;
-
 use super::{BondSetup, force_problem::ENDS, shared_rows::Known};
-use crate::peridynamics::offset_table::OffsetTable;
+use crate::{parallel, peridynamics::offset_table::OffsetTable};
 
 /// Largest distance of a weight from that of its offset, in parts of it.
 const TOLERANCE: f64 = 1e-9;
@@ -46,16 +44,13 @@ pub(super) fn numbers<const D: usize>(
     points: usize,
     step: impl Fn(usize, u32) -> [i32; D] + Sync,
 ) -> Result<Numbers<D>, String> {
-    let reach = (0..points)
-        .into_par_iter()
-        .with_min_len(POINTS)
-        .map(|i| {
-            let family = setup.families.of(i).iter();
-            let farthest = |&j: &u32| step(i, j).into_iter().map(i32::abs).max();
-            family.filter_map(farthest).max().unwrap_or(0)
-        })
-        .max()
-        .unwrap_or(0);
+    let reaches = parallel::map(points.div_ceil(POINTS), 1, |task| {
+        let points = task * POINTS..((task + 1) * POINTS).min(points);
+        let bonds = points.flat_map(|i| setup.families.of(i).iter().map(move |&j| (i, j)));
+        let farthest = |(i, j)| step(i, j).into_iter().map(i32::abs).max();
+        bonds.filter_map(farthest).max().unwrap_or(0)
+    });
+    let reach = reaches.into_iter().max().unwrap_or(0);
     let known = first_bonds(setup, points, reach, step);
     let (all, mut are_alike) = match (setup.shared, known) {
         (None, known) => known?,
@@ -105,9 +100,8 @@ fn first_bonds<const D: usize>(
     };
     // tasks of fixed size, joined in order: the first point with a bond gives its numbers, for any number of threads
     let size = POINTS.max(points.div_ceil(TASKS));
-    let parts: Vec<(OffsetTable<Known, D>, bool)> = (0..points.div_ceil(size))
-        .into_par_iter()
-        .map(|task| {
+    let parts: Vec<(OffsetTable<Known, D>, bool)> =
+        parallel::try_map(points.div_ceil(size), 1, |task| {
             let points = task * size..((task + 1) * size).min(points);
             // every family has bonds of the largest weight, unless it is cut off
             let first = points.clone().find(|&i| !setup.families.of(i).is_empty());
@@ -133,8 +127,7 @@ fn first_bonds<const D: usize>(
                 }
             }
             Ok((found, are_alike))
-        })
-        .collect::<Result<_, String>>()?;
+        })?;
     let (mut all, mut are_alike) = (OffsetTable::empty(reach), true);
     let most = parts.iter().map(|(part, _)| largest(part));
     let most = most.fold(0.0, f64::max);

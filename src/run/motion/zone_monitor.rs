@@ -1,13 +1,14 @@
 //! Where a zone that follows the crack is wanted, and when that is looked at.
 
-use rayon::prelude::*;
-
 use super::bounding_boxes::CellBoxes;
-use crate::coupling::{Model, SiteKind, Zone};
 use crate::fem;
 use crate::scene::adaptive_zone::Follow;
 use crate::system::SemiDiscrete;
 use crate::tensor::{Tensor, Vector};
+use crate::{
+    coupling::{Model, SiteKind, Zone},
+    parallel,
+};
 
 /// Part of the padding beyond the reach that the fastest crack may cross between two looks; the rest is how far it runs before the zone has to change.
 const CROSSED: f64 = 0.3;
@@ -76,19 +77,18 @@ impl<'a, const D: usize> ZoneMonitor<'a, D> {
         let barriers = model.peridynamics.as_ref().map_or(&[][..], |p| &p.barriers);
         let voids = model.peridynamics.as_ref().map_or(&[][..], |p| &p.voids);
         let boxes = CellBoxes::new(mesh);
-        let (cut, notched) = (0..cells)
-            .into_par_iter()
-            .map(|c| {
-                let (x, (low, high)) = (mesh.centroid(c), boxes.of(c));
-                let own = 0.5 * (high - low).amax();
-                let shapes = barriers.iter().map(|b| b.shape()).chain(voids);
-                let distance = shapes
-                    .map(|s| s.signed_distance(&x))
-                    .fold(f64::INFINITY, f64::min);
-                let is_cut = distance < follow.reach + own * (1.0 - 1e-9);
-                (!follow.barred[c] && is_cut, distance < own * (1.0 + 1e-9))
-            })
-            .unzip();
+        let (cut, notched) = parallel::map(cells, 1, |c| {
+            let (x, (low, high)) = (mesh.centroid(c), boxes.of(c));
+            let own = 0.5 * (high - low).amax();
+            let shapes = barriers.iter().map(|b| b.shape()).chain(voids);
+            let distance = shapes
+                .map(|s| s.signed_distance(&x))
+                .fold(f64::INFINITY, f64::min);
+            let is_cut = distance < follow.reach + own * (1.0 - 1e-9);
+            (!follow.barred[c] && is_cut, distance < own * (1.0 + 1e-9))
+        })
+        .into_iter()
+        .unzip();
         let mut watch = Self {
             follow,
             model,
@@ -262,18 +262,13 @@ impl<'a, const D: usize> ZoneMonitor<'a, D> {
     fn mark_elements(&self, u: &[f64], hot: &mut [bool]) {
         let limit = self.limits[0];
         let of_site = |site: u32| Vector::<D>::from_column_slice(&u[site as usize * D..][..D]);
-        let found: Vec<u32> = (0..self.elements.len())
-            .into_par_iter()
-            .with_min_len(256)
-            .filter(|&e| {
-                let mut g = Tensor::<D>::zeros();
-                for (site, shape) in &self.gradients[self.offsets[e]..self.offsets[e + 1]] {
-                    g += of_site(*site) * shape.transpose();
-                }
-                largest_stretch(&g, limit) > limit
-            })
-            .map(|e| self.elements[e])
-            .collect();
+        let found: Vec<u32> = parallel::filter_map(self.elements.len(), 256, |e| {
+            let mut g = Tensor::<D>::zeros();
+            for (site, shape) in &self.gradients[self.offsets[e]..self.offsets[e + 1]] {
+                g += of_site(*site) * shape.transpose();
+            }
+            (largest_stretch(&g, limit) > limit).then(|| self.elements[e])
+        });
         found.into_iter().for_each(|c| hot[c as usize] = true);
     }
 
@@ -284,23 +279,20 @@ impl<'a, const D: usize> ZoneMonitor<'a, D> {
         };
         let position = &body.cloud.position;
         let [lowest, highest] = self.limits.map(|s| s * (2.0 + s));
-        let found: Vec<[u32; 2]> = bonds
-            .par_iter()
-            .with_min_len(1024)
-            .filter(|([i, j], r2)| {
-                let [a, b] = [*i, *j].map(|p| self.site_of_point[p as usize] as usize * D);
-                let (mut along, mut square) = (0.0, 0.0);
-                for k in 0..D {
-                    let eta = u[b + k] - u[a + k];
-                    along += (position[*j as usize][k] - position[*i as usize][k]) * eta;
-                    square += eta * eta;
-                }
-                // (|ξ + η|² − |ξ|²)/|ξ|² = s (2 + s); a bond beyond the critical stretch is broken, or may not break
-                let t = 2.0 * along + square;
-                t > lowest * r2 && t <= highest * r2
-            })
-            .map(|bond| bond.0)
-            .collect();
+        let found: Vec<[u32; 2]> = parallel::filter_map(bonds.len(), 1024, |bond| {
+            let (ends, r2) = &bonds[bond];
+            let [i, j] = ends;
+            let [a, b] = [*i, *j].map(|p| self.site_of_point[p as usize] as usize * D);
+            let (mut along, mut square) = (0.0, 0.0);
+            for k in 0..D {
+                let eta = u[b + k] - u[a + k];
+                along += (position[*j as usize][k] - position[*i as usize][k]) * eta;
+                square += eta * eta;
+            }
+            // (|ξ + η|² − |ξ|²)/|ξ|² = s (2 + s); a bond beyond the critical stretch is broken, or may not break
+            let t = 2.0 * along + square;
+            (t > lowest * r2 && t <= highest * r2).then_some(*ends)
+        });
         for point in found.into_iter().flatten() {
             self.mark_point(self.site_of_point[point as usize], hot);
         }

@@ -1,12 +1,9 @@
 //! Affine fields through the model of a scene: whether each row balances a constant stress, and by how much the stress is wrong where it does not.
 
-use rayon::prelude::*;
-
 use super::classes::{Layout, RowClass, Skin, Unbalanced, limits, told};
 use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress};
 use super::patch::{Around, PatchField, StressError, stress_errors};
 use super::surface::{self, Boundary, FacetKind};
-use crate::assembly::Row;
 use crate::coupling::{Model, Operator, Site, SiteKind, Zone};
 use crate::observe::proof::Part;
 use crate::progress::Progress;
@@ -16,6 +13,7 @@ use crate::scene::conditions::{Condition, Support};
 use crate::scene::spec::PrecisionSpec;
 use crate::system::{BlockCsr, Spread};
 use crate::tensor::{Tensor, Tensor4, Vector};
+use crate::{assembly::Row, parallel};
 
 /// Most rows whose kind is found out one by one; of more, a sample of the worst.
 const CLASSIFIED: usize = 20_000;
@@ -60,9 +58,9 @@ fn centre<const D: usize>(model: &Model<D>) -> Vector<D> {
 
 fn affine<const D: usize>(model: &Model<D>, g: &Tensor<D>, centre: &Vector<D>) -> Vec<f64> {
     let mut u = vec![0.0; model.sites.len() * D];
-    u.par_chunks_mut(D)
-        .zip(&model.sites)
-        .for_each(|(u, s)| u.copy_from_slice((g * (s.position - centre)).as_slice()));
+    parallel::for_each_chunk(&mut u, D, 1, |s, u| {
+        u.copy_from_slice((g * (model.sites[s].position - centre)).as_slice());
+    });
     u
 }
 
@@ -112,9 +110,8 @@ pub(super) fn part<const D: usize>(
                 model.add_scaled_row(subject.operator, s, row);
                 row.take_products([u])[0]
             };
-            let each = (0..sites).into_par_iter();
-            let each = each.map_init(|| Row::<D>::new(sites), |row, s| rows(s, row));
-            let products: Vec<Vector<D>> = each.collect();
+            let new = || Row::<D>::new(sites);
+            let products = parallel::map_with(sites, 1, new, |row, s| rows(s, row));
             force.clear();
             products.iter().for_each(|f| force.extend(f.iter()));
         }
@@ -150,7 +147,7 @@ fn prove<const D: usize>(
         let u = affine(model, g, &centre);
         apply(number, &u, &mut force);
         nodal_forces(model, &integrals, &site_of_node, g, &mut wanted);
-        worst.par_iter_mut().enumerate().for_each(|(s, worst)| {
+        parallel::for_each_mut(&mut worst, 1, |s, worst| {
             let v = model.sites[s].volume;
             let h = v.powf(1.0 / D as f64);
             let difference = (s * D..(s + 1) * D).map(|k| (force[k] - wanted[k]).abs());
@@ -323,12 +320,10 @@ fn classes<const D: usize>(
 ) -> Vec<Class> {
     let model = subject.model;
     let classes_of = |sites: &[u32]| -> Vec<Class> {
-        let sites = sites.par_iter();
-        let classes = sites.map_init(
-            || Row::<D>::new(model.sites.len()),
-            |row, &s| class(subject, boundary, reach, s, row),
-        );
-        classes.collect()
+        let new = || Row::<D>::new(model.sites.len());
+        parallel::map_with(sites.len(), 1, new, |row, k| {
+            class(subject, boundary, reach, sites[k], row)
+        })
     };
     match &subject.spread {
         // a row takes families that its own process holds

@@ -1,9 +1,6 @@
 //! The stress error of a row that an affine field leaves out of balance: the sites around it are released and solved for, everything else keeps the field.
 
-use rayon::prelude::*;
-
 use super::surface::{Boundary, FacetKind};
-use crate::assembly::Row;
 use crate::coupling::{Model, Operator, SiteKind};
 use crate::fem;
 use crate::progress::Silent;
@@ -13,6 +10,7 @@ use crate::solve::direct_params::DirectParams;
 use crate::solve::ordering::Ordering;
 use crate::system::{BlockCsr, Spread, Symmetry};
 use crate::tensor::{Tensor, Vector, padded};
+use crate::{assembly::Row, parallel};
 
 /// Most sites of a patch: in the plane some four horizons around its middle at m = 3, in space one and a half. With 300 in the plane the patch of a splice on scattered points came near to a singular one.
 const SITES: [usize; 3] = [200, 500, 250];
@@ -111,7 +109,7 @@ pub(super) fn stress_errors<const D: usize>(
             }
         }
         let mut u = vec![0.0; model.sites.len() * D];
-        u.par_chunks_mut(D).enumerate().for_each(|(s, u)| {
+        parallel::for_each_chunk(&mut u, D, 1, |s, u| {
             let x = model.sites[s].position - around.centre;
             u.copy_from_slice((field.gradient * x).as_slice());
         });
@@ -215,7 +213,8 @@ fn own_rows<const D: usize>(
 ) -> Rows {
     let model = around.model;
     let new_row = || Row::<D>::new(model.sites.len());
-    let each = some.par_iter().map_init(new_row, |row, &site| {
+    let each = parallel::map_with(some.len(), 1, new_row, |row, k| {
+        let site = some[k];
         match around.stiffness {
             Some(stiffness) => {
                 let (columns, values) = stiffness.row(site as usize);
@@ -248,7 +247,6 @@ fn own_rows<const D: usize>(
         let products: Vec<Vector<D>> = fields.iter().zip(mismatches).map(product).collect();
         (within, products)
     });
-    let each: Vec<_> = each.collect();
     let (mut matrix, mut products) = (no_rows::<D>(), Vec::new());
     for (within, of_fields) in each {
         for (place, block) in within {

@@ -4,15 +4,13 @@
 //! A density that is wrong by the fraction `ε` of `C : ∇∇u` in a layer of the thickness `δ` moves the stress by `ε δ C ∇∇u`, a stress that is wrong by `ℓ C ∇∇u` does so at once; over a zone of the size L,
 //! in which the strain changes by `L ∇∇u`, the error of the strain is `ε δ/L` or `ℓ/L` of that change. It is of first order in δ, where classical elasticity beside a right seam is met with second order.
 
-use rayon::prelude::*;
-
 use super::Subject;
-use crate::assembly::Row;
 use crate::coupling::{CellRole, PointSource, SiteKind};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::peridynamics::PdBody;
 use crate::run::error::RunError;
 use crate::tensor::{Tensor, Tensor4, Vector};
+use crate::{assembly::Row, parallel};
 
 /// Error of the strain over its change across the zone, as this check predicts it, from which on it is warned of: elements of two spacings beside a right seam err as much.
 const WARNED: f64 = 0.01;
@@ -103,35 +101,34 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     if model.faces_cut_bonds() || (0..places).all(is_site) {
         return Ok(None);
     }
-    let whole: Vec<bool> = (0..places)
-        .into_par_iter()
-        .map(|i| is_whole(body, i) && is_of_material(body, i, model.peridynamic_material()))
-        .collect();
+    let whole: Vec<bool> = parallel::map(places, 1, |i| {
+        is_whole(body, i) && is_of_material(body, i, model.peridynamic_material())
+    });
     let seam = seam_sites(subject, body, &whole);
     let Some(&(first, _)) = seam.first() else {
         return Ok(None);
     };
     let tensor = body.collapsed_tensor(first);
     let stiffness = tensor.get(0, 0, 0, 0);
-    let moments: Vec<(f64, Vec<Tensor<D>>)> = seam
-        .par_iter()
-        .map_init(
-            || Row::<D>::new(model.sites.len()),
-            |row, &(point, site)| {
-                // assembled rows are scaled to the part of the body that a site stands for
-                let scale = match subject.stiffness {
-                    Some(_) => model.row_scale().map_or(1.0, |scale| scale[site]),
-                    None => 1.0,
-                };
-                let volume = body.cloud.volume[point] * scale;
-                let mut sums = second_moments(subject, site, row);
-                for (sum, (b, d)) in sums.iter_mut().zip(pairs::<D>()) {
-                    *sum += density(&tensor, b, d) * volume;
-                }
-                (volume, sums)
-            },
-        )
-        .collect();
+    let moments: Vec<(f64, Vec<Tensor<D>>)> = parallel::map_with(
+        seam.len(),
+        1,
+        || Row::<D>::new(model.sites.len()),
+        |row, k| {
+            let (point, site) = seam[k];
+            // assembled rows are scaled to the part of the body that a site stands for
+            let scale = match subject.stiffness {
+                Some(_) => model.row_scale().map_or(1.0, |scale| scale[site]),
+                None => 1.0,
+            };
+            let volume = body.cloud.volume[point] * scale;
+            let mut sums = second_moments(subject, site, row);
+            for (sum, (b, d)) in sums.iter_mut().zip(pairs::<D>()) {
+                *sum += density(&tensor, b, d) * volume;
+            }
+            (volume, sums)
+        },
+    );
     let Density {
         largest,
         mean,

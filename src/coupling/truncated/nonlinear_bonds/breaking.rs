@@ -3,12 +3,11 @@
 //! A piece may be shorter than the spacing, and the trace at its end may follow nodes and points around: its own stretch is not that of its bond. An end in the zone moves with its point, one in an element with the shape functions
 //! there. Of a bond that leaves the mesh, the part within it counts.
 
-use rayon::prelude::*;
-
 use crate::{
     assembly::Transfer,
     coupling::{Model, SiteKind},
     fem::Locator,
+    parallel,
     peridynamics::{PdBody, bond_force::Kinematics},
     tensor::Vector,
 };
@@ -45,20 +44,20 @@ impl<const D: usize> Breaking<D> {
         longest_piece: impl Fn(usize) -> (f64, Carrier) + Sync,
     ) -> Self {
         let carriers = Carriers::new(model, body);
-        let (part, rows): (Vec<_>, Vec<_>) = (bonds.par_iter().enumerate())
-            .map(|(bond, [i, j])| {
-                let xi = body.bond(*i as usize, *j as usize);
-                let counted = carriers.of_bond(*i, *j, &xi);
-                let (length, row) = counted.unwrap_or_else(|| longest_piece(bond));
-                let part = Part {
-                    xi: xi.into(),
-                    stiffness: 0.0,
-                    length,
-                    bond: bond as u32,
-                };
-                (part, row)
-            })
-            .unzip();
+        let parts = parallel::map(bonds.len(), 1, |bond| {
+            let [i, j] = bonds[bond];
+            let xi = body.bond(i as usize, j as usize);
+            let counted = carriers.of_bond(i, j, &xi);
+            let (length, row) = counted.unwrap_or_else(|| longest_piece(bond));
+            let part = Part {
+                xi: xi.into(),
+                stiffness: 0.0,
+                length,
+                bond: bond as u32,
+            };
+            (part, row)
+        });
+        let (part, rows): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let fails = |bond: &[u32; 2]| bond.iter().any(|&p| never(p));
         Self {
             limit: bonds.iter().map(|bond| limit(*bond)).collect(),
@@ -83,9 +82,9 @@ impl<const D: usize> Breaking<D> {
             };
             strained.excess > self.limit[bond] * strained.square
         };
-        let bonds = (0..self.part.len()).into_par_iter().with_min_len(CHUNK);
-        let may = bonds.filter(|&bond| stands(bond) && !self.never[bond]);
-        may.filter(|&bond| is_over(bond)).collect()
+        parallel::filter_map(self.part.len(), CHUNK, |bond| {
+            (stands(bond) && !self.never[bond] && is_over(bond)).then_some(bond)
+        })
     }
 
     /// What moves the ends of a bond.
