@@ -1,7 +1,7 @@
 //! Parallel loops whose machinery is compiled once for each type of item.
 //!
 //! rayon compiles its splitting of work anew for each closure that it is given, and the closure itself several times within: where code is generic over the dimension, the
-//! law and the kind of pass, one loop came to dozens of copies, and all of them to a quarter of the program. Here the closure is called through a pointer. That costs a
+//! law and the kind of pass, one loop came to dozens of copies, and all of them to a fifth of the program. Here the closure is called through a pointer. That costs a
 //! nanosecond for each item: a loop over single numbers goes by chunks of them.
 //!
 //! `at_least` is the least number of items of a task, one where nothing is gained by more. Where tasks end depends on the threads that are free, so that no result may.
