@@ -59,20 +59,25 @@ fn execute(arguments: &Arguments) -> miette::Result<ExitCode> {
         None => SUITES.iter().collect(),
         Some(name) => suite(name).into_iter().collect(),
     };
-    let outcomes: Vec<Outcome> = chosen
-        .into_iter()
-        .map(|suite| {
-            let start = Instant::now();
-            let tables = (suite.run)(effort, &progress);
-            let seconds = start.elapsed().as_secs_f64();
-            tell(format_args!("{}: {seconds:.1} s", suite.name));
-            Outcome {
-                suite,
-                tables,
-                seconds,
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    for suite in chosen {
+        let start = Instant::now();
+        let tables = (suite.run)(effort, &progress);
+        let seconds = start.elapsed().as_secs_f64();
+        tell(format_args!("{}: {seconds:.1} s", suite.name));
+        // at once: suites that follow may take an hour
+        if !arguments.json {
+            if !outcomes.is_empty() {
+                print("")?;
             }
-        })
-        .collect();
+            print(render(&tables, Format::Text).trim_end())?;
+        }
+        outcomes.push(Outcome {
+            suite,
+            tables,
+            seconds,
+        });
+    }
     let total: f64 = outcomes.iter().map(|o| o.seconds).sum();
     tell(format_args!("{} suite(s): {total:.1} s", outcomes.len()));
     if let Some(path) = &arguments.markdown {
@@ -85,12 +90,9 @@ fn execute(arguments: &Arguments) -> miette::Result<ExitCode> {
         draw(folder, &outcomes, &progress)?;
     }
     let tables: Vec<Table> = outcomes.into_iter().flat_map(|o| o.tables).collect();
-    let format = if arguments.json {
-        Format::Json
-    } else {
-        Format::Text
-    };
-    print(render(&tables, format).trim_end())?;
+    if arguments.json {
+        print(render(&tables, Format::Json).trim_end())?;
+    }
     Ok(ExitCode::from(exit_code(&tables)))
 }
 
