@@ -156,16 +156,22 @@ impl<const D: usize> Row<D> {
     }
 
     /// Adds `block · u(site)` to the row.
-    #[inline]
+    // a row of a state-based law names each of its sites many times: a call would be a fifth of the work
+    #[inline(always)]
     pub fn add_site(&mut self, site: u32, block: &Tensor<D>) {
         let slot = self.slot[site as usize];
         if slot == EMPTY {
-            self.slot[site as usize] = self.columns.len() as u32;
-            self.columns.push(site);
-            self.blocks.push(*block);
+            self.add_new_site(site, block);
         } else {
             self.blocks[slot as usize] += block;
         }
+    }
+
+    #[inline(never)]
+    fn add_new_site(&mut self, site: u32, block: &Tensor<D>) {
+        self.slot[site as usize] = self.columns.len() as u32;
+        self.columns.push(site);
+        self.blocks.push(*block);
     }
 
     /// Adds `block · u(place)` to the row, the place being expressed through sites.
