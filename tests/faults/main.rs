@@ -16,6 +16,7 @@ mod k;
 mod m;
 mod n;
 mod o;
+mod proof_rows;
 mod q;
 mod r;
 mod s;
