@@ -1,109 +1,70 @@
 #!/usr/bin/env python3
-"""partitions.py: ghosts and balance of weighted coordinate bisection beside those of a graph partitioner (METIS, by pymetis), for points of some bodies in 2, 4 and 16 parts.
+"""partitions.py PROGRAM: the most sites of others beside those of a process, ghosts of a bond-based law, by weighted coordinate bisection, and by PT-Scotch, as `bondline check --processes` finds them for scenes at rest on 2, 4 and 16 processes.
 
-Needs numpy, scipy and pymetis. Bisection is that of `Partition::by_bisection`; the graph has a vertex for each point, weighted by its bonds, and an edge for each pair within a horizon.
-"Ghosts" are the points of others in the families of a part: the most of any part, and the sum; "balance" is the bonds of the largest part over the mean.
+PROGRAM is a `bondline` that was built with the feature petsc. Prints a table in Markdown.
 """
 
+import json
+import re
+import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
-import numpy
-import pymetis
-import scipy.spatial
-
-AS_LONG = 0.9
-
-
-def bisected(points, work, count):
-    """The part of each point: the longest side of a box is cut where the work on both sides is in the proportion of their parts, of sides of one length the last."""
-    owner = numpy.zeros(len(points), int)
-
-    def cut(some, first, count):
-        if count == 1 or not len(some):
-            owner[some] = first
-            return
-        x = points[some]
-        sides = x.max(0) - x.min(0)
-        axis = numpy.flatnonzero(sides >= AS_LONG * sides.max())[-1]
-        some = some[numpy.lexsort((some, x[:, axis]))]
-        below = count // 2
-        done = numpy.cumsum(work[some]) - 0.5 * work[some]
-        split = numpy.searchsorted(done, work[some].sum() * below / count)
-        cut(some[:split], first, below)
-        cut(some[split:], first + below, count - below)
-
-    cut(numpy.arange(len(points)), 0, count)
-    return owner
+MATERIAL = "\n[materials.body.bond-based]\nyoungs-modulus = 1\n[solve.static]\n[conditions.left.displacement]\non = 'left'\nx = 0\ny = 0\n"
+PLATE = "coupling = '{coupling}'\nkinematics = 'plane-stress'\n[mesh.rectangle]\nmin = [0, 0]\nmax = [{w}, {h}]\n{axes}\n[peridynamics]\nhorizon = {horizon}\n{points}\n"
+LATTICE = "points.lattice = { spacing = 1, origin = [0.5, 0.5] }"
 
 
-def grid(*counts):
-    return numpy.stack(numpy.meshgrid(*map(numpy.arange, counts), indexing="ij"), -1).reshape(-1, len(counts)) + 0.5
+def plate(w, h, more="", horizon="4", axes=None, points=LATTICE, coupling="nonlocal"):
+    axes = axes or f"x = {{ cells = {w} }}\ny = {{ cells = {h} }}"
+    return PLATE.format(coupling=coupling, w=w, h=h, axes=axes, horizon=horizon, points=points) + MATERIAL + more
 
 
-def crosses(a, b, x, top):
-    """Whether a bond crosses a slit up from the bottom at `x`."""
-    left, right = a[:, 0], b[:, 0]
-    with numpy.errstate(divide="ignore", invalid="ignore"):
-        height = a[:, 1] + (b[:, 1] - a[:, 1]) * (x - left) / (right - left)
-    return ((left < x) != (right < x)) & (height < top)
+def graded():
+    """Cells from 0.25 to 2, as points."""
+    axis = "{ graded = { fine = [0, 12], spacing = 0.25, growth = 1.03, largest = 2 } }"
+    return {"w": 120, "h": 120, "axes": f"x = {axis}\ny = {axis}", "points": "points = 'cells'"}
 
 
-def bodies():
-    """Points, their horizon (one for all, or of each), and whether a bond is cut."""
-    whole = lambda a, b: numpy.zeros(len(a), bool)
-    yield "cube", grid(32, 32, 32), 3, whole
-    yield "bar, 8 × 1 × 1", grid(96, 12, 12), 3, whole
-    yield "plate with a slit", grid(240, 160), 4, lambda a, b: crosses(a, b, 120, 80)
-    p = grid(240, 240)
-    yield "L-shaped plate", p[(p < 120).any(1)], 4, whole
-    centres = numpy.array([[x, y] for x in (40, 120, 200) for y in (40, 120, 200)])
-    far = numpy.linalg.norm(p[:, None] - centres, axis=2).min(1) > 25
-    yield "plate with nine holes", p[far], 4, whole
-    p = grid(200, 200) / 200
-    # spacings from 0.2 to 1.8, and horizons that follow them
-    graded = 200 * (0.2 * p + 0.8 * p**2)
-    yield "graded plate, equal horizon", graded, 4, whole
-    yield "graded plate, horizon by spacing", graded, 3 * (0.2 + 1.6 * p).max(1), whole
-    x = numpy.random.default_rng(1).random((20000, 3)) * 27
-    yield "scattered points in a ball", x[numpy.linalg.norm(x - 13.5, axis=1) < 13.5], 3, whole
-
-
-def bonds_of(points, horizon, is_cut):
-    tree = scipy.spatial.cKDTree(points)
-    if numpy.ndim(horizon) == 0:
-        pairs = tree.query_pairs(horizon * (1 + 1e-9), output_type="ndarray")
-    else:
-        found = tree.query_ball_point(points, horizon)
-        pairs = numpy.array(sorted({(min(i, j), max(i, j)) for i, near in enumerate(found) for j in near if i != j}))
-    return pairs[~is_cut(points[pairs[:, 0]], points[pairs[:, 1]])]
-
-
-def ghosts(ends, owner, count):
-    """Points of others in the families of each part."""
-    a, b = ends[:, 0], ends[:, 1]
-    far = owner[a] != owner[b]
-    seen = numpy.unique(owner[a[far]] * len(owner) + b[far])
-    return numpy.bincount(seen // len(owner), minlength=count)
+def scenes():
+    yield "square plate", plate(200, 200)
+    yield "plate with a slit of one spacing", plate(240, 160, "[voids.slit]\ninside.box = { min = [119, -1], max = [120, 80] }\n")
+    yield "L-shaped plate", plate(240, 240, "[voids.corner]\ninside.box = { min = [120, 120], max = [241, 241] }\n")
+    holes = [f"[voids.hole{x}_{y}]\ninside.ball = {{ center = [{x}, {y}], radius = 25 }}\n" for x in (40, 120, 200) for y in (40, 120, 200)]
+    yield "plate with nine holes", plate(240, 240, "".join(holes))
+    yield "graded plate, equal horizon", plate(**graded(), horizon="4")
+    yield "graded plate, horizon by spacing", plate(**graded(), horizon="'1 + 0.09 * max(x, y)'")
+    zone = "[zones.nonlocal]\nbox = { min = [60, 60], max = [120, 120] }\n"
+    axes = "x = { cells = 60 }\ny = { cells = 60 }"
+    yield "plate of elements of 4 × 4 spacings, points in its middle", plate(240, 240, zone.replace("120, 120", "180, 180"), axes=axes, coupling="truncated")
+    yield "the same, points in a corner", plate(240, 240, zone.replace("60, 60", "160, 160").replace("120, 120", "241, 241"), axes=axes, coupling="truncated")
 
 
 def main():
-    print("| body | points | parts | ghosts, most | of the graph | ghosts, sum | of the graph | balance | of the graph |\n|---|---|---|---|---|---|---|---|---|")
-    for name, points, horizon, is_cut in bodies():
-        pairs = bonds_of(points, horizon, is_cut)
-        ends = numpy.concatenate([pairs, pairs[:, ::-1]])
-        ends = ends[numpy.argsort(ends[:, 0], kind="stable")]
-        work = numpy.bincount(ends[:, 0], minlength=len(points))
-        starts = numpy.concatenate([[0], numpy.cumsum(work)])
+    program = str(Path(sys.argv[1]).resolve())
+    print("| body | sites | 2 | 4 | 16 |\n|---|---|---|---|---|")
+    for name, text in scenes():
+        cells = []
         for count in (2, 4, 16):
-            _, graph = pymetis.part_graph(count, pymetis.CSRAdjacency(starts, ends[:, 1]), vweights=work, recursive=False)
-            found = []
-            for owner in (bisected(points, work, count), numpy.array(graph)):
-                each = ghosts(ends, owner, count)
-                parts = numpy.bincount(owner, work, count)
-                found.append((each.max(), each.sum(), parts.max() / parts.mean()))
-            (most, total, balance), other = found
-            words = [name, len(points), count, most, f"{other[0]} ({other[0] / most:.2f})", total, f"{other[1]} ({other[1] / total:.2f})", f"{balance:.3f}", f"{other[2]:.3f}"]
-            print("| " + " | ".join(map(str, words)) + " |", flush=True)
+            with tempfile.TemporaryDirectory() as folder:
+                scene = Path(folder, "scene.toml")
+                scene.write_text(text)
+                found = subprocess.run([program, "check", scene, "--processes", str(count), "--json"], capture_output=True, text=True)
+            if found.returncode:
+                raise SystemExit(f"{name}: {found.stderr}")
+            found = json.loads(found.stdout)
+            most = max(share["ghosts"] for share in found["processes"])
+            graph = re.search(r"than (\d+) sites of others beside its own, (\d+) by coordinate bisection", found["distribution"])
+            kept = re.search(r"than (\d+) sites of others beside its own, (\d+) by a graph partitioner", found["distribution"])
+            if graph:
+                cells.append(f"{graph[2]}, **{graph[1]}**")
+            elif kept:
+                cells.append(f"**{kept[1]}**, {kept[2]}")
+            else:
+                cells.append(f"**{most}**")
+        sites = sum(share["sites"] for share in found["processes"])
+        print(f"| {name} | {sites} | " + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ mod element_tangent;
 mod exact_sum;
 mod ghosts;
 mod neighbour_springs;
+mod partition;
 pub mod ranks;
 mod segments;
 mod shared_blocks;
@@ -21,9 +22,8 @@ pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
 pub(crate) use neighbour_springs::share_long_rows;
-pub use ranks::{
-    Exchange, Partition, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread,
-};
+pub use partition::{Partition, SiteGraph};
+pub use ranks::{Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
 pub(crate) use ranks::{all_say, first_text};
 pub use segments::Segments;
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
@@ -476,11 +476,16 @@ impl BlockCsr {
 
     /// Adds so large a part of its diagonal to the matrix; rows that share their blocks share them still.
     pub fn raise_diagonal(&mut self, part: f64) {
+        self.raise_diagonal_of(|row| row as u32, part);
+    }
+
+    /// The same where each row is that of a `site`.
+    pub fn raise_diagonal_of(&mut self, site: impl Fn(usize) -> u32, part: f64) {
         let d = self.block;
         let mut done = vec![false; self.values.len() / (d * d).max(1)];
         for i in 0..self.rows() {
             let (columns, _) = self.row(i);
-            let Ok(place) = columns.binary_search(&(i as u32)) else {
+            let Ok(place) = columns.binary_search(&site(i)) else {
                 continue;
             };
             let block = self.start(i) + place;

@@ -12,6 +12,7 @@
 //! | `exact_stresses.rs` | partial stresses of geometrically exact bonds | eq. (2.19) |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `sites.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
+//! | `distribution.rs` | which of several processes has which sites | |
 //! | `shared_families.rs`, `shared_body.rs` | families that are spread over processes | |
 //! | `multi_lattice.rs`, `completed_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
 //! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
@@ -36,6 +37,7 @@ pub mod blending;
 mod bond_cutting;
 mod cauchy_born;
 mod completed_lattice;
+mod distribution;
 pub mod error_indicator;
 mod exact_stresses;
 pub mod field_evaluation;
@@ -71,6 +73,7 @@ pub mod zone_distance;
 pub use balanced::Balanced;
 pub use bins::Bins;
 pub use blending::{Blending, BlendingFunction};
+pub use distribution::Distribution;
 pub use exact_stresses::ExactStresses;
 pub use field_evaluation::{Carrier, Sampler};
 pub use impact::{ContactPatch, Impact, ImpactedSystem, ImpactorShape, RigidImpactor};

@@ -3,7 +3,7 @@
 use crate::{
     coupling::{Model, ModelError, SharedFamilies},
     peridynamics::{Accelerator, PdBody},
-    system::{Partition, Ranks, Spread, first_text},
+    system::{Ranks, Spread, first_text},
 };
 
 impl<const D: usize> Model<D> {
@@ -35,22 +35,6 @@ impl<const D: usize> Model<D> {
     pub fn spread<'a>(&'a self, ranks: Option<&'a dyn Ranks>) -> Option<Spread<'a>> {
         let shared = self.shared.as_ref()?;
         Some(shared.spread(ranks?))
-    }
-
-    /// Which of `count` processes computes which sites; `is_shared` where families shall be spread over these as well.
-    ///
-    /// Sites are weighted by the bonds and cells around them, or count the same where families are not known before they are spread.
-    pub fn partition(&self, count: usize, is_shared: bool) -> Partition {
-        let positions: Vec<[f64; 3]> = self
-            .sites
-            .iter()
-            .map(|s| crate::tensor::padded(&s.position))
-            .collect();
-        let work = match is_shared && self.can_spread_families() {
-            true => vec![1.0; positions.len()],
-            false => self.work_of_sites(),
-        };
-        Partition::by_bisection(&positions, &work, count)
     }
 
     /// Whether families are searched along a lattice, and can be spread over processes.

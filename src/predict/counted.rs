@@ -64,5 +64,6 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
         no_error: None,
         motion: None,
         processes: Vec::new(),
+        distribution: String::new(),
     })
 }

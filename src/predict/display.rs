@@ -65,6 +65,7 @@ impl fmt::Display for Prediction {
         self.write_steps(f)?;
         if !self.processes.is_empty() {
             writeln!(f, "\n{}", aligned(&processes::table(&self.processes)))?;
+            writeln!(f, "distributed            by {}", self.distribution)?;
         }
         writeln!(
             f,

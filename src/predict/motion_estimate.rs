@@ -128,6 +128,7 @@ fn prediction<const D: usize>(
         no_error: None,
         motion: None,
         processes: Vec::new(),
+        distribution: String::new(),
     }
 }
 

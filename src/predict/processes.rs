@@ -5,7 +5,7 @@ use rustc_hash::FxHashSet;
 use super::process_memory::{Spreading, divide, per_bond};
 use super::process_share::ProcessShare;
 use super::resource_estimate::Prediction;
-use crate::coupling::{Coupling, Model};
+use crate::coupling::{Coupling, Distribution, Model};
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
@@ -15,7 +15,7 @@ use crate::run::motion::{Sharing, may_share, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
 use crate::solve::statics::Method;
-use crate::system::{Partition, SemiDiscrete, Symmetry, share_long_rows};
+use crate::system::{Partition, Ranks, SemiDiscrete, Symmetry, share_long_rows};
 use crate::{assembly::Pattern, parallel};
 
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
@@ -25,6 +25,7 @@ const SCALAR: u64 = 12;
 #[derive(Clone, Debug)]
 pub struct Processes {
     shares: Vec<ProcessShare>,
+    distribution: String,
     spreading: Spreading,
     /// Bytes of each bond of a family.
     per_bond: f64,
@@ -36,6 +37,11 @@ impl Processes {
         &self.shares
     }
 
+    /// By what sites are distributed, and why.
+    pub fn distribution(&self) -> &str {
+        &self.distribution
+    }
+
     /// The same with the memory of each, where one process would need `alone`.
     pub fn with_memory(mut self, alone: &Prediction) -> Vec<ProcessShare> {
         divide(&mut self.shares, self.spreading, self.per_bond, alone);
@@ -43,26 +49,28 @@ impl Processes {
     }
 }
 
-/// What `count` processes will have of a scene.
+/// What `count` processes will have of a scene; `partitioner` is a process that can cut graphs, without which sites are distributed by bisection.
 ///
 /// # Errors
 /// [`RunError`] if the model cannot be built, as a run would.
 pub fn processes(
     scene: AnyScene,
     count: usize,
+    partitioner: Option<&dyn Ranks>,
     progress: &dyn Progress,
 ) -> Result<Processes, RunError> {
     scene.fits()?;
     match scene {
-        AnyScene::Bar(s) => with_choice(s.scene, |s| shares(s, count, progress)),
-        AnyScene::Plane(s) => with_choice(s.scene, |s| shares(s, count, progress)),
-        AnyScene::Solid(s) => with_choice(s.scene, |s| shares(s, count, progress)),
+        AnyScene::Bar(s) => with_choice(s.scene, |s| shares(s, count, partitioner, progress)),
+        AnyScene::Plane(s) => with_choice(s.scene, |s| shares(s, count, partitioner, progress)),
+        AnyScene::Solid(s) => with_choice(s.scene, |s| shares(s, count, partitioner, progress)),
     }
 }
 
 fn shares<const D: usize>(
     scene: Scene<D>,
     count: usize,
+    partitioner: Option<&dyn Ranks>,
     progress: &dyn Progress,
 ) -> Result<Processes, RunError> {
     let is_static = scene.solve == Solve::Static;
@@ -73,7 +81,7 @@ fn shares<const D: usize>(
     let (problem, rest) = setup::problem(scene);
     let is_shared = explicit.is_some() && may_share(&problem, &rest);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
-    let partition = model.partition(count, is_shared);
+    let Distribution { partition, why } = model.distribute(count, is_shared, partitioner);
     let mut spreading = match is_shared && model.can_spread_families() {
         true => Spreading::Families,
         // forces that are not linear are solved for by every process, with all rows
@@ -89,6 +97,7 @@ fn shares<const D: usize>(
         });
         return Ok(Processes {
             shares,
+            distribution: why,
             spreading,
             per_bond,
         });
@@ -130,6 +139,7 @@ fn shares<const D: usize>(
     progress.finish();
     Ok(Processes {
         shares,
+        distribution: why,
         spreading,
         per_bond,
     })

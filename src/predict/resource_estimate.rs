@@ -91,6 +91,9 @@ pub struct Prediction {
     /// What each of several processes will have, if that was asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub processes: Vec<ProcessShare>,
+    /// By what their sites are distributed, and why.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub distribution: String,
 }
 
 /// The steps of a scene in time.
@@ -118,8 +121,7 @@ pub(crate) fn predict<const D: usize>(
     scene: Scene<D>,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    let mut timings = Timings::default();
-    let mut watch = Stopwatch::start();
+    let (mut timings, mut watch) = (Timings::default(), Stopwatch::start());
     let title = scene.title.clone();
     let joining = scene.coupling.joining();
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
@@ -189,6 +191,7 @@ pub(crate) fn predict<const D: usize>(
         no_error: None,
         motion: None,
         processes: Vec::new(),
+        distribution: String::new(),
     };
     prediction.warnings = warnings(&model, &rest, joining, &prediction)?;
     holds(&prediction)?;

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::budget;
 use super::loads::{loads, supports};
 use super::springs::Springs;
-use crate::coupling::{Coupling, Model, Operator};
+use crate::coupling::{Coupling, Distribution, Model, Operator};
 use crate::observe::summary::{Applied, Decision, Stopwatch, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
@@ -178,7 +178,8 @@ fn spread<const D: usize>(
     let mut watch = Stopwatch::start();
     let model = at.model;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-    let partition = model.partition(ranks.count(), false);
+    let Distribution { partition, why } = model.distribute(ranks.count(), false, Some(ranks));
+    watch.lap(&mut timings, "distribution");
     let spread = Spread {
         ranks,
         partition: &partition,
@@ -193,7 +194,7 @@ fn spread<const D: usize>(
     };
     let mut choices = vec![Decision {
         choice: format!("{} processes", ranks.count()),
-        why: "each has the rows of its own sites".to_owned(),
+        why: format!("each has the rows of its own sites, by {why}"),
     }];
     let symmetry = symmetry(at.coupling, || rows.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");

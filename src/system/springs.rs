@@ -84,7 +84,7 @@ impl SpringRows {
     }
 
     /// The rows of a matrix, row `k` that of site `sites[k]`, with those of the springs added.
-    fn added(&self, matrix: &BlockCsr, sites: &[u32]) -> BlockCsr {
+    pub fn added(&self, matrix: &BlockCsr, sites: &[u32]) -> BlockCsr {
         let size = matrix.block * matrix.block;
         let mut sum = BlockCsr {
             block: matrix.block,

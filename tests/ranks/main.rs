@@ -1,6 +1,7 @@
 //! Scenes on several processes have the results of one: processes are threads here, which gather as those of `mpirun` do. `.ci/petsc` runs the same on MPI.
 
 mod coupled;
+mod load_steps;
 mod memory;
 mod pieces;
 mod threads;

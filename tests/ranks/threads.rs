@@ -10,7 +10,9 @@ use bondline::predict::{Prediction, Processes, predict, processes};
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, RunError, RunOptions, StartFrom};
 use bondline::scene::Source;
-use bondline::system::{Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Traffic};
+use bondline::system::{
+    Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, SiteGraph, Traffic,
+};
 use nalgebra::{DMatrix, DVector};
 
 use crate::pieces::assert_same_numbers;
@@ -24,6 +26,8 @@ struct Board {
     gathers: AtomicUsize,
     /// Calls of all threads that gather numbers of all sites, or the like.
     of_all: AtomicUsize,
+    /// Solvers of all threads.
+    solvers: AtomicUsize,
     /// Bytes that came to each thread by exchanges.
     received: Mutex<Vec<u64>>,
 }
@@ -35,6 +39,7 @@ impl Board {
             barrier: Barrier::new(count),
             gathers: AtomicUsize::new(0),
             of_all: AtomicUsize::new(0),
+            solvers: AtomicUsize::new(0),
             received: Mutex::new(vec![0; count]),
         }
     }
@@ -98,11 +103,36 @@ impl Ranks for ThreadRank {
         })
     }
 
+    fn parts(&self, graph: &SiteGraph, count: usize) -> Result<Vec<u32>, String> {
+        // by rings of neighbours around the first site
+        let sites = graph.starts.len() - 1;
+        let (mut order, mut seen) = (Vec::new(), vec![false; sites]);
+        for first in 0..sites as u32 {
+            let mut next = order.len();
+            if !std::mem::replace(&mut seen[first as usize], true) {
+                order.push(first);
+            }
+            while next < order.len() {
+                for &j in graph.of(order[next]) {
+                    if !std::mem::replace(&mut seen[j as usize], true) {
+                        order.push(j);
+                    }
+                }
+                next += 1;
+            }
+        }
+        let mut parts = vec![0; sites];
+        (order.iter().enumerate())
+            .for_each(|(k, &s)| parts[s as usize] = (k * count / sites) as u32);
+        Ok(parts)
+    }
+
     fn solver<'a>(
         &'a self,
         rows: RankRows<'a>,
         _: RankSolverKind,
     ) -> Result<Box<dyn RankSolver + 'a>, String> {
+        self.board.solvers.fetch_add(1, Ordering::Relaxed);
         // every thread has all rows, and factorises them as one matrix
         let (d, partition) = (rows.matrix.block, rows.partition);
         let mut own = Vec::new();
@@ -242,6 +272,8 @@ pub struct Done {
     pub received: Vec<u64>,
     /// How often each process gathered numbers of all sites, or the like.
     pub of_all: usize,
+    /// Solvers that each process set up.
+    pub solvers: usize,
 }
 
 /// What a process tells of its run.
@@ -280,9 +312,10 @@ pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
             traffic,
             received: Vec::new(),
             of_all: 0,
+            solvers: 0,
         });
     }
-    let gathers = AtomicUsize::new(0);
+    let [gathers, solvers] = [(); 2].map(|()| AtomicUsize::new(0));
     let (of_all, received) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let ends = on_processes_for(how.ranks, how.lives, |rank| {
         let end = one(Some(rank)).map_err(|e| e.to_string());
@@ -290,7 +323,12 @@ pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
             rank.board.gathers.load(Ordering::Relaxed),
             Ordering::Relaxed,
         );
-        of_all.store(rank.board.of_all.load(Ordering::Relaxed), Ordering::Relaxed);
+        for (sum, to) in [
+            (&rank.board.of_all, &of_all),
+            (&rank.board.solvers, &solvers),
+        ] {
+            to.store(sum.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
         rank.board
             .received
             .lock()
@@ -312,6 +350,7 @@ pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
         traffic,
         received: received.into_inner().unwrap(),
         of_all: of_all.load(Ordering::Relaxed) / how.ranks,
+        solvers: solvers.load(Ordering::Relaxed) / how.ranks,
     })
 }
 
@@ -403,5 +442,12 @@ pub fn alone(text: &str) -> Prediction {
 
 /// What is predicted of some processes.
 pub fn predicted(text: &str, ranks: usize) -> Processes {
-    processes(scene(text, Path::new(".")), ranks, &Silent).expect("a prediction")
+    let predict = |partitioner: &dyn Ranks| predicted_by(text, ranks, Some(partitioner));
+    on_processes(1, predict).remove(0)
+}
+
+/// What is predicted of some processes, with a partitioner of graphs or by bisection.
+pub fn predicted_by(text: &str, ranks: usize, partitioner: Option<&dyn Ranks>) -> Processes {
+    let scene = scene(text, Path::new("."));
+    processes(scene, ranks, partitioner, &Silent).expect("a prediction")
 }

@@ -1,7 +1,7 @@
 //! What processes exchange in steps that they share: their ghosts, as predicted, and nothing of all sites.
 
 use crate::memory::{COUNTS, block};
-use crate::threads::{ALONE, Done, How, assert_same, folder, predicted, run};
+use crate::threads::{ALONE, Done, How, assert_same, folder, predicted, predicted_by, run};
 
 pub fn done(text: &str, ranks: usize) -> Done {
     run(text, folder().path(), How { ranks, ..ALONE }).expect("a run")
@@ -52,6 +52,62 @@ fn ghosts_are_layers_and_bytes_are_as_predicted() {
                 |of: fn(&bondline::system::Traffic) -> u64| traffic.iter().map(of).sum::<u64>();
             assert!(sum(|t| t.sent_sites) <= sum(|t| t.ghosts));
         }
+    }
+}
+
+/// An L-shaped plate of points with elements along one side: bisection cuts it along a leg, rings around its corner across both.
+const L: &str = r#"
+coupling = "splice"
+kinematics = "plane-stress"
+
+[mesh.rectangle]
+min = [0, 0]
+max = [24, 24]
+x = { cells = 24 }
+y = { cells = 24 }
+
+[materials.plate.lps]
+youngs-modulus = 1
+poisson-ratio = 0.3
+density = 1
+
+[peridynamics]
+horizon = 3
+points.lattice = { spacing = 1, origin = [0.5, 0.5] }
+
+[zones.nonlocal]
+box = { min = [4, -1], max = [25, 25] }
+
+[voids.notch]
+inside.box = { min = [8, 8], max = [25, 25] }
+
+[initial.pulse.velocity]
+x = "1e-3 * exp(-((x - 8) / 2)^2)"
+
+[solve.explicit]
+duration = 10
+"#;
+
+#[test]
+fn a_graph_partitioner_cuts_where_it_leaves_fewer_ghosts() {
+    assert_same(L, &[2, 3]);
+    for ranks in [2, 3] {
+        let found = done(L, ranks);
+        let most = found.traffic.0.iter().map(|t| t.ghosts).max();
+        let by_graph = predicted(L, ranks);
+        let bisected = predicted_by(L, ranks, None);
+        for (t, share) in found.traffic.0.iter().zip(by_graph.shares()) {
+            assert_eq!(
+                [t.sites, t.ghosts],
+                [share.sites as u64, share.ghosts as u64],
+                "{ranks} processes"
+            );
+        }
+        let of_bisection = bisected.shares().iter().map(|s| s.ghosts as u64).max();
+        assert!(
+            most.unwrap() as f64 <= 0.9 * of_bisection.unwrap() as f64,
+            "{most:?} of {of_bisection:?} by bisection"
+        );
     }
 }
 

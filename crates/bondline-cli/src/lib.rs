@@ -380,10 +380,13 @@ fn check(
     let mut prediction = found.map_err(told)?;
     if let Some(count) = processes {
         // lays the model out even where a check alone would count it from volumes
-        let count = count as usize;
+        let partitioner = Processes::of_prediction();
+        let count = (count as usize, partitioner.ranks());
         let (path, overrides) = (&scene.scene, &scene.overrides);
-        let found = bondline_study::processes(path, overrides, count, &prediction, &progress);
-        prediction.processes = found.map_err(told)?;
+        let added =
+            bondline_study::add_processes(&mut prediction, path, overrides, count, &progress);
+        partitioner.end(Ok(0), WRONG)?;
+        added.map_err(told)?;
     }
     Ok(prediction)
 }

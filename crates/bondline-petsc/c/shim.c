@@ -32,6 +32,8 @@ const char *bl_message(void) { return text; }
 /* collective; threads call one at a time */
 int bl_start(int *rank, int *size, int *threads) {
   int level = 0;
+  /* else Scotch takes all cores, and cuts a graph differently each time */
+  setenv("SCOTCH_PTHREAD_NUMBER", "1", 0);
   OK(MPI_Init_thread(NULL, NULL, MPI_THREAD_SERIALIZED, &level));
   *threads = level >= MPI_THREAD_SERIALIZED;
   OK(PetscInitialize(NULL, NULL, NULL, NULL));
@@ -60,6 +62,40 @@ int bl_gather_words(const unsigned long long *own, int n, unsigned long long *al
 
 /* each number the sum of those of all ranks */
 int bl_add(long long *sums, int n) { return MPI_Allreduce(MPI_IN_PLACE, sums, n, MPI_LONG_LONG, MPI_SUM, PETSC_COMM_WORLD); }
+
+/* the part of each vertex, in this process alone; -1 where PETSc has no PT-Scotch */
+int bl_parts(int n, const int *starts, const unsigned *neighbours, int parts, unsigned *of) {
+#ifdef PETSC_HAVE_PTSCOTCH
+  PetscInt *i, *j, *w;
+  const PetscInt *p;
+  Mat graph;
+  MatPartitioning cut;
+  IS is;
+  OK(PetscMalloc1((size_t)n + 1, &i));
+  OK(PetscMalloc1((size_t)starts[n] + 1, &j));
+  OK(PetscMalloc1((size_t)n + 1, &w));
+  for (int k = 0; k <= n; k++) i[k] = starts[k];
+  for (int k = 0; k < starts[n]; k++) j[k] = (PetscInt)neighbours[k];
+  for (int k = 0; k < n; k++) w[k] = 1 + starts[k + 1] - starts[k];
+  /* the lists are the objects' from here on */
+  OK(MatCreateMPIAdj(PETSC_COMM_SELF, n, n, i, j, NULL, &graph));
+  OK(MatPartitioningCreate(PETSC_COMM_SELF, &cut));
+  OK(MatPartitioningSetAdjacency(cut, graph));
+  OK(MatPartitioningSetVertexWeights(cut, w));
+  OK(MatPartitioningSetType(cut, MATPARTITIONINGPTSCOTCH));
+  OK(MatPartitioningSetNParts(cut, parts));
+  OK(MatPartitioningApply(cut, &is));
+  OK(ISGetIndices(is, &p));
+  for (int k = 0; k < n; k++) of[k] = (unsigned)p[k];
+  OK(ISRestoreIndices(is, &p));
+  OK(ISDestroy(&is));
+  OK(MatPartitioningDestroy(&cut));
+  return (int)MatDestroy(&graph);
+#else
+  (void)n, (void)starts, (void)neighbours, (void)parts, (void)of;
+  return -1;
+#endif
+}
 
 /* `mine` blocks of this rank and those of others that it wants, by their numbers over all ranks */
 int bl_ghosts(int bs, int mine, int n, const long long *wanted, Vec *out) {

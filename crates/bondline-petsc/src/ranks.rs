@@ -4,7 +4,8 @@ use std::process::exit;
 use std::time::Duration;
 
 use bondline::system::{
-    Exchange, Ghosts, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread, Symmetry,
+    Exchange, Ghosts, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, SiteGraph, Spread,
+    Symmetry,
 };
 
 use crate::shim::{self, GhostVector, Product, System};
@@ -117,6 +118,14 @@ impl Ranks for PetscRanks {
         let vector = self.must(GhostVector::new(own, wanted, block));
         let ranks = Self { ..*self };
         Box::new(PetscExchange { vector, ranks })
+    }
+
+    fn parts(&self, graph: &SiteGraph, count: usize) -> Result<Vec<u32>, String> {
+        let has_edges = !graph.neighbours.is_empty();
+        if !has_edges {
+            return Err("no site is next to another".to_owned());
+        }
+        shim::parts_of_graph(&graph.starts, &graph.neighbours, count)
     }
 
     fn solver<'a>(

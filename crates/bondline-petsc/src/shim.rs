@@ -1,6 +1,6 @@
 //! The functions of `c/shim.c`, each behind a safe one that checks lengths.
 
-use std::ffi::{CStr, c_char, c_double, c_int, c_longlong, c_ulonglong, c_void};
+use std::ffi::{CStr, c_char, c_double, c_int, c_longlong, c_uint, c_ulonglong, c_void};
 use std::ptr::{NonNull, null, null_mut};
 
 /// A matrix with its solver, on the side of C.
@@ -36,6 +36,13 @@ unsafe extern "C" {
         starts: *const c_int,
     ) -> c_int;
     fn bl_add(sums: *mut c_longlong, n: c_int) -> c_int;
+    fn bl_parts(
+        n: c_int,
+        starts: *const c_int,
+        neighbours: *const c_uint,
+        parts: c_int,
+        of: *mut c_uint,
+    ) -> c_int;
     fn bl_ghosts(
         block: c_int,
         mine: c_int,
@@ -79,6 +86,9 @@ unsafe extern "C" {
     fn bl_free(s: *mut Bl);
 }
 
+/// What `bl_parts` returns without PT-Scotch; no code of PETSc is negative.
+const NO_PARTITIONER: c_int = -1;
+
 /// What is told of a code of PETSc or MPI that is not zero.
 fn told(code: c_int) -> Result<(), String> {
     if code == 0 {
@@ -113,6 +123,37 @@ pub fn start() -> Result<(usize, usize, bool), String> {
 pub fn stop() {
     // SAFETY: nothing is asked of either after this; the process ends whatever they say
     unsafe { bl_stop() };
+}
+
+/// The part of each vertex of a graph, by PT-Scotch in this process; a vertex weighs as much as it has neighbours and one.
+pub fn parts_of_graph(
+    starts: &[usize],
+    neighbours: &[u32],
+    count: usize,
+) -> Result<Vec<u32>, String> {
+    let vertices = starts.len() - 1;
+    assert_eq!(starts[vertices], neighbours.len(), "neighbours of all");
+    assert!(
+        neighbours.iter().all(|&j| (j as usize) < vertices),
+        "neighbours are vertices"
+    );
+    let starts = ints(starts)?;
+    let mut of = vec![0; vertices];
+    // SAFETY: lengths as C reads them, neighbours that are vertices
+    let code = unsafe {
+        bl_parts(
+            int(vertices)?,
+            starts.as_ptr(),
+            neighbours.as_ptr(),
+            int(count)?,
+            of.as_mut_ptr(),
+        )
+    };
+    if code == NO_PARTITIONER {
+        return Err("PETSc was built without PT-Scotch".to_owned());
+    }
+    told(code)?;
+    Ok(of)
 }
 
 /// Ends all processes of the job.
@@ -238,7 +279,7 @@ impl Drop for GhostVector {
 }
 
 /// Overwrites the second with the own rows times the first, numbers of this rank; collective.
-pub type Product<'a> = dyn FnMut(&[f64], &mut [f64]) + 'a;
+pub type Product<'a> = dyn FnMut(&[f64], &mut [f64]) + Send + 'a;
 
 /// What PETSc calls for a product.
 struct Callback<'a> {
@@ -266,6 +307,9 @@ pub struct System<'a> {
     rows: usize,
     block: usize,
 }
+
+// SAFETY: PETSc's objects belong to no thread, and MPI is started so that any thread may call it; `&mut self` lets one at a time
+unsafe impl Send for System<'_> {}
 
 impl<'a> System<'a> {
     /// A matrix of blocks with so many entries in each row, in columns of this rank and of others.

@@ -17,7 +17,7 @@ mod load;
 pub mod pareto;
 pub mod variants;
 
-pub use accuracy::{CheckError, ErrorPrediction, check, check_source, processes};
+pub use accuracy::{CheckError, ErrorPrediction, add_processes, check, check_source};
 pub use bondline::predict::{MotionPrediction, Prediction, predict};
 pub use converge::{ConvergeError, ConvergeParams, Converged, Level, Refinement, converge};
 pub use load::{from_source, load};

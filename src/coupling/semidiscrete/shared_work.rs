@@ -7,6 +7,7 @@
 use super::behaviour::NONE;
 use super::split::Split;
 use super::{CoupledSystem, scale_rows};
+use crate::coupling::Distribution;
 use crate::system::{FailureUpdate, Interval, Ranks, Spread};
 
 impl<'a, const D: usize> CoupledSystem<'a, D> {
@@ -16,9 +17,12 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         let Some(ranks) = ranks else {
             return self;
         };
-        let partition = match self.model.shared_families() {
-            Some(shared) => shared.partition().clone(),
-            None => self.model.partition(ranks.count(), false),
+        let Distribution { partition, why } = match self.model.shared_families() {
+            Some(shared) => Distribution {
+                partition: shared.partition().clone(),
+                why: "coordinate bisection".to_owned(),
+            },
+            None => self.model.distribute(ranks.count(), false, Some(ranks)),
         };
         let is_own = |site: u32| partition.owner(site) == ranks.rank();
         self.linear.compute_only(|site| is_own(site as u32));
@@ -33,9 +37,16 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self.split = Some(Split {
             ranks,
             partition,
+            why,
             breaks,
         });
         self
+    }
+
+    /// How many processes share the work out, and why each has the sites that it has.
+    pub fn distribution(&self) -> Option<(usize, &str)> {
+        let split = self.split.as_ref()?;
+        Some((split.ranks.count(), &split.why))
     }
 
     /// Lets each process move its own sites, where the forces are such; who looks at a step then asks for all.

@@ -7,6 +7,8 @@ use crate::system::{FailureUpdate, Partition, Ranks};
 pub(super) struct Split<'a> {
     pub ranks: &'a dyn Ranks,
     pub partition: Partition,
+    /// Why they have these.
+    pub why: String,
     /// Whether bonds may break.
     pub breaks: bool,
 }

@@ -202,6 +202,12 @@ fn tell_bonds<const D: usize>(
     storage: Storage,
     choices: &mut Vec<Decision>,
 ) {
+    if let Some((count, why)) = motion.distribution() {
+        choices.push(Decision {
+            choice: format!("{count} processes"),
+            why: format!("each has the forces of its own sites, by {why}"),
+        });
+    }
     if model.body().is_some() {
         let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
             _ if is_linear => "",

@@ -15,7 +15,7 @@ use crate::tensor::padded;
 
 /// What is added to the stiffness, as a part of its diagonal, so that pieces that nothing holds have factors too: far above round-off, and too little to
 /// cost an iteration.
-const RAISED: f64 = 1e-10;
+pub(super) const RAISED: f64 = 1e-10;
 
 /// Factors of the stiffness before bonds break.
 pub(super) struct NewtonFactors {

@@ -12,9 +12,9 @@ use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
-use super::newton_factors::NewtonFactors;
 use super::saved::{EdgeReached, Saved, StepChoice};
 use super::setup::{ModelSetup, laid_out, opened, restore};
+use super::spread_factors::Leads;
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{Moment, Recorder};
@@ -77,12 +77,11 @@ fn load_steps<const D: usize>(
     let (is_linear, mut system) = (moving.is_linear, moving.system);
     let pace = step_choice(spec);
     let params = equilibrium_params(spec, &mut choices);
-    let mut near = None;
-    if params.equilibrium == Equilibrium::Newton {
-        let body = (model, operator, laid_out.springs.as_ref());
-        near = NewtonFactors::new(body, system.symmetry(), rest, &mut choices, progress)?;
-        watch.lap(&mut timings, "factorisation");
-    }
+    let body = (model, operator, laid_out.springs.as_ref());
+    let how = (system.symmetry(), params.equilibrium);
+    let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
+    let of_all = leads.factorised()?;
+    leads.time(&mut watch, &mut timings);
     let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
         .with_impactors(&rest.impactors, pace.steps)
         .heated(rest.stresses.thermal.as_ref(), system.as_ref());
@@ -119,8 +118,9 @@ fn load_steps<const D: usize>(
         failed: None,
     };
     watch.lap(&mut timings, "start");
-    let refactor = (near.as_ref()).and_then(NewtonFactors::of_present_tangents);
-    let near = near.as_ref().map(|f| BodyOnly::new(&f.factor, model));
+    let refactor = leads.of_present_tangents();
+    let lead = leads.lead(of_all.as_ref());
+    let near = lead.map(|lead| BodyOnly::new(lead, model));
     let near = (near.as_ref(), refactor.as_ref());
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
     choices.push(observer.spent());

@@ -35,6 +35,11 @@ mod petsc {
             Ok(Self(Some(ranks)))
         }
 
+        /// This process alone, to cut graphs as a run would; nothing where PETSc does not start.
+        pub fn of_prediction() -> Self {
+            Self(PetscRanks::start().ok())
+        }
+
         /// The processes, if there are several.
         pub fn ranks(&self) -> Option<&dyn Ranks> {
             self.0.as_ref().map(|ranks| ranks as &dyn Ranks)
@@ -73,6 +78,11 @@ mod alone {
         /// None.
         pub fn start() -> miette::Result<Self> {
             Ok(Self)
+        }
+
+        /// Nothing cuts graphs.
+        pub fn of_prediction() -> Self {
+            Self
         }
 
         /// There are no others.

@@ -35,14 +35,15 @@ pub use estimate::{SPREAD, difference};
 pub use sample_run::Bench;
 use scene_refinements::predicted_error;
 
+use bondline::predict::Prediction;
 use bondline::predict::counted::{ANSWERS, TENTH};
-use bondline::predict::{Prediction, ProcessShare};
 use bondline::progress::Progress;
 use bondline::run::AnyScene;
 use bondline::run::RunError;
 use bondline::scene::SceneError;
 use bondline::scene::Source;
 use bondline::scene::read;
+use bondline::system::Ranks;
 
 /// Why there is nothing to tell of a scene.
 #[derive(Debug, thiserror::Error)]
@@ -85,27 +86,29 @@ pub fn check(
     check_source(&source, directory, &name, pilots, progress)
 }
 
-/// What each of `count` processes will have of a scene file; `alone` is what one process will need.
+/// Adds to a prediction what each of some processes will have of a scene file, as [`bondline::predict::processes`].
 ///
 /// # Errors
 /// [`CheckError`], each with place and remedy.
-pub fn processes(
+pub fn add_processes(
+    alone: &mut Prediction,
     path: &Path,
     overrides: &[String],
-    count: usize,
-    alone: &Prediction,
+    (count, partitioner): (usize, Option<&dyn Ranks>),
     progress: &dyn Progress,
-) -> Result<Vec<ProcessShare>, CheckError> {
+) -> Result<(), CheckError> {
     let (source, directory, name) = read(path, overrides)?;
     let chosen = completed(&source, directory)?;
     let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
     let scene = || AnyScene::complete(complete, directory, &name);
-    let shares = bondline::predict::processes(scene()?, count, progress)?;
-    Ok(match alone.counted {
+    let shares = bondline::predict::processes(scene()?, count, partitioner, progress)?;
+    shares.distribution().clone_into(&mut alone.distribution);
+    alone.processes = match alone.counted {
         None => shares.with_memory(alone),
         // what is counted from volumes is too little to take shares from
         Some(_) => shares.with_memory(&bondline::predict::laid_out(scene()?, progress)?),
-    })
+    };
+    Ok(())
 }
 
 /// As [`check`], of a scene whose relative paths start in `directory` and whose files are named `name` by default.
