@@ -22,7 +22,7 @@ pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
 pub(crate) use neighbour_springs::share_long_rows;
-pub use partition::{Partition, SiteGraph};
+pub use partition::{NeighbourGraph, Partition};
 pub use ranks::{Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
 pub(crate) use ranks::{all_say, first_text};
 pub use segments::Segments;

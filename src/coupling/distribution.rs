@@ -3,7 +3,7 @@
 use crate::{
     coupling::Model,
     parallel,
-    system::{Partition, Ranks, SiteGraph, first_text},
+    system::{NeighbourGraph, Partition, Ranks, first_text},
     tensor::padded,
 };
 
@@ -102,7 +102,7 @@ impl<const D: usize> Model<D> {
     }
 
     /// Which sites take part in the forces of which others: the ends of bonds, and the nodes of elements.
-    fn site_graph(&self) -> SiteGraph {
+    fn site_graph(&self) -> NeighbourGraph {
         let of_site = |site: usize| -> Vec<u32> {
             if let Some((body, point)) = self.point_of(site) {
                 let ends = body.families.of(point).iter();
@@ -115,6 +115,6 @@ impl<const D: usize> Model<D> {
             let sites = nodes.flat_map(|&n| self.node_transfer.row(n as usize));
             sites.map(|(s, _)| s).collect()
         };
-        SiteGraph::of_rows(parallel::map(self.sites.len(), 64, of_site))
+        NeighbourGraph::of_rows(parallel::map(self.sites.len(), 64, of_site))
     }
 }

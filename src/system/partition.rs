@@ -53,7 +53,7 @@ impl Partition {
     }
 
     /// Sites of others beside those of each rank.
-    pub fn neighbours(&self, graph: &SiteGraph) -> Vec<usize> {
+    pub fn neighbours(&self, graph: &NeighbourGraph) -> Vec<usize> {
         let mut seen_by = vec![u32::MAX; self.sites()];
         let of_rank = |rank: usize| {
             let mut count = 0;
@@ -98,7 +98,7 @@ impl Partition {
         (self.owner(site) == rank).then(|| self.number(site) as usize - self.starts[rank])
     }
 
-    /// Numbers of all ranks with `block` per site, for [`Ranks::gather_into`].
+    /// Numbers of all ranks with `block` per site, for [`Ranks::gather_into`](super::Ranks::gather_into).
     pub fn lengths(&self, block: usize) -> Vec<usize> {
         self.starts
             .windows(2)
@@ -109,14 +109,14 @@ impl Partition {
 
 /// Which sites take part in the forces of which others, either way: what a partition cuts.
 #[derive(Clone, Debug)]
-pub struct SiteGraph {
+pub struct NeighbourGraph {
     /// Start of each site's neighbours, and their end.
     pub starts: Vec<usize>,
     /// Neighbours, ascending for each site; each has the other.
     pub neighbours: Vec<u32>,
 }
 
-impl SiteGraph {
+impl NeighbourGraph {
     /// Of the sites that each row takes, in any order, its own or others.
     pub fn of_rows(mut rows: Vec<Vec<u32>>) -> Self {
         parallel::for_each_mut(&mut rows, 64, |site, row| {

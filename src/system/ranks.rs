@@ -3,7 +3,7 @@
 //! All of them do the same, in the same order, with the same mesh; each computes the rows of its own sites. Whoever starts them supplies [`Ranks`]: the library
 //! knows no message passing. Sites are numbered anew for such a run, rank by rank, so that the rows of a rank follow one another.
 
-use super::{BlockCsr, Partition, SiteGraph, Symmetry};
+use super::{BlockCsr, NeighbourGraph, Partition, Symmetry};
 
 /// The processes of a run, as one of them sees them.
 ///
@@ -35,7 +35,7 @@ pub trait Ranks: Send + Sync + std::fmt::Debug {
     ///
     /// # Errors
     /// In words, if there is no graph partitioner, or it fails.
-    fn parts(&self, graph: &SiteGraph, count: usize) -> Result<Vec<u32>, String>;
+    fn parts(&self, graph: &NeighbourGraph, count: usize) -> Result<Vec<u32>, String>;
 
     /// Collective: what solves systems with a matrix of which each rank holds its own rows.
     ///

@@ -11,7 +11,7 @@ use bondline::progress::Silent;
 use bondline::run::{AnyScene, RunError, RunOptions, StartFrom};
 use bondline::scene::Source;
 use bondline::system::{
-    Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, SiteGraph, Traffic,
+    Exchange, NeighbourGraph, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Traffic,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -103,7 +103,7 @@ impl Ranks for ThreadRank {
         })
     }
 
-    fn parts(&self, graph: &SiteGraph, count: usize) -> Result<Vec<u32>, String> {
+    fn parts(&self, graph: &NeighbourGraph, count: usize) -> Result<Vec<u32>, String> {
         // by rings of neighbours around the first site
         let sites = graph.starts.len() - 1;
         let (mut order, mut seen) = (Vec::new(), vec![false; sites]);

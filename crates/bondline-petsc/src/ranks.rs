@@ -4,8 +4,8 @@ use std::process::exit;
 use std::time::Duration;
 
 use bondline::system::{
-    Exchange, Ghosts, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, SiteGraph, Spread,
-    Symmetry,
+    Exchange, Ghosts, NeighbourGraph, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks,
+    Spread, Symmetry,
 };
 
 use crate::shim::{self, GhostVector, Product, System};
@@ -120,7 +120,7 @@ impl Ranks for PetscRanks {
         Box::new(PetscExchange { vector, ranks })
     }
 
-    fn parts(&self, graph: &SiteGraph, count: usize) -> Result<Vec<u32>, String> {
+    fn parts(&self, graph: &NeighbourGraph, count: usize) -> Result<Vec<u32>, String> {
         let has_edges = !graph.neighbours.is_empty();
         if !has_edges {
             return Err("no site is next to another".to_owned());

@@ -136,9 +136,14 @@ fn coupled(bars: &[(f64, f64, &str)], progress: &dyn Progress) -> Table {
                 table.push(Row::at_most(&case, "largest load", f64::NAN, 0.0).because(why));
             }
         }
-        progress.advance(1);
+        progress.advance(2 * work(spacing));
     }
     table
+}
+
+/// Work of a bar for the estimate of the time left: its bonds times its steps.
+fn work(spacing: f64) -> u64 {
+    (10.0 / spacing.powi(4)).ceil() as u64
 }
 
 /// What a bar did.
@@ -194,8 +199,9 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         Effort::Quick => (&BARS[..1], &COUPLED_BARS[..1]),
         Effort::Full => (&BARS[..], &COUPLED_BARS[..]),
     };
-    let all = bars.len() + coupled_bars.len();
-    progress.stage("notched bar", Some(all as u64));
+    let alone: u64 = bars.iter().map(|bar| work(bar[0])).sum();
+    let pairs: u64 = coupled_bars.iter().map(|bar| 2 * work(bar.0)).sum();
+    progress.stage("notched bar", Some(alone + pairs));
     let reference = reference();
     let largest = reference.iter().map(|row| row[1]).fold(0.0, f64::max);
     let mut table = Table::new(
@@ -203,7 +209,6 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         Columns::Full,
     );
     for &[spacing, drag, left_limit] in bars {
-        progress.advance(1);
         let case = format!("spacing {spacing} mm");
         let seen = bar(spacing, 2.0 * spacing, drag);
         match seen.and_then(|seen| Ok((pulled(&seen)?, seen.seconds))) {
@@ -237,6 +242,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
                 table.push(Row::at_most(&case, quantity, f64::NAN, AXIS_LIMIT).because(why));
             }
         }
+        progress.advance(work(spacing));
     }
     let coupled = coupled(coupled_bars, progress);
     progress.finish();
