@@ -272,3 +272,23 @@ y = 0
     assert!(!said.contains("among"), "{said}");
     assert!(!said.contains("leave peridynamics"), "{said}");
 }
+
+#[test]
+fn mpirun_starts_no_copies_of_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |count: &str| {
+        Command::new(env!("CARGO_BIN_EXE_bondline"))
+            .args(["run", "examples/coupled_bar.toml", "--output"])
+            .arg(folder.path())
+            .env("OMPI_COMM_WORLD_SIZE", count)
+            .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+            .output()
+            .expect("the program starts")
+    };
+    let refused = run("2");
+    let told = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1), "{told}");
+    assert!(told.contains("mpirun has started 2 processes"), "{told}");
+    assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none());
+    assert!(run("1").status.success());
+}

@@ -75,9 +75,19 @@ mod alone {
         /// Nothing is to be started.
         ///
         /// # Errors
-        /// None.
+        /// Where `mpirun` has started several, of which each would run the whole scene.
         pub fn start() -> miette::Result<Self> {
-            Ok(Self)
+            let size = |name| std::env::var(name).ok()?.parse::<usize>().ok();
+            match ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"]
+                .into_iter()
+                .find_map(size)
+            {
+                Some(count) if count > 1 => Err(miette::miette!(
+                    help = "build it with `cargo build --release -p bondline-cli --features petsc` (docs/clusters.md), or run it without mpirun",
+                    "mpirun has started {count} processes, and this program was built without the feature petsc, so that each would run the whole scene"
+                )),
+                _ => Ok(Self),
+            }
         }
 
         /// Nothing cuts graphs.
