@@ -25,14 +25,16 @@ const MOST_CELLS: f64 = 1e8;
 fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Mesh<D>, SceneError> {
     let path = directory.join(&file.path.value);
     let failed = |error: MeshError| {
-        SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
-            .label(file.path.span.clone(), "this mesh")
-            .help(match similar(&path) {
-                Some(name) => {
-                    format!("did you mean `{name}`? The path is relative to the scene file")
-                }
-                None => "the path is relative to the scene file".to_owned(),
-            })
+        let told = SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
+            .label(file.path.span.clone(), "this mesh");
+        match (&error, similar(&path)) {
+            (MeshError::Open { .. }, Some(name)) => told.help(format!(
+                "did you mean `{name}`? The path is relative to the scene file"
+            )),
+            (MeshError::Open { .. }, None) => told.help("the path is relative to the scene file"),
+            // a file that is read says itself what is wrong with it
+            _ => told,
+        }
     };
     let order = match file.order {
         FileOrderSpec::Kept => Order::Kept,
