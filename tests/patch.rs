@@ -55,7 +55,7 @@ fn assert_complete<'a>(d: usize, cases: impl Iterator<Item = &'a str> + Clone) {
 
 #[test]
 fn affine_fields_are_exact_through_every_seam_of_a_bar() {
-    let tables = [patch::table::<1>(Effort::Quick, &Silent)];
+    let tables = [patch::table::<1>(Effort::Quick, &Silent, None)];
     assert_eq!(exit_code(&tables), 0, "{}", shorts(&tables));
     // a figure that was measured
     let measured = |r: &&Row| r.quantity == "residual" && r.value > 0.0;
@@ -230,6 +230,7 @@ fn residual_of_law(case: &Case, material: &str) -> Result<f64, String> {
         coupling,
         stiffness,
         rows: Rows::Own,
+        shared: None,
         half: f64::from(case.widths.total()) * bondline_verify::enclosed::SPACING,
         tensor,
     }) / size)

@@ -107,10 +107,17 @@ impl<const D: usize> Model<D> {
 
     /// Assembles the rows as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
     pub fn assemble_unscaled(&self, operator: &dyn Operator<D>) -> BlockCsr {
-        assembly::assemble(
+        let sites: Vec<u32> = (0..self.sites.len() as u32).collect();
+        self.assemble_sites_unscaled(operator, &sites)
+    }
+
+    /// The same rows of some sites, in the order of `sites`.
+    pub fn assemble_sites_unscaled(&self, operator: &dyn Operator<D>, sites: &[u32]) -> BlockCsr {
+        assembly::assemble_rows(
+            sites.len(),
             self.sites.len(),
             |_| (),
-            |site, row| operator.add_row(site, row),
+            |r, row| operator.add_row(sites[r] as usize, row),
         )
     }
 

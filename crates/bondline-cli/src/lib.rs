@@ -16,12 +16,11 @@ use bondline::system::Ranks;
 use bondline_study::pareto::{self, CostBy, Reference, TradeEnd, TradeParams};
 use bondline_study::{CheckError, ConvergeError, ConvergeParams, Prediction, Refinement};
 use bondline_terminal::memory;
-use bondline_terminal::{TerminalProgress, print, report, tell};
+use bondline_terminal::{Processes, TerminalProgress, print, report, tell};
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use command::interrupt::{self, INTERRUPTED};
-use command::ranks::Processes;
 use command::threads::{self, Oversubscribe};
 use command::verify;
 

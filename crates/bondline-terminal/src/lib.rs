@@ -7,13 +7,16 @@
 //! | `report.rs` | a mistake in a scene, with the text underlined |
 //! | `streams.rs` | standard output and standard error, which may be full or closed |
 //! | `memory.rs` | the limit of memory, and the end of a run that exceeds it |
+//! | `processes.rs` | several processes under `mpirun` |
 
 pub mod memory;
+mod processes;
 pub mod progress;
 mod progress_log;
 mod report;
 mod streams;
 
+pub use processes::Processes;
 pub use progress::TerminalProgress;
 pub use report::report;
 pub use streams::{print, tell};

@@ -13,10 +13,8 @@
 //! For a pairwise law `M₆′ = M₆`. For an LPS in 1D, `M₆ = (6 μ + 8 (k − 3 μ)) Σωξ⁴V/m` since its dilatation reaches over two horizons, while the expansion of
 //! the force state sees one, `M₆′ = 2 C Σωξ⁴V/m`. Balanced rows take of each what makes the two cancel.
 
-use rayon::prelude::*;
-
 use crate::{
-    Effort,
+    Effort, each,
     enclosed::{Case, Cells, Enclosed, INFLUENCE, Law, Method, SPACING, Widths},
     patch::{out_of_balance, relative_out_of_balance, round_off, spurious_force, widths},
     tangents::momentum,
@@ -26,6 +24,7 @@ use bondline::{
     observe::report::{Columns, Row, Table},
     peridynamics::Micromodulus,
     progress::Progress,
+    system::Ranks,
 };
 
 /// Largest out-of-balance force of a method in exact equilibrium, over the force on a face; where round-off alone may make more of it ([`round_off`]: 1e-11 at 400 spacings from the origin), that.
@@ -191,7 +190,7 @@ fn seam_cases(effort: Effort, ratios: &[u32]) -> Vec<(&'static str, Case)> {
 }
 
 /// Out-of-balance force at one seam of a bar, under cubic and quartic fields.
-pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
+pub fn leading_terms(effort: Effort, progress: &dyn Progress, ranks: Option<&dyn Ranks>) -> Table {
     let ratios: &[u32] = if effort == Effort::Full {
         &[3, 4, 6]
     } else {
@@ -199,55 +198,45 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress) -> Table {
     };
     let cases = seam_cases(effort, ratios);
     progress.stage("out-of-balance force", Some(cases.len() as u64));
-    let rows: Vec<Vec<Row>> = cases
-        .into_par_iter()
-        .map(|(law, case)| {
-            let width = case.widths.transition / case.ratio;
-            let name = format!(
-                "{law}, m = {}, {}{}",
-                case.ratio,
-                case.method.name(),
-                if width == 0 {
-                    String::new()
-                } else {
-                    format!(" over {width} delta")
-                }
-            );
-            progress.advance(1);
-            let quantities = [(3, "cubic, N"), (4, "quartic, N m")];
-            match Enclosed::<1>::new(&case) {
-                Ok(bar) => quantities
-                    .map(|(degree, quantity)| {
-                        let force = out_of_balance(&bar, degree);
-                        match leading_term(&case, degree) {
-                            Some(term) => {
-                                Row::within(&name, quantity, force, term, LEADING_TERM_LIMIT)
-                            }
-                            None if is_in_balance(case.method, degree) => {
-                                let force = relative_out_of_balance(&bar, degree).abs();
-                                let quantity = match degree {
-                                    3 => "cubic, over the force on a face",
-                                    _ => "quartic, over the force on a face",
-                                };
-                                Row::at_most(
-                                    &name,
-                                    quantity,
-                                    force,
-                                    equilibrium_limit(&bar, degree),
-                                )
-                            }
-                            None => Row::info(&name, quantity, force),
-                        }
-                    })
-                    .to_vec(),
-                Err(e) => quantities
-                    .map(|(_, q)| {
-                        Row::at_most(&name, q, f64::NAN, LEADING_TERM_LIMIT).because(e.to_string())
-                    })
-                    .to_vec(),
+    let rows = each(ranks, &cases, |(law, case)| {
+        let width = case.widths.transition / case.ratio;
+        let name = format!(
+            "{law}, m = {}, {}{}",
+            case.ratio,
+            case.method.name(),
+            if width == 0 {
+                String::new()
+            } else {
+                format!(" over {width} delta")
             }
-        })
-        .collect();
+        );
+        progress.advance(1);
+        let quantities = [(3, "cubic, N"), (4, "quartic, N m")];
+        match Enclosed::<1>::on(case, ranks) {
+            Ok(bar) => quantities
+                .map(|(degree, quantity)| {
+                    let force = out_of_balance(&bar, degree);
+                    match leading_term(case, degree) {
+                        Some(term) => Row::within(&name, quantity, force, term, LEADING_TERM_LIMIT),
+                        None if is_in_balance(case.method, degree) => {
+                            let force = relative_out_of_balance(&bar, degree).abs();
+                            let quantity = match degree {
+                                3 => "cubic, over the force on a face",
+                                _ => "quartic, over the force on a face",
+                            };
+                            Row::at_most(&name, quantity, force, equilibrium_limit(&bar, degree))
+                        }
+                        None => Row::info(&name, quantity, force),
+                    }
+                })
+                .to_vec(),
+            Err(e) => quantities
+                .map(|(_, q)| {
+                    Row::at_most(&name, q, f64::NAN, LEADING_TERM_LIMIT).because(e.to_string())
+                })
+                .to_vec(),
+        }
+    });
     let mut table = Table::new(
         "Out-of-balance force at a seam of a bar, peridynamics on its left; reference: -+ (M6 - 2 C h^2) u'''/24",
         Columns::Full,
@@ -270,7 +259,11 @@ fn equilibrium_limit<const D: usize>(enclosed: &Enclosed<D>, degree: u32) -> f64
 }
 
 /// Largest spurious force of a single site for each method, relative to `C/h` times the area of a point, and the ratio of splice to smooth blending.
-pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
+pub fn spurious_forces(
+    effort: Effort,
+    progress: &dyn Progress,
+    ranks: Option<&dyn Ranks>,
+) -> Table {
     let mut table = Table::new(
         "Largest spurious force per unit displacement of a single site, times h/C over the face of a point; transition zones 3 delta wide",
         Columns::Full,
@@ -310,6 +303,7 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
                 &format!("1D {name}, m = {ratio}"),
                 &cases,
                 Some(SPURIOUS_RATIO),
+                ranks,
             );
         }
     }
@@ -334,6 +328,7 @@ pub fn spurious_forces(effort: Effort, progress: &dyn Progress) -> Table {
                 &format!("2D {}, m = 3", law.name()),
                 &cases,
                 None,
+                ranks,
             );
         }
     }
@@ -353,18 +348,15 @@ fn push_spurious<const D: usize>(
     name: &str,
     cases: &[Case],
     limit: Option<f64>,
+    ranks: Option<&dyn Ranks>,
 ) {
-    let forces: Vec<Result<f64, String>> = cases
-        .par_iter()
-        .map(|case| {
-            Enclosed::<D>::new(case)
-                .map(|e| {
-                    let scale = e.tensor.get(0, 0, 0, 0) * SPACING.powi(D as i32 - 2);
-                    spurious_force(&e) / scale
-                })
-                .map_err(|e| e.to_string())
-        })
-        .collect();
+    let forces = each(ranks, cases, |case| {
+        let found = Enclosed::<D>::on(case, ranks).map(|e| {
+            let scale = e.tensor.get(0, 0, 0, 0) * SPACING.powi(D as i32 - 2);
+            spurious_force(&e) / scale
+        });
+        found.map_err(|e| e.to_string())
+    });
     for (case, force) in cases.iter().zip(&forces) {
         table.push(match force {
             Ok(force) => Row::info(name, case.method.name(), *force),
@@ -381,7 +373,7 @@ fn push_spurious<const D: usize>(
 }
 
 /// Sums of internal forces of every method: under a random displacement, and at half of the seam under polynomials.
-pub fn every_method(progress: &dyn Progress) -> Table {
+pub fn every_method(progress: &dyn Progress, ranks: Option<&dyn Ranks>) -> Table {
     progress.stage("out-of-balance force of every method", None);
     let mut table = Table::new(
         "Out of balance, every method, m = 3 (3D: 2). forces, moments: their sum under a random displacement over the sum of their sizes; cubic, quartic: force of half the seam \
@@ -390,58 +382,64 @@ pub fn every_method(progress: &dyn Progress) -> Table {
     );
     let pairwise = Law::BondBased(Micromodulus::InverseDistance);
     for law in [pairwise, Law::StateBased(INFLUENCE)] {
-        table.rows.extend(every_method_rows::<1>(law));
-        table.rows.extend(every_method_rows::<2>(law));
-        table.rows.extend(every_method_rows::<3>(law));
+        table.rows.extend(every_method_rows::<1>(law, ranks));
+        table.rows.extend(every_method_rows::<2>(law, ranks));
+        table.rows.extend(every_method_rows::<3>(law, ranks));
     }
     table
 }
 
-fn every_method_rows<const D: usize>(law: Law) -> Vec<Row> {
-    let rows: Vec<Vec<Row>> = offered(&Method::ALL, law)
-        .into_par_iter()
-        .map(|method| {
-            let case = Case {
-                method,
-                law,
-                cells: Cells::Matching,
-                widths: widths::<D>(method, Cells::Matching),
-                ratio: if D == 3 { 2 } else { 3 },
-            };
-            let name = format!("{D}D {}, {}", law.name(), method.name());
-            let e = match Enclosed::<D>::new(&case) {
-                Ok(e) => e,
-                Err(e) => return vec![Row::refused(name, "forces", e.to_string())],
-            };
-            let places: Vec<_> = e.positions().copied().collect();
-            let (forces, moments) = momentum(&e.stiffness, &places);
-            let exact = method == Method::Truncated;
-            let row = |quantity: &str, value: f64, limit: Option<f64>| match limit {
-                Some(limit) => Row::at_most(&name, quantity, value.abs(), limit),
-                None => Row::info(&name, quantity, value),
-            };
-            let sums = exact.then_some(EQUILIBRIUM_LIMIT);
-            let mut rows = vec![row("forces", forces, sums)];
-            if D > 1 {
-                rows.push(row("moments", moments, sums));
-            }
-            for (degree, quantity) in [(3, "cubic"), (4, "quartic")] {
-                let limited = exact || D == 1 && is_in_balance(method, degree);
-                let limit = limited.then(|| equilibrium_limit(&e, degree));
-                rows.push(row(quantity, relative_out_of_balance(&e, degree), limit));
-            }
-            rows
-        })
-        .collect();
+fn every_method_rows<const D: usize>(law: Law, ranks: Option<&dyn Ranks>) -> Vec<Row> {
+    let rows = each(ranks, &offered(&Method::ALL, law), |&method| {
+        let case = Case {
+            method,
+            law,
+            cells: Cells::Matching,
+            widths: widths::<D>(method, Cells::Matching),
+            ratio: if D == 3 { 2 } else { 3 },
+        };
+        let name = format!("{D}D {}, {}", law.name(), method.name());
+        let e = match Enclosed::<D>::on(&case, ranks) {
+            Ok(e) => e,
+            Err(e) => return vec![Row::refused(name, "forces", e.to_string())],
+        };
+        let places: Vec<_> = e.positions().copied().collect();
+        let (forces, moments) = momentum(&e.stiffness, &places);
+        let exact = method == Method::Truncated;
+        let row = |quantity: &str, value: f64, limit: Option<f64>| match limit {
+            Some(limit) => Row::at_most(&name, quantity, value.abs(), limit),
+            None => Row::info(&name, quantity, value),
+        };
+        let sums = exact.then_some(EQUILIBRIUM_LIMIT);
+        let mut rows = vec![row("forces", forces, sums)];
+        if D > 1 {
+            rows.push(row("moments", moments, sums));
+        }
+        for (degree, quantity) in [(3, "cubic"), (4, "quartic")] {
+            let limited = exact || D == 1 && is_in_balance(method, degree);
+            let limit = limited.then(|| equilibrium_limit(&e, degree));
+            rows.push(row(quantity, relative_out_of_balance(&e, degree), limit));
+        }
+        rows
+    });
     rows.into_iter().flatten().collect()
 }
 
 /// The suite `balance`.
 pub fn balance(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    balance_on(effort, progress, None)
+}
+
+/// The same; where there are several processes, by all of them.
+pub fn balance_on(
+    effort: Effort,
+    progress: &dyn Progress,
+    ranks: Option<&dyn Ranks>,
+) -> Vec<Table> {
     let tables = vec![
-        every_method(progress),
-        leading_terms(effort, progress),
-        spurious_forces(effort, progress),
+        every_method(progress, ranks),
+        leading_terms(effort, progress, ranks),
+        spurious_forces(effort, progress, ranks),
     ];
     progress.finish();
     tables

@@ -14,7 +14,7 @@ use bondline::{
         generate::{Axis, Grid},
     },
     run::SceneModel,
-    system::BlockCsr,
+    system::{BlockCsr, Partition, Ranks, Spread},
     tensor::{Tensor4, Vector},
 };
 
@@ -131,10 +131,21 @@ pub struct Enclosed<const D: usize> {
     pub stiffness: BlockCsr,
     /// What the rows of the stiffness are.
     pub rows: Rows,
+    /// Which process assembled which rows, where several did.
+    pub shared: Option<SharedRows>,
     /// Half the width of the block \[m\].
     pub half: f64,
     /// The elastic tensor of the elements \[Pa\].
     pub tensor: Tensor4<D>,
+}
+
+/// Rows that several processes assembled, each those of its own sites.
+#[derive(Clone, Debug)]
+pub struct SharedRows {
+    /// Which process has which sites.
+    pub partition: Partition,
+    /// The rows of this process, ascending by site.
+    pub own: BlockCsr,
 }
 
 /// Which volume the rows of a stiffness are equations of.
@@ -166,6 +177,14 @@ impl<const D: usize> Enclosed<D> {
         Self::with(case, &Otherwise::default())
     }
 
+    /// Collective: the same by several processes, of which each assembles the rows of its own sites, distributed as those of a run; all have the stiffness then. Without `ranks`, as [`Enclosed::new`].
+    ///
+    /// # Errors
+    /// As [`Enclosed::new`], the same on every process.
+    pub fn on(case: &Case, ranks: Option<&dyn Ranks>) -> Result<Self, EnclosedError> {
+        Self::build(case, &Otherwise::default(), ranks)
+    }
+
     /// The same block with finite elements everywhere.
     ///
     /// # Errors
@@ -186,15 +205,38 @@ impl<const D: usize> Enclosed<D> {
     /// # Errors
     /// As [`Enclosed::new`].
     pub fn with(case: &Case, otherwise: &Otherwise<'_>) -> Result<Self, EnclosedError> {
+        Self::build(case, otherwise, None)
+    }
+
+    fn build(
+        case: &Case,
+        otherwise: &Otherwise<'_>,
+        ranks: Option<&dyn Ranks>,
+    ) -> Result<Self, EnclosedError> {
         let half = f64::from(case.widths.total()) * SPACING;
         let file = case.cells.file::<D>(case.widths)?;
         let files: Vec<(&str, &str)> = file.iter().map(|text| (MESH, text.as_str())).collect();
         let SceneModel {
             model, coupling, ..
         } = scene::model(&case.text::<D>(otherwise), &files)?;
-        let stiffness = {
+        let (stiffness, shared) = {
             let operator = coupling.operator(&model).map_err(SceneFailure::from)?;
-            model.assemble_unscaled(operator.as_ref())
+            let rows = |sites: &[u32]| model.assemble_sites_unscaled(operator.as_ref(), sites);
+            match ranks {
+                None => (model.assemble_unscaled(operator.as_ref()), None),
+                Some(ranks) => {
+                    let partition = model
+                        .distribute(ranks.count(), false, Some(ranks))
+                        .partition;
+                    let spread = Spread {
+                        ranks,
+                        partition: &partition,
+                    };
+                    let all: Vec<u32> = (0..model.sites.len() as u32).collect();
+                    let (stiffness, own) = (spread.gather_rows(&all, rows), rows(spread.own()));
+                    (stiffness, Some(SharedRows { partition, own }))
+                }
+            }
         };
         let tensor = *model.tensor_of_cell(0);
         Ok(Self {
@@ -202,6 +244,7 @@ impl<const D: usize> Enclosed<D> {
             coupling,
             stiffness,
             rows: Rows::Own,
+            shared,
             half,
             tensor,
         })
@@ -216,6 +259,7 @@ impl<const D: usize> Enclosed<D> {
         Ok(Self {
             stiffness: laid.stiffness()?,
             rows: Rows::OfSites,
+            shared: None,
             tensor: *laid.model.tensor_of_cell(0),
             model: laid.model,
             coupling: laid.coupling,

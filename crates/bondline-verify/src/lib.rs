@@ -78,7 +78,8 @@ pub use patch::patch;
 pub use tangents::tangents;
 pub use weights::weights;
 
-use bondline::{observe::report::Table, progress::Progress};
+use bondline::{observe::report::Table, progress::Progress, system::Ranks};
+use rayon::prelude::*;
 
 /// How much of a suite is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +99,25 @@ pub struct Suite {
     pub about: &'static str,
     /// Runs it.
     pub run: fn(Effort, &dyn Progress) -> Vec<Table>,
+}
+
+/// The suites that several processes can run together.
+pub const ON_PROCESSES: [(&str, OnProcesses); 2] =
+    [("patch", patch::patch_on), ("balance", balance::balance_on)];
+
+/// Runs a suite by all processes, where there are several; all have the same tables.
+pub type OnProcesses = fn(Effort, &dyn Progress, Option<&dyn Ranks>) -> Vec<Table>;
+
+/// What `of_case` gives for each case, in their order. By several processes one after another, since all have to come to the same case together; else side by side.
+fn each<C: Sync, R: Send>(
+    ranks: Option<&dyn Ranks>,
+    cases: &[C],
+    of_case: impl Fn(&C) -> R + Sync + Send,
+) -> Vec<R> {
+    match ranks {
+        None => cases.par_iter().map(of_case).collect(),
+        Some(_) => cases.iter().map(of_case).collect(),
+    }
 }
 
 /// Every suite, in the order in which `verify` runs them.

@@ -5,16 +5,21 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use bondline::observe::report::{Format, Table, exit_code, render};
+use bondline::progress::{Progress, Silent};
+use bondline::system::Ranks;
 use bondline_terminal::memory::{self, Allocator};
-use bondline_terminal::{TerminalProgress, print, tell};
+use bondline_terminal::{Processes, TerminalProgress, print, tell};
 use bondline_verify::figures::{FIGURES, figures};
 use bondline_verify::report_page::{Outcome, page};
-use bondline_verify::{Effort, LONG_SUITES, SUITES, Suite, suite};
+use bondline_verify::{Effort, LONG_SUITES, ON_PROCESSES, SUITES, Suite, suite};
 use clap::Parser;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
 #[global_allocator]
 static ALLOCATOR: Allocator = Allocator;
+
+/// Exit status of what is short, wrong or impossible.
+const WRONG: u8 = 1;
 
 /// Measure what the code claims, as tables with limits; the exit status is 1 if any row is short.
 #[derive(Parser)]
@@ -38,39 +43,45 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match execute(&Arguments::parse()) {
-        Ok(code) => code,
-        Err(report) => {
-            tell(format_args!("{report:?}"));
-            ExitCode::FAILURE
-        }
-    }
+    let arguments = Arguments::parse();
+    let code = Processes::start().and_then(|processes| {
+        let result = execute(&arguments, processes.ranks());
+        processes.end(result, WRONG)
+    });
+    ExitCode::from(code.unwrap_or_else(|report| {
+        tell(format_args!("{report:?}"));
+        WRONG
+    }))
 }
 
-fn execute(arguments: &Arguments) -> miette::Result<ExitCode> {
+/// Runs the suites, and gives the exit status. Of several processes the first tells of it.
+fn execute(arguments: &Arguments, ranks: Option<&dyn Ranks>) -> miette::Result<u8> {
     memory::limit(None);
     let effort = if arguments.quick {
         Effort::Quick
     } else {
         Effort::Full
     };
-    let progress = TerminalProgress::on_stderr();
-    let chosen: Vec<&'static Suite> = match &arguments.name {
-        None => SUITES.iter().collect(),
-        Some(name) => suite(name).into_iter().collect(),
+    let chosen = chosen(arguments.name.as_deref(), ranks)?;
+    let is_first = ranks.is_none_or(|ranks| ranks.rank() == 0);
+    let progress: &dyn Progress = match is_first {
+        true => &TerminalProgress::on_stderr(),
+        false => &Silent,
     };
     let mut outcomes: Vec<Outcome> = Vec::new();
-    for suite in chosen {
+    for (suite, run) in chosen {
         let start = Instant::now();
-        let tables = (suite.run)(effort, &progress);
+        let tables = run(effort, progress);
         let seconds = start.elapsed().as_secs_f64();
-        tell(format_args!("{}: {seconds:.1} s", suite.name));
         // at once: suites that follow may take an hour
-        if !arguments.json {
-            if !outcomes.is_empty() {
-                print("")?;
+        if is_first {
+            tell(format_args!("{}: {seconds:.1} s", suite.name));
+            if !arguments.json {
+                if !outcomes.is_empty() {
+                    print("")?;
+                }
+                print(render(&tables, Format::Text).trim_end())?;
             }
-            print(render(&tables, Format::Text).trim_end())?;
         }
         outcomes.push(Outcome {
             suite,
@@ -78,26 +89,70 @@ fn execute(arguments: &Arguments) -> miette::Result<ExitCode> {
             seconds,
         });
     }
+    if is_first {
+        write(arguments, effort, &outcomes, progress)?;
+    }
+    let tables: Vec<Table> = outcomes.into_iter().flat_map(|o| o.tables).collect();
+    if arguments.json && is_first {
+        print(render(&tables, Format::Json).trim_end())?;
+    }
+    Ok(exit_code(&tables))
+}
+
+/// A suite, and how it is run.
+type Chosen<'a> = (
+    &'static Suite,
+    Box<dyn Fn(Effort, &dyn Progress) -> Vec<Table> + 'a>,
+);
+
+/// The suites that were asked for; of several processes one that these can run together.
+fn chosen<'a>(name: Option<&str>, ranks: Option<&'a dyn Ranks>) -> miette::Result<Vec<Chosen<'a>>> {
+    let named = name.and_then(suite);
+    if ranks.is_none() {
+        let suites: Vec<&Suite> = match named {
+            None => SUITES.iter().collect(),
+            Some(suite) => vec![suite],
+        };
+        let alone = suites.into_iter().map(|s| (s, Box::new(s.run) as _));
+        return Ok(alone.collect());
+    }
+    let run = ON_PROCESSES.iter().find(|(n, _)| Some(*n) == name);
+    match (named, run) {
+        (Some(suite), Some((_, run))) => {
+            let on_all = move |effort, progress: &dyn Progress| run(effort, progress, ranks);
+            Ok(vec![(suite, Box::new(on_all))])
+        }
+        _ => Err(miette::miette!(
+            help = "name one of these, or leave out mpirun",
+            "several processes run one suite together, which is {}",
+            ON_PROCESSES.map(|(n, _)| n).join(" or ")
+        )),
+    }
+}
+
+/// Writes the page and the figures that were asked for.
+fn write(
+    arguments: &Arguments,
+    effort: Effort,
+    outcomes: &[Outcome],
+    progress: &dyn Progress,
+) -> miette::Result<()> {
     let total: f64 = outcomes.iter().map(|o| o.seconds).sum();
     tell(format_args!("{} suite(s): {total:.1} s", outcomes.len()));
     if let Some(path) = &arguments.markdown {
-        std::fs::write(path, page(&outcomes, effort)).map_err(|e| {
+        std::fs::write(path, page(outcomes, effort)).map_err(|e| {
             miette::miette!("cannot write {}: {e}; check the folder", path.display())
         })?;
         tell(format_args!("wrote {}", path.display()));
     }
     if let Some(folder) = &arguments.figures {
-        draw(folder, &outcomes, &progress)?;
+        draw(folder, outcomes, progress)?;
     }
-    let tables: Vec<Table> = outcomes.into_iter().flat_map(|o| o.tables).collect();
-    if arguments.json {
-        print(render(&tables, Format::Json).trim_end())?;
-    }
-    Ok(ExitCode::from(exit_code(&tables)))
+    Ok(())
 }
 
 /// Draws the figures of the suites that were run.
-fn draw(folder: &Path, outcomes: &[Outcome], progress: &TerminalProgress) -> miette::Result<()> {
+fn draw(folder: &Path, outcomes: &[Outcome], progress: &dyn Progress) -> miette::Result<()> {
     let mut drawn = 0;
     for outcome in outcomes {
         let Some(draw) = figures(outcome.suite.name) else {

@@ -2,19 +2,20 @@
 
 pub mod influence;
 
-use rayon::prelude::*;
-
-use crate::Effort;
 use crate::enclosed::{
     Case, Cells, Enclosed, EnclosedError, Law, Method, SPACING, Widths, YOUNGS_MODULUS,
 };
 use crate::fields::{Field, affine_modes, monomials, worst};
+use crate::{Effort, each};
 use bondline::observe::report::{Columns, Row, Table};
 use bondline::progress::{Progress, Silent};
 use bondline::solve::FreeDofs;
 use bondline::solve::direct::DirectParams;
 use bondline::solve::direct::{Analysis, Factor};
+use bondline::solve::krylov::LinearMap as _;
 use bondline::solve::ordering::Ordering;
+use bondline::solve::statics::SpreadRows;
+use bondline::system::{RankRows, RankSolverKind, Ranks, Spread, Symmetry};
 use bondline::tensor::{Tensor, Vector, padded};
 
 /// Largest affine residual per volume, relative to `E |G|/h`, with elements aligned to the lattice.
@@ -111,13 +112,9 @@ fn largest_density<const D: usize>(
 /// # Errors
 /// The solver's message if the system is singular.
 pub fn solution_error<const D: usize>(enclosed: &Enclosed<D>) -> Result<f64, String> {
-    let k = &enclosed.stiffness;
-    let sites = &enclosed.model.sites;
-    let held: Vec<Option<f64>> = (0..sites.len() * D)
-        .map(|dof| enclosed.is_outer(dof / D).then_some(0.0))
-        .collect();
+    let (k, held) = (&enclosed.stiffness, held(enclosed));
     let free = FreeDofs::from_prescribed(&held, D);
-    let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
+    let positions = places(enclosed);
     // one factorisation serves all modes
     let params = DirectParams::default();
     let (factor, _) = Analysis::new(k, &free, &positions, Ordering::default())
@@ -125,6 +122,81 @@ pub fn solution_error<const D: usize>(enclosed: &Enclosed<D>) -> Result<f64, Str
         .and_then(|analysis| {
             Factor::new(k, &free, analysis, &params, &Silent).map_err(|e| e.to_string())
         })?;
+    Ok(error_of_solutions(
+        enclosed,
+        &held,
+        |u| k.multiply(u),
+        |residual| factor.solve(residual),
+    ))
+}
+
+/// Collective: the same, by products with rows and a factorisation of which each process has its part.
+///
+/// # Errors
+/// In words, if there are no factors.
+///
+/// # Panics
+/// Of a block that one process assembled.
+pub fn solution_error_on<const D: usize>(
+    enclosed: &Enclosed<D>,
+    ranks: &dyn Ranks,
+) -> Result<f64, String> {
+    let shared = enclosed.shared.as_ref().expect("rows of several processes");
+    let (held, positions) = (held(enclosed), places(enclosed));
+    let prescribed: Vec<bool> = held.iter().map(Option::is_some).collect();
+    let rows = SpreadRows {
+        matrix: &shared.own,
+        spread: Spread {
+            ranks,
+            partition: &shared.partition,
+        },
+    };
+    let mut solver = ranks.solver(
+        RankRows {
+            matrix: &shared.own,
+            partition: &shared.partition,
+            symmetry: Symmetry::Unsymmetric,
+            positions: &positions,
+            prescribed: &prescribed,
+        },
+        RankSolverKind::Direct,
+    )?;
+    let mut own = vec![0.0; shared.own.dofs()];
+    Ok(error_of_solutions(
+        enclosed,
+        &held,
+        |u| {
+            let mut force = vec![0.0; u.len()];
+            rows.apply_into(u, &mut force);
+            force
+        },
+        |residual| {
+            solver.solve_into(&rows.spread.take_own(residual), &mut own, 0.0, 1);
+            let mut all = vec![0.0; residual.len()];
+            rows.spread.gather_sites(&own, &mut all);
+            all
+        },
+    ))
+}
+
+/// Zero where a displacement is given: on the outer boundary.
+fn held<const D: usize>(enclosed: &Enclosed<D>) -> Vec<Option<f64>> {
+    let dofs = 0..enclosed.model.sites.len() * D;
+    let held = dofs.map(|dof| enclosed.is_outer(dof / D).then_some(0.0));
+    held.collect()
+}
+
+fn places<const D: usize>(enclosed: &Enclosed<D>) -> Vec<[f64; 3]> {
+    enclosed.positions().map(padded).collect()
+}
+
+/// The largest error over all modes, by products with the stiffness and by what solves a system with it.
+fn error_of_solutions<const D: usize>(
+    enclosed: &Enclosed<D>,
+    held: &[Option<f64>],
+    multiply: impl Fn(&[f64]) -> Vec<f64>,
+    mut solve: impl FnMut(&[f64]) -> Vec<f64>,
+) -> f64 {
     let mut error = 0.0;
     for mode in affine_modes::<D>() {
         let exact = mode.at(enclosed.positions());
@@ -135,11 +207,11 @@ pub fn solution_error<const D: usize>(enclosed: &Enclosed<D>) -> Result<f64, Str
             .collect();
         // the second step refines the first
         for _ in 0..2 {
-            let mut residual = k.multiply(&u);
-            for (r, held) in residual.iter_mut().zip(&held) {
+            let mut residual = multiply(&u);
+            for (r, held) in residual.iter_mut().zip(held) {
                 *r = if held.is_some() { 0.0 } else { -*r };
             }
-            for (u, step) in u.iter_mut().zip(factor.solve(&residual)) {
+            for (u, step) in u.iter_mut().zip(solve(&residual)) {
                 *u += step;
             }
         }
@@ -148,7 +220,7 @@ pub fn solution_error<const D: usize>(enclosed: &Enclosed<D>) -> Result<f64, Str
             error = worst(error, (u - exact).abs() / size);
         }
     }
-    Ok(error)
+    error
 }
 
 /// Sum of each block column of the stiffness, `Σ_i K_ij`: the force that the whole model exerts on itself when site `j` moves by 1.
@@ -285,7 +357,7 @@ pub fn cases<const D: usize>(effort: Effort) -> Vec<Case> {
 }
 
 /// The rows of one case.
-fn rows<const D: usize>(case: &Case) -> Vec<Row> {
+fn rows<const D: usize>(case: &Case, ranks: Option<&dyn Ranks>) -> Vec<Row> {
     let name = format!(
         "{}, {}, {}",
         case.method.name(),
@@ -297,7 +369,7 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
     } else {
         IRREGULAR_LIMIT
     };
-    let enclosed = match Enclosed::<D>::new(case) {
+    let enclosed = match Enclosed::<D>::on(case, ranks) {
         Ok(enclosed) => enclosed,
         Err(EnclosedError::Scene(e)) if e.is_seam() => {
             return vec![Row::refused(&name, "residual", e.to_string())];
@@ -308,7 +380,11 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
                 .to_vec();
         }
     };
-    let error = match solution_error(&enclosed) {
+    let error = match ranks {
+        None => solution_error(&enclosed),
+        Some(ranks) => solution_error_on(&enclosed, ranks),
+    };
+    let error = match error {
         Ok(error) => Row::at_most(&name, "solution error", error, SOLUTION_LIMIT),
         Err(why) => Row::at_most(&name, "solution error", f64::NAN, SOLUTION_LIMIT).because(why),
     };
@@ -326,22 +402,23 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
     ]
 }
 
-/// One table for a dimension.
-pub fn table<const D: usize>(effort: Effort, progress: &dyn Progress) -> Table {
+/// One table for a dimension; collective where there are several processes.
+pub fn table<const D: usize>(
+    effort: Effort,
+    progress: &dyn Progress,
+    ranks: Option<&dyn Ranks>,
+) -> Table {
     let cases = cases::<D>(effort);
     let stage = format!("patch test, {D}D");
     progress.stage(&stage, Some(cases.len() as u64));
-    let rows: Vec<Vec<Row>> = cases
-        .par_iter()
-        .map(|case| {
-            let mut rows = rows::<D>(case);
-            for row in &mut rows {
-                row.case = format!("{D}D {}", row.case);
-            }
-            progress.advance(1);
-            rows
-        })
-        .collect();
+    let rows = each(ranks, &cases, |case| {
+        let mut rows = rows::<D>(case, ranks);
+        for row in &mut rows {
+            row.case = format!("{D}D {}", row.case);
+        }
+        progress.advance(1);
+        rows
+    });
     let mut table = Table::new(
         format!(
             "Patch test in {D}D. residual: largest affine internal force per volume over E|G|/h; solution error: displacement given on the outer \
@@ -356,12 +433,17 @@ pub fn table<const D: usize>(effort: Effort, progress: &dyn Progress) -> Table {
 
 /// The suite `patch`.
 pub fn patch(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
+    patch_on(effort, progress, None)
+}
+
+/// The same; where there are several processes, by all of them, without what it has of influence functions alone.
+pub fn patch_on(effort: Effort, progress: &dyn Progress, ranks: Option<&dyn Ranks>) -> Vec<Table> {
     let mut tables = vec![
-        table::<1>(effort, progress),
-        table::<2>(effort, progress),
-        table::<3>(effort, progress),
+        table::<1>(effort, progress, ranks),
+        table::<2>(effort, progress, ranks),
+        table::<3>(effort, progress, ranks),
     ];
-    if effort == Effort::Full {
+    if effort == Effort::Full && ranks.is_none() {
         tables.push(influence::table(progress));
     }
     progress.finish();

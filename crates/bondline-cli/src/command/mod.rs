@@ -3,11 +3,9 @@
 //! | file | what |
 //! |---|---|
 //! | `interrupt.rs` | signals |
-//! | `ranks.rs` | several processes |
 //! | `threads.rs` | how many threads compute |
 //! | `verify.rs` | the program of the suites, which is built apart |
 
 pub mod interrupt;
-pub mod ranks;
 pub mod threads;
 pub mod verify;

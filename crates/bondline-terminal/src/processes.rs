@@ -1,4 +1,4 @@
-//! A run by several processes, where the program is built for it and `mpirun` has started it.
+//! The processes of a job under `mpirun`, where a program is built for them.
 
 #[cfg(feature = "petsc")]
 pub use petsc::Processes;
@@ -10,7 +10,8 @@ pub use alone::Processes;
 mod petsc {
     use bondline::system::Ranks;
     use bondline_petsc::{PetscRanks, is_under_mpi};
-    use bondline_terminal::tell;
+
+    use crate::tell;
 
     /// The processes of this run: one, unless `mpirun` has started several.
     pub struct Processes(Option<PetscRanks>);
@@ -83,8 +84,8 @@ mod alone {
                 .find_map(size)
             {
                 Some(count) if count > 1 => Err(miette::miette!(
-                    help = "build it with `cargo build --release -p bondline-cli --features petsc` (docs/clusters.md), or run it without mpirun",
-                    "mpirun has started {count} processes, and this program was built without the feature petsc, so that each would run the whole scene"
+                    help = "build it with `cargo build --release --bins --features bondline-cli/petsc` (docs/clusters.md), or run it without mpirun",
+                    "mpirun has started {count} processes, and this program was built without the feature petsc, so that each would do all of the work"
                 )),
                 _ => Ok(Self),
             }
