@@ -270,6 +270,7 @@ fn steps<const D: usize>(
         proved: laid_out.proved,
         policy: spec.growing_modes,
         place: &|site| model.sites[site].position.iter().copied().collect(),
+        ranks: None,
     };
     let begin = start(model, rest);
     let choices = &mut laid_out.choices;

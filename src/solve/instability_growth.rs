@@ -13,7 +13,7 @@ use crate::{
         neighbourhood::Neighbourhood,
         stable_step::{Scaled, Space, StepError},
     },
-    system::{SemiDiscrete, Symmetry},
+    system::{Ranks, SemiDiscrete, Symmetry},
 };
 
 /// What to do about an unstable partial stress.
@@ -106,6 +106,8 @@ pub fn stepped_growth_rate(real: f64, imaginary: f64, step: f64) -> f64 {
 ///
 /// Up to [`DENSE`] unknowns all eigenvalues are computed. Beyond, a tenth of the steps is run from noise (at least 200 and at most 4000), and the eigenvalues of one to four neighbourhoods of the seam are computed if the model has no symmetry.
 ///
+/// Collective, of processes: the first of `ranks` computes eigenvalues and tells them to all.
+///
 /// # Errors
 /// [`StepError::Row`] for a site without mass, [`StepError::Eigenvalues`].
 pub fn growth(
@@ -113,13 +115,14 @@ pub fn growth(
     prescribed: &[u32],
     step: f64,
     steps: u64,
+    ranks: Option<&dyn Ranks>,
 ) -> Result<Growth, StepError> {
     let mut operator = Scaled::new(system, prescribed)?;
     // one change of threads instead of several per product
     rayon::scope(|_| {
         let unknowns = operator.free.count();
         if unknowns <= DENSE {
-            return Ok(growth_by_eigenvalues(&mut operator, step)?.0);
+            return Ok(growth_by_eigenvalues(&mut operator, step, ranks)?.0);
         }
         let products = (steps / 10).clamp(200, 4000);
         let (mut found, left) = growth_from_noise(&mut operator, step, products)?;
@@ -130,6 +133,7 @@ pub fn growth(
                 step,
                 products,
                 most: most as usize,
+                ranks,
             };
             near.look(&mut operator, &left, &mut found)?;
         }
@@ -148,6 +152,7 @@ struct NearSeam<'a> {
     products: u64,
     /// Neighbourhoods, at most.
     most: usize,
+    ranks: Option<&'a dyn Ranks>,
 }
 
 impl NearSeam<'_> {
@@ -178,7 +183,7 @@ impl NearSeam<'_> {
             candidates.retain(|s| !near.contains(*s));
             neighbourhoods += 1;
             let mut part = Scaled::new(&near.motion, &near.held)?;
-            let (local, mode) = growth_by_eigenvalues(&mut part, self.step)?;
+            let (local, mode) = growth_by_eigenvalues(&mut part, self.step, self.ranks)?;
             if local.rate <= fastest.as_ref().map_or(0.0, |(f, _)| f.rate) {
                 continue;
             }
@@ -285,20 +290,74 @@ fn free_dofs(operator: &Scaled<'_>) -> Vec<usize> {
         .collect()
 }
 
+/// The fastest growing mode of a matrix.
+struct Fastest {
+    /// The largest size of any eigenvalue \[1/s²\].
+    largest: f64,
+    /// Its eigenvalue, real and imaginary part \[1/s²\].
+    value: [f64; 2],
+    /// Its vector, real and imaginary parts.
+    vector: Vec<[f64; 2]>,
+}
+
+impl Fastest {
+    /// Of a motion by steps of `step`; none if the eigenvalues are not found.
+    fn of(matrix: &faer::Mat<f64>, step: f64) -> Option<Self> {
+        let eigen = matrix.eigen().ok()?;
+        let values = eigen.S().column_vector();
+        let count = matrix.nrows();
+        let rate = |k: usize| stepped_growth_rate(values[k].re, values[k].im, step);
+        let best = (0..count).fold(0, |best, k| if rate(k) > rate(best) { k } else { best });
+        let vector = (0..count).map(|i| eigen.U()[(i, best)]);
+        Some(Self {
+            largest: (0..count).fold(0.0, |m, k| values[k].re.hypot(values[k].im).max(m)),
+            value: match count {
+                0 => [0.0; 2],
+                _ => [values[best].re, values[best].im],
+            },
+            vector: vector.map(|c| [c.re, c.im]).collect(),
+        })
+    }
+
+    fn words(&self) -> Vec<u64> {
+        let numbers = [self.largest, self.value[0], self.value[1]];
+        let all = numbers.iter().chain(self.vector.as_flattened());
+        all.map(|x| x.to_bits()).collect()
+    }
+
+    /// What [`Fastest::words`] gave; none of no words.
+    fn from_words(words: &[u64]) -> Option<Self> {
+        let numbers: Vec<f64> = words.iter().map(|&w| f64::from_bits(w)).collect();
+        let (&[largest, re, im], vector) = numbers.split_first_chunk()?;
+        let (pairs, _) = vector.as_chunks();
+        Some(Self {
+            largest,
+            value: [re, im],
+            vector: pairs.to_vec(),
+        })
+    }
+}
+
 /// The fastest growing mode of a small model by all of its eigenvalues, and the real part of its vector in the scaled displacements of the operator; zero if none grows.
 fn growth_by_eigenvalues(
     operator: &mut Scaled<'_>,
     step: f64,
+    ranks: Option<&dyn Ranks>,
 ) -> Result<(Growth, Vec<f64>), StepError> {
     let free = free_dofs(operator);
     let matrix = dense(operator)?;
-    let eigen = matrix.eigen().map_err(|_| StepError::Eigenvalues)?;
-    let values = eigen.S().column_vector();
-    let largest = (0..free.len()).fold(0.0_f64, |m, k| m.max(values[k].re.hypot(values[k].im)));
+    let fastest = match ranks {
+        None => Fastest::of(&matrix, step),
+        Some(ranks) => {
+            let found = (ranks.rank() == 0).then(|| Fastest::of(&matrix, step));
+            let words = found.flatten().map_or(Vec::new(), |f| f.words());
+            Fastest::from_words(&ranks.gather_words(&words)[0])
+        }
+    };
+    let fastest = fastest.ok_or(StepError::Eigenvalues)?;
     // zero comes out as round-off of the largest, and its square root is what counts
-    let resolution = (1e-13 * largest).sqrt();
-    let rate = |k: usize| stepped_growth_rate(values[k].re, values[k].im, step);
-    let best = (0..free.len()).fold(0, |best, k| if rate(k) > rate(best) { k } else { best });
+    let resolution = (1e-13 * fastest.largest).sqrt();
+    let rate = stepped_growth_rate(fastest.value[0], fastest.value[1], step);
     let mut found = Growth {
         rate: 0.0,
         resolution,
@@ -308,15 +367,14 @@ fn growth_by_eigenvalues(
         evidence: Evidence::Eigenvalues,
     };
     let mut real = vec![0.0; operator.dofs()];
-    if !free.is_empty() && rate(best) > resolution {
+    if rate > resolution {
         let mut mode = vec![0.0; operator.dofs()];
-        for (i, &k) in free.iter().enumerate() {
-            let c = eigen.U()[(i, best)];
-            mode[k] = c.re.hypot(c.im);
-            real[k] = c.re;
+        for (&k, [re, im]) in free.iter().zip(fastest.vector) {
+            mode[k] = re.hypot(im);
+            real[k] = re;
         }
-        found.rate = rate(best);
-        found.eigenvalue = [values[best].re, values[best].im];
+        found.rate = rate;
+        found.eigenvalue = fastest.value;
         found.site = operator.site_of(&mode);
     }
     Ok((found, real))

@@ -55,7 +55,7 @@ fn growth_is_that_of_the_eigenvalues() {
             system.symmetry = Symmetry::Unsymmetric;
             leave_out_zeros(&mut system);
             let step = stable_step(&system, &[]).expect("masses").stable;
-            let found = growth(&system, &[], step, 20_000).expect("eigenvalues");
+            let found = growth(&system, &[], step, 20_000, None).expect("eigenvalues");
             let [re, im]: [f64; 2] = expected;
             let root = by_recurrence(re, im, step);
             assert!(
@@ -72,7 +72,7 @@ fn growth_is_that_of_the_eigenvalues() {
         let mut stable = springs(n);
         leave_out_zeros(&mut stable);
         let step = stable_step(&stable, &[]).expect("masses").stable;
-        let found = growth(&stable, &[], step, 20_000).expect("eigenvalues");
+        let found = growth(&stable, &[], step, 20_000, None).expect("eigenvalues");
         assert!(found.rate == 0.0 && found.resolution < 0.02, "{found:?}");
     }
 }
@@ -155,7 +155,7 @@ fn growth_that_noise_cannot_show_is_found_near_the_seam() {
         system,
         sites: vec![i as u32, j as u32],
     };
-    let found = growth(&seam, &[], step, 20_000).expect("eigenvalues");
+    let found = growth(&seam, &[], step, 20_000, None).expect("eigenvalues");
     let expected = by_recurrence(2.0, 2e-3, step);
     assert!(
         (found.rate / expected - 1.0).abs() < 0.05,

@@ -149,7 +149,7 @@ fn partial_stress() -> [Kind; 3] {
 fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row {
     let found = Strip::new::<D>(case).and_then(|strip| {
         let length: f64 = case.lengths.iter().map(|l| f64::from(*l)).sum();
-        instability_growth::growth(&strip.motion, &[], 0.5, 0)
+        instability_growth::growth(&strip.motion, &[], 0.5, 0, None)
             .map(|g| g.rate * length)
             .map_err(|e| e.to_string())
     });
@@ -367,7 +367,7 @@ fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
             },
         ];
         // a mode that grows at any step leaves no limit to bisect
-        let grows = instability_growth::growth(&strip.motion, &[], found.stable, 0)
+        let grows = instability_growth::growth(&strip.motion, &[], found.stable, 0, None)
             .map_err(|e| e.to_string())?
             .rate
             * 4000.0

@@ -243,7 +243,7 @@ fn coupled_rows(name: &str, case: &StripCase) -> Vec<Row> {
         let mut strip = Strip::new::<1>(case)?;
         let limit = stable_step::stable_step(&strip.motion, &[]).map_err(|e| e.to_string())?;
         let step = FRACTION * limit.stable;
-        let growth = instability_growth::growth(&strip.motion, &[], step, STEPS)
+        let growth = instability_growth::growth(&strip.motion, &[], step, STEPS, None)
             .map_err(|e| e.to_string())?;
         growth
             .admit(step * STEPS as f64, remedy)

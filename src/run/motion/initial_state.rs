@@ -114,6 +114,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             proved: self.proved,
             policy: spec.growing_modes,
             place: &|site| model.sites[site].position.iter().copied().collect(),
+            ranks: options.ranks,
         };
         let (mut moving, pace, growth) = paced(spec, &asked, moving, &held, known, self.choices)?;
         self.watch.lap(self.timings, "stable step");

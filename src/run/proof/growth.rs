@@ -32,6 +32,8 @@ pub struct GrowthQuestion<'a> {
     pub policy: GrowingModesSpec,
     /// Where a site is.
     pub place: &'a dyn Fn(usize) -> Vec<f64>,
+    /// The processes that ask together.
+    pub ranks: Option<&'a dyn Ranks>,
 }
 
 /// What to do about modes that grow with a coupling.
@@ -101,7 +103,7 @@ fn line_of(found: &Growth, exponent: f64, unseen: f64, place: &[f64]) -> String 
     }
 }
 
-/// Looks for modes that grow over a run of `steps` steps of `step`; at most a tenth of its products, and at least 200.
+/// Collective: looks for modes that grow over a run of `steps` steps of `step`; at most a tenth of its products, and at least 200.
 ///
 /// # Errors
 /// [`RunError::Grows`] for a mode that doubles the energy, unless the scene wants to be told only.
@@ -119,7 +121,7 @@ pub(crate) fn check(
             findings: Vec::new(),
         });
     }
-    let found = growth(system, held, step, steps)?;
+    let found = growth(system, held, step, steps, asked.ranks)?;
     let duration = steps as f64 * step;
     let exponent = found.rate * duration;
     // below the least that is told the fastest mode is one that does not show either
