@@ -428,3 +428,70 @@ conditions.right.traction = { on = "right", x = 1e-3 }
         "{error}"
     );
 }
+
+/// A cantilever of plane strain whose free end is pulled down, in cells of one kind.
+fn cantilever(cell: &str, poisson_ratio: f64) -> (f64, Vec<String>) {
+    let text = format!(
+        r#"
+kinematics = "plane-strain"
+coupling = "local"
+[mesh.rectangle]
+min = [0, 0]
+max = [10, 2]
+x = {{ cells = 40 }}
+y = {{ cells = 8 }}
+cell = "{cell}"
+[materials.rubber.lps]
+youngs-modulus = 200
+poisson-ratio = {poisson_ratio}
+[conditions.wall.displacement]
+on = "left"
+x = 0
+y = 0
+[conditions.end.traction]
+on = "right"
+y = -1e-3
+[output]
+vtu = false
+probes.tip = {{ at = [10, 1] }}
+"#
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let source = Source::new("scene.toml", text);
+    let mut scene = AnyScene::from_source(&source, folder.path(), "scene").unwrap();
+    scene.set_output_directory(folder.path().to_owned());
+    let summary = scene.run(&Silent).unwrap();
+    let table = std::fs::read_to_string(folder.path().join("scene_probes.csv")).unwrap();
+    let (names, row) = table.split_once('\n').unwrap();
+    let column = names.split(',').position(|n| n == "uy").unwrap();
+    let tip = row.trim().split(',').nth(column).unwrap().parse().unwrap();
+    (tip, summary.warnings)
+}
+
+#[test]
+fn elements_of_first_order_that_lock_are_warned_of() {
+    // P L³/(3 E′ I) and the shear of a beam: P = 2e-3, I = 8/12, E′ = E/(1 − ν²)
+    let of_beam = |nu: f64| {
+        let (p, inertia, shear) = (2e-3, 8.0 / 12.0, 200.0 / (2.0 * (1.0 + nu)));
+        let bend = p * 1e3 / (3.0 * 200.0 / (1.0 - nu * nu) * inertia);
+        -(bend + 1.2 * p * 10.0 / (shear * 2.0))
+    };
+    for (cell, nu, low, high) in [
+        ("quad4", 0.3, 0.97, 1.02),
+        ("quad4", 0.45, 0.9, 0.95),
+        ("quad4", 0.49, 0.7, 0.85),
+        ("quad4", 0.4999, 0.05, 0.1),
+        ("quad8", 0.4999, 0.94, 1.02),
+    ] {
+        let (tip, warnings) = cantilever(cell, nu);
+        let part = tip / of_beam(nu);
+        println!("{cell}, {nu}: {part:.3}");
+        assert!((low..high).contains(&part), "{cell}, {nu}: {part}");
+        let locks = warnings.iter().any(|w| w.contains("volumetric locking"));
+        assert_eq!(
+            locks,
+            cell == "quad4" && nu > 0.45,
+            "{cell}, {nu}: {warnings:?}"
+        );
+    }
+}

@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::error::position;
 use super::{Facet, Mesh, MeshError, facet_corners};
 use crate::tensor::Vector;
 
@@ -236,9 +237,18 @@ impl<const D: usize> Mesh<D> {
             .map(|f| {
                 wanted[&key(facet_corners::<D>(f).iter().copied())]
                     .clone()
-                    .ok_or_else(|| MeshError::LooseFacet { nodes: f.clone() })
+                    .ok_or_else(|| self.loose(f))
             })
             .collect()
+    }
+
+    fn loose(&self, facet: &[u32]) -> MeshError {
+        let places = facet.iter().map(|&n| self.nodes[n as usize]);
+        let middle = places.sum::<Vector<D>>() / facet.len() as f64;
+        MeshError::LooseFacet {
+            nodes: facet.to_vec(),
+            position: position(middle.as_slice()),
+        }
     }
 
     /// Outward normal of a facet times its area [length^(D−1)]; `±1` in 1D.
@@ -425,7 +435,9 @@ mod tests {
         assert!((mesh.facet_normal_area(&found[1]) - Vector::from([0.5, 0.0])).norm() < 1e-15);
         let message = mesh.locate_facets(&[vec![0, 8]]).unwrap_err().to_string();
         assert!(
-            message.contains("nodes [0, 8] is no facet of any cell"),
+            message.contains(
+                "around (0.500000, 0.500000) (nodes [0, 8], counted from 0) is no facet of any cell"
+            ),
             "{message}"
         );
         let line = Grid::new([uniform(3)]).mesh().unwrap();

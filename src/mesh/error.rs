@@ -243,7 +243,7 @@ pub enum MeshError {
     },
     /// A cell whose nodes run the wrong way round.
     #[error(
-        "cell {cell} ({shape:?}) with its centroid at {centroid} is inverted: its smallest scaled Jacobian is {value:.3e}; reverse its node order (in Gmsh: reverse the surface or volume, or ReorientMesh)"
+        "cell {cell} ({shape:?}), counted from 0, with its centroid at {centroid} is inverted: its smallest scaled Jacobian is {value:.3e}; reverse its node order (in Gmsh: reverse the surface or volume, or ReorientMesh)"
     )]
     Inverted {
         /// Number of the cell, from 0.
@@ -257,7 +257,7 @@ pub enum MeshError {
     },
     /// A cell without volume, or folded over at a corner.
     #[error(
-        "cell {cell} ({shape:?}) with its centroid at {centroid} is degenerate: its smallest scaled Jacobian is {value:.3e}, more than {limit:.0e} is needed; mesh that region again"
+        "cell {cell} ({shape:?}), counted from 0, with its centroid at {centroid} is degenerate: its smallest scaled Jacobian is {value:.3e}, more than {limit:.0e} is needed; mesh that region again"
     )]
     Degenerate {
         /// Number of the cell, from 0.
@@ -273,7 +273,7 @@ pub enum MeshError {
     },
     /// A cell far longer than wide.
     #[error(
-        "cell {cell} ({shape:?}) with its centroid at {centroid} is {ratio:.1e} times as long as it is wide, more than {limit:.0e}: round-off would spoil the strain in it; mesh that region again"
+        "cell {cell} ({shape:?}), counted from 0, with its centroid at {centroid} is {ratio:.1e} times as long as it is wide, more than {limit:.0e}: round-off would spoil the strain in it; mesh that region again"
     )]
     Thin {
         /// Number of the cell, from 0.
@@ -289,7 +289,7 @@ pub enum MeshError {
     },
     /// Two nodes at one place.
     #[error(
-        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart); merge them (in Gmsh: Coherence Mesh; in a deck: Merge Instances), or leave a gap between parts that are not bonded"
+        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart; counted from 0); merge them (in Gmsh: Coherence Mesh; in a deck: Merge Instances), or leave a gap between parts that are not bonded"
     )]
     CoincidentNodes {
         /// Number of one, from 0.
@@ -333,11 +333,13 @@ pub enum MeshError {
     },
     /// A facet of a set that belongs to no cell.
     #[error(
-        "the facet with nodes {nodes:?} is no facet of any cell; facet sets must lie on the faces of cells"
+        "the facet around {position} (nodes {nodes:?}, counted from 0) is no facet of any cell; facet sets must lie on the faces of cells"
     )]
     LooseFacet {
         /// Its nodes.
         nodes: Vec<u32>,
+        /// The mean of their places.
+        position: String,
     },
 }
 

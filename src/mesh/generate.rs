@@ -207,6 +207,9 @@ fn graded(length: f64, spacing: f64, ratio: f64, largest: f64) -> Result<Vec<f64
     Ok(found)
 }
 
+/// The sets of facets that every grid has, by axis: the lower side, then the upper.
+pub(crate) const SIDES: [&str; 6] = ["left", "right", "bottom", "top", "back", "front"];
+
 /// A named box whose cells are removed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutOut<const D: usize> {
@@ -379,8 +382,7 @@ impl<const D: usize> Grid<D> {
     fn add_sets(&self, mesh: &mut Mesh<D>, nodes: &[usize; D], ranges: &[[[usize; 2]; D]]) {
         let all = (0..mesh.cell_count() as u32).collect();
         mesh.cell_sets.insert("all".into(), all);
-        let sides = ["left", "right", "bottom", "top", "back", "front"];
-        for name in &sides[..2 * D] {
+        for name in &SIDES[..2 * D] {
             mesh.facet_sets.insert((*name).into(), Vec::new());
         }
         for cut_out in &self.cut_outs {
@@ -399,10 +401,10 @@ impl<const D: usize> Grid<D> {
             };
             for k in 0..D {
                 if at.iter().all(|at| at[k] == 0) {
-                    add(sides[2 * k]);
+                    add(SIDES[2 * k]);
                 }
                 if at.iter().all(|at| at[k] == nodes[k] - 1) {
-                    add(sides[2 * k + 1]);
+                    add(SIDES[2 * k + 1]);
                 }
             }
             for (cut_out, range) in self.cut_outs.iter().zip(ranges) {

@@ -105,7 +105,7 @@ impl Rotation {
             None => String::new(),
         };
         format!(
-            "a finite element at ({}) has rotated by {:.1} degrees{when}: elements are linear, and rotated by so much they are {} % too large{failure}{energy}; where that matters use bonds = \"exact\" and elements = \"cauchy-born\" in [peridynamics], or let coupling = \"nonlocal\" carry what rotates",
+            "the body at ({}) has rotated by {:.1} degrees{when}: what is linear there, elements or bonds, is {} % too large{failure}{energy}; where that matters use bonds = \"exact\" in [peridynamics], and for elements elements = \"cauchy-born\" or coupling = \"nonlocal\" with exact bonds",
             components(&self.place),
             self.degrees,
             number(100.0 * self.length_error)

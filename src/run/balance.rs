@@ -1,6 +1,25 @@
 //! Whether internal forces of a body in equilibrium sum to nothing, so that loads and reactions do.
 
+use crate::coupling::Model;
 use crate::tensor::Vector;
+
+/// Forces that are none, over those that would displace the body as far by strains.
+const ROUND_OFF: f64 = 1e-9;
+
+/// Forces \[N\] that equilibria found to a tolerance leave in a body without stress that has moved by up to `furthest` \[m\].
+pub(crate) fn round_off<const D: usize>(model: &Model<D>, furthest: f64) -> f64 {
+    let cells = 0..model.mesh.cell_count();
+    let volume: f64 = cells.map(|c| model.mesh.cell_volume(c).abs()).sum();
+    let size = volume.powf(1.0 / D as f64);
+    // force over displacement of the whole body
+    let stiffness = model.tensor_of_cell(0).get(0, 0, 0, 0) * volume / (size * size);
+    ROUND_OFF * stiffness * furthest
+}
+
+/// The largest displacement along an axis \[m\].
+pub(crate) fn furthest(u: &[f64]) -> f64 {
+    u.iter().fold(0.0, |most, u| most.max(u.abs()))
+}
 
 /// The sum of internal forces, against the forces that it is made of.
 #[derive(Clone, Copy)]

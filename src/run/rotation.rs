@@ -1,4 +1,4 @@
-//! Rotation of finite elements, which are linear, and what it costs.
+//! Rotation of finite elements and bonds that are linear, and what it costs.
 //!
 //! A linear element that rotates by θ without strain has the strain `(cos θ − 1) I` in the plane of the rotation. Where all of a body is linear, it is free to grow by `1/cos θ − 1` instead, and its
 //! lengths are wrong by as much. Where exact bonds keep their lengths in a zone, the elements around it want to be larger than the zone by `e = 1/cos θ − 1`, and both strain each other: a misfit.
@@ -14,7 +14,7 @@ use crate::coupling::{Model, SiteKind};
 use crate::fem;
 use crate::observe::summary::Rotation;
 use crate::run::setup::RunSettings;
-use crate::tensor::{Tensor, padded};
+use crate::tensor::{Tensor, Vector, padded};
 
 /// Rotation in degrees from which on it is told.
 pub(crate) const TOLD: f64 = 2.0;
@@ -22,11 +22,16 @@ pub(crate) const TOLD: f64 = 2.0;
 /// Misfit, over the stretch at which bonds fail, from which on a smaller rotation is told as well.
 const TOLD_OF_FAILURE: f64 = 0.1;
 
-/// The finite elements of a model, to measure their rotation.
+/// Points whose rotation is measured, at most: all of a small body, and every so manyth of a large one, which a look would cost as much as a step.
+const POINTS: usize = 2000;
+
+/// What is linear in a model, to measure its rotation.
 pub(crate) struct Rotations<'m, const D: usize> {
     model: &'m Model<D>,
     cells: Vec<u32>,
     volume: Vec<f64>,
+    /// Points with linear bonds.
+    points: Vec<u32>,
     /// Energy of a misfit of 1 for each unit of the elements' volume; zero where none arises.
     stiffness: f64,
     /// The stretch at which bonds break or soften; none where no misfit arises or none fails.
@@ -42,7 +47,7 @@ pub(crate) struct Largest {
 }
 
 impl<'m, const D: usize> Rotations<'m, D> {
-    /// Of all elements of a model that are for small strains, none in one dimension; `is_linear` tells that bonds are linear too, `failing` the stretch at which they break or soften.
+    /// Of all elements of a model that are for small strains, and of its points where `is_linear` tells that bonds are too, none in one dimension; `failing` the stretch at which they break or soften.
     pub fn new(
         model: &'m Model<D>,
         rest: &RunSettings<D>,
@@ -60,11 +65,21 @@ impl<'m, const D: usize> Rotations<'m, D> {
         let of_cell = |&c: &u32| fem::cell_volume(&model.mesh, c as usize);
         let volume: Vec<f64> = cells.iter().map(of_cell).collect();
         let elements: f64 = volume.iter().sum();
-        let points = model
-            .sites
-            .iter()
-            .filter(|s| matches!(s.kind, SiteKind::Point(_)));
-        let zone: f64 = points.map(|s| s.volume).sum();
+        let zone: f64 = (model.sites.iter())
+            .filter(|s| matches!(s.kind, SiteKind::Point(_)))
+            .map(|s| s.volume)
+            .sum();
+        // of families that are spread over processes each would see another part
+        let sees_points = D > 1 && is_linear && model.shared_families().is_none();
+        let points = match model.body().filter(|_| sees_points) {
+            Some(body) => {
+                let all = body.families.len();
+                let has_bonds = |&i: &usize| body.families.of(i).len() > D;
+                let some = (0..all).step_by(all.div_ceil(POINTS).max(1));
+                some.filter(has_bonds).map(|i| i as u32).collect()
+            }
+            None => Vec::new(),
+        };
         let stiffness = match (is_linear, cells.first()) {
             (false, Some(&c)) if zone > 0.0 => {
                 misfit_stiffness(model, c as usize) * zone / (zone + elements)
@@ -75,36 +90,58 @@ impl<'m, const D: usize> Rotations<'m, D> {
             model,
             cells,
             volume,
+            points,
             stiffness,
             failing: failing.filter(|_| stiffness > 0.0),
         }
     }
 
-    /// The largest rotation under a displacement; none without elements.
+    /// The largest rotation under a displacement; none without anything linear.
     pub fn largest(&self, u: &[f64]) -> Option<Largest> {
         let transfer = &self.model.node_transfer;
-        let (mut largest, mut energy) = ((-1.0, 0), 0.0);
+        let (mut largest, mut energy) = ((-1.0, Vector::<D>::zeros()), 0.0);
         for (&c, volume) in self.cells.iter().zip(&self.volume) {
             let node = |n: usize| transfer.displacement(n, u);
             let gradient = fem::displacement_gradient_at_centre(&self.model.mesh, c as usize, node);
             let angle = rotation(&gradient);
             if angle > largest.0 {
-                largest = (angle, c);
+                largest = (angle, self.model.mesh.centroid(c as usize));
             }
             // beyond 89.5 degrees a linear body has no size
             let misfit = 1.0 / angle.cos().max(0.01) - 1.0;
             energy += self.stiffness * volume * misfit * misfit;
         }
-        self.cells.first()?;
-        let (angle, c) = largest;
-        let nodes = self.model.mesh.cell(c as usize);
-        let sum = nodes.iter().map(|&n| self.model.mesh.nodes[n as usize]);
-        let centre =
-            sum.fold(crate::tensor::Vector::<D>::zeros(), |s, x| s + x) / nodes.len() as f64;
-        Some(Largest {
+        for (x, gradient) in self.gradients_of_points(u) {
+            let angle = rotation(&gradient);
+            if angle > largest.0 {
+                largest = (angle, x);
+            }
+        }
+        let (angle, place) = largest;
+        (angle >= 0.0).then(|| Largest {
             degrees: angle.to_degrees(),
-            place: padded(&centre),
+            place: padded(&place),
             energy,
+        })
+    }
+
+    /// The displacement gradient that fits the family of each point best, and where that is.
+    fn gradients_of_points(&self, u: &[f64]) -> impl Iterator<Item = (Vector<D>, Tensor<D>)> {
+        let body = self.model.body();
+        let bodies = self
+            .points
+            .iter()
+            .filter_map(move |&i| Some((body?, i as usize)));
+        bodies.filter_map(|(body, i)| {
+            let displacement = |p: usize| body.cloud.transfer.displacement(p, u);
+            let (x, at) = (body.cloud.position[i], displacement(i));
+            let (mut shape, mut moved) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
+            for &j in body.families.of(i) {
+                let xi = body.cloud.position[j as usize] - x;
+                shape += xi * xi.transpose();
+                moved += (displacement(j as usize) - at) * xi.transpose();
+            }
+            Some((x, moved * shape.try_inverse()?))
         })
     }
 

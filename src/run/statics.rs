@@ -23,11 +23,11 @@ use crate::observe::summary::{
     peak_memory_bytes,
 };
 use crate::progress::Progress;
-use crate::run::balance::Balance;
+use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::definiteness;
 use crate::run::error::RunError;
 use crate::run::surface_gradient::missed_peak;
-use crate::run::warnings::{indefinite, out_of_balance, warnings};
+use crate::run::warnings::{indefinite, locking, out_of_balance, warnings};
 use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
@@ -318,9 +318,16 @@ impl<const D: usize> StaticBody<'_, D> {
         let balance = Balance::<D>::of(&equilibrium.internal, &equilibrium.load, reactions);
         let (force, relative) = (balance.force.as_slice(), balance.relative());
         let mut told = warnings(self.model, joining, &proof);
+        told.extend(locking(
+            self.model,
+            &self.model.local_laws(&self.rest.local_laws),
+        ));
         told.extend(indefinite(equilibrium.symmetry, info.method));
         told.extend(rotation.as_ref().map(Rotation::warning));
-        told.extend(out_of_balance(force, relative, joining));
+        // what is left of the forces of a body that only turns is round-off
+        let least = round_off(self.model, furthest(&solution.displacement));
+        let is_loaded = balance.scale > least;
+        told.extend(out_of_balance(force, relative, joining).filter(|_| is_loaded));
         let stresses = &self.rest.stresses;
         // strains of free expansion are no stress
         if stresses.thermal.is_none() {

@@ -96,15 +96,21 @@ pub(crate) fn indefinite(symmetry: Symmetry, method: MethodUsed) -> Option<Strin
     })
 }
 
-/// Elements of one quadrature point whose material flows at constant volume.
+/// Elements that resist deformations at constant volume, by their laws.
 pub(crate) fn locking<const D: usize>(
     model: &Model<D>,
     laws: &[Option<Arc<dyn LocalLaw<D>>>],
-) -> Option<String> {
+) -> impl Iterator<Item = String> + use<D> {
     let flows = |c: usize| {
         let law = laws[model.material_of_cell(c) as usize].as_ref();
         law.is_some_and(|law| law.flows_at_constant_volume())
     };
+    let all = [flowing(model, flows), nearly_incompressible(model, flows)];
+    all.into_iter().flatten()
+}
+
+/// Elements of one quadrature point whose material flows at constant volume.
+fn flowing<const D: usize>(model: &Model<D>, flows: impl Fn(usize) -> bool) -> Option<String> {
     let is_simplex = |c: usize| matches!(model.mesh.shapes[c], CellShape::Tri3 | CellShape::Tet4);
     let count = (0..model.mesh.cell_count())
         .filter(|&c| model.is_element(c) && is_simplex(c) && flows(c))
@@ -112,6 +118,39 @@ pub(crate) fn locking<const D: usize>(
     (count > 0).then(|| {
         format!(
             "{count} tri3 or tet4 elements flow at constant volume, which such cells resist: where they flow they are too stiff; mesh them with quad4 or hex8 cells"
+        )
+    })
+}
+
+/// The Poisson ratio beyond which elements of first order are warned of: a cantilever of plane strain with eight quad4 cells over its height bends by 0.93 of what it should at 0.45, by 0.79 at 0.49 and by a twelfth at 0.4999 (`tests/scene_runs.rs`).
+const NEARLY_INCOMPRESSIBLE: f64 = 0.45;
+
+/// Elements of first order of a solid that hardly changes its volume, which they can only keep by hardly bending.
+///
+/// Of laws that flow at constant volume they take the mean dilatation of a cell, or are warned of anyway.
+fn nearly_incompressible<const D: usize>(
+    model: &Model<D>,
+    flows: impl Fn(usize) -> bool,
+) -> Option<String> {
+    if D == 1 {
+        return None;
+    }
+    // of plane stress a third at most, since its thickness gives way
+    let ratio = |c: usize| {
+        let tensor = model.tensor_of_cell(c);
+        let (lambda, mu) = (tensor.get(0, 0, 1, 1), tensor.get(0, 1, 0, 1));
+        lambda / (2.0 * (lambda + mu))
+    };
+    let is_first_order = |c: usize| model.mesh.shapes[c] == model.mesh.shapes[c].linear();
+    let cells = (0..model.mesh.cell_count())
+        .filter(|&c| model.is_element(c) && is_first_order(c) && !flows(c))
+        .map(ratio)
+        .filter(|ratio| *ratio > NEARLY_INCOMPRESSIBLE);
+    let (count, largest) = cells.fold((0, 0.0_f64), |(n, most), r| (n + 1, most.max(r)));
+    (count > 0).then(|| {
+        format!(
+            "{count} elements of first order have a Poisson ratio of up to {}: they resist bending at nearly constant volume (volumetric locking), and displacements may be far too small; mesh them with cells of second order (quad8, tri6, hex20, tet10)",
+            number(largest)
         )
     })
 }

@@ -116,6 +116,8 @@ fn one<const D: usize>(
             let typed = typed("traction", [&c.x, &c.y, &c.z]);
             let components = typed.components(clock)?;
             let facets = facet_set(&typed.place, &c.on, mesh)?;
+            // else a line through cells would carry a load
+            surface_conditions::faces(&typed.place, &c.on, mesh)?;
             let nodes = facets.iter().flatten().map(|&n| mesh.nodes[n as usize]);
             finite(&typed.place, name, &components, clock, nodes)?;
             Ok(typed.condition(Prescribed::Traction(facets.to_vec()), components))

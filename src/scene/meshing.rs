@@ -14,7 +14,7 @@ use super::spec::{
 };
 use super::value::{Coordinates, Text};
 use crate::fem;
-use crate::mesh::generate::{Axis, CutOut, Grid};
+use crate::mesh::generate::{Axis, CutOut, Grid, SIDES};
 use crate::mesh::{Mesh, MeshError, Order, quality, read};
 use crate::observe::checkpoint::Fingerprint;
 
@@ -218,6 +218,14 @@ fn generate<const D: usize>(
     }
     for (name, cutout) in cutouts {
         let at = format!("{place}.cutouts.{name}");
+        if SIDES[..2 * D].contains(&name.value.as_str()) {
+            return Err(SceneError::new(
+                SceneErrorKind::WrongValue,
+                format!("`{at}` has the name of a side of the mesh, whose set it would join"),
+            )
+            .label(name.span.clone(), "a side")
+            .help("give the cutout another name, such as `hole`"));
+        }
         let (min, max) = corners::<D>(&at, &cutout.min, &cutout.max)?;
         grid.cut_out(CutOut {
             name: name.value.clone(),

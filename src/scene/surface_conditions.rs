@@ -68,6 +68,16 @@ pub(super) fn outer_facets<const D: usize>(
         .label(on.span.clone(), "has no outside there")
         .help("name a set of facets that each belong to one cell; inside of the body prescribe a traction"));
     }
+    faces(place, on, mesh)
+}
+
+/// The facets of a named set, each a face of a cell, its normal pointing out of that.
+pub(super) fn faces<const D: usize>(
+    place: &str,
+    on: &Text,
+    mesh: &Mesh<D>,
+) -> Result<Vec<BoundaryFacet>, SceneError> {
+    let facets = facet_set(place, on, mesh)?;
     mesh.locate_facets(facets).map_err(|error| {
         SceneError::new(SceneErrorKind::Conflict, format!("`{place}.on`: {error}"))
             .label(on.span.clone(), "not a face of a cell")

@@ -143,6 +143,34 @@ const ON_FILE: &[(&str, &str)] = &[
 ];
 
 #[test]
+fn a_cutout_does_not_join_a_side() {
+    let cutout = "mesh.rectangle.cutouts.top={min=[0.1,0.1],max=[0.2,0.2]}";
+    let parts = ["mesh.rectangle.cutouts.top", "the name of a side", "hole"];
+    wrong_scene(&[], &[cutout], &parts);
+}
+
+#[test]
+fn a_traction_acts_on_faces_of_cells() {
+    // of the first group, one facet leads across the cells
+    let crossed = mesh().replace("1 1 2 1 1 1 10\n", "1 1 2 1 1 1 11\n");
+    assert_ne!(crossed, mesh());
+    let pulled = [
+        (
+            "on = \"left\"\nx = 0\ny = 0",
+            "on = \"right\"\nx = 0\ny = 0",
+        ),
+        ("on = \"right\"\nx = 1e6", "on = \"left\"\nx = -1e6"),
+    ];
+    let scene = edit(scene_of_mesh(), &pulled);
+    let parts = [
+        "conditions.pulled.traction.on",
+        "around (0.062500, 0.062500)",
+        "no facet of any cell",
+    ];
+    refused(&scene, &crossed, &[], &parts);
+}
+
+#[test]
 fn the_scene_and_the_mesh_are_right() {
     for scene in [SCENE.to_owned(), scene_of_mesh()] {
         let (status, message) = run(&scene, &mesh(), &[]);

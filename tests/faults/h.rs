@@ -47,7 +47,7 @@ fn a_rotation_is_warned_of_with_an_estimate_of_what_it_costs() {
             "{degrees}: {estimate} {lost}"
         );
         let warnings = summary["warnings"].to_string();
-        assert!(warnings.contains("elements are linear"), "{warnings}");
+        assert!(warnings.contains("what is linear there"), "{warnings}");
     }
 }
 
@@ -61,6 +61,17 @@ fn a_small_rotation_is_not_told_and_a_typed_limit_stops_the_run() {
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(said.contains("beyond largest-rotation"), "{said}");
     assert!(said.contains("has rotated by 3."), "{said}");
+    // what has ended takes no further step
+    let limit = ["--set", "solve.explicit.largest-rotation=3", "--json"];
+    let steps = |more: &[&str]| {
+        let checkpoints = ["--checkpoint-every", "1000"];
+        let output = case.command("run", &[&limit[..], &checkpoints, more].concat());
+        assert_eq!(output.status.code(), Some(3));
+        let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        summary["motion"]["time"].as_f64().unwrap()
+    };
+    let stopped = steps(&[]);
+    assert_eq!([stopped; 2], [steps(&["--resume"]), steps(&["--resume"])]);
 }
 
 #[test]
@@ -96,4 +107,64 @@ y = 0.25
         .run(&["--set", "conditions.r.traction={on=\"right\",y=0.025}"])
         .unwrap();
     assert!(small["rotation"].is_null(), "{small}");
+}
+
+#[test]
+fn points_alone_whose_bonds_are_linear_are_told_that_they_rotate() {
+    let spin = SPIN
+        .replace("bonds = \"exact\"\n", "")
+        .replace("[coupling.truncated]", "[coupling.nonlocal]")
+        .replace("bond-based]", "lps]\npoisson-ratio = 0.3");
+    let degrees = |summary: &serde_json::Value| summary["rotation"]["degrees"].as_f64();
+    let summary = Case::new(&spin).run(&[]).unwrap();
+    let told = degrees(&summary).unwrap();
+    // 5 degrees at the speed of the start: linear bodies turn by the arc tangent of the angle
+    assert!((4.5..5.5).contains(&told), "{told}");
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("use bonds = \\\"exact\\\""), "{warnings}");
+    let exact = Case::new(&spin)
+        .run(&["--set", "peridynamics.bonds=exact"])
+        .unwrap();
+    assert!(exact["rotation"].is_null(), "{exact}");
+    let limit = ["--set", "solve.explicit.largest-rotation=3"];
+    let output = Case::new(&spin).command("run", &limit);
+    assert_eq!(output.status.code(), Some(3));
+    // both ends are held as by a rigid rotation: nothing strains a body of exact bonds
+    let held = spin.split("[initial").next().unwrap().to_owned()
+        + "[conditions.a.rotation]\non = \"left\"\ncenter = [0, 0]\nangle = 30\n[conditions.b.rotation]\non = \"right\"\ncenter = [0, 0]\nangle = 30\n";
+    let summary = Case::new(&held).run(&[]).unwrap();
+    let told = degrees(&summary).unwrap();
+    // the free corners turn farther
+    assert!((25.0..50.0).contains(&told), "{told}");
+}
+
+#[test]
+fn a_body_that_only_turns_is_not_out_of_balance() {
+    let turned = r#"
+kinematics = "plane-stress"
+[mesh.rectangle]
+min = [0, 0]
+max = [10, 4]
+x = { cells = 40 }
+y = { cells = 16 }
+[materials.s.neo-hooke]
+youngs-modulus = 200
+poisson-ratio = 0.3
+[zones.nonlocal]
+box = { min = [4, 1], max = [6, 3] }
+[peridynamics]
+horizon = 0.375
+points.lattice = { spacing = 0.125 }
+[conditions.a.rotation]
+on = "left"
+center = [5, 2]
+angle = 10
+[conditions.b.rotation]
+on = "right"
+center = [5, 2]
+angle = 10
+"#;
+    let summary = Case::new(turned).run(&[]).unwrap();
+    let warnings = summary["warnings"].to_string();
+    assert!(!warnings.contains("out of balance"), "{warnings}");
 }

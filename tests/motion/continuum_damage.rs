@@ -214,10 +214,24 @@ fn damage_beside_a_seam_does_not_depend_on_its_place_and_stops_the_run_where_it_
         // too near to the hole
         let typed = plate(coupling, [5.5, 10.5], "stop", [1.0, 0.0]);
         write(folder.path(), "near.toml", &typed);
-        let mut program = crate::bondline(folder.path());
-        let output = program.args(["run", "near.toml"]).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stdout);
-        assert_eq!(output.status.code(), Some(3), "{coupling}: {said}");
+        let run = |more: &[&str]| {
+            let arguments = [
+                "run",
+                "near.toml",
+                "--output",
+                "near",
+                "--checkpoint-every",
+                "1",
+            ];
+            let program = &mut crate::bondline(folder.path());
+            let output = program.args(arguments).args(more).output().unwrap();
+            let said = String::from_utf8_lossy(&output.stdout).into_owned();
+            assert_eq!(output.status.code(), Some(3), "{coupling}: {said}");
+            (said, crate::files(&folder.path().join("near")))
+        };
+        let (said, files) = run(&[]);
+        // what has ended takes no further load step
+        assert!(files == run(&["--resume"]).1, "{coupling}: other files");
         assert!(
             said.contains("damage reached the edge"),
             "{coupling}: {said}"

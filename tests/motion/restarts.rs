@@ -127,6 +127,25 @@ fn damage_at_the_edge_stops_a_run_with_its_outputs_written() {
 }
 
 #[test]
+fn a_run_that_came_to_a_limit_takes_no_further_step_when_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = BREAKING.replace("\"warn\"", "\"stop\"");
+    write(folder.path(), "bar.toml", &scene);
+    let ends = |more: &[&str]| {
+        let arguments = ["run", "bar.toml", "--checkpoint-every", "1000"];
+        let output = bondline(folder.path()).args(arguments).args(more).output();
+        let output = output.unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        crate::files(&folder.path().join("out"))
+    };
+    let stopped = ends(&[]);
+    for _ in 0..2 {
+        assert!(stopped == ends(&["--resume"]), "other files");
+    }
+}
+
+#[test]
 fn checkpoints_of_another_scene_and_damaged_ones_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), "bar.toml", BREAKING);

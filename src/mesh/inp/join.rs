@@ -57,6 +57,21 @@ fn offsets(bodies: &[Body]) -> Vec<u64> {
     bodies.iter().map(&mut offset).collect()
 }
 
+/// Which of the three nodes of a line of second order lies between the others: the second by the manuals of Abaqus and CalculiX, as Gmsh writes it; meshio writes the third.
+fn middle(body: &Body, nodes: &[u64]) -> usize {
+    let places: Vec<[f64; 3]> = (nodes.iter())
+        .map(|n| body.nodes[body.node_places[n] as usize].x)
+        .collect();
+    let off = |m: usize| -> f64 {
+        let [a, b] = [(m + 1) % 3, (m + 2) % 3];
+        (0..3)
+            .map(|k| (places[a][k] + places[b][k] - 2.0 * places[m][k]).powi(2))
+            .sum()
+    };
+    // the first is an end
+    if off(2) < off(1) { 2 } else { 1 }
+}
+
 struct Join<'r, 'a> {
     reader: &'r Reader<'a>,
     offsets: Vec<u64>,
@@ -110,6 +125,12 @@ impl Join<'_, '_> {
                         });
                     }
                     self.raw.element_nodes.push(self.offsets[b] + node);
+                }
+                if element.kind.shape == CellShape::Line3 {
+                    let own = &mut self.raw.element_nodes[start..];
+                    if middle(body, body.nodes_of(element)) == 1 {
+                        own.swap(1, 2);
+                    }
                 }
                 if element.kind.shape.dimension() == self.dimension {
                     let mut key = self.raw.element_nodes[start..].to_vec();

@@ -320,6 +320,19 @@ fn sets_of_numbers_ranges_and_sets() {
     assert_eq!(wide.node_sets["w"].len(), 6);
 }
 
+/// The middle of an edge is its second node in decks of Abaqus and Gmsh, and the third in those of meshio.
+#[test]
+fn edges_of_second_order_have_their_middle_second_or_last() {
+    for edge in ["2, 6, 3", "2, 3, 6", "3, 6, 2"] {
+        let mesh = plane(&format!(
+            "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n5,0.5,0\n6,1.01,0.4\n7,0.5,1\n8,0,0.5\n*ELEMENT,TYPE=CPS8,ELSET=BODY\n10,1,2,3,4,5,6,7,8\n*ELEMENT,TYPE=T3D3,ELSET=R\n1,{edge}\n"
+        ));
+        let facet = &mesh.facet_sets["R"][0];
+        assert_eq!(facet[2], 5, "{edge}: {facet:?}");
+        mesh.locate_facets(&mesh.facet_sets["R"]).unwrap();
+    }
+}
+
 #[test]
 fn surfaces_of_faces_edges_and_nodes() {
     let mesh = plane(&format!(

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::setup::ModelSetup;
 use crate::coupling::Model;
-use crate::run::balance::Balance;
+use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::setup::RunSettings;
 use crate::run::springs::Springs;
 use crate::run::surface_gradient::missed_peak;
@@ -13,24 +13,19 @@ use crate::scene::spec::CouplingTraits;
 use crate::solve::quasi_static::LoadStep;
 use crate::tensor::Vector;
 
-/// Forces that are none, over those that would displace the body as far by strains.
-const ROUND_OFF: f64 = 1e-9;
-
 /// Watches load steps for what their equilibria do not show.
 pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     model: &'a Model<D>,
     rest: &'a RunSettings<D>,
     joining: CouplingTraits,
     springs: Arc<Springs>,
-    /// Force over displacement of the whole body \[N/m\].
-    stiffness: f64,
     /// The stress error of a uniform field at surfaces of points.
     uniform: f64,
     /// The largest sum of internal forces \[N\], and the largest scale of forces; not those of one load step, since little holds a body that is unloaded.
     force: Vector<D>,
     scale: f64,
-    /// Forces that equilibria found to a tolerance leave in a body without stress that moves \[N\].
-    round_off: f64,
+    /// The largest displacement \[m\].
+    furthest: f64,
     /// Whether a load step has been asked for its peak of stress.
     asked: bool,
     peak: Option<String>,
@@ -40,20 +35,15 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
     /// Of a run.
     pub fn new(setup: &ModelSetup<'a, D>) -> Self {
         let model = setup.model;
-        let cells = 0..model.mesh.cell_count();
-        let volume: f64 = cells.map(|c| model.mesh.cell_volume(c).abs()).sum();
-        let size = volume.powf(1.0 / D as f64);
-        let stiffness = model.tensor_of_cell(0).get(0, 0, 0, 0) * volume / (size * size);
         Self {
             model,
             rest: setup.rest,
             joining: setup.joining,
             springs: Arc::clone(&setup.springs),
             uniform: setup.proof.largest("stress error"),
-            stiffness,
             force: Vector::zeros(),
             scale: 0.0,
-            round_off: 0.0,
+            furthest: 0.0,
             asked: false,
             peak: None,
         }
@@ -72,8 +62,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
             self.force = balance.force;
         }
         self.scale = self.scale.max(balance.scale);
-        let furthest = u.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
-        self.round_off = self.round_off.max(ROUND_OFF * self.stiffness * furthest);
+        self.furthest = self.furthest.max(furthest(u));
         self.ask_for_peak(seen);
     }
 
@@ -97,8 +86,9 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
     /// The warnings.
     pub fn told(self) -> impl Iterator<Item = String> {
         let Self { force, scale, .. } = self;
+        let round_off = round_off(self.model, self.furthest);
         let relative = Balance { force, scale }.relative();
-        let is_loaded = scale > self.round_off;
+        let is_loaded = scale > round_off;
         let balance = out_of_balance(force.as_slice(), relative, self.joining);
         let balance = balance.filter(|_| is_loaded);
         balance.into_iter().chain(self.peak)

@@ -94,6 +94,16 @@ impl<'m, const D: usize> Guard<'m, D> {
         (gain > self.largest_gain).then_some(Ended::EnergyGained)
     }
 
+    /// The limit that has been exceeded, if one has.
+    pub fn exceeded(&self) -> Option<Ended> {
+        let seen = &self.seen;
+        let rotated = seen.rotated.filter(|r| r.degrees > self.largest_rotation);
+        let gained = seen.most.filter(|(gain, ..)| *gain > self.largest_gain);
+        rotated
+            .map(|_| Ended::ElementsRotated)
+            .or(gained.map(|_| Ended::EnergyGained))
+    }
+
     /// Looks at the rotation of elements, where that is due; returns why the run has to end.
     pub fn look_at_rotation(&mut self, moment: &Moment<'_>, is_last: bool) -> Option<Ended> {
         let state = moment.state;

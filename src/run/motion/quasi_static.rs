@@ -113,7 +113,7 @@ fn load_steps<const D: usize>(
         iterations: 0,
         factorisations: 0,
         edge,
-        ended: Ended::Finished,
+        ended: ended_before(edge, rest),
         rotation: None,
         failed: None,
     };
@@ -169,6 +169,14 @@ fn recorder<'a, const D: usize>(
         },
         saved.map(|s| &s.written),
     )
+}
+
+/// Why a run that goes on from its checkpoint has come to its end there, where it has not finished.
+fn ended_before<const D: usize>(edge: Option<EdgeReached>, rest: &RunSettings<D>) -> Ended {
+    match edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
+        true => Ended::DamageAtEdge,
+        false => Ended::Finished,
+    }
 }
 
 /// Load steps of equal length.
@@ -274,6 +282,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         loaded: &mut LoadState,
         timings: &mut Timings,
     ) -> Result<f64, RunError> {
+        if self.ended != Ended::Finished {
+            return Ok(0.0);
+        }
         let written = self.recorder.seconds;
         let (progress, pace, drive) = (self.progress, self.pace, self.drive);
         let spec = self.spec;

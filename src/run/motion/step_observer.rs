@@ -233,8 +233,19 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         if due {
             self.write_checkpoint(&moment)?;
         }
-        self.look_before_steps(motion);
+        match resumed.then(|| self.ended_before()).flatten() {
+            Some(why) => self.stop = Some(Stop::Ended(why)),
+            None => self.look_before_steps(motion),
+        }
         Ok(())
+    }
+
+    /// Why a run that goes on from its checkpoint has come to its end there, as long as the scene has the same limits.
+    fn ended_before(&self) -> Option<Ended> {
+        match self.edge.is_some() && self.segment.rest.breaking.at_edge == EdgeSpec::Stop {
+            true => Some(Ended::DamageAtEdge),
+            false => self.guard.exceeded(),
+        }
     }
 
     /// Looks at the zone where an interrupt left a checkpoint behind in the step in which that was due.
