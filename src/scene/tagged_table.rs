@@ -63,12 +63,21 @@ const TRANSITIONS: &[&str] = &[
 ];
 /// Keys of materials: those with keys of their own kind, and the laws that are known by name.
 static MATERIALS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
-    let typed = ["bond-based", "correspondence", "lps"];
+    let typed = ["bond-based", "correspondence", "lps", "umat"];
     typed.iter().chain(Named::KEYS).copied().collect()
 });
 const AXES: &[&str] = &["cells", "graded", "spacing"];
 const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
-const CONDITIONS: &[&str] = &["body-force", "displacement", "traction", "velocity"];
+const CONDITIONS: &[&str] = &[
+    "body-force",
+    "displacement",
+    "pressure",
+    "rotation",
+    "spring",
+    "symmetry",
+    "traction",
+    "velocity",
+];
 const SOLVES: &[&str] = &["explicit", "quasi-static", "static"];
 const INITIAL: &[&str] = &["displacement", "velocity"];
 const POINTS: &[&str] = &["cells", "lattice"];
@@ -294,4 +303,37 @@ pub(crate) fn quoted(names: &[&str]) -> String {
         .map(|n| format!("`{n}`"))
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A choice that is left out here would not be replaced by an override.
+    #[test]
+    fn choices_are_those_of_the_schema() {
+        let schema = serde_json::to_value(crate::scene::schema()).unwrap();
+        let of_schema = |name: &str| -> Vec<String> {
+            let variants = schema["$defs"][name]["oneOf"].as_array().unwrap();
+            let keys = variants.iter().filter_map(|v| v["properties"].as_object());
+            let mut keys: Vec<String> = keys.flat_map(|v| v.keys().cloned()).collect();
+            keys.sort();
+            keys
+        };
+        let lists: [(&str, &[&str]); 8] = [
+            ("AxisSpec", AXES),
+            ("ConditionSpec", CONDITIONS),
+            ("InitialSpec", INITIAL),
+            ("MaterialSpec", &MATERIALS),
+            ("MeshSpec", MESHES),
+            ("ShapeSpec", SHAPES),
+            ("SolveSpec", SOLVES),
+            ("TransitionSpec", TRANSITIONS),
+        ];
+        for (name, list) in lists {
+            let mut list = list.to_vec();
+            list.sort_unstable();
+            assert_eq!(list, of_schema(name), "{name}");
+        }
+    }
 }
