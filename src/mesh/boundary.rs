@@ -17,6 +17,13 @@ pub struct BoundaryFacet {
     pub local: u8,
 }
 
+impl BoundaryFacet {
+    /// What all cells that share it have in common: its corners.
+    pub(super) fn key<const D: usize>(&self) -> [u32; 4] {
+        key(facet_corners::<D>(&self.nodes).iter().copied())
+    }
+}
+
 /// A facet between cells of two classes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InterfaceFacet {
@@ -92,7 +99,7 @@ impl<const D: usize> Mesh<D> {
     }
 
     /// The facets of a cell by their numbers, with their keys.
-    fn keys_of_cell(&self, c: u32) -> impl Iterator<Item = ((u32, u8), [u32; 4])> + '_ {
+    pub(super) fn keys_of_cell(&self, c: u32) -> impl Iterator<Item = ((u32, u8), [u32; 4])> + '_ {
         let nodes = self.cell(c as usize);
         // corners tell facets apart, whatever the order of their cells
         let facets = self.shapes[c as usize].linear().facets();

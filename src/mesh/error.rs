@@ -301,6 +301,30 @@ pub enum MeshError {
         /// How far apart.
         distance: f64,
     },
+    /// A facet of more than two cells.
+    #[error(
+        "cell {cell}, counted from 0, with its centroid at {centroid} has a face that two others have as well: three cells overlap there, or the body branches; mesh that region again"
+    )]
+    CrowdedFacet {
+        /// Number of the cell, from 0.
+        cell: u32,
+        /// Where it is.
+        centroid: String,
+    },
+    /// A node on a face of a cell that is not its own.
+    #[error(
+        "node {node} at {position}, counted from 0, lies on a face of cell {cell} with its centroid at {centroid}, of which it is no node: the body would tear or overlap there; mesh both sides with the same nodes (in Gmsh: BooleanFragments, Coherence), or leave a gap between parts that are not bonded"
+    )]
+    HangingNode {
+        /// Number of the node, from 0.
+        node: u32,
+        /// Where it is.
+        position: String,
+        /// Number of the cell, from 0.
+        cell: u32,
+        /// Where the cell is.
+        centroid: String,
+    },
     /// A node whose position is no number.
     #[error("node {node} lies at {position}; every coordinate must be a finite number")]
     NonFiniteNode {

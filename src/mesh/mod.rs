@@ -13,6 +13,7 @@
 //! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
+//! | `conformity.rs` | whether cells meet face to face |
 //! | `visibility.rs` | which bonds leave the mesh |
 //! | `dilate_erode.rs` | sets of cells that grow and shrink |
 //! | `order.rs` | cells of first and second order: corners, mid-side nodes, from the one to the other |
@@ -21,6 +22,7 @@
 use std::collections::BTreeMap;
 
 pub mod boundary;
+mod conformity;
 mod dilate_erode;
 mod error;
 pub mod generate;

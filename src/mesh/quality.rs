@@ -1,7 +1,7 @@
 //! Sizes and shapes of cells, and the checks that refuse a mesh no element can live on.
 
 use super::error::position;
-use super::{CellShape, Mesh, MeshError};
+use super::{CellShape, Mesh, MeshError, conformity};
 use crate::tensor::{Tensor, Vector};
 
 /// A corner whose scaled Jacobian is at or below this counts as degenerate.
@@ -157,7 +157,7 @@ impl<const D: usize> Mesh<D> {
 ///
 /// # Errors
 /// Named by number, place and value: a reference to a node or cell that does not exist, a coordinate that is no number,
-/// a node without a cell, two nodes at one place, an inverted or degenerate cell.
+/// a node without a cell, two nodes at one place, an inverted or degenerate cell, cells that do not meet face to face.
 pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
     check_references(mesh)?;
     for (node, x) in mesh.nodes.iter().enumerate() {
@@ -210,6 +210,7 @@ pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
         quality.volume += volume;
     }
     check_thickness(mesh)?;
+    conformity::check(mesh)?;
     Ok(quality)
 }
 
