@@ -8,7 +8,7 @@ use crate::{
     coupling::{FitDegree, Model, SiteKind, least_squares_gradient},
     fem::Locator,
     shape::Barriers,
-    tensor::Vector,
+    tensor::{Vector, padded},
 };
 
 /// How far from a position its points lie, in spacings.
@@ -34,10 +34,10 @@ pub struct Sampler<'a, const D: usize> {
 }
 
 /// What carries the displacement at a position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Carrier {
-    /// A finite element, by its cell.
-    Element(usize),
+    /// A finite element, by its cell, and the reference coordinates of the position in it.
+    Element(usize, [f64; 3]),
     /// The points around; the nearest one, by its site.
     Point(usize),
 }
@@ -123,7 +123,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
     /// What carries the displacement at `x` \[m\]; `None` farther than 1.6 spacings from any point and outside of all elements.
     pub fn carrier(&self, x: &Vector<D>) -> Option<Carrier> {
         if let Some(located) = self.elements.locate(&self.model.mesh, x, 1e-9) {
-            return Some(Carrier::Element(located.cell));
+            return Some(Carrier::Element(located.cell, padded(&located.reference)));
         }
         let distance = |s: &u32| (self.model.sites[*s as usize].position - x).norm();
         let near = self.near(&self.points, x, AROUND);

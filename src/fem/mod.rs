@@ -38,6 +38,7 @@
 //! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one linear cell each |
 //! | `line3.rs`, `tri6.rs`, `quad8.rs`, `tet10.rs`, `hex20.rs` | one cell of second order each |
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
+//! | `superconvergent.rs` | the displacement gradient anywhere in a cell, from where it is most accurate |
 //! | `crack_band.rs` | the width in which a law that softens localises in a cell |
 //! | `nonlinear.rs` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
@@ -61,6 +62,7 @@ mod lumping;
 mod nonlinear;
 mod quad4;
 mod quad8;
+mod superconvergent;
 mod tet10;
 mod tet4;
 mod tri3;
@@ -86,6 +88,7 @@ pub use load::{
 pub use locate::{Located, Locator, reference_of};
 pub use lumping::{for_each_share, lumped_mass, nodal_volumes};
 pub use nonlinear::NonlinearElements;
+pub use superconvergent::{position_in, superconvergent_gradient};
 
 use crate::mesh::CellShape;
 

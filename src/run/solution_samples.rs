@@ -75,7 +75,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         !in_void && self.body.locate(&model.mesh, x, self.tolerance).is_some()
     }
 
-    /// In an element its strain; among points that of the nearest point's family. `None` outside of the body.
+    /// In an element its strain there; among points that of the nearest point's family. `None` outside of the body.
     fn at(&self, x: &Vector<D>) -> Option<Sample<D>> {
         if !self.is_inside(x) {
             return None;
@@ -87,7 +87,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             .has_derived()
             .then(|| solved.carried_stress(carrier, &self.known, &self.intact));
         let (gradient, zone) = match carrier {
-            Carrier::Element(c) => (solved.element_gradient(c), solved.model.zones[c]),
+            Carrier::Element(c, xi) => (solved.gradient_in(c, &xi), solved.model.zones[c]),
             Carrier::Point(site) => (
                 solved.point_gradient(site, &self.intact),
                 solved.zone_of_site[site],
@@ -175,6 +175,11 @@ impl<const D: usize> Solved<'_, D> {
         fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
     }
 
+    /// The displacement gradient at reference coordinates `xi` of an element.
+    pub(super) fn gradient_in(&self, c: usize, xi: &[f64; 3]) -> Tensor<D> {
+        fem::superconvergent_gradient(&self.model.mesh, c, xi, |n| self.node(n))
+    }
+
     /// Stress of what carries a position, and the numbers made of it.
     pub(super) fn carried_stress(
         &self,
@@ -183,10 +188,7 @@ impl<const D: usize> Solved<'_, D> {
         intact: &Intact,
     ) -> (Tensor<D>, Vec<f64>) {
         let (stress, place) = match carrier {
-            Carrier::Element(c) => {
-                let gradient = self.element_gradient(c);
-                (self.cell_stress(c, &gradient, known), Place::Cell(c))
-            }
+            Carrier::Element(c, xi) => (self.stress_in(c, &xi, known), Place::Within(c, xi)),
             Carrier::Point(site) => {
                 let stands = |p, j| intact.is_intact(p, j);
                 let stress = self.point_stress(site, stands, known);

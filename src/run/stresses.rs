@@ -5,6 +5,7 @@ use rustc_hash::FxHashMap;
 use super::solution::Solved;
 use super::stress_settings::StressSettings;
 use super::thermal::Thermal;
+use crate::fem;
 use crate::material::Kinematics;
 use crate::scene::spec::StressSpec;
 use crate::tensor::{Tensor, Vector};
@@ -34,6 +35,8 @@ fn name(asked: &StressSpec) -> &'static str {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Place {
     Cell(usize),
+    /// A cell, and reference coordinates in it.
+    Within(usize, [f64; 3]),
     Point(usize),
 }
 
@@ -105,18 +108,10 @@ impl<const D: usize> Solved<'_, D> {
         gradient: &Tensor<D>,
         known: &KnownStresses,
     ) -> Tensor<D> {
-        if let Some(rows) = known.cells.get(&(c as u32)) {
-            return Tensor::from_fn(|i, j| rows[i][j]);
+        if let Some(own) = self.own_cell_stress(c, known) {
+            return own;
         }
-        let (model, operator) = (self.model, self.operator);
-        if let Some(own) = operator.cell_stress(c, self.displacement) {
-            let Some((thermal, t)) = self.thermal() else {
-                return own;
-            };
-            let of = |u: &[f64]| operator.cell_stress(c, u).unwrap_or_else(Tensor::zeros);
-            let parts = thermal.parts(model.material_of_cell(c), &model.mesh.centroid(c), t);
-            return own - known.expanded(&parts, of);
-        }
+        let model = self.model;
         match self.thermal() {
             Some((thermal, t)) => {
                 let mechanical = gradient - thermal.cell_gradient(model, c, t);
@@ -124,6 +119,34 @@ impl<const D: usize> Solved<'_, D> {
             }
             None => model.tensor_of_cell(c).contract(gradient),
         }
+    }
+
+    /// Stress of an element at reference coordinates `xi`; the mean of the cell where its law is not linear, or its stress the partial stress of bonds.
+    pub(super) fn stress_in(&self, c: usize, xi: &[f64; 3], known: &KnownStresses) -> Tensor<D> {
+        if let Some(own) = self.own_cell_stress(c, known) {
+            return own;
+        }
+        let model = self.model;
+        let mut gradient = self.gradient_in(c, xi);
+        if let Some((thermal, t)) = self.thermal() {
+            gradient -= thermal.gradient_in(model, c, xi, t);
+        }
+        model.tensor_of_cell(c).contract(&gradient)
+    }
+
+    /// The mean stress of an element that is no product of a tensor with the displacement gradient; none of other elements.
+    fn own_cell_stress(&self, c: usize, known: &KnownStresses) -> Option<Tensor<D>> {
+        if let Some(rows) = known.cells.get(&(c as u32)) {
+            return Some(Tensor::from_fn(|i, j| rows[i][j]));
+        }
+        let (model, operator) = (self.model, self.operator);
+        let own = operator.cell_stress(c, self.displacement)?;
+        let Some((thermal, t)) = self.thermal() else {
+            return Some(own);
+        };
+        let of = |u: &[f64]| operator.cell_stress(c, u).unwrap_or_else(Tensor::zeros);
+        let parts = thermal.parts(model.material_of_cell(c), &model.mesh.centroid(c), t);
+        Some(own - known.expanded(&parts, of))
     }
 
     /// Stress of a point over the bonds of its family that stand.
@@ -180,6 +203,10 @@ impl<const D: usize> Solved<'_, D> {
         let model = self.model;
         let (material, x): (u16, Vector<D>) = match place {
             Place::Cell(c) => (model.material_of_cell(c), model.mesh.centroid(c)),
+            Place::Within(c, xi) => (
+                model.material_of_cell(c),
+                fem::position_in(&model.mesh, c, &xi),
+            ),
             Place::Point(site) => {
                 let material = model
                     .point_of(site)

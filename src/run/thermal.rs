@@ -63,12 +63,27 @@ impl<const D: usize> Thermal<D> {
 
     /// The gradient at the centre of a cell of the displacement by which it expands freely.
     pub fn cell_gradient(&self, model: &Model<D>, c: usize, t: f64) -> Tensor<D> {
+        fem::displacement_gradient_at_centre(&model.mesh, c, self.expanded_in(model, c, t))
+    }
+
+    /// The same at reference coordinates `xi`.
+    pub fn gradient_in(&self, model: &Model<D>, c: usize, xi: &[f64; 3], t: f64) -> Tensor<D> {
+        fem::superconvergent_gradient(&model.mesh, c, xi, self.expanded_in(model, c, t))
+    }
+
+    /// The displacement by which a cell expands freely, of its nodes by their numbers in the mesh.
+    fn expanded_in<'a>(
+        &self,
+        model: &'a Model<D>,
+        c: usize,
+        t: f64,
+    ) -> impl Fn(usize) -> Vector<D> + use<'a, D> {
         let expanded = self.expanded_nodes(model, c, t);
         let nodes = model.mesh.cell(c);
-        fem::displacement_gradient_at_centre(&model.mesh, c, |n| {
+        move |n| {
             let place = nodes.iter().position(|&m| m as usize == n);
             place.map_or(Vector::zeros(), |place| expanded[place])
-        })
+        }
     }
 
     /// What of each of the [`unit_expansions`] the free expansion around `x` is made of; rigid motions are left out.

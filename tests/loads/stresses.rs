@@ -174,3 +174,56 @@ fn no_peak_is_told_where_a_finer_lattice_would_show_none() {
     );
     assert_eq!(told_of_a_peak(&crack, &[]), None);
 }
+
+/// A beam of one cell of second order over its height, bent: its stress at the surface, not the mean of the cell.
+#[test]
+fn a_bent_beam_has_its_stress_at_the_surface() {
+    let beam = r#"
+kinematics = "KINEMATICS"
+coupling = "local"
+mesh.rectangle = { min = [0, -1], max = [10, 1], x = { cells = 5 }, y = { cells = 1 }, cell = "CELL" }
+materials.m.lps = { youngs-modulus = 100, poisson-ratio = 0.3 }
+conditions.left.displacement = { on = "left", x = 0 }
+conditions.corner.displacement = { inside.ball = { center = [0, -1], radius = 0.1 }, y = 0 }
+conditions.right.traction = { on = "right", x = "3 * y" }
+[output]
+vtu = false
+stresses = ["von-mises"]
+probes.top.at = [4.7, 1]
+probes.inside.at = [4.7, 0.3]
+probes.low.at = [6, -1]
+lines.up = { from = [4.7, -1], to = [4.7, 1], samples = 5 }
+"#;
+    for cell in ["quad8", "tri6"] {
+        let beam = beam.replace("CELL", cell);
+        let still = beam.replace("KINEMATICS", "plane-stress");
+        let bent = run(&still, &[]);
+        let stress = bent.column("scene_probes.csv", "sxx");
+        for (found, exact) in stress.iter().zip([0.9, -3.0, 3.0]) {
+            assert!((found - exact).abs() < 1e-9, "{cell}: {stress:?}");
+        }
+        let along = bent.column("scene_up.csv", "sxx");
+        let strains = bent.column("scene_up.csv", "exx");
+        for ((s, e), exact) in along.iter().zip(&strains).zip([-3.0, -1.5, 0.0, 1.5, 3.0]) {
+            assert!((s - exact).abs() < 1e-9, "{cell}: {along:?}");
+            assert!((e - exact / 100.0).abs() < 1e-11, "{cell}: {strains:?}");
+        }
+        // warmer above, a free beam bends without a stress, but for that across the plane
+        let warm = beam.replace("KINEMATICS", "plane-strain");
+        let warm = warm.replace("ratio = 0.3", "ratio = 0.3, thermal-expansion = 1e-3");
+        let warm = warm.replace(
+            "conditions.right.traction = { on = \"right\", x = \"3 * y\" }",
+            "temperature.value = \"20 * y\"",
+        );
+        let warm = run(&warm, &[]);
+        let in_plane = warm.column("scene_probes.csv", "sxx");
+        assert!(
+            in_plane.iter().all(|s| s.abs() < 1e-9),
+            "{cell}: {in_plane:?}"
+        );
+        let across = warm.column("scene_probes.csv", "von_mises");
+        for (found, exact) in across.iter().zip([0.6, 2.0, 2.0]) {
+            assert!((found - exact).abs() < 1e-9, "{cell}: {across:?}");
+        }
+    }
+}

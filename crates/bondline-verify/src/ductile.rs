@@ -1,7 +1,7 @@
 //! Ductile failure: the notched bar of [SAND2015-7998] section 6.3.1, `examples/notched_bar.toml`, beside CalculiX until it tears.
 
-use crate::Effort;
 use crate::observed::{Seen, run_scene_with};
+use crate::{Effort, tell};
 use bondline::{
     observe::report::{Columns, Row, Table},
     progress::Progress,
@@ -98,45 +98,42 @@ fn coupled_and_alone(
     ])
 }
 
-/// The coupled bars beside points alone.
-fn coupled(bars: &[(f64, f64, &str)], progress: &dyn Progress) -> Table {
+/// A coupled bar beside points alone.
+fn coupled(bar: (f64, f64, &str)) -> Table {
     let mut table = Table::new(
         "Notched bar coupled outside the notch (truncated) beside points alone on the same lattice: loads [kN] and nominal strains",
         Columns::Full,
     );
-    for &bar in bars {
-        let (spacing, ..) = bar;
-        let (case, alone_case) = (
-            format!("coupled, {spacing} mm"),
-            format!("points alone, {spacing} mm"),
-        );
-        match coupled_and_alone(bar) {
-            Ok([(bar, seconds), (alone, of_points)]) => {
-                for (quantity, found, wanted) in [
-                    ("largest load", bar.peak[0], alone.peak[0]),
-                    ("load at the first break", bar.first[0], alone.first[0]),
-                ] {
-                    table.push(Row::within(&case, quantity, found, wanted, COUPLED_LIMIT));
-                }
-                for (case, bar) in [(&case, &bar), (&alone_case, &alone)] {
-                    table.push(Row::info(case, "strain at the first break", bar.first[1]));
-                    table.push(Row::info(case, "load at the end", bar.left[1]));
-                }
-                let quantity = "work not accounted for, largest share";
-                table.push(Row::at_most(
-                    &case,
-                    quantity,
-                    bar.missing,
-                    COUPLED_BALANCE_LIMIT,
-                ));
-                let quantity = "seconds over those of points alone";
-                table.push(Row::info(&case, quantity, seconds / of_points));
+    let (spacing, ..) = bar;
+    let (case, alone_case) = (
+        format!("coupled, {spacing} mm"),
+        format!("points alone, {spacing} mm"),
+    );
+    match coupled_and_alone(bar) {
+        Ok([(bar, seconds), (alone, of_points)]) => {
+            for (quantity, found, wanted) in [
+                ("largest load", bar.peak[0], alone.peak[0]),
+                ("load at the first break", bar.first[0], alone.first[0]),
+            ] {
+                table.push(Row::within(&case, quantity, found, wanted, COUPLED_LIMIT));
             }
-            Err(why) => {
-                table.push(Row::at_most(&case, "largest load", f64::NAN, 0.0).because(why));
+            for (case, bar) in [(&case, &bar), (&alone_case, &alone)] {
+                table.push(Row::info(case, "strain at the first break", bar.first[1]));
+                table.push(Row::info(case, "load at the end", bar.left[1]));
             }
+            let quantity = "work not accounted for, largest share";
+            table.push(Row::at_most(
+                &case,
+                quantity,
+                bar.missing,
+                COUPLED_BALANCE_LIMIT,
+            ));
+            let quantity = "seconds over those of points alone";
+            table.push(Row::info(&case, quantity, seconds / of_points));
         }
-        progress.advance(2 * work(spacing));
+        Err(why) => {
+            table.push(Row::at_most(&case, "largest load", f64::NAN, 0.0).because(why));
+        }
     }
     table
 }
@@ -193,58 +190,72 @@ fn pulled(seen: &Seen) -> Result<Pulled, String> {
     })
 }
 
-/// The suite `ductile`.
+/// A bar of points alone beside CalculiX, whose largest load is `largest`.
+fn alone([spacing, drag, left_limit]: [f64; 3], reference: &[[f64; 2]], largest: f64) -> Table {
+    let mut table = Table::new(
+        "Notched bar of SAND2015-7998 section 6.3.1, horizon two spacings: loads [kN] by the nominal strain, beside CalculiX without failure, first damage on the axis, balance of energy to the end",
+        Columns::Full,
+    );
+    let case = format!("spacing {spacing} mm");
+    let seen = bar(spacing, 2.0 * spacing, drag);
+    match seen.and_then(|seen| Ok((pulled(&seen)?, seen.seconds))) {
+        Ok((bar, seconds)) => {
+            let quantity = "largest load";
+            table.push(Row::within(
+                &case,
+                quantity,
+                bar.peak[0],
+                largest,
+                PEAK_LIMIT,
+            ));
+            table.push(Row::info(&case, "strain at it", bar.peak[1]));
+            table.push(Row::info(&case, "load at the first break", bar.first[0]));
+            table.push(Row::info(&case, "strain at the first break", bar.first[1]));
+            let quantity = "first damage from the axis [mm]";
+            table.push(Row::at_most(&case, quantity, bar.from_axis, AXIS_LIMIT));
+            let quantity = "work not accounted for, largest share";
+            table.push(Row::at_most(&case, quantity, bar.missing, BALANCE_LIMIT));
+            let [strain, left] = bar.left;
+            table.push(Row::info(&case, "load at the end", left));
+            // the load of the bar without failure at the same strain
+            let whole = reference.iter().find(|row| row[0] >= strain);
+            let left = whole.map_or(f64::NAN, |row| left / row[1]);
+            let quantity = "load at the end over that without failure";
+            table.push(Row::at_most(&case, quantity, left, left_limit));
+            table.push(Row::info(&case, "seconds", seconds));
+        }
+        Err(why) => {
+            let quantity = "first damage from the axis [mm]";
+            table.push(Row::at_most(&case, quantity, f64::NAN, AXIS_LIMIT).because(why));
+        }
+    }
+    table
+}
+
+/// The suite `ductile`. Each table is also told when its bar has torn: the finest take most of an hour.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     let (bars, coupled_bars) = match effort {
         Effort::Quick => (&BARS[..1], &COUPLED_BARS[..1]),
         Effort::Full => (&BARS[..], &COUPLED_BARS[..]),
     };
-    let alone: u64 = bars.iter().map(|bar| work(bar[0])).sum();
+    let by_points: u64 = bars.iter().map(|bar| work(bar[0])).sum();
     let pairs: u64 = coupled_bars.iter().map(|bar| 2 * work(bar.0)).sum();
-    progress.stage("notched bar", Some(alone + pairs));
+    progress.stage("notched bar", Some(by_points + pairs));
     let reference = reference();
     let largest = reference.iter().map(|row| row[1]).fold(0.0, f64::max);
-    let mut table = Table::new(
-        "Notched bar of SAND2015-7998 section 6.3.1, horizon two spacings: loads [kN] by the nominal strain, beside CalculiX without failure, first damage on the axis, balance of energy to the end",
-        Columns::Full,
-    );
-    for &[spacing, drag, left_limit] in bars {
-        let case = format!("spacing {spacing} mm");
-        let seen = bar(spacing, 2.0 * spacing, drag);
-        match seen.and_then(|seen| Ok((pulled(&seen)?, seen.seconds))) {
-            Ok((bar, seconds)) => {
-                let quantity = "largest load";
-                table.push(Row::within(
-                    &case,
-                    quantity,
-                    bar.peak[0],
-                    largest,
-                    PEAK_LIMIT,
-                ));
-                table.push(Row::info(&case, "strain at it", bar.peak[1]));
-                table.push(Row::info(&case, "load at the first break", bar.first[0]));
-                table.push(Row::info(&case, "strain at the first break", bar.first[1]));
-                let quantity = "first damage from the axis [mm]";
-                table.push(Row::at_most(&case, quantity, bar.from_axis, AXIS_LIMIT));
-                let quantity = "work not accounted for, largest share";
-                table.push(Row::at_most(&case, quantity, bar.missing, BALANCE_LIMIT));
-                let [strain, left] = bar.left;
-                table.push(Row::info(&case, "load at the end", left));
-                // the load of the bar without failure at the same strain
-                let whole = reference.iter().find(|row| row[0] >= strain);
-                let left = whole.map_or(f64::NAN, |row| left / row[1]);
-                let quantity = "load at the end over that without failure";
-                table.push(Row::at_most(&case, quantity, left, left_limit));
-                table.push(Row::info(&case, "seconds", seconds));
-            }
-            Err(why) => {
-                let quantity = "first damage from the axis [mm]";
-                table.push(Row::at_most(&case, quantity, f64::NAN, AXIS_LIMIT).because(why));
-            }
-        }
-        progress.advance(work(spacing));
+    let mut tables = Vec::new();
+    for &bar in bars {
+        let table = alone(bar, &reference, largest);
+        tell(&table, effort, progress);
+        progress.advance(work(bar[0]));
+        tables.push(table);
     }
-    let coupled = coupled(coupled_bars, progress);
+    for &bar in coupled_bars {
+        let table = coupled(bar);
+        tell(&table, effort, progress);
+        progress.advance(2 * work(bar.0));
+        tables.push(table);
+    }
     progress.finish();
-    vec![table, coupled]
+    tables
 }

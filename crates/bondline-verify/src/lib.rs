@@ -108,6 +108,13 @@ pub const ON_PROCESSES: [(&str, OnProcesses); 2] =
 /// Runs a suite by all processes, where there are several; all have the same tables.
 pub type OnProcesses = fn(Effort, &dyn Progress, Option<&dyn Ranks>) -> Vec<Table>;
 
+/// Shows a table of a full suite as soon as it is there, where the suite takes half an hour or more.
+fn tell(table: &Table, effort: Effort, progress: &dyn Progress) {
+    if effort == Effort::Full {
+        progress.note(&table.text());
+    }
+}
+
 /// What `of_case` gives for each case, in their order. By several processes one after another, since all have to come to the same case together; else side by side.
 fn each<C: Sync, R: Send>(
     ranks: Option<&dyn Ranks>,
@@ -273,7 +280,7 @@ pub const LONG_SUITES: &[Suite] = &[
     },
     Suite {
         name: "ductile",
-        about: "SAND2015-7998 section 6.3.1: a notched bar beside CalculiX until it tears; minutes, only if named",
+        about: "SAND2015-7998 section 6.3.1: a notched bar beside CalculiX until it tears; an hour or more, only if named",
         run: ductile::run,
     },
     Suite {

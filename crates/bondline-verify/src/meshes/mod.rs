@@ -20,7 +20,7 @@ mod motion;
 mod order;
 pub mod scene;
 
-use super::Effort;
+use super::{Effort, tell};
 use bondline::{observe::report::Table, progress::Progress};
 
 /// The tables of one file.
@@ -45,11 +45,4 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     // these take the longest, and tell of each problem by themselves
     tables.extend(order::order(effort, progress));
     tables
-}
-
-/// Shows a table of the full suite as soon as it is there: the suite takes half an hour.
-fn tell(table: &Table, effort: Effort, progress: &dyn Progress) {
-    if effort == Effort::Full {
-        progress.note(&table.text());
-    }
 }
