@@ -263,7 +263,11 @@ impl<const D: usize> NonlinearElements<D> {
         let mut found: Vec<(&'static str, Vec<(u32, f64)>)> = Vec::new();
         for element in &self.elements {
             let names = self.laws[element.law as usize].history();
-            for (k, name) in names.iter().enumerate() {
+            let shown = names
+                .iter()
+                .enumerate()
+                .filter(|(_, name)| !name.is_empty());
+            for (k, name) in shown {
                 let (mut sum, mut volume, mut point) = (0.0, 0.0, 0);
                 for_each_point(mesh, element.cell as usize, Rule::Stiffness, |p| {
                     sum += p.weight * self.past[element.first + point * element.each + k];

@@ -76,18 +76,31 @@ impl LocalLaw<3> for StVenantKirchhoff {
         _past: &[f64],
         _present: &mut [f64],
     ) -> LocalResponse<3> {
+        let volume_ratio = 1.0 + volume_change(gradient);
+        if volume_ratio <= 0.0 {
+            return INSIDE_OUT;
+        }
         // E without the difference of two ones, which would lose small strains
         let green = (gradient + gradient.transpose() + gradient.transpose() * gradient) * 0.5;
         let second = self.elastic.contract(&green);
         LocalResponse {
             stress: (Tensor::identity() + gradient) * second,
             across: 0.0,
-            volume_ratio: 1.0 + volume_change(gradient),
+            volume_ratio,
             stored: 0.5 * second.dot(&green),
             dissipated: 0.0,
         }
     }
 }
+
+/// The response of a material that is turned inside out.
+const INSIDE_OUT: LocalResponse<3> = LocalResponse {
+    stress: Tensor::from_array_storage(nalgebra::ArrayStorage([[f64::NAN; 3]; 3])),
+    across: 0.0,
+    volume_ratio: f64::NAN,
+    stored: f64::NAN,
+    dissipated: 0.0,
+};
 
 /// Compressible Neo-Hooke: `W = ½ μ (tr FᵀF − 3 − 2 ln J) + ½ λ (ln J)²`, `P = μ (F − F⁻ᵀ) + λ ln J F⁻ᵀ`, `J = det F` (\[BonetWood2008\] eq. 6.27).
 ///
@@ -162,13 +175,7 @@ impl LocalLaw<3> for NeoHooke {
         let log = volume_change(gradient).ln_1p();
         let deformation = Tensor::identity() + gradient;
         let Some((inverse, _)) = inverse(&deformation).filter(|_| log.is_finite()) else {
-            return LocalResponse {
-                stress: Tensor::from_element(f64::NAN),
-                across: 0.0,
-                volume_ratio: f64::NAN,
-                stored: f64::NAN,
-                dissipated: 0.0,
-            };
+            return INSIDE_OUT;
         };
         // F − F⁻ᵀ = (F Fᵀ − I) F⁻ᵀ, and F Fᵀ − I without the difference of two ones
         let left = gradient + gradient.transpose() + gradient * gradient.transpose();
@@ -206,6 +213,22 @@ mod tests {
             let along = shear * (stretch - 1.0 / stretch) + lambda * stretch.ln() / stretch;
             assert!((found.stress[(1, 1)] - along).abs() < 1e-14);
             assert!((found.stress[(2, 2)] - lambda * stretch.ln()).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn what_is_turned_inside_out_has_no_response() {
+        let laws: [&dyn LocalLaw<3>; 2] =
+            [&StVenantKirchhoff::new(1.7, 1.3), &NeoHooke::new(1.7, 1.3)];
+        for law in laws {
+            let mut g = Tensor::<3>::zeros();
+            for (along, is_whole) in [(-0.9, true), (-1.0, false), (-1.4, false)] {
+                g[(1, 1)] = along;
+                assert_eq!(
+                    respond(law, &g).stress.iter().all(|s| s.is_finite()),
+                    is_whole
+                );
+            }
         }
     }
 

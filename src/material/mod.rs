@@ -208,7 +208,7 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// Whether it holds for strains of any size: a rotation of the deformed body rotates its stress, `P(Q F) = Q P(F)`.
     fn is_objective(&self) -> bool;
 
-    /// The names of the numbers that it remembers; all are zero at the start.
+    /// The names of the numbers that it remembers; all are zero at the start. Those without a name are not shown.
     fn history(&self) -> &'static [&'static str];
 
     /// Whether it flows without a change of volume, so that cells with a dilatation at each quadrature point would resist it.

@@ -1,6 +1,7 @@
 //! A law of solids in bodies of fewer dimensions.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Kinematics, LocalLaw, LocalResponse, WideBand};
 use crate::tensor::{Tensor, Tensor4};
@@ -12,12 +13,26 @@ const ITERATIONS: usize = 60;
 /// contract alike).
 ///
 /// The strain that no stress goes with is found by Newton's method at each response, to round-off; it is a function of the gradient and of the history alone.
+/// Beside a history, that strain is remembered: a state that is looked at again is the one that was found.
 #[derive(Clone, Debug)]
 pub struct Reduced<const D: usize> {
     law: Arc<dyn LocalLaw<3>>,
+    /// What the law remembers, then the numbers of [`OWN`] where it remembers any and a strain is free.
+    history: &'static [&'static str],
     /// The first direction whose strain follows from the stress being zero; 3 if there is none.
     free: usize,
     tangent: Tensor4<D>,
+}
+
+/// What is remembered beside the history of the solid, and not shown: the strain out of the body, and the largest gradient so far, which sets the scale of round-off.
+const OWN: [&str; 2] = [""; 2];
+
+/// The names of a solid's history, and [`OWN`].
+fn with_own(solid: &'static [&'static str]) -> &'static [&'static str] {
+    static MADE: Mutex<BTreeMap<Vec<&str>, &'static [&'static str]>> = Mutex::new(BTreeMap::new());
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(solid.to_vec())
+        .or_insert_with(|| [solid, &OWN].concat().leak())
 }
 
 impl<const D: usize> Reduced<D> {
@@ -29,7 +44,16 @@ impl<const D: usize> Reduced<D> {
             Kinematics::PlaneStrain | Kinematics::Solid => 3,
         };
         let tangent = condensed(law.tangent(), free);
-        Self { law, free, tangent }
+        let history = match law.history() {
+            solid if free < 3 && !solid.is_empty() => with_own(solid),
+            solid => solid,
+        };
+        Self {
+            law,
+            history,
+            free,
+            tangent,
+        }
     }
 
     /// The gradient of the solid.
@@ -54,17 +78,36 @@ impl<const D: usize> Reduced<D> {
         self.law.respond(&whole, step, past, present)
     }
 
+    /// What the solid remembers.
+    fn of_solid<'a>(&self, history: &'a [f64]) -> &'a [f64] {
+        &history[..self.law.history().len()]
+    }
+
+    /// The strain out of the body and the largest gradient that are remembered; zero of a law without a history.
+    fn remembered(&self, past: &[f64]) -> [f64; 2] {
+        match past.get(self.law.history().len()..) {
+            Some(&[out, largest]) => [out, largest],
+            _ => [0.0; 2],
+        }
+    }
+
     /// The strain out of the body; not a number where none is found.
     fn out(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> f64 {
         match self.free {
             3 => 0.0,
             _ if gradient.amax() == 0.0 && past.iter().all(|x| *x == 0.0) => 0.0,
-            _ => self.strain_out(gradient, step, past),
+            _ => self.strain_out(gradient, step, self.of_solid(past), self.remembered(past)),
         }
     }
 
     /// The strain out of the body at which no stress acts there; not a number where none is found.
-    fn strain_out(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> f64 {
+    fn strain_out(
+        &self,
+        gradient: &Tensor<D>,
+        step: f64,
+        past: &[f64],
+        [known, largest]: [f64; 2],
+    ) -> f64 {
         let solid = self.law.tangent();
         let resistance: f64 = (self.free..3).map(|g| solid.get(2, 2, g, g)).sum();
         let mut present = vec![0.0; past.len()];
@@ -72,12 +115,23 @@ impl<const D: usize> Reduced<D> {
         let along: f64 = (0..D)
             .map(|k| solid.get(2, 2, k, k) * gradient[(k, k)])
             .sum();
+        let is_none = |stress: f64, size: f64| stress.abs() <= 1e-11 * resistance * size;
+        // no time has passed: what was found holds, as long as the body is where it was; a law whose stress takes a rate would find another
+        if step == 0.0 && largest > 0.0 && is_none(stress(known), largest.max(known.abs())) {
+            return known;
+        }
         let mut out = (-along / resistance).max(-0.9);
         let mut here = stress(out);
-        // a body that is back where it began may be stressed by what it remembers alone
-        let size = (gradient.amax()).max(here.abs() / resistance);
-        let size = size.max(f64::MIN_POSITIVE);
+        // a body that is back where it began may be stressed by what it remembers alone, and by the round-off of what it had
+        let size = gradient.amax().max(here.abs() / resistance);
+        let size = size.max(largest).max(f64::MIN_POSITIVE);
+        let mut within = [f64::NEG_INFINITY, f64::INFINITY];
         for _ in 0..ITERATIONS {
+            // the stress grows with the strain
+            match here > 0.0 {
+                true => within[1] = within[1].min(out),
+                false => within[0] = within[0].max(out),
+            }
             let by = 1e-7 * size.max(out.abs());
             let slope = (stress(out + by) - stress(out - by)) / (2.0 * by);
             let mut change = -here / slope;
@@ -85,14 +139,23 @@ impl<const D: usize> Reduced<D> {
                 // the material keeps a positive thickness
                 change = change.max(-0.5 * (1.0 + out));
             }
+            let is_last = change.abs() <= 1e-15 * size.max(out.abs()) || !change.is_finite();
+            let [low, high] = within;
+            // between flow in one direction and in the other Newton's method may go to and fro
+            if !is_last && (out + change <= low || out + change >= high) {
+                let middle = 0.5 * (low + high);
+                if middle.is_finite() {
+                    change = middle - out;
+                }
+            }
             out += change;
             here = stress(out);
-            if change.abs() <= 1e-15 * size.max(out.abs()) || !change.is_finite() {
+            if is_last {
                 break;
             }
         }
         // the last change may go to and fro by round-off; a stress that stays is none
-        match here.abs() <= 1e-11 * resistance * size.max(out.abs()) {
+        match is_none(here, size.max(out.abs())) {
             true => out,
             false => f64::NAN,
         }
@@ -131,7 +194,7 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
     }
 
     fn history(&self) -> &'static [&'static str] {
-        self.law.history()
+        self.history
     }
 
     fn damage(&self) -> Option<usize> {
@@ -154,6 +217,7 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
 
     fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
         let whole = self.whole(gradient, self.out(gradient, step, past));
+        let past = self.of_solid(past);
         condensed(&self.law.algorithmic_tangent(&whole, step, past), self.free)
     }
 
@@ -169,7 +233,12 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         present: &mut [f64],
     ) -> LocalResponse<D> {
         let out = self.out(gradient, step, past);
-        let found = self.at(gradient, out, step, past, present);
+        let (of_solid, own) = present.split_at_mut(self.law.history().len());
+        if let [across, largest] = own {
+            let [_, before] = self.remembered(past);
+            (*across, *largest) = (out, before.max(gradient.amax()).max(out.abs()));
+        }
+        let found = self.at(gradient, out, step, self.of_solid(past), of_solid);
         LocalResponse {
             stress: Tensor::from_fn(|i, j| found.stress[(i, j)]),
             // no shear across and no strain: P_zz is the Kirchhoff stress
@@ -279,6 +348,161 @@ mod tests {
                 (found - expected).abs() < 1e-11 * young,
                 "{found} {expected}"
             );
+        }
+    }
+
+    /// A solid that is given by its increments, as user routines are: `Δσ = C : Δε`, and beside it a stress `η Δε/Δt` while time passes.
+    #[derive(Debug)]
+    struct Increments {
+        elastic: Tensor4<3>,
+        viscosity: f64,
+    }
+
+    /// Gradient and elastic stress, by columns, then the stress of the last step.
+    const NUMBERS: [&str; 27] = ["number"; 27];
+
+    impl LocalLaw<3> for Increments {
+        fn tangent(&self) -> &Tensor4<3> {
+            &self.elastic
+        }
+
+        fn is_linear(&self) -> bool {
+            false
+        }
+
+        fn is_objective(&self) -> bool {
+            false
+        }
+
+        fn flows_at_constant_volume(&self) -> bool {
+            false
+        }
+
+        fn history(&self) -> &'static [&'static str] {
+            &NUMBERS
+        }
+
+        fn respond(
+            &self,
+            gradient: &Tensor<3>,
+            step: f64,
+            past: &[f64],
+            present: &mut [f64],
+        ) -> LocalResponse<3> {
+            let [before, elastic, last] =
+                [0, 9, 18].map(|k| Tensor::<3>::from_column_slice(&past[k..k + 9]));
+            let change = gradient - before;
+            let elastic = elastic + self.elastic.contract(&change);
+            let stress = match step {
+                0.0 if change.amax() == 0.0 => last,
+                0.0 => elastic,
+                _ => elastic + (change + change.transpose()) * (0.5 * self.viscosity / step),
+            };
+            for (k, kept) in [*gradient, elastic, stress].iter().enumerate() {
+                present[9 * k..9 * k + 9].copy_from_slice(kept.as_slice());
+            }
+            LocalResponse {
+                stress,
+                across: 0.0,
+                volume_ratio: 1.0 + gradient.trace(),
+                stored: 0.0,
+                dissipated: 0.0,
+            }
+        }
+    }
+
+    fn increments(viscosity: f64) -> Arc<dyn LocalLaw<3>> {
+        let elastic = *StVenantKirchhoff::new(LAME.0, LAME.1).tangent();
+        Arc::new(Increments { elastic, viscosity })
+    }
+
+    #[test]
+    fn a_state_that_is_looked_at_again_has_the_stress_that_was_found() {
+        let law = Reduced::<2>::new(increments(80.0), Kinematics::PlaneStress);
+        let mut past = vec![0.0; law.history().len()];
+        let mut present = past.clone();
+        for k in 1..6 {
+            let g = Tensor::<2>::new(0.01, 0.002, 0.0, -0.004) * f64::from(k);
+            let found = law.respond(&g, 0.1, &past, &mut present);
+            past.clone_from(&present);
+            let again = law.respond(&g, 0.0, &past, &mut present);
+            assert!((again.stress - found.stress).amax() < 1e-12 * found.stress.amax());
+            // Kelvin and Voigt in plane stress: σ_zz = λ tr ε + 2 μ ε_zz + η dε_zz/dt = 0, in steps
+            let (lambda, shear, rate) = (LAME.0, LAME.1, 80.0 / 0.1);
+            let mut out = 0.0;
+            for n in 1..=k {
+                let within = 0.006 * f64::from(n);
+                out = (rate * out - lambda * within) / (lambda + 2.0 * shear + rate);
+            }
+            let elastic = lambda * (g.trace() + out) + 2.0 * shear * g[(0, 0)];
+            let expected = elastic + rate * 0.01;
+            assert!((found.stress[(0, 0)] - expected).abs() < 1e-10 * expected);
+        }
+    }
+
+    #[test]
+    fn increments_that_lead_back_leave_round_off() {
+        for kinematics in [Kinematics::PlaneStress, Kinematics::PlaneStrain] {
+            let law = Reduced::<2>::new(increments(0.0), kinematics);
+            let g = Tensor::<2>::new(0.013, 0.002, 0.001, -0.0137);
+            let back = [g, g * 0.37, Tensor::zeros(), g * 1e-9];
+            for length in 1..=back.len() {
+                let last = along(&law, &back[..length]).stress;
+                let expected = law.tangent().contract(&back[length - 1]);
+                assert!(
+                    (last - expected).amax() < 1e-12,
+                    "{kinematics:?} {length}: {last}"
+                );
+            }
+        }
+        let law = Reduced::<1>::new(increments(0.0), Kinematics::Bar);
+        let path = [0.01, -0.02, 0.0].map(Tensor::<1>::new);
+        assert!(along(&law, &path).stress.amax() < 1e-12);
+    }
+
+    /// Beyond a reversal the stress out of the plane is S-shaped in the strain there, between slopes of which Newton's method may go to and fro where 4 μ/3 > K.
+    #[test]
+    fn a_plate_that_flows_to_and_fro_has_its_closed_form_at_any_poisson_ratio() {
+        let (young, hardening, flow) = (1000.0, 50.0, 2.0);
+        for poisson in [0.0, 0.1, 0.15, 0.3, 0.45] {
+            let shear = 0.5 * young / (1.0 + poisson);
+            let lambda = 2.0 * shear * poisson / (1.0 - 2.0 * poisson);
+            let solid = J2::<3>::new(lambda, shear, flow, hardening);
+            let law = Reduced::<1>::new(Arc::new(solid), Kinematics::Bar);
+            let plate = J2::<3>::new(lambda, shear, flow, hardening);
+            let plate = Reduced::<2>::new(Arc::new(plate), Kinematics::PlaneStress);
+            for size in [0.005, 0.03, 0.2] {
+                let path = [0.5, 1.0, 0.2, -1.0, -0.9, 1.0, 0.0].map(|part| part * size);
+                // linear isotropic hardening of a bar
+                let (mut plastic, mut equivalent) = (0.0, 0.0);
+                let mut expected = 0.0;
+                for strain in path {
+                    let trial: f64 = young * (strain - plastic);
+                    let over = trial.abs() - (flow + hardening * equivalent);
+                    let more = (over / (young + hardening)).max(0.0);
+                    plastic += more * trial.signum();
+                    equivalent += more;
+                    expected = young * (strain - plastic);
+                }
+                let found = along(&law, &path.map(Tensor::<1>::new)).stress[0];
+                assert!(
+                    (found - expected).abs() < 1e-9 * young * size,
+                    "{poisson} {size}"
+                );
+                // sheared: no strain out of the plane, whatever the ratio
+                let turned = path.map(|strain| Tensor::<2>::new(strain, 0.0, 0.0, -strain));
+                let stress = along(&plate, &turned).stress;
+                assert!(
+                    stress.iter().all(|s| s.is_finite()),
+                    "{poisson} {size}: {stress}"
+                );
+                let pulled = path.map(|strain| Tensor::<2>::new(strain, 0.0, 0.0, 0.3 * strain));
+                let stress = along(&plate, &pulled).stress;
+                assert!(
+                    stress.iter().all(|s| s.is_finite()),
+                    "{poisson} {size}: {stress}"
+                );
+            }
         }
     }
 

@@ -61,6 +61,8 @@ fn asymmetry<const D: usize>(tangent: &Tensor4<D>) -> f64 {
 fn follow<const D: usize>(name: &str, law: &dyn LocalLaw<D>, step: f64) -> [usize; 2] {
     let mut past = vec![0.0; law.history().len()];
     let mut counts = [0; 2];
+    // beside it only what has no name is remembered
+    let plastic = law.history().iter().rposition(|name| !name.is_empty());
     for (number, gradient) in path::<D>().iter().enumerate() {
         let distance = off(law, gradient, step, &past);
         assert!(distance < 1e-6, "{name}, point {number}: {distance:e}");
@@ -71,10 +73,10 @@ fn follow<const D: usize>(name: &str, law: &dyn LocalLaw<D>, step: f64) -> [usiz
         );
         let mut present = past.clone();
         law.respond(gradient, step, &past, &mut present);
-        if let (Some(is), Some(was)) = (present.last(), past.last()) {
+        if let Some((is, was)) = plastic.map(|k| (present[k], past[k])) {
             match is > was {
                 true => counts[0] += 1,
-                false if *was > 0.0 => counts[1] += 1,
+                false if was > 0.0 => counts[1] += 1,
                 false => {}
             }
         }

@@ -23,6 +23,28 @@ UMAT(hasty_)
     }
 }
 
+/* Elastic, with the Lame constants PROPS(1..2), and a viscous stress PROPS(3) times the rate of strain while time passes. */
+UMAT(viscous_)
+{
+    double trace = 0.0;
+    for (int i = 0; i < 3; i++)
+        trace += stran[i] + dstran[i];
+    for (int i = 0; i < 6; i++) {
+        double strain = stran[i] + dstran[i];
+        stress[i] = (i < 3 ? props[0] * trace : 0.0) + props[1] * (i < 3 ? 2.0 : 1.0) * strain;
+        if (*dtime > 0.0)
+            stress[i] += props[2] * dstran[i] / *dtime;
+    }
+}
+
+/* Elastic with nu = 0, and writes to STATEV(3), whether there is one or not. */
+UMAT(greedy_)
+{
+    for (int i = 0; i < 6; i++)
+        stress[i] += props[0] * (i < 3 ? 1.0 : 0.5) * dstran[i];
+    statev[2] = 1.0;
+}
+
 /* STATEV: SINV (2) and SPRINC (3) of the stress PROPS(1..6), ROTSIG (6) of it by DROT, SPRINC (3) of it as a strain,
  * then NDI, NSHR, NTENS, KINC, TIME(1), DTIME, TEMP, CELENT, whether COORDS is a number, the first letters of CMNAME. */
 UMAT(shown_)

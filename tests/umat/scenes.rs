@@ -252,6 +252,82 @@ fn what_is_not_a_number_names_point_and_step() {
     }
 }
 
+/// Plane stress and bars find the strain out of the body anew; a stress that takes a rate must not lose it where the state is only looked at.
+#[test]
+fn a_rate_counts_in_every_kinematics() {
+    let folder = tempfile::tempdir().unwrap();
+    let (lambda, shear) = (1000.0 * 0.3 / (1.3 * 0.4), 500.0 / 1.3);
+    let numbers = format!("symbol = \"viscous_\"\nconstants = [{lambda}, {shear}, 300]");
+    let material = user(&in_c(folder.path(), "odd.c"), &numbers);
+    let scene = r#"
+kinematics = "plane-stress"
+coupling = "local"
+mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 4 }, y = { cells = 2 } }
+{material}
+conditions.left.displacement = { on = "left", x = 0 }
+conditions.base.displacement = { on = "bottom", y = 0 }
+conditions.right.displacement = { on = "right", x = "0.01*t" }
+solve.quasi-static = { duration = 1, steps = 10, tolerance = 1e-11 }
+[output]
+vtu = false
+stresses = ["von-mises"]
+probes.a.at = [1.2, 0.3]
+"#;
+    let bar = scene
+        .replace("plane-stress", "bar")
+        .replace(
+            "mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 4 }, y = { cells = 2 } }",
+            "mesh.line = { min = 0, max = 2, x = { cells = 4 } }",
+        )
+        .replace(
+            "conditions.base.displacement = { on = \"bottom\", y = 0 }\n",
+            "",
+        )
+        .replace("at = [1.2, 0.3]", "at = 1.2");
+    for scene in [scene.to_owned(), bar] {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = scene.replace("{material}", &material);
+        let (names, rows) = history(folder.path(), &scene);
+        let column = |name: &str| -> Vec<f64> {
+            let k = names.iter().position(|n| n == name).unwrap();
+            rows.iter().map(|row| row[k]).collect()
+        };
+        let (stress, force) = (column("a_sxx"), column("right_reaction_x"));
+        let (work, stored) = (column("external_work"), column("stored_energy"));
+        for (k, (s, f)) in stress.iter().zip(&force).enumerate() {
+            assert!((s - f).abs() < 1e-8, "{k}: {s} {f}");
+        }
+        // the trapezoids of the reaction
+        let trapezoids: f64 = force.windows(2).map(|f| 0.5 * (f[0] + f[1]) * 1e-3).sum();
+        assert!(
+            (work[10] - trapezoids).abs() < 1e-9 * trapezoids,
+            "{work:?}"
+        );
+        assert!(stored.iter().all(|e| e.is_finite()), "{stored:?}");
+    }
+}
+
+#[test]
+fn a_routine_that_takes_more_statev_than_it_has_is_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let greedy = user(
+        &in_c(folder.path(), "odd.c"),
+        "symbol = \"greedy_\"\nconstants = [1000]",
+    );
+    let greedy = greedy.replace("poisson-ratio = 0.3", "poisson-ratio = 0");
+    let scene = PULLED
+        .replace("{coupling}", "local")
+        .replace("{pull}", "0.1*t")
+        .replace("{steps}", "2");
+    let said = refused(folder.path(), &scene.replace("{material}", &greedy));
+    assert!(
+        said.contains("wrote to number 3 of STATEV, which has 0") && said.contains("`state`"),
+        "{said}"
+    );
+    let enough = greedy.replace("symbol", "state = 3\nsymbol");
+    history(folder.path(), &scene.replace("{material}", &enough));
+}
+
 #[test]
 fn a_tangent_of_the_routine_solves_the_same_load_steps() {
     let folder = tempfile::tempdir().unwrap();

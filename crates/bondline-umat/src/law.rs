@@ -246,9 +246,13 @@ impl Umat {
         let total = turned(tensor(&past[STRAIN..ENERGIES], 0.5));
         let settings = &self.settings;
         let identity = Tensor::identity();
+        // a routine may take more than the scene gives it
+        let mut guarded = vec![GUARD; states.len() + GUARDS];
+        guarded[..states.len()].copy_from_slice(states);
+        let (own, guards) = guarded.split_at_mut(states.len());
         let mut call = Call {
             stress: components(&stress, 1.0),
-            state: states,
+            state: own,
             energies: std::array::from_fn(|k| past[ENERGIES + k]),
             strain: components(&total, 2.0),
             change: components(&increment.change, 2.0),
@@ -269,7 +273,17 @@ impl Umat {
             wanted_step: 1.0,
         };
         self.routine.call(&mut call, !settings.is_thread_safe);
-        let wrong = self.wrong(&call);
+        let written = guards.iter().rposition(|x| x.to_bits() != GUARD.to_bits());
+        let wrong = match written {
+            Some(k) => {
+                self.is_over.store(true, Ordering::Relaxed);
+                let (states, wanted) = (call.state.len(), call.state.len() + k + 1);
+                let what = format!("wrote to number {wanted} of STATEV, which has {states}");
+                Some((what, "give it as many by `state`"))
+            }
+            None => self.wrong(&call),
+        };
+        states.copy_from_slice(call.state);
         // what was to be read only is as it was, whatever the routine wrote there
         call.strain = components(&total, 2.0);
         call.change = components(&increment.change, 2.0);
@@ -376,6 +390,10 @@ const NOT_A_NUMBER: LocalResponse<3> = LocalResponse {
     stored: f64::NAN,
     dissipated: f64::NAN,
 };
+
+/// Numbers behind `STATEV` that no routine has to write to, and what they are.
+const GUARDS: usize = 64;
+const GUARD: f64 = -7.306_172_948e-289;
 
 /// Deformations that differ by no more than this of their size are one.
 const SAME: f64 = 4.0 * f64::EPSILON;

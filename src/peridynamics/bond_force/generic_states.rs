@@ -64,7 +64,10 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
             let points = self.past.point.chunks_exact(names.len());
             points.map(|numbers| numbers[k]).collect()
         };
-        let named = names.iter().enumerate();
+        let named = names
+            .iter()
+            .enumerate()
+            .filter(|(_, name)| !name.is_empty());
         let mut found: Vec<_> = named.map(|(k, name)| (*name, column(k))).collect();
         if let BondFailure::Tearing(tearing) = &self.failure {
             found.push(("tearing parameter", tearing.values().to_vec()));
