@@ -408,6 +408,20 @@ impl BlockCsr {
         self.columns.len() * self.block * self.block
     }
 
+    /// The largest sum of the sizes of the scalars of a row, `‖K‖_∞`.
+    pub fn largest_row_sum(&self) -> f64 {
+        let d = self.block;
+        let mut largest = 0.0_f64;
+        for i in 0..self.rows() {
+            let (_, blocks) = self.row(i);
+            for a in 0..d {
+                let scalars = blocks.chunks(d * d).flat_map(|k| &k[a * d..(a + 1) * d]);
+                largest = largest.max(scalars.map(|k| k.abs()).sum());
+            }
+        }
+        largest
+    }
+
     /// The first block of row `i`, counted in blocks from the start of `values`.
     pub fn start(&self, i: usize) -> usize {
         match &self.shared {

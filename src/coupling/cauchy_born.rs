@@ -94,6 +94,14 @@ impl<const D: usize> Model<D> {
         own.or_else(|| of(typed).and_then(Option::as_ref))
     }
 
+    /// The local law of a point, where the stress of its family is that of one.
+    pub fn local_law_at(&self, point: usize) -> Option<&dyn LocalLaw<D>> {
+        let states = self.peridynamics.as_ref()?.law.force_state()?;
+        let material = self.body()?.cloud.material.get(point).copied();
+        let own = material.unwrap_or(self.peridynamic_material());
+        states.correspondence(Some(own)).map(|point| point.law)
+    }
+
     /// [`Model::local_law`] of every material.
     pub fn local_laws(
         &self,

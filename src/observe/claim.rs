@@ -44,7 +44,18 @@ impl Files {
     /// A file at rest may be called as one of a series is: it is part of it where the collection lists it. A series begins with a file that stands alone
     /// only where another scene wrote that: its own runs, ended or killed, leave a claim, a collection or a table with it.
     fn of_another(&self, folder: &Path, was_claimed: bool) -> Option<(PathBuf, String)> {
+        let lists = |collection: &Path, file: &str| {
+            regular_file::read_to_string(collection)
+                .is_ok_and(|text| text.contains(&format!("\"{file}\"")))
+        };
         let listed = self.files.iter().find_map(|file| {
+            if let Some((whole, _)) = file.strip_suffix(".vtu").and_then(|f| f.rsplit_once("_p")) {
+                // perhaps the piece of a process
+                let pieces = folder.join(format!("{whole}.pvtu"));
+                if lists(&pieces, file) {
+                    return Some((folder.join(file), pieces.display().to_string()));
+                }
+            }
             let (name, _) = stem(file)?.rsplit_once('_')?;
             let series = Self {
                 name: name.to_owned(),
@@ -52,10 +63,8 @@ impl Files {
                 ..Self::default()
             };
             let collection = folder.join(format!("{name}.pvd"));
-            let lists = series.is_of_series(file)
-                && regular_file::read_to_string(&collection)
-                    .is_ok_and(|text| text.contains(&format!("\"{file}\"")));
-            lists.then(|| (folder.join(file), collection.display().to_string()))
+            let is_of_another = series.is_of_series(file) && lists(&collection, file);
+            is_of_another.then(|| (folder.join(file), collection.display().to_string()))
         });
         let alone = || {
             let first = ["vtu", "pvtu"].map(|end| folder.join(format!("{}_0000.{end}", self.name)));
@@ -347,6 +356,23 @@ mod tests {
         std::fs::write(folder.path().join(".plate_0000.lock"), b"{").unwrap();
         std::fs::write(folder.path().join(".cargo.lock"), b"x = 1").unwrap();
         Claim::take(folder.path(), "still", &still("plate_0000.csv")).unwrap();
+    }
+
+    #[test]
+    fn a_piece_of_another_scene_is_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let list = b"<PUnstructuredGrid><Piece Source=\"st_p1.vtu\"/></PUnstructuredGrid>";
+        std::fs::write(folder.path().join("st.pvtu"), list).unwrap();
+        let named = |name: &str| Files {
+            name: name.to_owned(),
+            files: vec![format!("{name}.vtu")],
+            series: false,
+        };
+        let error = Claim::take(folder.path(), "other", &named("st_p1")).unwrap_err();
+        assert!(error.to_string().contains("st_p1.vtu"), "{error}");
+        for name in ["st_p2", "st_pa", "st"] {
+            Claim::take(folder.path(), "other", &named(name)).unwrap();
+        }
     }
 
     #[test]

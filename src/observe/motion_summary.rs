@@ -50,7 +50,7 @@ impl EnergyGain {
         let (step, time) = self.first_told?;
         let cause = match self.by_law {
             true => {
-                "the material has stiffened with its strain, or more of the body lies against an impactor than the step allows for, and the step is too large for it; results from there on are not to be trusted: take a smaller solve.explicit.step-fraction"
+                "the step is too large for what happens within it: a material that stiffens with its strain, bonds that break, or contact; results from there on are not to be trusted: take a smaller solve.explicit.step-fraction"
             }
             false => {
                 "the stiffness is not symmetric, and the seam feeds its modes; results from there on are not to be trusted: make the run shorter, or use coupling.truncated"
@@ -81,6 +81,8 @@ pub struct Rotation {
     pub of_failure: Option<f64>,
     /// Energy of the misfit between elements and a zone of exact bonds, as a part of the largest energy of the run; none where bonds are linear as well, or nothing moves.
     pub energy_error: Option<f64>,
+    /// What lets it rotate.
+    pub remedy: String,
 }
 
 impl Rotation {
@@ -105,10 +107,11 @@ impl Rotation {
             None => String::new(),
         };
         format!(
-            "the body at ({}) has rotated by {:.1} degrees{when}: what is linear there, elements or bonds, is {} % too large{failure}{energy}; where that matters use bonds = \"exact\" in [peridynamics], and for elements elements = \"cauchy-born\" or coupling = \"nonlocal\" with exact bonds",
+            "the body at ({}) has rotated by {:.1} degrees{when}: what is for small rotations there, elements or points, is {} % too large{failure}{energy}; where that matters use {}",
             components(&self.place),
             self.degrees,
-            number(100.0 * self.length_error)
+            number(100.0 * self.length_error),
+            self.remedy
         )
     }
 }

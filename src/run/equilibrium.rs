@@ -99,10 +99,8 @@ pub(crate) fn equilibrium<const D: usize>(
     let mut stiffness = model.assemble(at.operator, progress);
     watch.lap(&mut timings, "assembly");
     let (mut load, applied) = loads(model, at.conditions, at.time)?;
-    let expands = (at.thermal).map(|thermal| thermal.forces(model, &stiffness, at.time));
-    if let Some(expands) = &expands {
-        load.iter_mut().zip(expands).for_each(|(f, own)| *f += own);
-    }
+    let expands = (at.thermal).map(|thermal| thermal.forces(model, &stiffness, None, at.time));
+    expand(&mut load, expands.as_deref());
     let (prescribed, holder) = supports(model, at.conditions, at.time)?;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
     let mut choices = Vec::new();
@@ -135,11 +133,7 @@ pub(crate) fn equilibrium<const D: usize>(
     // what springs take is no force within the body
     springs.take_from(&mut internal, &solution.displacement);
     if let Some(expands) = expands {
-        // what expansion takes belongs to the forces within the body
-        for ((f, load), own) in internal.iter_mut().zip(&mut load).zip(&expands) {
-            *f -= own;
-            *load -= own;
-        }
+        take_expansion(&mut internal, &mut load, &expands);
         energy = None;
     }
     let info = &solution.info;
@@ -159,6 +153,47 @@ pub(crate) fn equilibrium<const D: usize>(
         choices,
         timings,
     })
+}
+
+/// That factors took over from an iteration, which took time; none where they did not.
+fn given_up(solver: &Solver, info: &StaticInfo) -> Option<Decision> {
+    let is_second = (solver.method, info.method) == (Method::Auto, MethodUsed::RankDirect);
+    is_second.then(|| Decision {
+        choice: "factors over the processes".to_owned(),
+        why: format!(
+            "the iteration did not come to its end; solver.method = \"direct\" leaves it out, which is most of {:.1} s",
+            info.factor_seconds + info.solve_seconds
+        ),
+    })
+}
+
+/// Collective: the forces of free expansion on all sites, each process from the rows of its own; none where nothing expands.
+fn spread_expansion<const D: usize>(
+    at: &StaticInput<'_, D>,
+    own_rows: &BlockCsr,
+    spread: Spread<'_>,
+) -> Option<Vec<f64>> {
+    let forces = (at.thermal?).forces(at.model, own_rows, Some(spread.own()), at.time);
+    let own = spread.own().iter().map(|&site| site as usize * D);
+    let own: Vec<f64> = own.flat_map(|dof| forces[dof..dof + D].to_vec()).collect();
+    let mut all = vec![0.0; forces.len()];
+    spread.gather_sites(&own, &mut all);
+    Some(all)
+}
+
+/// Adds to a load what free expansion takes, if anything expands.
+fn expand(load: &mut [f64], expands: Option<&[f64]>) {
+    for (f, own) in load.iter_mut().zip(expands.unwrap_or_default()) {
+        *f += own;
+    }
+}
+
+/// What expansion takes belongs to the forces within the body, not to the load.
+fn take_expansion(internal: &mut [f64], load: &mut [f64], expands: &[f64]) {
+    for ((f, load), own) in internal.iter_mut().zip(load).zip(expands) {
+        *f -= own;
+        *load -= own;
+    }
 }
 
 /// As [`equilibrium`], of linear forces, each process with the rows of its own sites.
@@ -186,7 +221,9 @@ fn spread<const D: usize>(
     };
     let stiffness = model.assemble_sites(at.operator, spread.own(), progress);
     watch.lap(&mut timings, "assembly");
-    let (load, applied) = loads(model, at.conditions, at.time)?;
+    let (mut load, applied) = loads(model, at.conditions, at.time)?;
+    let expands = spread_expansion(at, &stiffness, spread);
+    expand(&mut load, expands.as_deref());
     let (prescribed, holder) = supports(model, at.conditions, at.time)?;
     let rows = SpreadRows {
         matrix: &stiffness,
@@ -210,10 +247,15 @@ fn spread<const D: usize>(
     let u = &solution.displacement;
     let mut internal = vec![0.0; u.len()];
     rows.apply_into(u, &mut internal);
-    let energy = (symmetry == Symmetry::Symmetric)
+    let energy = (symmetry == Symmetry::Symmetric && expands.is_none())
         .then(|| 0.5 * u.iter().zip(&internal).map(|(u, f)| u * f).sum::<f64>());
-    timings.add("factorisation", solution.info.factor_seconds);
-    timings.add("solve", solution.info.solve_seconds);
+    if let Some(expands) = expands {
+        take_expansion(&mut internal, &mut load, &expands);
+    }
+    let info = &solution.info;
+    choices.extend(given_up(at.solver, info));
+    timings.add("factorisation", info.factor_seconds);
+    timings.add("solve", info.solve_seconds);
     Ok(Equilibrium {
         stiffness,
         symmetry,

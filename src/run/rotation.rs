@@ -36,6 +36,7 @@ pub(crate) struct Rotations<'m, const D: usize> {
     stiffness: f64,
     /// The stretch at which bonds break or soften; none where no misfit arises or none fails.
     failing: Option<f64>,
+    remedy: String,
 }
 
 /// The largest rotation of a state.
@@ -47,13 +48,8 @@ pub(crate) struct Largest {
 }
 
 impl<'m, const D: usize> Rotations<'m, D> {
-    /// Of all elements of a model that are for small strains, and of its points where `is_linear` tells that bonds are too, none in one dimension; `failing` the stretch at which they break or soften.
-    pub fn new(
-        model: &'m Model<D>,
-        rest: &RunSettings<D>,
-        is_linear: bool,
-        failing: Option<f64>,
-    ) -> Self {
+    /// Of all elements of a model that are for small strains, and of its points that are too, none in one dimension; `failing` the stretch at which they break or soften.
+    pub fn new(model: &'m Model<D>, rest: &RunSettings<D>, failing: Option<f64>) -> Self {
         let all = 0..model.mesh.cell_count();
         let cells: Vec<u32> = match D {
             1 => Vec::new(),
@@ -69,23 +65,29 @@ impl<'m, const D: usize> Rotations<'m, D> {
             .filter(|s| matches!(s.kind, SiteKind::Point(_)))
             .map(|s| s.volume)
             .sum();
+        let linear = |i: &usize| rest.has_linear_point(model, *i);
         // of families that are spread over processes each would see another part
-        let sees_points = D > 1 && is_linear && model.shared_families().is_none();
-        let points = match model.body().filter(|_| sees_points) {
+        let sees_points = D > 1 && model.shared_families().is_none();
+        let points: Vec<u32> = match model.body().filter(|_| sees_points) {
             Some(body) => {
                 let all = body.families.len();
                 let has_bonds = |&i: &usize| body.families.of(i).len() > D;
                 let some = (0..all).step_by(all.div_ceil(POINTS).max(1));
-                some.filter(has_bonds).map(|i| i as u32).collect()
+                let some = some.filter(has_bonds).filter(linear);
+                some.map(|i| i as u32).collect()
             }
             None => Vec::new(),
         };
+        let is_linear = model
+            .body()
+            .is_none_or(|b| (0..b.families.len()).any(|i| linear(&i)));
         let stiffness = match (is_linear, cells.first()) {
             (false, Some(&c)) if zone > 0.0 => {
                 misfit_stiffness(model, c as usize) * zone / (zone + elements)
             }
             _ => 0.0,
         };
+        let remedy = remedy(model, rest, &cells, &points);
         Self {
             model,
             cells,
@@ -93,6 +95,7 @@ impl<'m, const D: usize> Rotations<'m, D> {
             points,
             stiffness,
             failing: failing.filter(|_| stiffness > 0.0),
+            remedy,
         }
     }
 
@@ -164,8 +167,40 @@ impl<'m, const D: usize> Rotations<'m, D> {
             length_error,
             of_failure: of_failure.filter(|_| is_near_failure),
             energy_error: (self.stiffness > 0.0 && scale > 0.0).then(|| energy / scale),
+            remedy: self.remedy.clone(),
         })
     }
+}
+
+/// What lets the elements and points that are linear rotate.
+fn remedy<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+    cells: &[u32],
+    points: &[u32],
+) -> String {
+    let has_law = |c: &u32| {
+        let material = model.material_of_cell(*c as usize);
+        model.local_law(&rest.local_laws, material).is_some()
+    };
+    let is_correspondence = |i: &u32| model.local_law_at(*i as usize).is_some();
+    let bonds = points.iter().any(|i| !is_correspondence(i));
+    let elements = cells.iter().any(|c| !has_law(c));
+    let laws = cells.iter().any(has_law) || points.iter().any(is_correspondence);
+    let remedies = [
+        (bonds, "bonds = \"exact\" in [peridynamics]"),
+        (
+            elements,
+            "for elements elements = \"cauchy-born\", or coupling = \"nonlocal\" with exact bonds",
+        ),
+        (
+            laws,
+            "strains = \"large\" in a material that has it, or a hyperelastic one",
+        ),
+    ];
+    let remedies = remedies.into_iter().filter(|(holds, _)| *holds);
+    let remedies: Vec<&str> = remedies.map(|(_, what)| what).collect();
+    remedies.join(", ")
 }
 
 /// `½ ε* : C : (ε* − S : ε*)` for a misfit of 1.

@@ -68,6 +68,28 @@ pub struct RunSettings<const D: usize> {
     pub choices: Vec<Decision>,
 }
 
+/// Collective: refuses processes that have read different scenes or tables, or start at different steps.
+///
+/// # Errors
+/// [`RunError::Later`].
+pub(crate) fn same_everywhere<const D: usize>(
+    rest: &RunSettings<D>,
+    step: u64,
+    ranks: Option<&dyn Ranks>,
+) -> Result<(), RunError> {
+    let Some(ranks) = ranks else {
+        return Ok(());
+    };
+    let all = ranks.gather_words(&[rest.fingerprint.value(), step]);
+    if all.iter().any(|words| *words != all[0]) {
+        return Err(RunError::Later {
+            what: "the processes do not read the same scene or the same checkpoint",
+            remedy: "run them in a folder that all of them see",
+        });
+    }
+    Ok(())
+}
+
 impl<const D: usize> RunSettings<D> {
     /// What was chosen for the accuracy, the zone and the coupling, in this order.
     pub fn made(&self) -> impl Iterator<Item = &Decision> {
@@ -86,6 +108,14 @@ impl<const D: usize> RunSettings<D> {
     pub fn is_objective(&self, model: &Model<D>, cell: usize) -> bool {
         let law = model.local_law(&self.local_laws, model.material_of_cell(cell));
         law.is_some_and(|law| law.is_objective())
+    }
+
+    /// Whether the forces at a point are for small rotations: of bonds linear in the displacement, or of a local law for small strains.
+    pub fn has_linear_point(&self, model: &Model<D>, point: usize) -> bool {
+        match model.local_law_at(point) {
+            Some(law) => !law.is_objective(),
+            None => self.kinematics() == Kinematics::Linear,
+        }
     }
 
     /// What makes the forces of bonds that are intact, or of elements, depend on the displacement otherwise than linearly, as a choice; none where they do not.

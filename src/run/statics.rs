@@ -6,7 +6,7 @@ use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::sections::Sections;
-use super::setup::{RunSettings, model, model_choices, problem};
+use super::setup::{RunSettings, model, model_choices, problem, same_everywhere};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
@@ -123,6 +123,7 @@ fn solve_chosen<const D: usize>(
         timings.add("placing the zone", placement.seconds);
     }
     let (problem, rest) = problem(scene);
+    same_everywhere(&rest, 0, ranks)?;
     let fresh;
     let (model, coupling) = match &kept {
         Some(k) => (&k.model, k.coupling.as_ref()),
@@ -184,7 +185,7 @@ fn solve_chosen<const D: usize>(
         peak_memory_bytes: peak_memory_bytes(),
         files,
         sections,
-        ..body.summary(equilibrium, is_linear, joining, proof)
+        ..body.summary(equilibrium, joining, proof)
     })
 }
 
@@ -304,13 +305,12 @@ impl<const D: usize> StaticBody<'_, D> {
     fn summary(
         &self,
         equilibrium: &Equilibrium,
-        is_linear: bool,
         joining: CouplingTraits,
         proof: Proof,
     ) -> RunSummary {
         let solution = &equilibrium.solution;
         let info = &solution.info;
-        let rotations = Rotations::new(self.model, self.rest, is_linear, None);
+        let rotations = Rotations::new(self.model, self.rest, None);
         let rotation = rotations
             .largest(&solution.displacement)
             .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));

@@ -95,10 +95,16 @@ impl<const D: usize> Thermal<D> {
         parts.map(|part| alpha * part).collect()
     }
 
-    /// Force \[N\] by dof that free expansion would take: `F = K u − f`; `rows` has the row of every site.
+    /// Force \[N\] by dof that free expansion would take: `F = K u − f`; `rows` has the row of every site, or those of the sites `own`, of which alone the forces are then right.
     ///
     /// All materials of a model with points expand alike.
-    pub fn forces(&self, model: &Model<D>, rows: &BlockCsr, t: f64) -> Vec<f64> {
+    pub fn forces(
+        &self,
+        model: &Model<D>,
+        rows: &BlockCsr,
+        own: Option<&[u32]>,
+        t: f64,
+    ) -> Vec<f64> {
         let mut forces = vec![0.0; model.sites.len() * D];
         let inner = inner_sites(model);
         let alpha = self.expansion[model.peridynamic_material() as usize];
@@ -106,9 +112,11 @@ impl<const D: usize> Thermal<D> {
             let rise: Vec<Rise<D>> = (model.sites.iter())
                 .map(|s| self.rise(&s.position, t))
                 .collect();
-            for site in (0..inner.len()).filter(|&s| !inner[s]) {
+            let row_of = |row: usize| own.map_or(row, |own| own[row] as usize);
+            for row in (0..rows.rows()).filter(|&row| !inner[row_of(row)]) {
+                let site = row_of(row);
                 let x = &model.sites[site].position;
-                let (columns, blocks) = rows.row(site);
+                let (columns, blocks) = rows.row(row);
                 let mut sum = Vector::<D>::zeros();
                 for (&column, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
                     let other = column as usize;

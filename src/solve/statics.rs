@@ -229,7 +229,7 @@ pub enum StaticError {
     /// The residual of a solver over ranks stayed above the tolerance.
     #[error(
         "the residual stayed at {residual:.1e} of the load after {iterations} iterations over ranks ({why}), {tolerance:.1e} was asked for; \
-         factorise instead (solver.method = \"direct\"), give other options in PETSC_OPTIONS, or check for near-mechanisms and extreme contrasts of stiffness"
+         {remedy} other options in PETSC_OPTIONS, or check for near-mechanisms and extreme contrasts of stiffness"
     )]
     RanksNotConverged {
         /// Relative residual reached.
@@ -240,6 +240,8 @@ pub enum StaticError {
         iterations: usize,
         /// What the solver says.
         why: String,
+        /// What to do first.
+        remedy: &'static str,
     },
     /// Newton's method found no equilibrium of forces that are not linear.
     #[error(

@@ -194,7 +194,7 @@ impl FineSites {
             .collect();
         if sites.is_empty() {
             let what = if breakable > usual {
-                "bonds that may break"
+                "sites whose force is not linear, or whose bonds may break,"
             } else {
                 "most of the sites"
             };

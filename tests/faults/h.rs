@@ -47,7 +47,10 @@ fn a_rotation_is_warned_of_with_an_estimate_of_what_it_costs() {
             "{degrees}: {estimate} {lost}"
         );
         let warnings = summary["warnings"].to_string();
-        assert!(warnings.contains("what is linear there"), "{warnings}");
+        assert!(
+            warnings.contains("what is for small rotations there"),
+            "{warnings}"
+        );
     }
 }
 

@@ -1,7 +1,7 @@
 //! J2 plasticity of points and of finite elements, through scenes.
 
-use crate::column;
 use crate::laws::{STEPS, history, refused, scene};
+use crate::{column, write};
 
 const YIELD: f64 = 5.0;
 const HARDENING: f64 = 250.0;
@@ -364,4 +364,120 @@ fn cells_of_second_order_are_elastic_below_yield() {
             );
         }
     }
+}
+
+/// A plate that is turned by 20 degrees, by all of its sites.
+const TURNED: &str = r#"
+kinematics = "plane-strain"
+coupling = "nonlocal"
+mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 8 }, y = { cells = 4 } }
+materials.m.{law}
+peridynamics = { horizon = 0.5, points.lattice = { spacing = 0.25, origin = [0.125, 0.125] } }
+[conditions.all.displacement]
+inside.everywhere = true
+x = "x*(cos(0.349*t) - 1) - y*sin(0.349*t)"
+y = "x*sin(0.349*t) + y*(cos(0.349*t) - 1)"
+[solve.quasi-static]
+steps = 4
+[output]
+vtu = false
+"#;
+
+#[test]
+fn points_for_small_rotations_are_warned_of_whatever_their_law() {
+    let folder = tempfile::tempdir().unwrap();
+    let elastic = "youngs-modulus = 200e3, poisson-ratio = 0.3";
+    let laws = [
+        ("lps", "", "bonds = \"exact\""),
+        (
+            "pave",
+            ", relaxing-share = 0.5, relaxation-time = 1",
+            "bonds = \"exact\"",
+        ),
+        (
+            "plastic-correspondence",
+            ", yield-stress = 300",
+            "strains = \"large\"",
+        ),
+        (
+            "damage-correspondence",
+            ", tensile-strength = 3, fracture-energy = 1",
+            "a hyperelastic one",
+        ),
+    ];
+    for (law, numbers, remedy) in laws {
+        let typed = TURNED.replace("{law}", &format!("{law} = {{ {elastic}{numbers} }}"));
+        let told = crate::laws::summary(folder.path(), &typed)["warnings"].to_string();
+        let told = told.replace("\\", "");
+        assert!(
+            told.contains("has rotated by 20.0 degrees") && told.contains(remedy),
+            "{law}: {told}"
+        );
+        assert!(
+            !told.contains("exact bonds of the nonlocal zone"),
+            "{law}: {told}"
+        );
+        // and stopped where the scene says so
+        let limited = typed.replace("steps = 4", "steps = 4\nlargest-rotation = 7");
+        write(folder.path(), "limited.toml", &limited);
+        let output = crate::bondline(folder.path())
+            .args(["run", "limited.toml"])
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(3), "{law}");
+    }
+    let free = [
+        "lps = { ELASTIC }".to_owned(),
+        "plastic-correspondence = { ELASTIC, yield-stress = 300, strains = \"large\" }".to_owned(),
+        "neo-hooke = { ELASTIC }".to_owned(),
+    ];
+    for law in free {
+        let law = law.replace("ELASTIC", elastic);
+        let mut typed = TURNED.replace("{law}", &law);
+        if law.starts_with("lps") {
+            typed = typed.replace("horizon = 0.5", "horizon = 0.5, bonds = \"exact\"");
+        }
+        let told = crate::laws::summary(folder.path(), &typed)["warnings"].to_string();
+        assert!(!told.contains("rotated"), "{law}: {told}");
+    }
+}
+
+/// A body that begins where it has flowed dissipated energy to get there, which nothing of the run has to account for.
+#[test]
+fn a_body_that_begins_beyond_its_yield_gains_no_energy() {
+    let folder = tempfile::tempdir().unwrap();
+    let bar = r#"
+kinematics = "plane-strain"
+coupling = "local"
+mesh.rectangle = { min = [0, 0], max = [10, 1], x = { cells = 20 }, y = { cells = 2 } }
+materials.m.plastic-correspondence = { youngs-modulus = 1000, poisson-ratio = 0.3, density = 1, yield-stress = 5, hardening-modulus = 50 }
+"#;
+    let swings = format!(
+        "{bar}[initial.a.displacement]\nx = \"0.02*x\"\n[solve.explicit]\nduration = 2\n[output]\nvtu = false\n"
+    );
+    let told = crate::laws::summary(folder.path(), &swings);
+    let motion = &told["motion"];
+    assert_eq!(motion["ended"], "finished", "{motion}");
+    let gain = motion["energy_gain"]["largest"].as_f64().unwrap();
+    assert!(gain < 1e-3, "{motion}");
+    let missing = motion["missing_energy"].as_f64().unwrap();
+    let inelastic = motion["inelastic_energy"].as_f64().unwrap();
+    // the ends are let go at once, and what flows within a step is of first order in it
+    assert!(
+        inelastic > 1.0 && (missing - inelastic).abs() < 0.1 * inelastic,
+        "{motion}"
+    );
+    let at_once = format!(
+        "{bar}[conditions.left.displacement]\non = \"left\"\nx = 0\ny = 0\n[conditions.right.displacement]\non = \"right\"\nx = \"0.4 + 0.001*t\"\n[solve.quasi-static]\nsteps = 4\n[output]\nvtu = false\n"
+    );
+    let told = crate::laws::summary(folder.path(), &at_once);
+    let warnings = told["warnings"].to_string();
+    assert!(!warnings.contains("exceed the work"), "{warnings}");
+    let motion = &told["motion"];
+    let missing = motion["missing_energy"].as_f64().unwrap();
+    let inelastic = motion["inelastic_energy"].as_f64().unwrap();
+    assert!(
+        inelastic > 0.01 && (missing - inelastic).abs() < 1e-3 * inelastic,
+        "{motion}"
+    );
 }

@@ -369,6 +369,48 @@ fn bars_at_rest_are_straight_on_any_number_of_processes() {
 }
 
 #[test]
+fn warm_bodies_at_rest_expand_alike() {
+    for coupling in ["truncated", "splice", "nonlocal", "local"] {
+        let text = format!(
+            r#"
+kinematics = "plane-stress"
+coupling = "{coupling}"
+mesh.rectangle = {{ min = [0, 0], max = [2, 1], x = {{ cells = 16 }}, y = {{ cells = 8 }} }}
+materials.m.lps = {{ youngs-modulus = 1000, poisson-ratio = 0.3, thermal-expansion = 1e-3 }}
+peridynamics = {{ horizon = 0.25, points.lattice = {{ spacing = 0.125, origin = [0.0625, 0.0625] }} }}
+{zone}
+temperature = {{ value = "2 + x*y", reference = 1 }}
+conditions.left.displacement = {{ on = "left", x = 0, y = 0 }}
+conditions.right.traction = {{ on = "right", x = 0.5 }}
+solver.tolerance = 1e-11
+[output]
+vtu = false
+stresses = ["von-mises"]
+lines.axis = {{ from = [0, 0.5], to = [2, 0.5], samples = 9 }}
+"#,
+            zone = match coupling {
+                "nonlocal" | "local" => "",
+                _ => "zones.nonlocal.box = { min = [0.5, 0], max = [1.5, 1] }",
+            }
+        );
+        let solved = |ranks: usize| {
+            let folder = folder();
+            run(&text, folder.path(), How { ranks, ..ALONE }).expect(coupling);
+            rows(folder.path(), "scene_axis.csv")
+        };
+        let one = solved(0);
+        // it has expanded by about α ΔT L
+        assert!(one[8][2] > 1.5e-3, "{:?}", one[8]);
+        for (alone, together) in one.iter().zip(&solved(3)) {
+            for (column, (a, b)) in alone.iter().zip(together).enumerate() {
+                // stresses of a modulus of 1000 from displacements of 5e-3
+                assert!((a - b).abs() < 1e-8, "{coupling}, column {column}: {a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
 fn springs_swing_alike_and_are_refused_at_rest() {
     let spring = "[conditions.bed.spring]\ninside.box = { min = 40, max = 75 }\nx = 0.01\n";
     assert_same(&format!("{WAVE}\n{spring}"), &[3]);

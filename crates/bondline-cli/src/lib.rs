@@ -16,7 +16,7 @@ use bondline::system::Ranks;
 use bondline_study::pareto::{self, CostBy, Reference, TradeEnd, TradeParams};
 use bondline_study::{CheckError, ConvergeError, ConvergeParams, Prediction, Refinement};
 use bondline_terminal::memory;
-use bondline_terminal::{Processes, TerminalProgress, print, report, tell};
+use bondline_terminal::{Processes, TerminalProgress, alone, print, report, tell};
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
@@ -434,6 +434,10 @@ fn converge(
 /// Does what a command says.
 fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Result<u8> {
     memory::limit(command.memory());
+    // these have several processes, or refuse them
+    if !matches!(command, Command::Run { .. } | Command::Verify { .. }) {
+        alone()?;
+    }
     match command {
         Command::Run {
             scene,

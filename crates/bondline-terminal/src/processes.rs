@@ -6,6 +6,41 @@ pub use petsc::Processes;
 #[cfg(not(feature = "petsc"))]
 pub use alone::Processes;
 
+/// The number of this process, and how many `mpirun` or the like has started, as the environment tells; none where nothing has started them.
+pub fn started() -> Option<(usize, usize)> {
+    let number = |name| std::env::var(name).ok()?.parse::<usize>().ok();
+    let kinds = [
+        ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"),
+        ("PMI_RANK", "PMI_SIZE"),
+    ];
+    let mut found = kinds
+        .into_iter()
+        .filter_map(|(rank, size)| Some((number(rank).unwrap_or(0), number(size)?)));
+    found.next()
+}
+
+/// Refuses several processes for what one has to do alone.
+///
+/// # Errors
+/// Where `mpirun` has started several; those after the first wait, so that it is told of once.
+pub fn alone() -> miette::Result<()> {
+    match started() {
+        Some((rank, count)) if count > 1 => {
+            if rank > 0 {
+                std::thread::sleep(PATIENCE);
+            }
+            Err(miette::miette!(
+                help = "leave out mpirun",
+                "mpirun has started {count} processes, each of which would do all of this: only `bondline run`, and `verify` of some suites, share their work"
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// How long processes after the first wait for its message, which ends them.
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(2);
+
 #[cfg(feature = "petsc")]
 mod petsc {
     use bondline::system::Ranks;
@@ -78,12 +113,8 @@ mod alone {
         /// # Errors
         /// Where `mpirun` has started several, of which each would run the whole scene.
         pub fn start() -> miette::Result<Self> {
-            let size = |name| std::env::var(name).ok()?.parse::<usize>().ok();
-            match ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"]
-                .into_iter()
-                .find_map(size)
-            {
-                Some(count) if count > 1 => Err(miette::miette!(
+            match super::started() {
+                Some((_, count)) if count > 1 => Err(miette::miette!(
                     help = "build it with `cargo build --release --bins --features bondline-cli/petsc` (docs/clusters.md), or run it without mpirun",
                     "mpirun has started {count} processes, and this program was built without the feature petsc, so that each would do all of the work"
                 )),

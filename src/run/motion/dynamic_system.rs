@@ -182,7 +182,15 @@ fn failure_text<const D: usize>(
                 CalibrationSpec::Lattice => "bonds through a plane of the lattice take it",
                 CalibrationSpec::Continuum => "bonds through a plane of a continuous body take it",
             };
-            format!("{s}, the fracture energy is {g:e}: {takes}")
+            let relaxes = law.is_some_and(|law| {
+                let states = law.force_state();
+                !law.damages() && states.is_some_and(|s| !s.history().bond.is_empty())
+            });
+            let slowly = match relaxes {
+                true => ", if at once, and less of it once they have relaxed",
+                false => "",
+            };
+            format!("{s}, the fracture energy is {g:e}: {takes}{slowly}")
         }
         (Some(s), _) => s,
         (None, _) if breaking.damages => {

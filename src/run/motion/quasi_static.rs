@@ -74,7 +74,7 @@ fn load_steps<const D: usize>(
         (laid_out.timings, laid_out.watch, laid_out.choices);
     let begin = start(model, rest);
     let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
-    let (is_linear, mut system) = (moving.is_linear, moving.system);
+    let mut system = moving.system;
     let pace = step_choice(spec);
     let params = equilibrium_params(spec, &mut choices);
     let body = (model, operator, laid_out.springs.as_ref());
@@ -94,7 +94,7 @@ fn load_steps<const D: usize>(
     let edge = saved.as_ref().and_then(|s| s.edge);
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
-    let rotations = Rotations::new(model, rest, is_linear, failing_stretch(model, rest)?);
+    let rotations = Rotations::new(model, rest, failing_stretch(model, rest)?);
     let mut observer = LoadStepObserver {
         model,
         rest,
@@ -577,7 +577,7 @@ fn created_energy<const D: usize>(
     let none = ROUND_OFF * model.tensor_of_cell(0).get(0, 0, 0, 0) * strain * strain * volume;
     (created > (CREATED * work).max(none)).then(|| {
         format!(
-            "stored and dissipated energy exceed the work of loads and supports by {} % of it: take smaller load steps; if that does not help, let coupling = \"nonlocal\" carry what rotates or cracks",
+            "stored and dissipated energy exceed the work of loads and supports by {} % of it: take smaller load steps, between which the work is summed by trapezoids; if that does not help, let coupling = \"nonlocal\" carry what rotates or cracks",
             number(100.0 * created / work)
         )
     })

@@ -213,17 +213,9 @@ pub(crate) fn opened<const D: usize>(
         StartFrom::Beginning => None,
         StartFrom::Checkpoint => read(&file, choices)?,
     };
-    if let Some(ranks) = options.ranks {
-        // each has read the file for itself
-        let step = saved.as_ref().map_or(u64::MAX, |saved| saved.state.step);
-        let all = ranks.gather_words(&[rest.fingerprint.value(), step]);
-        if all.iter().any(|words| *words != all[0]) {
-            return Err(RunError::Later {
-                what: "the processes do not read the same scene or the same checkpoint",
-                remedy: "run them in a folder that all of them see",
-            });
-        }
-    }
+    // each has read the file for itself
+    let step = saved.as_ref().map_or(u64::MAX, |saved| saved.state.step);
+    setup::same_everywhere(rest, step, options.ranks)?;
     Ok((file, saved))
 }
 

@@ -164,7 +164,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         if thermal.temperature.value.depends_on_time() {
             self.heat = Some((thermal, rows));
         } else {
-            let forces = thermal.forces(self.model, &rows, 0.0);
+            let forces = thermal.forces(self.model, &rows, None, 0.0);
             let loads = self.steady.iter_mut().zip(forces);
             loads.for_each(|(load, f)| *load += f);
         }
@@ -289,7 +289,7 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
             self.loads.add_condition(condition, number, time, load);
         }
         if let Some((thermal, rows)) = &self.heat {
-            let forces = thermal.forces(self.model, rows, time);
+            let forces = thermal.forces(self.model, rows, None, time);
             load.iter_mut().zip(forces).for_each(|(load, f)| *load += f);
         }
     }

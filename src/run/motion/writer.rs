@@ -205,12 +205,24 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// Begins the account of energy.
     pub fn begin(&mut self, moment: &Moment<'_>) {
-        self.energy_at_start = moment.kinetic + moment.system.stored_energy(&moment.state.u);
+        let Moment { state, system, .. } = moment;
+        // a body that begins deformed may have flowed to get there
+        let dissipated = self.dissipated(*system);
+        self.energy_at_start = moment.kinetic + system.stored_energy(&state.u) + dissipated;
     }
 
     /// As many zeros as there are columns of stresses at probes: for trials of the output.
     pub fn unprobed(&self) -> Vec<f64> {
         vec![0.0; stress_probes::header(self.output).len()]
+    }
+
+    fn dissipated(&self, system: &dyn SemiDiscrete) -> f64 {
+        match self.breaks {
+            Breaks::Possibly | Breaks::Gradually | Breaks::Dissipating => {
+                system.dissipated_energy().unwrap_or(0.0)
+            }
+            Breaks::Never => 0.0,
+        }
     }
 
     /// The energies of a state.
@@ -221,12 +233,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             kinetic: moment.kinetic,
             stored,
             work: state.work,
-            dissipated: match self.breaks {
-                Breaks::Possibly | Breaks::Gradually | Breaks::Dissipating => {
-                    system.dissipated_energy().unwrap_or(0.0)
-                }
-                Breaks::Never => 0.0,
-            },
+            dissipated: self.dissipated(*system),
             missing: self.energy_at_start + state.work - moment.kinetic - stored,
         }
     }

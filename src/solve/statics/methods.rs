@@ -22,11 +22,11 @@ const REFINEMENTS: usize = 4;
 
 /// A direct solution whose residual is this small against `‖K‖ ‖u‖ + ‖f‖` solves a problem within round-off of the
 /// one given, and no direct method does better: long slender models have `‖K‖ ‖u‖ ≫ ‖f‖`.
-const BACKWARD: f64 = 1e-14;
+pub(super) const BACKWARD: f64 = 1e-14;
 
 /// A refined direct solution with a larger relative residual than this comes of a matrix that is singular to
 /// round-off: a pivot of `p` of its diagonal leaves about 1e-16 / `p`, and pivots below 1e-11 are refused before.
-const SUSPECT: f64 = 1e-6;
+pub(super) const SUSPECT: f64 = 1e-6;
 
 /// `f − K u` on free dofs, zero elsewhere, and its 2-norm.
 fn residual(problem: &StaticProblem<'_>, u: &[f64]) -> (Vec<f64>, f64) {
@@ -302,21 +302,7 @@ fn direct(
 /// `‖r‖ / (‖K‖ ‖u‖ + ‖f‖)` in the largest-entry norm.
 fn backward_error(problem: &StaticProblem<'_>, u: &[f64], r: &[f64]) -> f64 {
     let largest = |v: &[f64]| v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let d = problem.stiffness.block;
-    let mut norm = 0.0_f64;
-    for i in 0..problem.stiffness.rows() {
-        let (_, blocks) = problem.stiffness.row(i);
-        for a in 0..d {
-            norm = norm.max(
-                blocks
-                    .chunks(d * d)
-                    .flat_map(|k| &k[a * d..(a + 1) * d])
-                    .map(|k| k.abs())
-                    .sum(),
-            );
-        }
-    }
-    let size = norm * largest(u) + largest(problem.load);
+    let size = problem.stiffness.largest_row_sum() * largest(u) + largest(problem.load);
     if size > 0.0 { largest(r) / size } else { 0.0 }
 }
 

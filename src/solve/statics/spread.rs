@@ -7,7 +7,9 @@
 use std::time::Instant;
 
 use super::{
-    Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticSolution, singular_error,
+    Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticSolution,
+    methods::{BACKWARD, SUSPECT},
+    singular_error,
 };
 use crate::progress::Progress;
 use crate::solve::FreeDofs;
@@ -117,6 +119,19 @@ impl SpreadProblem<'_> {
         (r, self.rows.spread.sum(own).sqrt())
     }
 
+    /// Collective: `‖r‖ / (‖K‖ ‖u‖ + ‖f‖)` in the largest-entry norm; `r` is that of the own dofs.
+    fn backward_error(&self, u: &[f64], r: &[f64]) -> f64 {
+        let largest = |v: &[f64]| v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let own = [self.rows.matrix.largest_row_sum(), largest(r)].map(f64::to_bits);
+        let all = self.rows.spread.ranks.gather_words(&own);
+        let of_all = |k: usize| {
+            let each = all.iter().map(|words| f64::from_bits(words[k]));
+            each.fold(0.0, f64::max)
+        };
+        let size = of_all(0) * largest(u) + largest(self.load);
+        if size > 0.0 { of_all(1) / size } else { 0.0 }
+    }
+
     /// Collective: refuses numbers that are not finite, with the first site of any rank.
     fn check(&self) -> Result<(), StaticError> {
         let d = self.rows.matrix.block;
@@ -217,6 +232,19 @@ pub fn solve_spread(
     })
 }
 
+/// Collective: whether factors leave no more than round-off.
+fn is_round_off(
+    problem: &SpreadProblem<'_>,
+    kind: RankSolverKind,
+    u: &[f64],
+    r: &[f64],
+    info: &StaticInfo,
+) -> bool {
+    kind == RankSolverKind::Direct
+        && info.relative_residual <= SUSPECT
+        && problem.backward_error(u, r) <= BACKWARD
+}
+
 /// Solves by one kind of solver with what is left of the residual until that is small enough.
 fn refine(
     problem: &SpreadProblem<'_>,
@@ -243,9 +271,9 @@ fn refine(
         positions: problem.positions,
         prescribed: &prescribed,
     };
-    let solver = spread.ranks.solver(rows, kind);
-    let mut solver = solver.map_err(|message| StaticError::Ranks { message })?;
-    info.factor_seconds = clock.elapsed().as_secs_f64();
+    let mut solver =
+        (spread.ranks.solver(rows, kind)).map_err(|message| StaticError::Ranks { message })?;
+    info.factor_seconds += clock.elapsed().as_secs_f64();
     let clock = Instant::now();
     progress.stage("solve", None);
     let (mut r, scale) = problem.residual(u);
@@ -282,8 +310,8 @@ fn refine(
         }
     }
     info.relative_residual = if scale > 0.0 { norm / scale } else { 0.0 };
-    info.solve_seconds = clock.elapsed().as_secs_f64();
-    if info.relative_residual <= params.tolerance {
+    info.solve_seconds += clock.elapsed().as_secs_f64();
+    if info.relative_residual <= params.tolerance || is_round_off(problem, kind, u, &r, info) {
         return Ok(());
     }
     Err(StaticError::RanksNotConverged {
@@ -291,5 +319,9 @@ fn refine(
         tolerance: params.tolerance,
         iterations: info.iterations,
         why: failure.unwrap_or_else(|| "the residual falls no further".to_owned()),
+        remedy: match kind {
+            RankSolverKind::Krylov => "factorise instead (solver.method = \"direct\"), give",
+            RankSolverKind::Direct => "ask for a larger solver.tolerance, give",
+        },
     })
 }
