@@ -215,7 +215,7 @@ pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
 }
 
 /// Shortest and longest edge of a cell.
-fn edges<const D: usize>(mesh: &Mesh<D>, cell: usize) -> (f64, f64) {
+pub(crate) fn edges<const D: usize>(mesh: &Mesh<D>, cell: usize) -> (f64, f64) {
     let nodes = mesh.cell(cell);
     let (mut shortest, mut longest) = (f64::INFINITY, 0.0f64);
     for (corner, neighbours) in corners(mesh.shapes[cell]) {

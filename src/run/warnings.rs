@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::coupling::{CellRole, Model, Zone};
 use crate::material::LocalLaw;
-use crate::mesh::CellShape;
+use crate::mesh::{CellShape, quality};
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::report::number;
 use crate::run::error::RunError;
@@ -105,7 +105,15 @@ pub(crate) fn locking<const D: usize>(
         let law = laws[model.material_of_cell(c) as usize].as_ref();
         law.is_some_and(|law| law.flows_at_constant_volume())
     };
-    let all = [flowing(model, flows), nearly_incompressible(model, flows)];
+    let softens = |c: usize| {
+        let law = laws[model.material_of_cell(c) as usize].as_ref();
+        law.is_some_and(|law| law.damage().is_some())
+    };
+    let all = [
+        flowing(model, flows),
+        nearly_incompressible(model, flows),
+        elongated(model, softens),
+    ];
     all.into_iter().flatten()
 }
 
@@ -118,6 +126,31 @@ fn flowing<const D: usize>(model: &Model<D>, flows: impl Fn(usize) -> bool) -> O
     (count > 0).then(|| {
         format!(
             "{count} tri3 or tet4 elements flow at constant volume, which such cells resist: where they flow they are too stiff; mesh them with quad4 or hex8 cells"
+        )
+    })
+}
+
+/// The longest edge of a cell over its shortest beyond which a crack band of [`crate::fem::crack_band`] takes 0.7 to 1.4 of the fracture energy.
+const ELONGATED: f64 = 2.0;
+
+/// Elements of a law that softens in which the width of a crack depends on its direction.
+fn elongated<const D: usize>(model: &Model<D>, softens: impl Fn(usize) -> bool) -> Option<String> {
+    if D == 1 {
+        return None;
+    }
+    let cells = (0..model.mesh.cell_count())
+        .filter(|&c| model.is_element(c) && softens(c))
+        .map(|c| quality::edges(&model.mesh, c))
+        .map(|(short, long)| long / short)
+        .filter(|ratio| *ratio > ELONGATED);
+    let (count, largest) = cells.fold((0, 0.0_f64), |(n, most), r| (n + 1, most.max(r)));
+    let factor = largest.sqrt();
+    (count > 0).then(|| {
+        format!(
+            "{count} elements that soften are up to {} times as long as wide: a crack takes {} to {} of the fracture energy there, by its direction (docs/methods.md, section 1); mesh where cracks run with edges of one length",
+            number(largest),
+            number(1.0 / factor),
+            number(factor)
         )
     })
 }

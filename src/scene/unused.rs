@@ -30,16 +30,9 @@ impl<const D: usize> Parts<'_, D> {
     /// A warning for each part that touches nothing.
     pub fn unused(&self) -> Vec<String> {
         let (mut list, joining) = (Vec::new(), self.scene.coupling.joining());
-        for (name, material) in &self.spec.materials {
-            let mut typed = material.fracture().into_iter().flat_map(|f| f.typed);
-            let Some((key, _)) = typed.find(|(_, number)| number.is_some()) else {
-                continue;
-            };
-            if !(0..self.scene.mesh.cell_count()).any(|c| self.holds(c)) {
-                list.push(format!(
-                    "`{key}` of the material `{name}` is not used: the body is all finite elements, and they do not break"
-                ));
-            }
+        let has_points = (0..self.scene.mesh.cell_count()).any(|c| self.holds(c));
+        if !has_points {
+            list.extend(self.without_points());
         }
         if self.spec.zones.transition.is_some() && matches!(joining.zones, ZonesNeeded::Nonlocal) {
             list.push(format!(
@@ -84,7 +77,7 @@ impl<const D: usize> Parts<'_, D> {
             }
         }
         for (name, region) in self.spec.no_fail.keys().zip(&self.scene.breaking.no_fail) {
-            if !self.touches(p, region) {
+            if has_points && !self.touches(p, region) {
                 list.push(format!(
                     "the region `no-fail.{name}` holds no point: it does nothing"
                 ));
@@ -98,6 +91,27 @@ impl<const D: usize> Parts<'_, D> {
                 ));
             }
         }
+        list
+    }
+
+    /// What a body of finite elements alone has no use for.
+    fn without_points(&self) -> Vec<String> {
+        let mut list = Vec::new();
+        for (name, material) in &self.spec.materials {
+            let mut typed = material.fracture().into_iter().flat_map(|f| f.typed);
+            if let Some((key, _)) = typed.find(|(_, number)| number.is_some()) {
+                list.push(format!(
+                    "`{key}` of the material `{name}` is not used: the body is all finite elements, and they do not break"
+                ));
+            }
+        }
+        if self.spec.contact.is_some() {
+            list.push("`contact` is not used: points touch, and the body is all finite elements, which pass through each other".to_owned());
+        }
+        let regions = self.spec.no_fail.keys();
+        list.extend(regions.map(|name| {
+            format!("the region `no-fail.{name}` is not used: it keeps bonds and the damage of points, and the body is all finite elements")
+        }));
         list
     }
 

@@ -104,6 +104,52 @@ fn a_zone_without_peridynamics_is_refused() {
         warned.contains("`fracture-energy` of the material `m` is not used"),
         "{warned}"
     );
+    // nor a contact, nor a region in which nothing fails
+    let sets = [
+        "contact={}",
+        "no-fail.all.box={min=[0,0],max=[1,1]}",
+        "materials.m.bond-based.fracture-energy=1",
+        "solve.explicit.duration=0.01",
+        "materials.m.bond-based.density=1",
+    ];
+    let warned = told(&alone, &sets);
+    for part in ["`contact` is not used", "`no-fail.all` is not used"] {
+        assert!(warned.contains(part), "{part}: {warned}");
+    }
+}
+
+#[test]
+fn cells_that_soften_are_as_long_as_wide() {
+    let bar = r#"
+kinematics = "plane-stress"
+coupling = "local"
+mesh.rectangle = { min = [0, 0], max = [1, 0.5], x = { cells = 10 }, y = { cells = 5 } }
+materials.m.damage-correspondence = { youngs-modulus = 1000, poisson-ratio = 0.2, tensile-strength = 1, fracture-energy = 0.01 }
+conditions.left.displacement = { on = "left", x = 0, y = 0 }
+conditions.right.displacement = { on = "right", x = "5e-4*t" }
+solve.quasi-static.steps = 2
+output.vtu = false
+"#;
+    let warned = told(bar, &[]);
+    assert!(!warned.contains("as long as wide"), "{warned}");
+    let warned = told(bar, &["mesh.rectangle.y.cells=1"]);
+    assert!(
+        warned.contains("10 elements that soften are up to 5.000 times as long as wide: a crack takes 0.4472 to 2.236"),
+        "{warned}"
+    );
+}
+
+#[test]
+fn saturating_hardening_has_both_its_numbers() {
+    let typed = PLATE.replace(
+        "bond-based]",
+        "plastic-correspondence]\npoisson-ratio = 0.3\nyield-stress = 1\nsaturation-stress = 1",
+    );
+    let error = told(&typed, &[]);
+    assert!(
+        error.contains("saturation-stress` is 1") && error.contains("saturation-rate"),
+        "{error}"
+    );
 }
 
 #[test]

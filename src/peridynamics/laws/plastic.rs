@@ -60,6 +60,16 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
         LocalCorrespondence::<D>::CONTROL,
     ];
 
+    fn conflict(values: &[f64]) -> Option<(&'static str, String)> {
+        let (key, other) = match (values[2] > 0.0, values[3] > 0.0) {
+            (true, false) => ("saturation-stress", "saturation-rate"),
+            (false, true) => ("saturation-rate", "saturation-stress"),
+            _ => return None,
+        };
+        let why = format!("does nothing without a {other}, which is 0: give both, or neither");
+        Some((key, why))
+    }
+
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
         let hardening = Hardening::Voce {
             yield_stress: values[0],
