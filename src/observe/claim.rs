@@ -51,8 +51,10 @@ impl Files {
         let listed = self.files.iter().find_map(|file| {
             if let Some((whole, _)) = file.strip_suffix(".vtu").and_then(|f| f.rsplit_once("_p")) {
                 // perhaps the piece of a process
-                let pieces = folder.join(format!("{whole}.pvtu"));
-                if lists(&pieces, file) {
+                let list = format!("{whole}.pvtu");
+                let pieces = folder.join(&list);
+                let is_own = whole == self.name || self.contains(&list);
+                if !is_own && lists(&pieces, file) {
                     return Some((folder.join(file), pieces.display().to_string()));
                 }
             }
@@ -373,6 +375,12 @@ mod tests {
         for name in ["st_p2", "st_pa", "st"] {
             Claim::take(folder.path(), "other", &named(name)).unwrap();
         }
+        // its own are written anew
+        let again = Files {
+            files: vec!["st.pvtu".to_owned(), "st_p1.vtu".to_owned()],
+            ..named("st")
+        };
+        Claim::take(folder.path(), "same", &again).unwrap();
     }
 
     #[test]
