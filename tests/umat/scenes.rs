@@ -263,11 +263,11 @@ fn a_rate_counts_in_every_kinematics() {
 kinematics = "plane-stress"
 coupling = "local"
 mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 4 }, y = { cells = 2 } }
-{material}
 conditions.left.displacement = { on = "left", x = 0 }
 conditions.base.displacement = { on = "bottom", y = 0 }
 conditions.right.displacement = { on = "right", x = "0.01*t" }
 solve.quasi-static = { duration = 1, steps = 10, tolerance = 1e-11 }
+{material}
 [output]
 vtu = false
 stresses = ["von-mises"]
