@@ -1,6 +1,6 @@
 //! The displacement gradient anywhere in a cell, from the points of the cell where it is most accurate.
 //!
-//! Gradients of shape functions are one order more accurate at the points of the lower Gauss rule than elsewhere in a cell (Barlow 1976): in linear cells at the
+//! Gradients of shape functions are one order more accurate at the points of the lower Gauss rule than elsewhere in a cell \[Barlow1976\]: in linear cells at the
 //! centre, in cells of second order at two points along each direction of a line, quadrilateral or hexahedron, three of a triangle, four of a tetrahedron. Between
 //! and beyond them the gradient is taken to be (multi)linear in the reference coordinates.
 
@@ -33,7 +33,7 @@ pub fn superconvergent_gradient<const D: usize>(
     points.iter().map(gradient).sum()
 }
 
-/// Where the value of [`superconvergent_gradient`] at `xi` belongs to: the place of `xi`, in linear cells the centroid.
+/// Where \[m\] the value of [`superconvergent_gradient`] at the reference coordinates `xi` of cell `c` belongs to: their own place, in linear cells the centroid.
 pub fn position_in<const D: usize>(mesh: &Mesh<D>, c: usize, xi: &[f64; 3]) -> Vector<D> {
     let shape = mesh.shapes[c];
     match reference_cell(shape).filter(|_| shape.is_quadratic()) {

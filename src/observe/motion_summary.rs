@@ -66,22 +66,22 @@ impl EnergyGain {
     }
 }
 
-/// The largest rotation of a finite element, where it matters: elements are linear.
+/// The largest rotation of an element or a point that is for small rotations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rotation {
     /// The angle in degrees.
     pub degrees: f64,
-    /// The centre of the element.
+    /// The centre of the element, or the point.
     pub place: Vec<f64>,
     /// Step and time, of a run in time or under a load that grows.
     pub when: Option<(u64, f64)>,
-    /// What linear elements add to lengths at this angle, `1/cos θ − 1`.
+    /// What is for small rotations adds to lengths at this angle, `1/cos θ − 1`.
     pub length_error: f64,
     /// That over the stretch at which the bonds beside them break or soften, where it is a tenth or more.
     pub of_failure: Option<f64>,
     /// Energy of the misfit between elements and a zone of exact bonds, as a part of the largest energy of the run; none where bonds are linear as well, or nothing moves.
     pub energy_error: Option<f64>,
-    /// What lets it rotate.
+    /// Keys of the scene that let it rotate, in words.
     pub remedy: String,
 }
 

@@ -112,9 +112,9 @@ impl<const D: usize> Thermal<D> {
             let rise: Vec<Rise<D>> = (model.sites.iter())
                 .map(|s| self.rise(&s.position, t))
                 .collect();
-            let row_of = |row: usize| own.map_or(row, |own| own[row] as usize);
-            for row in (0..rows.rows()).filter(|&row| !inner[row_of(row)]) {
-                let site = row_of(row);
+            let site_of = |row: usize| own.map_or(row, |own| own[row] as usize);
+            for row in (0..rows.rows()).filter(|&row| !inner[site_of(row)]) {
+                let site = site_of(row);
                 let x = &model.sites[site].position;
                 let (columns, blocks) = rows.row(row);
                 let mut sum = Vector::<D>::zeros();

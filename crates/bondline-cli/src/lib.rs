@@ -16,7 +16,7 @@ use bondline::system::Ranks;
 use bondline_study::pareto::{self, CostBy, Reference, TradeEnd, TradeParams};
 use bondline_study::{CheckError, ConvergeError, ConvergeParams, Prediction, Refinement};
 use bondline_terminal::memory;
-use bondline_terminal::{Processes, TerminalProgress, alone, print, report, tell};
+use bondline_terminal::{Processes, TerminalProgress, print, refuse_several, report, tell};
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
@@ -436,7 +436,7 @@ fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Resul
     memory::limit(command.memory());
     // these have several processes, or refuse them
     if !matches!(command, Command::Run { .. } | Command::Verify { .. }) {
-        alone()?;
+        refuse_several()?;
     }
     match command {
         Command::Run {

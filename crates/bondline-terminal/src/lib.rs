@@ -16,7 +16,7 @@ mod progress_log;
 mod report;
 mod streams;
 
-pub use processes::{Processes, alone};
+pub use processes::{Processes, refuse_several};
 pub use progress::TerminalProgress;
 pub use report::report;
 pub use streams::{print, tell};

@@ -7,7 +7,7 @@ pub use petsc::Processes;
 pub use alone::Processes;
 
 /// The number of this process, and how many `mpirun` or the like has started, as the environment tells; none where nothing has started them.
-pub fn started() -> Option<(usize, usize)> {
+fn started() -> Option<(usize, usize)> {
     let number = |name| std::env::var(name).ok()?.parse::<usize>().ok();
     let kinds = [
         ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"),
@@ -23,7 +23,7 @@ pub fn started() -> Option<(usize, usize)> {
 ///
 /// # Errors
 /// Where `mpirun` has started several; those after the first wait, so that it is told of once.
-pub fn alone() -> miette::Result<()> {
+pub fn refuse_several() -> miette::Result<()> {
     match started() {
         Some((rank, count)) if count > 1 => {
             if rank > 0 {
