@@ -29,7 +29,7 @@ use crate::run::loads;
 use crate::run::proof::{self, Subject};
 use crate::run::setup::{self, RunSettings};
 use crate::run::solution::{self, Solved};
-use crate::run::warnings::{doubtful_elements, doubts, unusual_stretch};
+use crate::run::warnings::{doubts, of_elements, unusual_stretch};
 use crate::scene::Scene;
 use crate::scene::spec::{CouplingTraits, ZonesNeeded};
 use crate::solve::FreeDofs;
@@ -394,10 +394,7 @@ pub(crate) fn warnings<const D: usize>(
         }
     }
     list.extend(doubts(model, joining));
-    list.extend(doubtful_elements(
-        model,
-        &model.local_laws(&rest.local_laws),
-    ));
+    list.extend(of_elements(model, &model.local_laws(&rest.local_laws)));
     list.extend(unusual_stretch(model, rest)?);
     let proof = &prediction.proof;
     list.extend(proof.messages(Severity::Warning).map(str::to_owned));

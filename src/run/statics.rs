@@ -27,7 +27,7 @@ use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::definiteness;
 use crate::run::error::RunError;
 use crate::run::surface_gradient::missed_peak;
-use crate::run::warnings::{doubtful_elements, indefinite, out_of_balance, warnings};
+use crate::run::warnings::{indefinite, of_elements, out_of_balance, warnings};
 use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
@@ -318,7 +318,7 @@ impl<const D: usize> StaticBody<'_, D> {
         let balance = Balance::<D>::of(&equilibrium.internal, &equilibrium.load, reactions);
         let (force, relative) = (balance.force.as_slice(), balance.relative());
         let mut told = warnings(self.model, joining, &proof);
-        told.extend(doubtful_elements(
+        told.extend(of_elements(
             self.model,
             &self.model.local_laws(&self.rest.local_laws),
         ));

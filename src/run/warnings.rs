@@ -97,7 +97,7 @@ pub(crate) fn indefinite(symmetry: Symmetry, method: MethodUsed) -> Option<Strin
 }
 
 /// Elements that resist deformations at constant volume, and those that soften in a width that depends on the direction of the crack; `laws` by material.
-pub(crate) fn doubtful_elements<const D: usize>(
+pub(crate) fn of_elements<const D: usize>(
     model: &Model<D>,
     laws: &[Option<Arc<dyn LocalLaw<D>>>],
 ) -> impl Iterator<Item = String> + use<D> {

@@ -23,7 +23,7 @@ use crate::progress::Progress;
 use crate::run::error::{RunError, explained};
 use crate::run::loads;
 use crate::run::setup::RunSettings;
-use crate::run::warnings::{doubtful_elements, unusual_stretch, warnings, without_response};
+use crate::run::warnings::{of_elements, unusual_stretch, warnings, without_response};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
@@ -316,10 +316,7 @@ impl SegmentRecord {
         let rotation = observer.guard.rotation();
         self.proof.parts.extend(self.growth.take());
         let mut told = warnings(model, self.joining, &self.proof);
-        told.extend(doubtful_elements(
-            model,
-            &model.local_laws(&rest.local_laws),
-        ));
+        told.extend(of_elements(model, &model.local_laws(&rest.local_laws)));
         told.extend(unusual_stretch(model, rest)?);
         told.extend(without_response(motion.system(), &motion.state().u));
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));

@@ -31,7 +31,7 @@ use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
-use crate::run::warnings::{doubtful_elements, unusual_stretch, warnings, without_response};
+use crate::run::warnings::{of_elements, unusual_stretch, warnings, without_response};
 use crate::scene::solve::QuasiStatic as Spec;
 use crate::scene::spec::{EdgeSpec, LoadStepSpec};
 use crate::scene::validated::Scene;
@@ -126,10 +126,7 @@ fn load_steps<const D: usize>(
     choices.push(observer.spent());
     let summary = observer.summary(system.as_ref(), first, taken?)?;
     let of_model = warnings(model, laid_out.joining, &laid_out.proof).into_iter();
-    let of_model = of_model.chain(doubtful_elements(
-        model,
-        &model.local_laws(&rest.local_laws),
-    ));
+    let of_model = of_model.chain(of_elements(model, &model.local_laws(&rest.local_laws)));
     Ok(RunSummary {
         scene: laid_out.title,
         coupling: laid_out.joining.name.to_owned(),
