@@ -36,7 +36,7 @@ impl<const D: usize> Model<D> {
         Partition::by_bisection(&positions, &work, count)
     }
 
-    /// Collective: which of `count` processes computes which sites, as a graph partitioner has it where that leaves fewer sites of others beside those of each; without `ranks`, by bisection.
+    /// Collective: which of `count` processes computes which sites: as families are distributed, where they are; else as a graph partitioner has it where that leaves fewer sites of others beside those of each; without `ranks`, by bisection.
     ///
     /// Sites are distributed by bisection also where families shall be spread, since then no process knows the graph, and where points on a lattice fill a box, since then the graph
     /// does no better and takes as long to cut as families to find.
@@ -46,6 +46,12 @@ impl<const D: usize> Model<D> {
         is_shared: bool,
         ranks: Option<&dyn Ranks>,
     ) -> Distribution {
+        if let Some(shared) = self.shared_families() {
+            return Distribution {
+                partition: shared.partition().clone(),
+                why: "coordinate bisection".to_owned(),
+            };
+        }
         let bisected = self.partition(count, is_shared);
         let is_told_by_axes = is_shared && self.can_spread_families() || self.fills_a_box();
         let Some(ranks) = ranks.filter(|_| count > 1 && !is_told_by_axes) else {

@@ -37,6 +37,30 @@ impl<const D: usize> Model<D> {
         Some(shared.spread(ranks?))
     }
 
+    /// `width` numbers of each of some points, or of the sites that are points, which take their families; collective where these are spread over processes, with the same `points` on all.
+    pub fn of_families(
+        &self,
+        ranks: Option<&dyn Ranks>,
+        points: &[u32],
+        width: usize,
+        of: impl Fn(&[u32]) -> Vec<f64>,
+    ) -> Vec<f64> {
+        match self.spread(ranks) {
+            // every point is a site, of the same number
+            Some(spread) => spread.of_sites(points, width, of),
+            None => of(points),
+        }
+    }
+
+    /// Bonds of the family of a point, whoever holds it.
+    pub fn family_size(&self, point: usize) -> usize {
+        match (&self.shared, self.body()) {
+            (Some(shared), _) => shared.sizes()[point] as usize,
+            (None, Some(body)) => body.families.of(point).len(),
+            (None, None) => 0,
+        }
+    }
+
     /// Whether families are searched along a lattice, and can be spread over processes.
     pub fn can_spread_families(&self) -> bool {
         self.is_searched_by_lattice

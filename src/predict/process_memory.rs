@@ -50,7 +50,7 @@ pub(super) fn per_bond<const D: usize>(model: &Model<D>) -> f64 {
     }
 }
 
-/// The memory of each process, whose other numbers are known, beside what one process holds `alone`.
+/// The memory of each process, whose other numbers are known, beside what one process holds `alone`; `per_bond` bytes of each bond of a family that others hold.
 pub(super) fn divide(
     shares: &mut [ProcessShare],
     spreading: Spreading,
@@ -68,15 +68,13 @@ pub(super) fn divide(
         let of_blocks = share.blocks as f64 / blocks as f64;
         // each process writes the piece of its own sites
         let output = (bytes("output") as f64 * of_sites) as u64;
-        let base = LIBRARIES + alone.base_bytes;
+        let others = alone.sizes.bonds.saturating_sub(share.bonds) as f64 * per_bond;
+        let base = (LIBRARIES + alone.base_bytes).saturating_sub(others as u64);
         let rows = SOLVERS + (bytes("stiffness") as f64 * of_blocks) as u64;
         let solver = in_petsc(share, spreading, of_blocks, alone);
         share.memory_bytes = match spreading {
             Spreading::Work => base + bytes("stiffness") + bytes("solver").max(output),
-            Spreading::Families => {
-                let others = alone.sizes.bonds.saturating_sub(share.bonds) as f64 * per_bond;
-                base.saturating_sub(others as u64) + output
-            }
+            Spreading::Families => base + output,
             _ => base + rows + solver.max(output),
         };
     }

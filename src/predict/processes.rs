@@ -11,7 +11,7 @@ use crate::progress::Progress;
 use crate::run::chosen::with_choice;
 use crate::run::equilibrium;
 use crate::run::motion::dynamic_system::{LayoutStart, dynamic};
-use crate::run::motion::{Sharing, may_share, moves_own_sites};
+use crate::run::motion::{Sharing, may_share, may_share_rows, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
 use crate::solve::statics::Method;
@@ -27,7 +27,7 @@ pub struct Processes {
     shares: Vec<ProcessShare>,
     distribution: String,
     spreading: Spreading,
-    /// Bytes of each bond of a family.
+    /// Bytes of each bond of a family that others hold; zero where every process has all families.
     per_bond: f64,
 }
 
@@ -79,16 +79,23 @@ fn shares<const D: usize>(
         _ => None,
     };
     let (problem, rest) = setup::problem(scene);
-    let is_shared = explicit.is_some() && may_share(&problem, &rest);
+    let is_shared = match is_static {
+        true => may_share_rows(&problem, &rest),
+        false => explicit.is_some() && may_share(&problem, &rest),
+    };
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let Distribution { partition, why } = model.distribute(count, is_shared, partitioner);
-    let mut spreading = match is_shared && model.can_spread_families() {
-        true => Spreading::Families,
+    let has_own_families = is_shared && model.can_spread_families();
+    let mut spreading = match is_static {
         // forces that are not linear are solved for by every process, with all rows
-        false if is_static && rest.nonlinear(&model).is_none() => Spreading::Rows,
-        false => Spreading::Work,
+        true if rest.nonlinear(&model).is_none() => Spreading::Rows,
+        false if has_own_families => Spreading::Families,
+        _ => Spreading::Work,
     };
-    let per_bond = per_bond(&model);
+    let per_bond = match has_own_families {
+        true => per_bond(&model),
+        false => 0.0,
+    };
     let moves_own = |spec| moves_own_sites(spec, &rest);
     if spreading == Spreading::Families && explicit.as_ref().is_some_and(moves_own) {
         progress.finish();
@@ -124,9 +131,9 @@ fn shares<const D: usize>(
         let system = system.as_deref();
         let share = of_rows(&model, &partition, rank, (&pattern, system, is_static));
         ProcessShare {
-            bonds: match spreading {
-                Spreading::Families => bonds_held(&model, &own_points(&partition, rank)),
-                _ => model.bond_count(),
+            bonds: match has_own_families {
+                true => bonds_held(&model, &own_points(&partition, rank)),
+                false => model.bond_count(),
             },
             stiffness_bytes: match spreading {
                 Spreading::Products => (share.sites * 3usize.pow(D as u32) * D * D) as u64 * SCALAR,

@@ -14,6 +14,7 @@ use crate::coupling::{Model, SiteKind};
 use crate::fem;
 use crate::observe::summary::Rotation;
 use crate::run::setup::RunSettings;
+use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, padded};
 
 /// Rotation in degrees from which on it is told.
@@ -32,6 +33,8 @@ pub(crate) struct Rotations<'m, const D: usize> {
     volume: Vec<f64>,
     /// Points with linear bonds.
     points: Vec<u32>,
+    /// The processes over which families may be spread.
+    ranks: Option<&'m dyn Ranks>,
     /// Energy of a misfit of 1 for each unit of the elements' volume; zero where none arises.
     stiffness: f64,
     /// The stretch at which bonds break or soften; none where no misfit arises or none fails.
@@ -49,7 +52,12 @@ pub(crate) struct Largest {
 
 impl<'m, const D: usize> Rotations<'m, D> {
     /// Of all elements of a model that are for small strains, and of its points that are too, none in one dimension; `failing` the stretch at which they break or soften.
-    pub fn new(model: &'m Model<D>, rest: &RunSettings<D>, failing: Option<f64>) -> Self {
+    pub fn new(
+        model: &'m Model<D>,
+        rest: &RunSettings<D>,
+        failing: Option<f64>,
+        ranks: Option<&'m dyn Ranks>,
+    ) -> Self {
         let all = 0..model.mesh.cell_count();
         let cells: Vec<u32> = match D {
             1 => Vec::new(),
@@ -66,12 +74,10 @@ impl<'m, const D: usize> Rotations<'m, D> {
             .map(|s| s.volume)
             .sum();
         let linear = |i: &usize| rest.has_linear_point(model, *i);
-        // of families that are spread over processes each would see another part
-        let sees_points = D > 1 && model.shared_families().is_none();
-        let points: Vec<u32> = match model.body().filter(|_| sees_points) {
+        let points: Vec<u32> = match model.body().filter(|_| D > 1) {
             Some(body) => {
                 let all = body.families.len();
-                let has_bonds = |&i: &usize| body.families.of(i).len() > D;
+                let has_bonds = |&i: &usize| model.family_size(i) > D;
                 let some = (0..all).step_by(all.div_ceil(POINTS).max(1));
                 let some = some.filter(has_bonds).filter(linear);
                 some.map(|i| i as u32).collect()
@@ -93,13 +99,14 @@ impl<'m, const D: usize> Rotations<'m, D> {
             cells,
             volume,
             points,
+            ranks,
             stiffness,
             failing: failing.filter(|_| stiffness > 0.0),
             remedy,
         }
     }
 
-    /// The largest rotation under a displacement; none without anything linear.
+    /// The largest rotation under a displacement; none without anything linear. Collective where families are spread.
     pub fn largest(&self, u: &[f64]) -> Option<Largest> {
         let transfer = &self.model.node_transfer;
         let (mut largest, mut energy) = ((-1.0, Vector::<D>::zeros()), 0.0);
@@ -114,10 +121,10 @@ impl<'m, const D: usize> Rotations<'m, D> {
             let misfit = 1.0 / angle.cos().max(0.01) - 1.0;
             energy += self.stiffness * volume * misfit * misfit;
         }
-        for (x, gradient) in self.gradients_of_points(u) {
-            let angle = rotation(&gradient);
-            if angle > largest.0 {
-                largest = (angle, x);
+        let of_points = (self.points.iter()).zip(self.angles_of_points(u));
+        for (&i, angle) in of_points {
+            if let Some(body) = self.model.body().filter(|_| angle > largest.0) {
+                largest = (angle, body.cloud.position[i as usize]);
             }
         }
         let (angle, place) = largest;
@@ -128,15 +135,14 @@ impl<'m, const D: usize> Rotations<'m, D> {
         })
     }
 
-    /// The displacement gradient that fits the family of each point best, and where that is.
-    fn gradients_of_points(&self, u: &[f64]) -> impl Iterator<Item = (Vector<D>, Tensor<D>)> {
-        let body = self.model.body();
-        let bodies = self
-            .points
-            .iter()
-            .filter_map(move |&i| Some((body?, i as usize)));
-        bodies.filter_map(|(body, i)| {
-            let displacement = |p: usize| body.cloud.transfer.displacement(p, u);
+    /// The angle of the displacement gradient that fits the family of each point best; not a number where none does.
+    fn angles_of_points(&self, u: &[f64]) -> Vec<f64> {
+        let Some(body) = self.model.body() else {
+            return Vec::new();
+        };
+        let displacement = |p: usize| body.cloud.transfer.displacement(p, u);
+        let angle = |&i: &u32| {
+            let i = i as usize;
             let (x, at) = (body.cloud.position[i], displacement(i));
             let (mut shape, mut moved) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
             for &j in body.families.of(i) {
@@ -144,8 +150,11 @@ impl<'m, const D: usize> Rotations<'m, D> {
                 shape += xi * xi.transpose();
                 moved += (displacement(j as usize) - at) * xi.transpose();
             }
-            Some((x, moved * shape.try_inverse()?))
-        })
+            let inverse = shape.try_inverse();
+            inverse.map_or(f64::NAN, |inverse| rotation(&(moved * inverse)))
+        };
+        let angles = |own: &[u32]| own.iter().map(angle).collect();
+        (self.model).of_families(self.ranks, &self.points, 1, angles)
     }
 
     /// What a summary tells, from [`TOLD`] or [`TOLD_OF_FAILURE`] on; `scale` is the largest energy of the run, `when` a step with its time.

@@ -7,6 +7,7 @@ use super::stresses::{KnownStresses, Place, names};
 use crate::fem::{self, Locator};
 use crate::scene::spec::StressSpec;
 use crate::shape::Shape;
+use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, strain};
 use crate::{
     coupling::{Carrier, Sampler, SiteKind, Zone},
@@ -31,7 +32,9 @@ pub(super) fn table_header<const D: usize>(asked: &[StressSpec]) -> Vec<String> 
 
 struct Sample<const D: usize> {
     displacement: Vector<D>,
-    gradient: Tensor<D>,
+    /// None of a point, whose family another process may have.
+    gradient: Option<Tensor<D>>,
+    carrier: Carrier,
     zone: Zone,
     /// The stress and the numbers made of it, if they are asked for.
     stress: Option<(Tensor<D>, Vec<f64>)>,
@@ -45,11 +48,12 @@ pub(super) struct SampledSolution<'a, const D: usize> {
     sampler: Sampler<'a, D>,
     body: Locator<D>,
     tolerance: f64,
+    ranks: Option<&'a dyn Ranks>,
 }
 
 impl<'a, const D: usize> SampledSolution<'a, D> {
-    /// Of a solution, with an index of its cells and points.
-    pub fn new(solved: &'a Solved<'a, D>) -> Self {
+    /// Of a solution, with an index of its cells and points; `ranks` are the processes over which families may be spread.
+    pub fn new(solved: &'a Solved<'a, D>, ranks: Option<&'a dyn Ranks>) -> Self {
         let model = solved.model;
         let (lo, hi) = model.mesh.bounds();
         Self {
@@ -62,6 +66,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             sampler: Sampler::new(model),
             body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
             tolerance: 1e-9 * (hi - lo).norm(),
+            ranks,
         }
     }
 
@@ -87,27 +92,49 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             .has_derived()
             .then(|| solved.carried_stress(carrier, &self.known, &self.intact));
         let (gradient, zone) = match carrier {
-            Carrier::Element(c, xi) => (solved.gradient_in(c, &xi), solved.model.zones[c]),
-            Carrier::Point(site) => (
-                solved.point_gradient(site, &self.intact),
-                solved.zone_of_site[site],
-            ),
+            Carrier::Element(c, xi) => (Some(solved.gradient_in(c, &xi)), solved.model.zones[c]),
+            Carrier::Point(site) => (None, solved.zone_of_site[site]),
         };
         Some(Sample {
             displacement,
             gradient,
+            carrier,
             zone,
             stress,
         })
     }
 
-    /// The rows of a table along positions, with the columns of [`table_header`]; none for a position outside of the body.
+    /// The gradients of the samples that points carry, in their order.
+    fn gradients_of_points<'s>(
+        &self,
+        samples: impl Iterator<Item = &'s Sample<D>>,
+    ) -> Vec<Tensor<D>> {
+        let points = samples.filter_map(|sample| match sample.carrier {
+            Carrier::Point(site) => Some(site as u32),
+            Carrier::Element(..) => None,
+        });
+        let points: Vec<u32> = points.collect();
+        let solved = self.solved;
+        let of_families = |own: &[u32]| {
+            let gradient = |k: usize| solved.point_gradient(own[k] as usize, &self.intact);
+            let gradients = parallel::map(own.len(), 1, gradient);
+            gradients.iter().flat_map(|g| g.iter().copied()).collect()
+        };
+        let numbers = (solved.model).of_families(self.ranks, &points, D * D, of_families);
+        let tensors = numbers.chunks_exact(D * D);
+        tensors.map(Tensor::from_column_slice).collect()
+    }
+
+    /// The rows of a table along positions, with the columns of [`table_header`]; none for a position outside of the body. Collective where families are spread.
     pub fn rows(&self, positions: &[Vector<D>]) -> Vec<Vec<f64>> {
         let samples: Vec<Option<Sample<D>>> = parallel::map_slice(positions, |x| self.at(x));
+        let of_points = self.gradients_of_points(samples.iter().flatten());
+        let mut of_points = of_points.into_iter();
         let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
             // a line may cross a slit: there is nothing to tell in it
             let sample = sample?;
-            let e = strain(&sample.gradient);
+            let gradient = sample.gradient.or_else(|| of_points.next())?;
+            let e = strain(&gradient);
             let mut row: Vec<f64> = x
                 .iter()
                 .chain(sample.displacement.iter())

@@ -6,7 +6,7 @@ use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::sections::Sections;
-use super::setup::{RunSettings, model, model_choices, problem, same_everywhere};
+use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model};
 use super::solution::{Solved, zone_of_site};
 use super::zone_placement::CachedSolution;
 use crate::run::placed_scene::PlacedScene;
@@ -32,7 +32,7 @@ use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
 use crate::solve::statics::StaticInfo;
-use crate::system::{Ranks, SemiDiscrete};
+use crate::system::{Ranks, SemiDiscrete, all_say};
 use crate::tensor::Vector;
 
 /// Runs a scene and writes its outputs.
@@ -128,7 +128,9 @@ fn solve_chosen<const D: usize>(
     let (model, coupling) = match &kept {
         Some(k) => (&k.model, k.coupling.as_ref()),
         None => {
-            fresh = model(problem, &rest, progress)?;
+            let holders =
+                ranks.filter(|&ranks| all_say(ranks, motion::may_share_rows(&problem, &rest)));
+            fresh = shared_model(problem, &rest, holders, progress)?;
             (&fresh.0, fresh.1.as_ref())
         }
     };
@@ -226,7 +228,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 },
                 system: None,
                 affine_forces: &[],
-                ranks: None,
+                ranks: self.ranks,
             },
             progress,
         )?;
@@ -310,7 +312,7 @@ impl<const D: usize> StaticBody<'_, D> {
     ) -> RunSummary {
         let solution = &equilibrium.solution;
         let info = &solution.info;
-        let rotations = Rotations::new(self.model, self.rest, None);
+        let rotations = Rotations::new(self.model, self.rest, None, self.ranks);
         let rotation = rotations
             .largest(&solution.displacement)
             .and_then(|r| rotations.told(r.degrees, r.place, 0.0, 0.0, None));
@@ -336,6 +338,7 @@ impl<const D: usize> StaticBody<'_, D> {
             let skin = "cover the surface (zones.skin = \"free-surfaces\")";
             told.extend(missed_peak(
                 self.model,
+                self.ranks,
                 stresses.kinematics,
                 u,
                 uniform,
@@ -384,7 +387,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 .iter()
                 .filter(|s| matches!(s.kind, SiteKind::Point(_)))
                 .count(),
-            bonds: model.body().map_or(0, |b| b.bond_count()) + self.operator.additional_bonds(),
+            bonds: model.bond_count() + self.operator.additional_bonds(),
             dofs: model.sites.len() * D,
             nonzeros: info.matrix_nnz,
         }

@@ -49,7 +49,7 @@ pub(super) fn write_for<const D: usize>(
     options: &RunOptions<'_>,
 ) -> Result<Vec<PathBuf>, ObserveError> {
     let mut files = Vec::new();
-    let solution = LazyCell::new(|| SampledSolution::new(solved));
+    let solution = LazyCell::new(|| SampledSolution::new(solved, options.ranks));
     let path = |end: &str| output.directory.join(format!("{}{end}", output.name));
     let whole = path(".vtu");
     let of = |shown: Shown<'_>| {
@@ -90,12 +90,14 @@ pub(super) fn write_for<const D: usize>(
         let header = table_header::<D>(solved.asked());
         (name, header, solution.rows(&positions))
     });
+    // by all processes before one writes, which may fail
+    let sampled: Vec<_> = sampled.collect();
     let forces = solved.sections.iter().flat_map(SectionForce::numbers);
     let sections = (!solved.sections.is_empty()).then(|| {
         let header = sections::header(&output.sections);
         (SECTIONS, header, vec![forces.collect()])
     });
-    for (name, header, rows) in sampled.chain(sections) {
+    for (name, header, rows) in sampled.into_iter().chain(sections) {
         if let Some(observer) = options.observer {
             for row in &rows {
                 let row: Vec<Entry> = row.iter().map(|&x| Entry::Real(x)).collect();

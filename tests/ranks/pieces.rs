@@ -77,7 +77,7 @@ fn bits(_: &str, a: f64, b: f64) -> bool {
 }
 
 /// The pieces together are the file `one`; returns their numbers of cells.
-fn assert_joined(one: &Path, list: &Path, agrees: Agrees<'_>) -> Vec<usize> {
+pub fn assert_joined(one: &Path, list: &Path, agrees: Agrees<'_>) -> Vec<usize> {
     let [whole] = &read(one)[..] else {
         panic!("one piece in {}", one.display());
     };

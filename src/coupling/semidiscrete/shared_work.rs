@@ -17,13 +17,8 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         let Some(ranks) = ranks else {
             return self;
         };
-        let Distribution { partition, why } = match self.model.shared_families() {
-            Some(shared) => Distribution {
-                partition: shared.partition().clone(),
-                why: "coordinate bisection".to_owned(),
-            },
-            None => self.model.distribute(ranks.count(), false, Some(ranks)),
-        };
+        let Distribution { partition, why } =
+            self.model.distribute(ranks.count(), false, Some(ranks));
         let is_own = |site: u32| partition.owner(site) == ranks.rank();
         self.linear.compute_only(|site| is_own(site as u32));
         let breaks = self.breaks();

@@ -79,7 +79,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
             // a seam within a horizon of what flows or breaks balances no steep stress: no skin
             let apart = "carry the surface and what lies within two horizons of it";
             let kinematics = stresses.kinematics;
-            self.peak = missed_peak(self.model, kinematics, u, self.uniform, apart);
+            self.peak = missed_peak(self.model, None, kinematics, u, self.uniform, apart);
         }
     }
 

@@ -94,7 +94,7 @@ fn load_steps<const D: usize>(
     let edge = saved.as_ref().and_then(|s| s.edge);
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
-    let rotations = Rotations::new(model, rest, failing_stretch(model, rest)?);
+    let rotations = Rotations::new(model, rest, failing_stretch(model, rest)?, None);
     let mut observer = LoadStepObserver {
         model,
         rest,

@@ -1,7 +1,8 @@
-//! What each of several processes has of a run in time.
+//! What each of several processes has of a run.
 
 use super::RunOptions;
 use crate::coupling::Problem;
+use crate::peridynamics::bond_force::Kinematics;
 use crate::run::setup::RunSettings;
 use crate::scene::conditions::Prescribed;
 use crate::scene::solve::Explicit;
@@ -32,8 +33,15 @@ pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings
         // lists hold the bonds of all points
         && rest.breaking.precision == PrecisionSpec::Double
         && rest.stresses.at(0.0).is_none()
-        && rest.output.lines.is_empty()
         && !rest.output.energy_density
+}
+
+/// The same of a static scene, whose forces then have to be linear: others take the rows of all sites.
+pub(crate) fn may_share_rows<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
+    let law = problem.peridynamics.as_ref().map(|p| &p.law);
+    rest.kinematics() == Kinematics::Linear
+        && law.is_some_and(|law| law.is_linear())
+        && may_share(problem, rest)
 }
 
 /// Whether a process then moves its own sites and their ghosts alone, and not all: no sub-steps, no springs, nothing that strikes.

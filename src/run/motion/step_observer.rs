@@ -182,7 +182,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             zone,
         } = watched;
         let failing = failing_stretch(model, rest)?;
-        let rotations = Rotations::new(model, rest, failing);
+        let rotations = Rotations::new(model, rest, failing, segment.options.ranks);
         let guard = Guard::new(rotations, balance, segment.spec, pace.steps, seen);
         let monitor = match &rest.follow {
             Some(follow) => {

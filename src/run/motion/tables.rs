@@ -81,7 +81,7 @@ impl Tables {
         Ok(())
     }
 
-    /// Appends a state along each line.
+    /// Appends a state along each line. Collective.
     ///
     /// # Errors
     /// [`ObserveError`] if a row cannot be written.
@@ -92,10 +92,13 @@ impl Tables {
         state: &State,
         solved: &Solved<'_, D>,
     ) -> Result<(), ObserveError> {
-        if self.lines.is_empty() || !(options.writes() || options.observer.is_some()) {
+        let sees = options.writes() || options.observer.is_some();
+        // others have families that the first process asks for
+        let is_asked = solved.model.shared_families().is_some();
+        if self.lines.is_empty() || !(sees || is_asked) {
             return Ok(());
         }
-        let solution = SampledSolution::new(solved);
+        let solution = SampledSolution::new(solved, options.ranks);
         for ((name, positions), table) in output.lines.iter().zip(&mut self.lines) {
             for values in solution.rows(positions) {
                 let mut row = when(state);
