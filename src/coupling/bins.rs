@@ -27,8 +27,12 @@ impl<const D: usize> Bins<D> {
     /// The numbers of all positions in bins that a ball meets, and of no others.
     pub fn around(&self, x: &Vector<D>, radius: f64) -> impl Iterator<Item = usize> + '_ {
         let reach = radius * (1.0 + 1e-9);
-        let low = Self::bin(&x.add_scalar(-reach), self.size);
-        let high = Self::bin(&x.add_scalar(reach), self.size);
+        self.in_box(x.add_scalar(-reach), x.add_scalar(reach))
+    }
+
+    /// The numbers of all positions in bins that a box meets, and of no others.
+    pub fn in_box(&self, low: Vector<D>, high: Vector<D>) -> impl Iterator<Item = usize> + '_ {
+        let (low, high) = (Self::bin(&low, self.size), Self::bin(&high, self.size));
         let counts: [usize; D] = std::array::from_fn(|i| (high[i] - low[i] + 1) as usize);
         (0..counts.iter().product::<usize>())
             .map(move |index| {

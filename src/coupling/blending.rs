@@ -4,13 +4,14 @@ use crate::{
     assembly::Row,
     coupling::{
         CellRole, Coupling, Model, ModelError, Operator, Rows, Zone,
+        held_families::depth_of_seam,
         least_squares_gradient::{self, DerivativeWeights},
         zone_distance::Edge,
     },
     dimension,
     mesh::Mesh,
     parallel,
-    peridynamics::PdBody,
+    peridynamics::{LinearForceState, PdBody},
     tensor::{Tensor, Vector},
 };
 
@@ -69,6 +70,10 @@ impl<const D: usize> Coupling<D> for Blending {
 
     fn takes_deviators(&self) -> bool {
         true
+    }
+
+    fn families_of_all(&self, law: &dyn LinearForceState<D>) -> Option<usize> {
+        Some(depth_of_seam(law.is_pairwise()))
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {

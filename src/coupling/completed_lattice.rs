@@ -1,6 +1,7 @@
 //! One lattice of points with its families, before it is part of a body.
 
 use super::bond_cutting::LatticeFactors;
+use super::held_families::HeldFamilies;
 use super::point_cloud::PointCloud;
 use super::shared_families::SharedFamilies;
 use crate::peridynamics::Families;
@@ -16,6 +17,6 @@ pub(super) struct CompletedLattice<const D: usize> {
     pub is_constant: bool,
     /// Who has which families, where they are spread over processes.
     pub shared: Option<SharedFamilies>,
-    /// Whether families came from the places of the points on their lattice.
-    pub is_searched_by_lattice: bool,
+    /// Which families a process would hold, where they can be spread over processes.
+    pub held: Option<HeldFamilies>,
 }

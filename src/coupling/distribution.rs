@@ -1,10 +1,9 @@
 //! Which of several processes computes which sites of a model.
 
 use crate::{
-    coupling::Model,
+    coupling::{Model, shared_families::by_work},
     parallel,
     system::{NeighbourGraph, Partition, Ranks, first_text},
-    tensor::padded,
 };
 
 /// A graph partitioner decides where the process with the most sites of others beside its own has at most this part of those that bisection leaves it. Where both do the same, as in blocks, the cuts of
@@ -26,14 +25,13 @@ pub struct Distribution {
 impl<const D: usize> Model<D> {
     /// Which of `count` processes computes which sites; `is_shared` where families shall be spread over these as well.
     ///
-    /// Sites are weighted by the bonds and cells around them, or count the same where families are not known before they are spread.
+    /// Sites are weighted by the bonds and cells around them, points by those of a family that lacks none where families are not known before they are spread.
     pub fn partition(&self, count: usize, is_shared: bool) -> Partition {
-        let positions: Vec<[f64; 3]> = self.sites.iter().map(|s| padded(&s.position)).collect();
-        let work = match is_shared && self.can_spread_families() {
-            true => vec![1.0; positions.len()],
-            false => self.work_of_sites(),
+        let work = match &self.held.filter(|_| is_shared) {
+            Some(held) => self.work_before_families(&self.sites, held),
+            None => self.work_of_sites(),
         };
-        Partition::by_bisection(&positions, &work, count)
+        by_work(&self.sites, &work, count)
     }
 
     /// Collective: which of `count` processes computes which sites: as families are distributed, where they are; else as a graph partitioner has it where that leaves fewer sites of others beside those of each; without `ranks`, by bisection.

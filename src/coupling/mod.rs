@@ -13,7 +13,7 @@
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `sites.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
 //! | `distribution.rs` | which of several processes has which sites | |
-//! | `shared_families.rs`, `shared_body.rs` | families that are spread over processes | |
+//! | `shared_families.rs`, `shared_body.rs`, `held_families.rs` | families that are spread over processes; which of them each has | |
 //! | `multi_lattice.rs`, `completed_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
 //! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
@@ -41,6 +41,7 @@ mod distribution;
 pub mod error_indicator;
 mod exact_stresses;
 pub mod field_evaluation;
+mod held_families;
 pub mod impact;
 mod interface_interpolation;
 mod lattice_axes;
@@ -162,9 +163,11 @@ pub trait Coupling<const D: usize>: Send + Sync {
         }
     }
 
-    /// Whether each process of a run may hold the families of its own sites alone: nothing is fitted to those of several sites, and no other place completes them.
-    fn shares_families(&self) -> bool {
-        false
+    /// How many families deep from the elements every process needs those of all points, where it may hold those of its own alone elsewhere; none where that is not known.
+    ///
+    /// Rows of sites beside a seam take the families of several, and every process works out and proves all of a seam.
+    fn families_of_all(&self, _law: &dyn LinearForceState<D>) -> Option<usize> {
+        None
     }
 
     /// Whether its rows hold the products of dilatations and deviatoric extensions that a law with [`LinearForceState::has_deviators`] has; any other coupling is refused for such a law.

@@ -11,6 +11,7 @@ use crate::{
         CellRole, Coupling, Interface, ModelError, Peridynamics, Problem, Reach, Surfaces, Zone,
         bond_cutting::{self, LatticeFactors, WholeFamily},
         completed_lattice::CompletedLattice,
+        held_families::HeldFamilies,
         interface_interpolation::{self, Sites},
         multi_lattice::{self, ContinuedLattice, MergedLattices, reach, weighting},
         point_cloud::{PointCloud, Volumes},
@@ -104,8 +105,8 @@ pub struct Model<const D: usize> {
     pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
     /// Who has which families, where they are spread over processes.
     pub(super) shared: Option<SharedFamilies>,
-    /// Whether families came from the places of the points on their lattice.
-    pub(super) is_searched_by_lattice: bool,
+    /// Which families a process would hold, where they can be spread over processes.
+    pub(super) held: Option<HeldFamilies>,
 }
 
 type LaidOut<const D: usize> = Result<(Model<D>, Box<dyn Coupling<D>>), ModelError>;
@@ -122,7 +123,7 @@ impl<const D: usize> Model<D> {
         Self::shared(problem, None, progress)
     }
 
-    /// Collective: as [`Model::new`], with the families spread over processes where [`Coupling::shares_families`] and the points are a lattice of one horizon. Who asks for it needs the rows of its own sites only.
+    /// Collective: as [`Model::new`], with the families spread over processes where [`Coupling::families_of_all`] says how and the points are a lattice of one horizon. Who asks for it needs the rows of its own sites only.
     ///
     /// # Errors
     /// As [`Model::new`].
@@ -139,7 +140,6 @@ impl<const D: usize> Model<D> {
         ranks: Option<&dyn Ranks>,
         progress: &dyn Progress,
     ) -> LaidOut<D> {
-        let ranks = ranks.filter(|_| problem.coupling.shares_families());
         let Problem {
             mesh,
             zones,
@@ -190,7 +190,7 @@ impl<const D: usize> Model<D> {
             dilatation: None,
             operator_cache: OnceLock::new(),
             shared: None,
-            is_searched_by_lattice: false,
+            held: None,
         };
         let has_points = model.roles.contains(&CellRole::Points);
         if has_points && model.peridynamics.is_none() {
@@ -282,15 +282,19 @@ impl<const D: usize> Model<D> {
     ) -> Result<(Vec<CompletedLattice<D>>, Option<Feet<D>>), ModelError> {
         let mut feet = None;
         let reach = reach(coupling, p);
+        let held = match &clouds[..] {
+            [alone] => HeldFamilies::of(coupling, p, reach, alone.spacing),
+            _ => None,
+        };
         let grow = |(l, cloud): (usize, PointCloud<D>)| match self.interface {
             Interface::Feet => {
-                let whole = self.grow(p, cloud, l, Reach::Neighbours, None)?;
+                let whole = self.grow(p, cloud, l, Reach::Neighbours, (None, None))?;
                 let (lattice, ends) =
                     truncated_families::place((&self.mesh, &self.roles), p, whole)?;
                 feet = Some(ends);
                 Ok(lattice)
             }
-            _ => self.grow(p, cloud, l, reach, ranks),
+            _ => self.grow(p, cloud, l, reach, (held, ranks)),
         };
         let grown: Result<Vec<_>, ModelError> = clouds.into_iter().enumerate().map(grow).collect();
         Ok((grown?, feet))
@@ -320,9 +324,9 @@ impl<const D: usize> Model<D> {
             of_point,
             horizons,
             shared,
-            is_searched_by_lattice,
+            held,
         } = merged;
-        self.is_searched_by_lattice = is_searched_by_lattice;
+        self.held = held;
         self.spacing = cloud.spacing;
         self.is_lattice = factors[0].is_lattice();
         self.volumes = cloud.volumes;
@@ -365,7 +369,7 @@ impl<const D: usize> Model<D> {
         };
         let body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
             .map_err(|e| ModelError::family("the point", e));
-        let mut body = self.held_body(shared.zip(ranks), body)?;
+        let mut body = self.held_body(shared.zip(ranks), &point_site, body)?;
         if let Some(feet) = feet {
             self.end_families(p, feet, &mut body)?;
         }

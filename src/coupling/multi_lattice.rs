@@ -6,6 +6,7 @@ use crate::{
         Surfaces,
         bond_cutting::{self, LatticeFactors, WholeFamily},
         completed_lattice::CompletedLattice,
+        held_families::HeldFamilies,
         point_cloud::PointCloud,
         shared_families::SharedFamilies,
     },
@@ -53,8 +54,8 @@ pub(super) struct MergedLattices<const D: usize> {
     pub horizons: Vec<f64>,
     /// Of the first lattice, see [`CompletedLattice::shared`].
     pub shared: Option<SharedFamilies>,
-    /// Of the first lattice.
-    pub is_searched_by_lattice: bool,
+    /// Of the first lattice, see [`CompletedLattice::held`].
+    pub held: Option<HeldFamilies>,
 }
 
 impl<const D: usize> MergedLattices<D> {
@@ -69,7 +70,7 @@ impl<const D: usize> MergedLattices<D> {
             wide,
             is_constant,
             shared,
-            is_searched_by_lattice,
+            held,
         } = grown.next()?;
         let mut factors = vec![first];
         let mut of_point = vec![0u16; cloud.position.len()];
@@ -101,7 +102,7 @@ impl<const D: usize> MergedLattices<D> {
             of_point,
             horizons,
             shared,
-            is_searched_by_lattice,
+            held,
         })
     }
 }
@@ -126,29 +127,30 @@ fn check_cloud<const D: usize>(cloud: &PointCloud<D>) -> Result<(), ModelError> 
     Ok(())
 }
 
-/// The families of points on a lattice along the axes, all of one `reach`, or those of this process; none of other points.
-fn by_lattice<const D: usize>(
-    p: &Peridynamics<D>,
-    cloud: &PointCloud<D>,
-    reaches: &[f64],
-    ranks: Option<&dyn Ranks>,
-) -> Option<(Families, Option<SharedFamilies>)> {
-    let reach = *reaches.first()?;
-    if !cloud.is_axis_parallel() || reaches.iter().any(|r| *r != reach) {
-        return None;
-    }
-    let Some(ranks) = ranks else {
-        let (points, spacing) = (&cloud.position, cloud.spacing);
-        let found = Families::search_lattice(points, spacing, reach, TIE_TOLERANCE)?;
-        return Some((found, None));
-    };
-    // the force of a law with a state takes those of neighbours
-    let with_neighbours = !p.law.linearised().is_pairwise();
-    let (found, shared) = SharedFamilies::search(ranks, cloud, reach, with_neighbours)?;
-    Some((found, Some(shared)))
-}
+/// How families may be spread over processes, and over which.
+pub(super) type Spreading<'a> = (Option<HeldFamilies>, Option<&'a dyn Ranks>);
 
 impl<const D: usize> Model<D> {
+    /// The families of points on a lattice along the axes, all of one `reach`, or those of this process; none of other points.
+    fn by_lattice(
+        &self,
+        cloud: &PointCloud<D>,
+        reaches: &[f64],
+        (held, ranks): Spreading<'_>,
+    ) -> Option<(Families, Option<SharedFamilies>)> {
+        let reach = *reaches.first()?;
+        if !cloud.is_axis_parallel() || reaches.iter().any(|r| *r != reach) {
+            return None;
+        }
+        if let (Some(held), Some(ranks)) = (held, ranks) {
+            let (found, shared) = self.search_shared(ranks, &held, cloud, reach)?;
+            return Some((found, Some(shared)));
+        }
+        let (points, spacing) = (&cloud.position, cloud.spacing);
+        let found = Families::search_lattice(points, spacing, reach, TIE_TOLERANCE)?;
+        Some((found, None))
+    }
+
     /// Completes the families of the points of one lattice, and drops the points that nothing needs.
     pub(super) fn grow(
         &self,
@@ -156,14 +158,15 @@ impl<const D: usize> Model<D> {
         mut cloud: PointCloud<D>,
         lattice: usize,
         reach: Reach,
-        ranks: Option<&dyn Ranks>,
+        (held, ranks): Spreading<'_>,
     ) -> Result<CompletedLattice<D>, ModelError> {
         check_cloud(&cloud)?;
         let is_constant = cloud.horizon.uniform().is_some();
         let points = 0..cloud.position.len();
         let reaches: Vec<f64> = points.map(|i| p.reach(cloud.horizon.of(i))).collect();
-        let known = by_lattice(p, &cloud, &reaches, ranks.filter(|_| is_constant));
-        let is_searched_by_lattice = is_constant && known.is_some();
+        let held = held.filter(|_| is_constant);
+        let known = self.by_lattice(&cloud, &reaches, (held, ranks));
+        let held = held.filter(|_| known.is_some());
         let (mut families, shared) = match known {
             Some(known) => known,
             None => {
@@ -221,7 +224,7 @@ impl<const D: usize> Model<D> {
             wide,
             is_constant,
             shared,
-            is_searched_by_lattice,
+            held,
         })
     }
 

@@ -2,7 +2,10 @@
 
 use crate::{
     assembly::Row,
-    coupling::{CellRole, Coupling, ExactStresses, Model, ModelError, Operator, Reach, Rows, Zone},
+    coupling::{
+        CellRole, Coupling, ExactStresses, Model, ModelError, Operator, Reach, Rows, Zone,
+        held_families::depth_of_seam,
+    },
     dimension,
     mesh::Mesh,
     peridynamics::{Influence, LinearForceState, PdBody},
@@ -41,6 +44,10 @@ impl<const D: usize> Coupling<D> for PartialStressMeshfree {
 
     fn takes_deviators(&self) -> bool {
         true
+    }
+
+    fn families_of_all(&self, law: &dyn LinearForceState<D>) -> Option<usize> {
+        Some(depth_of_seam(law.is_pairwise()))
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {

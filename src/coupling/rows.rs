@@ -94,10 +94,8 @@ impl<const D: usize> Model<D> {
         let of_site = |site: usize| match self.point_of(site) {
             Some((body, point)) => 1 + body.families.of(point).len(),
             None => {
-                1 + self
-                    .cells_of_site(site)
-                    .map(|(c, _)| self.mesh.cell(c).len())
-                    .sum::<usize>()
+                let cells = self.cells_of_site(site);
+                1 + cells.map(|(c, _)| self.mesh.cell(c).len()).sum::<usize>()
             }
         };
         (0..self.sites.len())

@@ -1,7 +1,7 @@
 //! A model whose families are spread over processes.
 
 use crate::{
-    coupling::{Model, ModelError, SharedFamilies},
+    coupling::{Model, ModelError, SharedFamilies, SiteKind},
     peridynamics::{Accelerator, PdBody},
     system::{Ranks, Spread, first_text},
 };
@@ -11,6 +11,7 @@ impl<const D: usize> Model<D> {
     pub(super) fn held_body(
         &mut self,
         shared: Option<(SharedFamilies, &dyn Ranks)>,
+        site_of_point: &[u32],
         body: Result<PdBody<D>, ModelError>,
     ) -> Result<PdBody<D>, ModelError> {
         let Some((mut shared, ranks)) = shared else {
@@ -21,7 +22,7 @@ impl<const D: usize> Model<D> {
             return Err(ModelError::OfProcess { message });
         }
         let body = body?;
-        shared.count(ranks, &body.families);
+        shared.count(ranks, site_of_point, &body.families);
         self.shared = Some(shared);
         Ok(body)
     }
@@ -37,7 +38,7 @@ impl<const D: usize> Model<D> {
         Some(shared.spread(ranks?))
     }
 
-    /// `width` numbers of each of some points, or of the sites that are points, which take their families; collective where these are spread over processes, with the same `points` on all.
+    /// `width` numbers of each of some points, which take their families; collective where these are spread over processes, with the same `points` on all.
     pub fn of_families(
         &self,
         ranks: Option<&dyn Ranks>,
@@ -45,11 +46,31 @@ impl<const D: usize> Model<D> {
         width: usize,
         of: impl Fn(&[u32]) -> Vec<f64>,
     ) -> Vec<f64> {
-        match self.spread(ranks) {
-            // every point is a site, of the same number
-            Some(spread) => spread.of_sites(points, width, of),
-            None => of(points),
+        let (Some(shared), Some(ranks)) = (&self.shared, ranks) else {
+            return of(points);
+        };
+        // every process has those of points in elements
+        let (sites, others): (Vec<u32>, Vec<u32>) = points
+            .iter()
+            .partition(|&&p| shared.site_of_point(p).is_some());
+        let sites: Vec<u32> = sites
+            .iter()
+            .filter_map(|&p| shared.site_of_point(p))
+            .collect();
+        let point = |site: &u32| Some(self.point_of(*site as usize)?.1 as u32);
+        let of_sites = shared.spread(ranks).of_sites(&sites, width, |own| {
+            of(&own.iter().filter_map(point).collect::<Vec<u32>>())
+        });
+        let of_others = of(&others);
+        let [mut of_sites, mut of_others] = [of_sites.iter(), of_others.iter()];
+        let mut all = Vec::with_capacity(points.len() * width);
+        for &p in points {
+            match shared.site_of_point(p) {
+                Some(_) => all.extend(of_sites.by_ref().take(width)),
+                None => all.extend(of_others.by_ref().take(width)),
+            }
         }
+        all
     }
 
     /// Bonds of the family of a point, whoever holds it.
@@ -61,9 +82,9 @@ impl<const D: usize> Model<D> {
         }
     }
 
-    /// Whether families are searched along a lattice, and can be spread over processes.
+    /// Whether families can be spread over processes: they are searched along a lattice, and the coupling says which of them every process needs.
     pub fn can_spread_families(&self) -> bool {
-        self.is_searched_by_lattice
+        self.held.is_some()
     }
 
     /// Own points and all whose displacements the forces of these take, and whether bonds of these break: neighbours, and those of neighbours where a law takes their dilatations.
@@ -77,11 +98,22 @@ impl<const D: usize> Model<D> {
         self.within_families(own, layers)
     }
 
-    /// Own points and all whose families their process holds where families are spread over processes: neighbours as well, if a law asks for these.
+    /// All points whose families a process with these `own` sites holds where families are spread over processes.
     pub fn points_held(&self, own: &[bool]) -> Vec<bool> {
-        let law = self.peridynamics.as_ref().map(|p| p.law.linearised());
-        let is_pairwise = law.is_none_or(|law| law.is_pairwise());
-        self.within_families(own, usize::from(!is_pairwise))
+        let (Some(body), Some(held)) = (self.body(), &self.held) else {
+            return Vec::new();
+        };
+        let mut of_own = vec![false; body.cloud.position.len()];
+        let mut in_element = vec![true; of_own.len()];
+        for (site, own) in self.sites.iter().zip(own) {
+            if let SiteKind::Point(p) = site.kind {
+                (of_own[p as usize], in_element[p as usize]) = (*own, false);
+            }
+        }
+        let reached = self.within_families(&of_own, usize::from(held.with_neighbours));
+        let beside = self.beside_elements(&body.cloud.position, held.depth);
+        let each = reached.iter().zip(&beside).zip(&in_element);
+        each.map(|((a, b), c)| *a || *b || *c).collect()
     }
 
     /// Points, and those in their families, so many times.

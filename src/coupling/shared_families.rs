@@ -1,58 +1,106 @@
-//! Families that are spread over processes: each process holds those of its own points, and of their neighbours where a law asks for these.
+//! Families that are spread over processes: each process holds those of its own points, and of others where the rows of its own, or the seam, take these.
 //!
-//! Points are distributed before any family is known, each counting the same, so that no process ever has the families of all.
+//! Sites are distributed before any family is known, by what their rows cost if these lack nothing, so that no process ever has the families of all.
 
+use super::held_families::HeldFamilies;
 use super::point_cloud::PointCloud;
+use super::{Model, Site, SiteKind};
 use crate::peridynamics::{Families, TIE_TOLERANCE, Wanted};
 use crate::system::{Partition, Ranks, Spread};
 use crate::tensor::padded;
 
-/// Which process has the families of which points. Every point is a site, of the same number.
+/// The site of a point that is none.
+const NONE: u32 = u32::MAX;
+
+/// Which process has the families of which points.
 #[derive(Clone, Debug)]
 pub struct SharedFamilies {
+    /// Of the sites.
     partition: Partition,
     rank: usize,
+    /// The site of each point.
+    site_of_point: Vec<u32>,
     /// Bonds of the family of each point, of all points.
     sizes: Vec<u32>,
 }
 
-impl SharedFamilies {
-    /// The families of this process, and who has which; none where the points are no lattice.
+impl<const D: usize> Model<D> {
+    /// The families of this process, and who has which; none where the points are no lattice. Sites that are nodes have been placed, and those that are points come behind them.
     ///
-    /// `reach` is how far families do \[m\]; of a law whose force takes the states of neighbours, `with_neighbours` holds.
-    pub(super) fn search<const D: usize>(
+    /// `reach` is how far families do \[m\].
+    pub(super) fn search_shared(
+        &self,
         ranks: &dyn Ranks,
+        held: &HeldFamilies,
         cloud: &PointCloud<D>,
         reach: f64,
-        with_neighbours: bool,
-    ) -> Option<(Families, Self)> {
-        let partition = by_count(&cloud.position, ranks.count());
-        let rank = ranks.rank();
-        let own = own_points(&partition, rank);
-        let wanted = match with_neighbours {
-            true => Wanted::WithNeighbours(&own),
-            false => Wanted::Of(&own),
+    ) -> Option<(Families, SharedFamilies)> {
+        let mut sites = self.sites.clone();
+        let mut site_of_point = vec![NONE; cloud.position.len()];
+        for (p, _) in cloud
+            .element
+            .iter()
+            .enumerate()
+            .filter(|(_, e)| e.is_none())
+        {
+            site_of_point[p] = sites.len() as u32;
+            sites.push(Site {
+                position: cloud.position[p],
+                kind: SiteKind::Point(p as u32),
+                volume: cloud.volume[p],
+            });
+        }
+        let work = self.work_before_families(&sites, held);
+        let partition = by_work(&sites, &work, ranks.count());
+        let shared = SharedFamilies {
+            partition,
+            rank: ranks.rank(),
+            site_of_point,
+            sizes: Vec::new(),
+        };
+        let own = shared.own();
+        // points in elements complete families of the seam, and have few of their own
+        let mut others = self.beside_elements(&cloud.position, held.depth);
+        let in_element = cloud.element.iter().map(Option::is_some);
+        (others.iter_mut().zip(in_element)).for_each(|(held, is_in)| *held |= is_in);
+        let both: Vec<bool>;
+        let wanted = match held.with_neighbours {
+            true => Wanted::WithNeighbours(&own, &others),
+            false => {
+                both = own.iter().zip(&others).map(|(a, b)| *a || *b).collect();
+                Wanted::Of(&both)
+            }
         };
         let (points, spacing) = (&cloud.position, cloud.spacing);
         let families = Families::search_lattice_of(points, spacing, reach, TIE_TOLERANCE, &wanted)?;
-        let shared = Self {
-            partition,
-            rank,
-            sizes: Vec::new(),
-        };
         Some((families, shared))
     }
+}
 
-    /// Collective: learns how many bonds the families have that others hold.
-    pub(super) fn count(&mut self, ranks: &dyn Ranks, families: &Families) {
-        let own = self.partition.of(self.rank).iter();
-        let own: Vec<f64> = own.map(|&i| families.of(i as usize).len() as f64).collect();
-        let mut all = vec![0.0; self.partition.sites()];
-        self.spread(ranks).gather_sites(&own, &mut all);
-        self.sizes = all.into_iter().map(|n| n as u32).collect();
+impl SharedFamilies {
+    /// Collective: learns which points are which sites, now that none is dropped any more, and how many bonds the families have that others hold.
+    pub(super) fn count(&mut self, ranks: &dyn Ranks, site_of_point: &[u32], families: &Families) {
+        let mut by_site = vec![0.0; self.partition.sites()];
+        for (p, &site) in site_of_point
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| **s != NONE)
+        {
+            by_site[site as usize] = families.of(p).len() as f64;
+        }
+        let spread = self.spread(ranks);
+        let own = spread.take_own(&by_site);
+        spread.gather_sites(&own, &mut by_site);
+        let size = |(p, &site): (usize, &u32)| match site {
+            // in an element: every process has it
+            NONE => families.of(p).len() as u32,
+            site => by_site[site as usize] as u32,
+        };
+        self.sizes = site_of_point.iter().enumerate().map(size).collect();
+        self.site_of_point = site_of_point.to_vec();
     }
 
-    /// The points over processes.
+    /// The sites over processes.
     pub fn spread<'a>(&'a self, ranks: &'a dyn Ranks) -> Spread<'a> {
         Spread {
             ranks,
@@ -60,14 +108,23 @@ impl SharedFamilies {
         }
     }
 
-    /// Which process has which points.
+    /// Which process has which sites.
     pub fn partition(&self) -> &Partition {
         &self.partition
     }
 
-    /// Whether each point is this process's own.
+    /// The site of a point that is one.
+    pub fn site_of_point(&self, point: u32) -> Option<u32> {
+        let site = self.site_of_point[point as usize];
+        (site != NONE).then_some(site)
+    }
+
+    /// Whether each point is a site of this process.
     pub fn own(&self) -> Vec<bool> {
-        own_points(&self.partition, self.rank)
+        let sites = self.site_of_point.iter();
+        sites
+            .map(|&s| s != NONE && self.partition.owner(s) == self.rank)
+            .collect()
     }
 
     /// Bonds of the family of each point, of all points.
@@ -81,16 +138,8 @@ impl SharedFamilies {
     }
 }
 
-/// Points over processes before their families are known.
-pub(super) fn by_count<const D: usize>(
-    position: &[crate::tensor::Vector<D>],
-    count: usize,
-) -> Partition {
-    let positions: Vec<[f64; 3]> = position.iter().map(padded).collect();
-    Partition::by_bisection(&positions, &vec![1.0; positions.len()], count)
-}
-
-fn own_points(partition: &Partition, rank: usize) -> Vec<bool> {
-    let points = 0..partition.sites() as u32;
-    points.map(|i| partition.owner(i) == rank).collect()
+/// Sites over processes by what they cost.
+pub(super) fn by_work<const D: usize>(sites: &[Site<D>], work: &[f64], count: usize) -> Partition {
+    let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
+    Partition::by_bisection(&positions, work, count)
 }

@@ -1,8 +1,12 @@
 //! Splice: each site takes the equation of its own model, and sees across the seam the continuation of that model.
 
 use crate::{
-    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone, uncoupled::own_model},
+    coupling::{
+        CellRole, Coupling, Model, ModelError, Operator, Zone, held_families::depth_of_seam,
+        uncoupled::own_model,
+    },
     mesh::Mesh,
+    peridynamics::LinearForceState,
 };
 
 /// The splice of a local and a peridynamic region.
@@ -30,6 +34,10 @@ impl<const D: usize> Coupling<D> for Splice {
 
     fn takes_deviators(&self) -> bool {
         true
+    }
+
+    fn families_of_all(&self, law: &dyn LinearForceState<D>) -> Option<usize> {
+        Some(depth_of_seam(law.is_pairwise()))
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {

@@ -5,6 +5,7 @@ use crate::{
     coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone},
     dimension,
     mesh::Mesh,
+    peridynamics::LinearForceState,
     system::Symmetry,
 };
 
@@ -55,8 +56,8 @@ impl<const D: usize> Coupling<D> for Nonlocal {
         true
     }
 
-    fn shares_families(&self) -> bool {
-        true
+    fn families_of_all(&self, _law: &dyn LinearForceState<D>) -> Option<usize> {
+        Some(0)
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {

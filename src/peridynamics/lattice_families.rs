@@ -20,20 +20,20 @@ pub enum Wanted<'a> {
     All,
     /// Those marked.
     Of(&'a [bool]),
-    /// Those marked, and all points in their families.
-    WithNeighbours(&'a [bool]),
+    /// Those marked first, all points in their families, and those marked then.
+    WithNeighbours(&'a [bool], &'a [bool]),
 }
 
 impl Wanted<'_> {
     /// A mark of each point that is wanted, empty for all; `neighbours` calls back with those of a point.
     fn marks(&self, neighbours: impl Fn(usize, &mut dyn FnMut(u32))) -> Vec<bool> {
-        let (own, with_neighbours) = match self {
+        let (own, others) = match self {
             Self::All => return Vec::new(),
-            Self::Of(own) => (own, false),
-            Self::WithNeighbours(own) => (own, true),
+            Self::Of(own) => return own.to_vec(),
+            Self::WithNeighbours(own, others) => (own, others),
         };
-        let mut marks = own.to_vec();
-        for i in (0..own.len()).filter(|&i| with_neighbours && own[i]) {
+        let mut marks: Vec<bool> = own.iter().zip(*others).map(|(a, b)| *a || *b).collect();
+        for i in (0..own.len()).filter(|&i| own[i]) {
             neighbours(i, &mut |j| marks[j as usize] = true);
         }
         marks
@@ -191,9 +191,13 @@ mod tests {
             all.of(i).iter().for_each(|&j| near[j as usize] = true);
         }
         assert!(near != own && near.contains(&false));
+        let mut others = vec![false; own.len()];
+        let mut more = near.clone();
+        let far = near.iter().position(|is_near| !is_near).unwrap();
+        (others[far], more[far]) = (true, true);
         for (found, held) in [
             (search(&Wanted::Of(&own)), &own),
-            (search(&Wanted::WithNeighbours(&own)), &near),
+            (search(&Wanted::WithNeighbours(&own, &others)), &more),
         ] {
             for (i, held) in held.iter().enumerate() {
                 let wanted: &[u32] = if *held { all.of(i) } else { &[] };

@@ -4,26 +4,25 @@
 
 use crate::coupling::{Definiteness, Model, Operator};
 use crate::observe::summary::Decision;
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::run::error::RunError;
 use crate::scene::materials::Ratio;
 use crate::solve::FreeDofs;
 use crate::solve::direct::{Analysis, Factor};
 use crate::solve::direct_params::{DirectError, DirectParams};
 use crate::solve::ordering::Ordering;
-use crate::system::Symmetry;
+use crate::system::{Ranks, Symmetry};
 use crate::tensor::padded;
 
 /// What is added to the matrix, as a part of its diagonal: far above what round-off leaves of the motions of a free body (6e-13), and no mode that it hides grows by more than e² in 100 000 steps.
 const SHIFT: f64 = 1e-10;
 
-/// Refuses a model that has negative eigenvalues; its matrix is looked at only if it may.
+/// Refuses a model that has negative eigenvalues; its matrix is looked at only if it may. Collective where families are spread over `ranks`.
 ///
 /// # Errors
 /// [`RunError::Indefinite`] if the matrix has a negative eigenvalue, or is too large to be factorised.
 pub(crate) fn check<const D: usize>(
-    model: &Model<D>,
-    operator: &dyn Operator<D>,
+    (model, operator, ranks): (&Model<D>, &dyn Operator<D>, Option<&dyn Ranks>),
     ratio: Ratio,
     choices: &mut Vec<Decision>,
     progress: &dyn Progress,
@@ -36,7 +35,7 @@ pub(crate) fn check<const D: usize>(
         typed: ratio.typed,
         pairwise: ratio.pairwise,
     };
-    match factorised(model, operator, f64::INFINITY, progress) {
+    match factorised((model, operator, ranks), f64::INFINITY, progress) {
         Ok(()) => {
             choices.push(Decision {
                 choice: "the seam is stable".to_owned(),
@@ -69,14 +68,19 @@ pub(crate) enum Open {
     NotFactorised(String),
 }
 
-/// Factorises the matrix at rest of all sites, none of them held, if that takes at most so many operations.
+/// Factorises the matrix at rest of all sites, none of them held, if that takes at most so many operations. Every process does, also where families are spread over `ranks`.
 pub(crate) fn factorised<const D: usize>(
-    model: &Model<D>,
-    operator: &dyn Operator<D>,
+    (model, operator, ranks): (&Model<D>, &dyn Operator<D>, Option<&dyn Ranks>),
     most_flops: f64,
     progress: &dyn Progress,
 ) -> Result<(), Open> {
-    let mut matrix = model.assemble(operator, progress);
+    let mut matrix = match model.spread(ranks) {
+        Some(spread) => {
+            let all: Vec<u32> = (0..model.sites.len() as u32).collect();
+            spread.gather_rows(&all, |own| model.assemble_sites(operator, own, &Silent))
+        }
+        None => model.assemble(operator, progress),
+    };
     matrix.raise_diagonal(SHIFT);
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
     let free = FreeDofs::from_prescribed(&vec![None; matrix.dofs()], D);

@@ -109,12 +109,12 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         &self,
         samples: impl Iterator<Item = &'s Sample<D>>,
     ) -> Vec<Tensor<D>> {
+        let solved = self.solved;
         let points = samples.filter_map(|sample| match sample.carrier {
-            Carrier::Point(site) => Some(site as u32),
+            Carrier::Point(site) => Some(solved.model.point_of(site)?.1 as u32),
             Carrier::Element(..) => None,
         });
         let points: Vec<u32> = points.collect();
-        let solved = self.solved;
         let of_families = |own: &[u32]| {
             let gradient = |k: usize| solved.point_gradient(own[k] as usize, &self.intact);
             let gradients = parallel::map(own.len(), 1, gradient);
@@ -226,11 +226,12 @@ impl<const D: usize> Solved<'_, D> {
     }
 
     /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.
-    pub(super) fn point_gradient(&self, site: usize, intact: &Intact) -> Tensor<D> {
-        let Some((body, p)) = self.model.point_of(site) else {
+    pub(super) fn point_gradient(&self, p: usize, intact: &Intact) -> Tensor<D> {
+        let Some(body) = self.model.body() else {
             return Tensor::zeros();
         };
-        let here = self.site(site);
+        let transfer = &body.cloud.transfer;
+        let here = transfer.displacement::<D>(p, self.displacement);
         let bonds: Vec<(Vector<D>, usize)> = body
             .families
             .of(p)
@@ -247,8 +248,7 @@ impl<const D: usize> Solved<'_, D> {
             let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
             for (xi, j) in bonds.iter().filter(|(xi, _)| xi.norm() <= reach) {
                 let w = 1.0 / xi.norm_squared();
-                let eta: Vector<D> =
-                    body.cloud.transfer.displacement::<D>(*j, self.displacement) - here;
+                let eta: Vector<D> = transfer.displacement::<D>(*j, self.displacement) - here;
                 shape += xi * xi.transpose() * w;
                 moment += eta * xi.transpose() * w;
             }

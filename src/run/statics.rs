@@ -137,7 +137,8 @@ fn solve_chosen<const D: usize>(
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(model)?;
     let mut choices: Vec<Decision> = rest.made().cloned().collect();
-    definiteness::check(model, operator.as_ref(), rest.ratio, &mut choices, progress)?;
+    let what = (model, operator.as_ref(), ranks);
+    definiteness::check(what, rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
     let mut system = motion::dynamic_system::still(model, coupling, operator.as_ref(), &rest)?;
     let is_linear = system.is_none();

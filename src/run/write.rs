@@ -26,10 +26,7 @@ use crate::scene::spec::PointOutputSpec;
 use crate::scene::validated::Output;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, padded, strain};
-use crate::{
-    coupling::{SiteKind, Zone},
-    parallel,
-};
+use crate::{coupling::Zone, parallel};
 
 /// Writes what the scene asks for; returns the files.
 ///
@@ -325,12 +322,12 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         let known = &self.known;
         let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> =
             parallel::filter_map(model.sites.len(), 1, |site| {
-                let is_shown = shown.includes_site(site)
-                    && matches!(model.sites[site].kind, SiteKind::Point(_));
-                is_shown.then(|| {
-                    let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
-                    (site, strain(&solved.point_gradient(site, &intact)), stress)
-                })
+                let (_, p) = model.point_of(site)?;
+                if !shown.includes_site(site) {
+                    return None;
+                }
+                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
+                Some((site, strain(&solved.point_gradient(p, &intact)), stress))
             });
         for (site, e, stress) in on_points {
             let Some((body, p)) = model.point_of(site) else {

@@ -1,5 +1,6 @@
 //! Scenes on several processes have the results of one: processes are threads here, which gather as those of `mpirun` do. `.ci/petsc` runs the same on MPI.
 
+mod at_rest;
 mod coupled;
 mod load_steps;
 mod memory;
@@ -339,7 +340,7 @@ sections.middle = {{ point = 0.003, normal = 1 }}
 }
 
 /// The rows of a CSV file of a folder.
-fn rows(folder: &Path, name: &str) -> Vec<Vec<f64>> {
+pub fn rows(folder: &Path, name: &str) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(folder.join(name)).expect("a table");
     let numbers = |line: &str| line.split(',').map(|x| x.parse().unwrap_or(0.0)).collect();
     text.lines().skip(1).map(numbers).collect()
@@ -409,88 +410,6 @@ lines.axis = {{ from = [0, 0.5], to = [2, 0.5], samples = 9 }}
                 assert!((a - b).abs() < 1e-8, "{coupling}, column {column}: {a} {b}");
             }
         }
-    }
-}
-
-/// A beam of points alone that is bent.
-fn beam(material: &str) -> String {
-    let ratio = match material {
-        "lps" => ", poisson-ratio = 0.3",
-        _ => "",
-    };
-    format!(
-        r#"
-kinematics = "plane-stress"
-coupling = "nonlocal"
-mesh.rectangle = {{ min = [0, 0], max = [3, 1], x = {{ cells = 24 }}, y = {{ cells = 8 }} }}
-materials.m.{material} = {{ youngs-modulus = 1000{ratio} }}
-peridynamics = {{ horizon = 0.375, points.lattice = {{ spacing = 0.125, origin = [0.0625, 0.0625] }} }}
-conditions.left.displacement = {{ on = "left", x = 0, y = 0 }}
-conditions.right.traction = {{ on = "right", y = 5 }}
-solver.tolerance = 1e-11
-output.sections.middle = {{ point = [1.5, 0], normal = [1, 0] }}
-output.probes.tip = {{ at = [3, 0.5] }}
-output.lines.axis = {{ from = [0, 0.5], to = [3, 0.5], samples = 9 }}
-"#
-    )
-}
-
-/// What is proved of points and warned of takes the families of all; each process holds those of its own.
-#[test]
-fn points_at_rest_are_told_of_alike_where_each_process_holds_its_own_families() {
-    // a solver of several processes ends at another last digit
-    let figures = |told: &str| -> Vec<f64> {
-        let words = told.split(|c: char| !(c.is_ascii_alphanumeric() || ".+-".contains(c)));
-        words
-            .filter_map(|word| word.trim_end_matches('.').parse().ok())
-            .collect()
-    };
-    for material in ["bond-based", "lps"] {
-        let text = beam(material);
-        let one = folder();
-        let alone = run(&text, one.path(), ALONE).expect("one process");
-        for what in ["has rotated by", "at free surfaces"] {
-            assert!(alone.told.contains(what), "{what}: {}", alone.told);
-        }
-        for ranks in [2, 5] {
-            let several = folder();
-            let how = How { ranks, ..ALONE };
-            let done = run(&text, several.path(), how).expect("several processes");
-            let [a, b] = [&alone.told, &done.told].map(|told| figures(told));
-            assert_eq!(a.len(), b.len(), "{} {}", alone.told, done.told);
-            let same = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-3 * a.abs().max(1e-9);
-            assert!(a.iter().zip(&b).all(same), "{} {}", alone.told, done.told);
-            for table in ["scene_axis.csv", "scene_sections.csv", "scene_probes.csv"] {
-                let [a, b] = [one.path(), several.path()].map(|f| rows(f, table).concat());
-                let largest = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-                let same = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * largest;
-                assert!(
-                    a.len() == b.len() && a.iter().zip(&b).all(same),
-                    "{table}: {a:?} {b:?}"
-                );
-            }
-            let close = |name: &str, a: f64, b: f64| match name {
-                "displacement" => (a - b).abs() < 1e-9,
-                "strain" => (a - b).abs() < 1e-8,
-                "stress" | "residual" => (a - b).abs() < 1e-5,
-                _ => a == b,
-            };
-            let list = several.path().join("scene.pvtu");
-            let sizes = pieces::assert_joined(&one.path().join("scene.vtu"), &list, &close);
-            assert_eq!(sizes.len(), ranks);
-        }
-    }
-}
-
-/// Each process of a static scene has the families of its own points, and of LPS those of their neighbours.
-#[test]
-fn points_at_rest_have_families_with_their_own_process() {
-    for material in ["bond-based", "lps"] {
-        let whole = threads::predicted(&beam(material), 1);
-        let shares = threads::predicted(&beam(material), 4);
-        let [one, four] = [&whole, &shares].map(|p| p.shares().iter().map(|s| s.bonds).max());
-        let part = four.unwrap() as f64 / one.unwrap() as f64;
-        assert!(part < 0.7, "{material}: {part}");
     }
 }
 

@@ -54,7 +54,8 @@ use self::{
 use crate::{
     assembly::Row,
     coupling::{
-        CellRole, Coupling, Definiteness, Interface, Model, ModelError, Operator, Reach, Rows, Zone,
+        CellRole, Coupling, Definiteness, Interface, Model, ModelError, Operator, Reach, Rows,
+        Zone, held_families::depth_of_seam,
     },
     dimension,
     mesh::Mesh,
@@ -110,6 +111,10 @@ impl<const D: usize> Coupling<D> for Truncated {
 
     fn takes_deviators(&self) -> bool {
         true
+    }
+
+    fn families_of_all(&self, law: &dyn LinearForceState<D>) -> Option<usize> {
+        Some(depth_of_seam(law.is_pairwise()))
     }
 
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {

@@ -116,7 +116,7 @@ pub(in crate::coupling) fn place<const D: usize>(
         wide: None,
         is_constant: true,
         shared: None,
-        is_searched_by_lattice: false,
+        held: None,
     };
     Ok((lattice, feet))
 }

@@ -74,7 +74,12 @@ pub(crate) fn dynamic<'a, const D: usize>(
         && breaking.bonds == BondsSpec::Linear
         && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
         && !rest.has_nonlinear_elements(model);
-    definiteness::check(model, operator, rest.ratio, choices, progress)?;
+    definiteness::check(
+        (model, operator, start.ranks),
+        rest.ratio,
+        choices,
+        progress,
+    )?;
     let moving = CoupledSystem::of_processes(
         model,
         operator,

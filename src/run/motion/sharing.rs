@@ -6,7 +6,7 @@ use crate::peridynamics::bond_force::Kinematics;
 use crate::run::setup::RunSettings;
 use crate::scene::conditions::Prescribed;
 use crate::scene::solve::Explicit;
-use crate::scene::spec::PrecisionSpec;
+use crate::scene::spec::{ElementsSpec, PrecisionSpec};
 use crate::system::all_say;
 
 /// What each process of a run in time has to itself, where the system lets it.
@@ -21,27 +21,35 @@ pub(crate) enum Sharing {
     Families,
 }
 
-/// Whether each process of a scene in time may hold the families of its own sites alone, by what the scene asks for. What of an output or of a step takes bonds one by one, beside strain and stress of
-/// points in VTU files, asks for those of all.
-pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
-    let has_pass = (problem.peridynamics.as_ref())
-        .is_some_and(|p| p.accelerator().is_some() && p.law.several().is_none());
-    has_pass
-        && problem.coupling.shares_families()
+/// How many families deep from the elements every process needs those of all points, where each may hold those of its own sites alone elsewhere; none where a scene asks for all. What of an output or of a step
+/// takes bonds one by one, beside strains of points along lines and in VTU files, takes those of all.
+fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> Option<usize> {
+    let p = problem.peridynamics.as_ref()?;
+    let asks_for_own = p.accelerator().is_some()
+        && p.law.several().is_none()
         && rest.follow.is_none()
         && rest.breaking.contact.is_none()
         // lists hold the bonds of all points
         && rest.breaking.precision == PrecisionSpec::Double
         && rest.stresses.at(0.0).is_none()
-        && !rest.output.energy_density
+        && !rest.output.energy_density;
+    let coupling = problem.coupling.as_ref();
+    (coupling.families_of_all(p.law.linearised())).filter(|_| asks_for_own)
 }
 
-/// The same of a static scene, whose forces then have to be linear: others take the rows of all sites.
+/// Whether each process of a scene in time may hold the families of its own sites alone.
+pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
+    // what moves of a seam looks at families of all
+    families_of_all(problem, rest) == Some(0)
+}
+
+/// Whether each process of a static scene may, beside those at a seam. Forces then have to be linear: of others each process has the rows of all sites.
 pub(crate) fn may_share_rows<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
     let law = problem.peridynamics.as_ref().map(|p| &p.law);
     rest.kinematics() == Kinematics::Linear
         && law.is_some_and(|law| law.is_linear())
-        && may_share(problem, rest)
+        && rest.elements == ElementsSpec::Linear
+        && families_of_all(problem, rest).is_some()
 }
 
 /// Whether a process then moves its own sites and their ghosts alone, and not all: no sub-steps, no springs, nothing that strikes.

@@ -61,7 +61,7 @@ pub(crate) fn proved<const D: usize>(
         // or the run would have been refused
         Definiteness::NegativeTerms => return Some(FACTORISED),
         Definiteness::EdgeTerms => {
-            return factorised(model, operator, MOST_FLOPS, progress)
+            return factorised((model, operator, ranks), MOST_FLOPS, progress)
                 .is_ok()
                 .then_some(FACTORISED);
         }

@@ -1,0 +1,131 @@
+//! Which families each of several processes holds: those of its own points, and of all points beside elements.
+//!
+//! Beside elements every process works out the seam as one process does, whose rows, fits and proofs look at the families of several points. That is a layer; inside of it bonds lie with
+//! the owner of their point alone.
+
+use super::bins::Bins;
+use super::{CellRole, Coupling, Model, Peridynamics, Reach, Site, SiteKind};
+use crate::coupling::HorizonField;
+use crate::peridynamics::TIE_TOLERANCE;
+use crate::tensor::Vector;
+
+/// How many families deep the rows and fits of a seam look, by whether the force of a bond takes the states of its ends.
+pub(super) const fn depth_of_seam(is_pairwise: bool) -> usize {
+    // a bond that a face cuts, and those that a fit of a second layer changes; a state reaches one family farther, and so do the bonds that carry it
+    if is_pairwise { 2 } else { 4 }
+}
+
+/// Which families a process holds beside those of its own points.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HeldFamilies {
+    /// Those of the points in the families of its own, too.
+    pub with_neighbours: bool,
+    /// Those of all points that are no farther from an element beside the points \[m\].
+    pub depth: f64,
+    /// Bonds of a family that lacks none.
+    full: usize,
+}
+
+impl HeldFamilies {
+    /// By the coupling; none where it needs those of all points, or where families are not alike.
+    pub fn of<const D: usize>(
+        coupling: &dyn Coupling<D>,
+        p: &Peridynamics<D>,
+        reach: Reach,
+        spacing: f64,
+    ) -> Option<Self> {
+        let HorizonField::Uniform(horizon) = p.horizon else {
+            return None;
+        };
+        let law = p.law.linearised();
+        let families = coupling.families_of_all(law)?;
+        let longest = p.reach(horizon);
+        Some(Self {
+            with_neighbours: reach == Reach::Neighbours || !law.is_pairwise(),
+            depth: families as f64 * longest * (1.0 + TIE_TOLERANCE),
+            full: places_within::<D>(longest / spacing * (1.0 + TIE_TOLERANCE)),
+        })
+    }
+}
+
+/// Places of a cubic lattice of spacing 1 within a distance of one of them, without that one.
+fn places_within<const D: usize>(distance: f64) -> usize {
+    let reach = distance.clamp(0.0, 1e3) as i64;
+    let side = 2 * reach + 1;
+    let is_within = |n: &i64| {
+        let mut rest = *n;
+        let square: i64 = (0..D)
+            .map(|_| {
+                let k = rest % side - reach;
+                rest /= side;
+                k * k
+            })
+            .sum();
+        square > 0 && (square as f64).sqrt() <= distance
+    };
+    (0..side.pow(D as u32)).filter(is_within).count()
+}
+
+impl<const D: usize> Model<D> {
+    /// About what the row of each site costs before families are known: as [`Model::work_of_sites`] with families that lack nothing.
+    pub(super) fn work_before_families(&self, sites: &[Site<D>], held: &HeldFamilies) -> Vec<f64> {
+        let of_site = |site: &Site<D>| match site.kind {
+            SiteKind::Point(_) => 1 + held.full,
+            SiteKind::Node(n) => {
+                let cells = self.cells_of_node(n);
+                1 + cells.map(|(c, _)| self.mesh.cell(c).len()).sum::<usize>()
+            }
+        };
+        sites.iter().map(|site| of_site(site) as f64).collect()
+    }
+
+    /// Whether each position lies no farther than `depth` from the box around an element that shares a node with a cell of points.
+    pub(super) fn beside_elements(&self, positions: &[Vector<D>], depth: f64) -> Vec<bool> {
+        let mut beside = vec![false; positions.len()];
+        if depth <= 0.0 {
+            return beside;
+        }
+        let mesh = &self.mesh;
+        let mut has_points = vec![false; mesh.nodes.len()];
+        for c in (0..mesh.cell_count()).filter(|&c| self.roles[c] == CellRole::Points) {
+            let nodes = mesh.cell(c).iter();
+            nodes.for_each(|&n| has_points[n as usize] = true);
+        }
+        let elements = (0..mesh.cell_count()).filter(|&c| self.is_element(c));
+        let at_seam = elements.filter(|&c| mesh.cell(c).iter().any(|&n| has_points[n as usize]));
+        let boxes = at_seam.map(|c| mesh.bounds_of(mesh.cell(c)));
+        let (mut first, mut last) = [f64::MAX, f64::MIN].map(Vector::<D>::repeat).into();
+        for x in positions {
+            (first, last) = (first.inf(x), last.sup(x));
+        }
+        let bins = Bins::new(positions, depth);
+        for (low, high) in boxes {
+            let is_near = |p: usize| {
+                let x = &positions[p];
+                let outside = (low - x).sup(&(x - high)).sup(&Vector::zeros());
+                outside.norm() <= depth
+            };
+            // an element may be far larger than all that has points
+            let from = low.add_scalar(-depth).sup(&first);
+            let to = high.add_scalar(depth).inf(&last);
+            if (0..D).all(|a| from[a] <= to[a]) {
+                for p in bins.in_box(from, to) {
+                    beside[p] = beside[p] || is_near(p);
+                }
+            }
+        }
+        beside
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn families_that_lack_nothing() {
+        assert_eq!(places_within::<1>(3.0), 6);
+        assert_eq!(places_within::<2>(3.0), 28);
+        assert_eq!(places_within::<3>(3.0), 122);
+    }
+}
