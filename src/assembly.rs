@@ -330,6 +330,36 @@ pub fn assemble_rows<const D: usize>(
     gathered.finish()
 }
 
+/// As [`assemble_rows`], each row with blocks of its own, whose bits do not depend on the other rows.
+pub fn assemble_apart<const D: usize>(
+    rows: usize,
+    sites: usize,
+    add_row: impl Fn(usize, &mut Row<D>) + Sync,
+) -> BlockCsr {
+    let each = parallel::map_with(
+        rows,
+        CHUNK,
+        || Row::<D>::new(sites),
+        |row, r| {
+            let (mut columns, mut values) = (Vec::new(), Vec::new());
+            add_row(r, row);
+            row.drain_into(&mut columns, &mut values);
+            (columns, values)
+        },
+    );
+    let mut matrix = BlockCsr {
+        block: D,
+        row_offsets: vec![0],
+        ..BlockCsr::default()
+    };
+    for (columns, values) in each {
+        matrix.columns.extend(columns);
+        matrix.values.extend(values);
+        matrix.row_offsets.push(matrix.columns.len());
+    }
+    matrix
+}
+
 /// What remains of a block matrix whose values were dropped row by row.
 #[derive(Clone, Debug, Default)]
 pub struct Pattern {

@@ -170,6 +170,11 @@ pub trait Coupling<const D: usize>: Send + Sync {
         None
     }
 
+    /// Whether processes may hold families so in motion, too: which rows are those of the body alone, and where these end, does not take families that lie elsewhere.
+    fn moves_with_own_families(&self) -> bool {
+        false
+    }
+
     /// Whether its rows hold the products of dilatations and deviatoric extensions that a law with [`LinearForceState::has_deviators`] has; any other coupling is refused for such a law.
     fn takes_deviators(&self) -> bool {
         false

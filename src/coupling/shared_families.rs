@@ -37,12 +37,8 @@ impl<const D: usize> Model<D> {
     ) -> Option<(Families, SharedFamilies)> {
         let mut sites = self.sites.clone();
         let mut site_of_point = vec![NONE; cloud.position.len()];
-        for (p, _) in cloud
-            .element
-            .iter()
-            .enumerate()
-            .filter(|(_, e)| e.is_none())
-        {
+        let points = cloud.element.iter().enumerate();
+        for (p, _) in points.filter(|(_, element)| element.is_none()) {
             site_of_point[p] = sites.len() as u32;
             sites.push(Site {
                 position: cloud.position[p],
@@ -58,11 +54,17 @@ impl<const D: usize> Model<D> {
             site_of_point,
             sizes: Vec::new(),
         };
-        let own = shared.own();
-        // points in elements complete families of the seam, and have few of their own
+        let mut own = shared.own();
         let mut others = self.beside_elements(&cloud.position, held.depth);
-        let in_element = cloud.element.iter().map(Option::is_some);
-        (others.iter_mut().zip(in_element)).for_each(|(held, is_in)| *held |= is_in);
+        // those in elements complete families of the seam
+        let in_element = cloud
+            .element
+            .iter()
+            .enumerate()
+            .filter(|(_, e)| e.is_some());
+        for (p, _) in in_element {
+            (own[p], others[p]) = (false, true);
+        }
         let both: Vec<bool>;
         let wanted = match held.with_neighbours {
             true => Wanted::WithNeighbours(&own, &others),
@@ -80,24 +82,8 @@ impl<const D: usize> Model<D> {
 impl SharedFamilies {
     /// Collective: learns which points are which sites, now that none is dropped any more, and how many bonds the families have that others hold.
     pub(super) fn count(&mut self, ranks: &dyn Ranks, site_of_point: &[u32], families: &Families) {
-        let mut by_site = vec![0.0; self.partition.sites()];
-        for (p, &site) in site_of_point
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| **s != NONE)
-        {
-            by_site[site as usize] = families.of(p).len() as f64;
-        }
-        let spread = self.spread(ranks);
-        let own = spread.take_own(&by_site);
-        spread.gather_sites(&own, &mut by_site);
-        let size = |(p, &site): (usize, &u32)| match site {
-            // in an element: every process has it
-            NONE => families.of(p).len() as u32,
-            site => by_site[site as usize] as u32,
-        };
-        self.sizes = site_of_point.iter().enumerate().map(size).collect();
         self.site_of_point = site_of_point.to_vec();
+        self.sizes = self.sizes_of(ranks, families);
     }
 
     /// The sites over processes.
@@ -119,12 +105,33 @@ impl SharedFamilies {
         (site != NONE).then_some(site)
     }
 
-    /// Whether each point is a site of this process.
+    /// Whether this process tells others of each point: it has the site, or is the first one, of points that are none.
     pub fn own(&self) -> Vec<bool> {
+        let owner = |&site: &u32| match site {
+            NONE => 0,
+            site => self.partition.owner(site),
+        };
         let sites = self.site_of_point.iter();
-        sites
-            .map(|&s| s != NONE && self.partition.owner(s) == self.rank)
-            .collect()
+        sites.map(|site| owner(site) == self.rank).collect()
+    }
+
+    /// Collective: the bonds of each point in `families` over the points, whoever holds them.
+    pub fn sizes_of(&self, ranks: &dyn Ranks, families: &Families) -> Vec<u32> {
+        let size = |p: usize| families.of(p).len();
+        let mut by_site = vec![0.0; self.partition.sites()];
+        let points = self.site_of_point.iter().enumerate();
+        for (p, &site) in points.clone().filter(|(_, site)| **site != NONE) {
+            by_site[site as usize] = size(p) as f64;
+        }
+        let spread = self.spread(ranks);
+        let own = spread.take_own(&by_site);
+        spread.gather_sites(&own, &mut by_site);
+        let of_any = |(p, &site): (usize, &u32)| match site {
+            // in an element: every process has it
+            NONE => size(p) as u32,
+            site => by_site[site as usize] as u32,
+        };
+        points.map(of_any).collect()
     }
 
     /// Bonds of the family of each point, of all points.

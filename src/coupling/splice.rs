@@ -40,6 +40,10 @@ impl<const D: usize> Coupling<D> for Splice {
         Some(depth_of_seam(law.is_pairwise()))
     }
 
+    fn moves_with_own_families(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(own_model(model))
     }

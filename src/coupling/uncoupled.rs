@@ -60,6 +60,10 @@ impl<const D: usize> Coupling<D> for Nonlocal {
         Some(0)
     }
 
+    fn moves_with_own_families(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(own_model(model))
     }

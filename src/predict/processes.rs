@@ -97,7 +97,9 @@ fn shares<const D: usize>(
         false => 0.0,
     };
     let moves_own = |spec| moves_own_sites(spec, &rest);
-    if spreading == Spreading::Families && explicit.as_ref().is_some_and(moves_own) {
+    let are_points = (0..model.sites.len()).all(|site| model.point_of(site).is_some());
+    let is_of_points = spreading == Spreading::Families && are_points;
+    if is_of_points && explicit.as_ref().is_some_and(moves_own) {
         progress.finish();
         let shares = parallel::map(partition.ranks(), 1, |rank| {
             of_points(&model, &partition, rank)

@@ -149,7 +149,7 @@ fn so_are_those_of_a_seam_that_is_fitted() {
 }
 
 /// Bonds of the families that each of some processes holds.
-fn held(text: &str, ranks: usize) -> Vec<usize> {
+pub fn held(text: &str, ranks: usize) -> Vec<usize> {
     on_processes(ranks, |rank| {
         let source = Source::new("scene.toml", text.to_owned());
         let scene = AnyScene::from_source(&source, Path::new("."), "scene").expect("a scene");

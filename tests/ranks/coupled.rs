@@ -1,5 +1,6 @@
 //! Scenes of finite elements and points on several processes: each receives what its own sites and the seam ask for, and the results are those of one.
 
+use crate::at_rest::held;
 use crate::threads::{Done, assert_same, predicted};
 use crate::traffic::done;
 use crate::{killed_and_resumed, plate};
@@ -194,4 +195,60 @@ fn a_zone_that_follows_the_crack_moves_alike() {
 #[test]
 fn a_coupled_run_that_was_killed_goes_on_with_other_processes() {
     killed_and_resumed(&inner_plate("lps", "[coupling.splice]"));
+}
+
+/// A plate with a zone so wide that families in its middle lie with one process alone, and a crack that runs through it into the seam.
+fn wide_plate(material: &str, coupling: &str) -> String {
+    let ratio = match material {
+        "lps" => ", poisson-ratio = 0.3",
+        _ => "",
+    };
+    format!(
+        r#"
+kinematics = "plane-stress"
+mesh.rectangle = {{ min = [0, 0], max = [3.75, 3], x = {{ cells = 30 }}, y = {{ cells = 24 }} }}
+materials.m.{material} = {{ youngs-modulus = 1000, density = 1, critical-stretch = 0.01{ratio} }}
+zones.nonlocal.box = {{ min = [0.25, 0.25], max = [3.5, 2.75] }}
+zones.damage-at-edge = "warn"
+cracks.notch.segment = {{ from = [1.2, 1.5], to = [2.6, 1.5] }}
+peridynamics = {{ horizon = 0.25, points.lattice = {{ spacing = 0.125, origin = [0.0625, 0.0625] }} }}
+conditions.below.traction = {{ on = "bottom", y = -6 }}
+conditions.above.traction = {{ on = "top", y = 6 }}
+output.lines.axis = {{ from = [0, 1.4], to = [3.7, 1.6], samples = 9 }}
+[solve.explicit]
+duration = 0.3
+outputs = 2
+history-interval = 0.03
+growing-modes = "warn"
+{coupling}
+"#
+    )
+}
+
+#[test]
+fn cracks_run_alike_where_families_of_a_coupled_zone_are_held_by_their_owner() {
+    let couplings = [
+        "[coupling.splice]",
+        "[coupling.truncated]",
+        "[coupling.truncated]\ncut-bonds = \"linear\"",
+    ];
+    for coupling in couplings {
+        for material in ["bond-based", "lps"] {
+            println!("{material}, {coupling}");
+            let text = wide_plate(material, coupling);
+            assert!(held(&text, 4).iter().any(|n| *n < held(&text, 1)[0]));
+            let one = assert_same(&text, &[4]);
+            let rows = String::from_utf8(one["scene_history.csv"].clone()).unwrap();
+            let column = |name: &str| {
+                rows.lines()
+                    .next()
+                    .unwrap()
+                    .split(',')
+                    .position(|h| h == name)
+            };
+            let broken = column("broken_bonds").expect("a column");
+            let last = rows.lines().last().unwrap().split(',').nth(broken);
+            assert!(last.unwrap().parse::<f64>().unwrap() > 100.0, "{rows}");
+        }
+    }
 }

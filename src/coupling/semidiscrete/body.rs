@@ -6,7 +6,7 @@ use super::split::Split;
 use crate::coupling::semidiscrete::behaviour::{BondBehaviour, CHUNK, Critical, NONE, SystemError};
 use crate::{
     assembly::{Row, Transfer},
-    coupling::{Model, NonlinearSeam, Operator, SharedFamilies, SiteKind},
+    coupling::{Model, NonlinearSeam, Operator, SiteKind},
     parallel,
     peridynamics::{
         Accelerator, Families, Law, PdBody,
@@ -171,17 +171,35 @@ impl<const D: usize> PassInput<'_, D> {
     }
 }
 
-/// Who has which families, where they are spread over processes; `own` marks the points of this one.
-fn shared_rows<'a, const D: usize>(
-    model: &'a Model<D>,
-    own: Option<&'a [bool]>,
-    ranks: Option<&'a dyn Ranks>,
-) -> Option<SharedRows<'a>> {
-    Some(SharedRows {
-        ranks: ranks?,
-        own: own?,
-        sizes: model.shared_families()?.sizes(),
-    })
+/// Who has which of the families that are passed over, where they are spread over processes: the points that this one tells of, and the bonds of each point.
+struct Holders<'a> {
+    ranks: &'a dyn Ranks,
+    own: Vec<bool>,
+    sizes: Vec<u32>,
+}
+
+impl<'a> Holders<'a> {
+    /// Collective.
+    fn of<const D: usize>(
+        model: &Model<D>,
+        families: &Families,
+        ranks: Option<&'a dyn Ranks>,
+    ) -> Option<Self> {
+        let (shared, ranks) = (model.shared_families()?, ranks?);
+        Some(Self {
+            ranks,
+            own: shared.own(),
+            sizes: shared.sizes_of(ranks, families),
+        })
+    }
+
+    fn rows(&self) -> SharedRows<'_> {
+        SharedRows {
+            ranks: self.ranks,
+            own: &self.own,
+            sizes: &self.sizes,
+        }
+    }
 }
 
 /// The families that are passed over, where rows keep some bonds of their points to themselves.
@@ -298,7 +316,7 @@ impl<const D: usize> MovingBody<D> {
         } else {
             Vec::new()
         };
-        let own = model.shared_families().map(SharedFamilies::own);
+        let holders = Holders::of(model, families, ranks);
         let pass = PassInput {
             body,
             law: &p.law,
@@ -309,7 +327,7 @@ impl<const D: usize> MovingBody<D> {
             no_fail: &no_fail,
             seam,
             behaviour,
-            shared: shared_rows(model, own.as_deref(), ranks),
+            shared: holders.as_ref().map(Holders::rows),
         }
         .pass()?;
         let contact = contact_of(behaviour, body, &own_row, model.spacing())?;

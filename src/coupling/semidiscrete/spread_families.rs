@@ -22,48 +22,44 @@ impl<const D: usize> CoupledSystem<'_, D> {
     }
 
     fn own_rows_at(&self, sites: &[u32]) -> BlockCsr {
-        assembly::assemble_rows(
-            sites.len(),
-            self.mass.len(),
-            |_| (),
-            |r, row| {
-                let site = sites[r] as usize;
-                self.linear.add_row(site, row);
-                if let (Some(moving), Some(body)) = (&self.body, self.model.body())
-                    && moving.bonds_of_site[site] != NONE
-                {
-                    let point = moving.bonds_of_site[site] as usize;
-                    let without_energy = self
-                        .seam
-                        .as_ref()
-                        .map_or(&[][..], NonlinearSeam::without_energy);
-                    if without_energy.is_empty() {
-                        let weight = |j: usize| match self.is_passed_over(point, j as u32) {
-                            true => 1.0,
-                            false => 0.0,
-                        };
-                        body.add_force_row(point, weight, row);
-                    } else {
-                        // a point with an energy in the body's pass has whole bonds only
-                        body.add_force_row_of_energies(
-                            point,
-                            |_| [1.0; 2],
-                            |j| !without_energy[j],
-                            row,
-                        );
-                    }
+        // of rows that share blocks each has the bits of the first, which may lie with another process
+        assembly::assemble_apart(sites.len(), self.mass.len(), |r, row| {
+            let site = sites[r] as usize;
+            self.linear.add_row(site, row);
+            if let (Some(moving), Some(body)) = (&self.body, self.model.body())
+                && moving.bonds_of_site[site] != NONE
+            {
+                let point = moving.bonds_of_site[site] as usize;
+                let without_energy = self
+                    .seam
+                    .as_ref()
+                    .map_or(&[][..], NonlinearSeam::without_energy);
+                if without_energy.is_empty() {
+                    let weight = |j: usize| match self.is_passed_over(point, j as u32) {
+                        true => 1.0,
+                        false => 0.0,
+                    };
+                    body.add_force_row(point, weight, row);
+                } else {
+                    // a point with an energy in the body's pass has whole bonds only
+                    body.add_force_row_of_energies(
+                        point,
+                        |_| [1.0; 2],
+                        |j| !without_energy[j],
+                        row,
+                    );
                 }
-                if let (Some(moving), Some(body)) = (&self.body, self.model.body()) {
-                    moving.add_rows_of_feet(body, sites[r], row);
-                }
-                if let Some(seam) = &self.seam {
-                    seam.add_row(site, row);
-                }
-                if let Some(scale) = self.model.row_scale() {
-                    row.scale(scale[site]);
-                }
-            },
-        )
+            }
+            if let (Some(moving), Some(body)) = (&self.body, self.model.body()) {
+                moving.add_rows_of_feet(body, sites[r], row);
+            }
+            if let Some(seam) = &self.seam {
+                seam.add_row(site, row);
+            }
+            if let Some(scale) = self.model.row_scale() {
+                row.scale(scale[site]);
+            }
+        })
     }
 
     /// See [`crate::system::SemiDiscrete::broken_bonds`]. Collective where families are spread.

@@ -117,6 +117,10 @@ impl<const D: usize> Coupling<D> for Truncated {
         Some(depth_of_seam(law.is_pairwise()))
     }
 
+    fn moves_with_own_families(&self) -> bool {
+        true
+    }
+
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (Rows<Truncated, 1>, Rows<Truncated, 2>, Rows<Truncated, 3>) =
             (Truncated::rows, Truncated::rows, Truncated::rows);

@@ -39,8 +39,7 @@ fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) 
 
 /// Whether each process of a scene in time may hold the families of its own sites alone.
 pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
-    // what moves of a seam looks at families of all
-    families_of_all(problem, rest) == Some(0)
+    problem.coupling.moves_with_own_families() && families_of_all(problem, rest).is_some()
 }
 
 /// Whether each process of a static scene may, beside those at a seam. Forces then have to be linear: of others each process has the rows of all sites.

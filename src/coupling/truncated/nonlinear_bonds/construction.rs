@@ -6,7 +6,7 @@ use super::{NonlinearSeam, counted_bonds::OwnBonds};
 use crate::{
     assembly::Transfer,
     coupling::{
-        Model,
+        Model, SiteKind,
         truncated::{
             bond_kinematics::{Part, whole_bonds},
             bond_segments::{Segments, Springs},
@@ -45,9 +45,14 @@ impl<const D: usize> NonlinearSeam<D> {
         }
         seam.first.push(seam.parts.len() as u32);
         let whole = |i: u32, j: u32| !taken.contains(&(i.min(j), i.max(j)));
-        let is_site = |p: u32| !body.families.of(p as usize).is_empty();
+        let mut is_site = vec![false; body.cloud.position.len()];
+        for site in &model.sites {
+            if let SiteKind::Point(p) = site.kind {
+                is_site[p as usize] = true;
+            }
+        }
         seam.families
-            .retain(|i, j| is_site(j) && whole(i as u32, j));
+            .retain(|i, j| is_site[j as usize] && whole(i as u32, j));
         seam.find_bonds_along_face(body.cloud.position.len());
         seam.index_sites(of_site);
         seam.intact = vec![0xff; seam.bonds.len().div_ceil(8)];
