@@ -1,9 +1,10 @@
 //! Which of several processes computes which sites of a model.
 
 use crate::{
-    coupling::{Model, shared_families::by_work},
+    coupling::{Model, Site},
     parallel,
     system::{NeighbourGraph, Partition, Ranks, first_text},
+    tensor::padded,
 };
 
 /// A graph partitioner decides where the process with the most sites of others beside its own has at most this part of those that bisection leaves it. Where both do the same, as in blocks, the cuts of
@@ -121,4 +122,10 @@ impl<const D: usize> Model<D> {
         };
         NeighbourGraph::of_rows(parallel::map(self.sites.len(), 64, of_site))
     }
+}
+
+/// Sites over processes by what they cost.
+pub(super) fn by_work<const D: usize>(sites: &[Site<D>], work: &[f64], count: usize) -> Partition {
+    let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
+    Partition::by_bisection(&positions, work, count)
 }

@@ -3,11 +3,9 @@
 //! Beside elements every process works out the seam as one process does, whose rows, fits and proofs look at the families of several points. That is a layer; inside of it bonds lie with
 //! the owner of their point alone.
 
-use super::bins::Bins;
-use super::{CellRole, Coupling, Model, Peridynamics, Reach, Site, SiteKind};
+use super::{Coupling, Peridynamics, Reach};
 use crate::coupling::HorizonField;
 use crate::peridynamics::TIE_TOLERANCE;
-use crate::tensor::Vector;
 
 /// How many families deep the rows and fits of a seam look, by whether the force of a bond takes the states of its ends.
 pub(super) const fn depth_of_seam(is_pairwise: bool) -> usize {
@@ -23,7 +21,7 @@ pub(super) struct HeldFamilies {
     /// Those of all points that are no farther from an element beside the points \[m\].
     pub depth: f64,
     /// Bonds of a family that lacks none.
-    full: usize,
+    pub full: usize,
 }
 
 impl HeldFamilies {
@@ -64,58 +62,6 @@ fn places_within<const D: usize>(distance: f64) -> usize {
         square > 0 && (square as f64).sqrt() <= distance
     };
     (0..side.pow(D as u32)).filter(is_within).count()
-}
-
-impl<const D: usize> Model<D> {
-    /// About what the row of each site costs before families are known: as [`Model::work_of_sites`] with families that lack nothing.
-    pub(super) fn work_before_families(&self, sites: &[Site<D>], held: &HeldFamilies) -> Vec<f64> {
-        let of_site = |site: &Site<D>| match site.kind {
-            SiteKind::Point(_) => 1 + held.full,
-            SiteKind::Node(n) => {
-                let cells = self.cells_of_node(n);
-                1 + cells.map(|(c, _)| self.mesh.cell(c).len()).sum::<usize>()
-            }
-        };
-        sites.iter().map(|site| of_site(site) as f64).collect()
-    }
-
-    /// Whether each position lies no farther than `depth` from the box around an element that shares a node with a cell of points.
-    pub(super) fn beside_elements(&self, positions: &[Vector<D>], depth: f64) -> Vec<bool> {
-        let mut beside = vec![false; positions.len()];
-        if depth <= 0.0 {
-            return beside;
-        }
-        let mesh = &self.mesh;
-        let mut has_points = vec![false; mesh.nodes.len()];
-        for c in (0..mesh.cell_count()).filter(|&c| self.roles[c] == CellRole::Points) {
-            let nodes = mesh.cell(c).iter();
-            nodes.for_each(|&n| has_points[n as usize] = true);
-        }
-        let elements = (0..mesh.cell_count()).filter(|&c| self.is_element(c));
-        let at_seam = elements.filter(|&c| mesh.cell(c).iter().any(|&n| has_points[n as usize]));
-        let boxes = at_seam.map(|c| mesh.bounds_of(mesh.cell(c)));
-        let (mut first, mut last) = [f64::MAX, f64::MIN].map(Vector::<D>::repeat).into();
-        for x in positions {
-            (first, last) = (first.inf(x), last.sup(x));
-        }
-        let bins = Bins::new(positions, depth);
-        for (low, high) in boxes {
-            let is_near = |p: usize| {
-                let x = &positions[p];
-                let outside = (low - x).sup(&(x - high)).sup(&Vector::zeros());
-                outside.norm() <= depth
-            };
-            // an element may be far larger than all that has points
-            let from = low.add_scalar(-depth).sup(&first);
-            let to = high.add_scalar(depth).inf(&last);
-            if (0..D).all(|a| from[a] <= to[a]) {
-                for p in bins.in_box(from, to) {
-                    beside[p] = beside[p] || is_near(p);
-                }
-            }
-        }
-        beside
-    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,115 @@
-//! A model whose families are spread over processes.
+//! A model whose families are spread over processes: which a process searches, and what follows from those that others hold.
 
 use crate::{
-    coupling::{Model, ModelError, SharedFamilies, SiteKind},
-    peridynamics::{Accelerator, PdBody},
+    coupling::{
+        CellRole, Model, ModelError, SharedFamilies, Site, SiteKind, bins::Bins,
+        distribution::by_work, held_families::HeldFamilies, point_cloud::PointCloud,
+        shared_families::NONE,
+    },
+    peridynamics::{Accelerator, Families, PdBody, TIE_TOLERANCE, Wanted},
     system::{Ranks, Spread, first_text},
+    tensor::Vector,
 };
 
 impl<const D: usize> Model<D> {
+    /// The families of this process, and who has which; none where the points are no lattice. Sites that are nodes have been placed, and those that are points come behind them.
+    ///
+    /// `reach` is how far families do \[m\].
+    pub(super) fn search_shared(
+        &self,
+        ranks: &dyn Ranks,
+        held: &HeldFamilies,
+        cloud: &PointCloud<D>,
+        reach: f64,
+    ) -> Option<(Families, SharedFamilies)> {
+        let mut sites = self.sites.clone();
+        let mut site_of_point = vec![NONE; cloud.position.len()];
+        let points = cloud.element.iter().enumerate();
+        for (p, _) in points.filter(|(_, element)| element.is_none()) {
+            site_of_point[p] = sites.len() as u32;
+            sites.push(Site {
+                position: cloud.position[p],
+                kind: SiteKind::Point(p as u32),
+                volume: cloud.volume[p],
+            });
+        }
+        let work = self.work_before_families(&sites, held);
+        let partition = by_work(&sites, &work, ranks.count());
+        let shared = SharedFamilies::new(partition, ranks.rank(), site_of_point);
+        let mut own = shared.own();
+        let mut others = self.beside_elements(&cloud.position, held.depth);
+        // those in elements complete families of the seam
+        let in_element = cloud
+            .element
+            .iter()
+            .enumerate()
+            .filter(|(_, e)| e.is_some());
+        for (p, _) in in_element {
+            (own[p], others[p]) = (false, true);
+        }
+        let both: Vec<bool>;
+        let wanted = match held.with_neighbours {
+            true => Wanted::WithNeighbours(&own, &others),
+            false => {
+                both = own.iter().zip(&others).map(|(a, b)| *a || *b).collect();
+                Wanted::Of(&both)
+            }
+        };
+        let (points, spacing) = (&cloud.position, cloud.spacing);
+        let families = Families::search_lattice_of(points, spacing, reach, TIE_TOLERANCE, &wanted)?;
+        Some((families, shared))
+    }
+
+    /// About what the row of each site costs before families are known: as [`Model::work_of_sites`] with families that lack nothing.
+    pub(super) fn work_before_families(&self, sites: &[Site<D>], held: &HeldFamilies) -> Vec<f64> {
+        let of_site = |site: &Site<D>| match site.kind {
+            SiteKind::Point(_) => 1 + held.full,
+            SiteKind::Node(n) => {
+                let cells = self.cells_of_node(n);
+                1 + cells.map(|(c, _)| self.mesh.cell(c).len()).sum::<usize>()
+            }
+        };
+        sites.iter().map(|site| of_site(site) as f64).collect()
+    }
+
+    /// Whether each position lies no farther than `depth` from the box around an element that shares a node with a cell of points.
+    pub(super) fn beside_elements(&self, positions: &[Vector<D>], depth: f64) -> Vec<bool> {
+        let mut beside = vec![false; positions.len()];
+        if depth <= 0.0 {
+            return beside;
+        }
+        let mesh = &self.mesh;
+        let mut has_points = vec![false; mesh.nodes.len()];
+        for c in (0..mesh.cell_count()).filter(|&c| self.roles[c] == CellRole::Points) {
+            let nodes = mesh.cell(c).iter();
+            nodes.for_each(|&n| has_points[n as usize] = true);
+        }
+        let elements = (0..mesh.cell_count()).filter(|&c| self.is_element(c));
+        let at_seam = elements.filter(|&c| mesh.cell(c).iter().any(|&n| has_points[n as usize]));
+        let boxes = at_seam.map(|c| mesh.bounds_of(mesh.cell(c)));
+        let (mut first, mut last) = [f64::MAX, f64::MIN].map(Vector::<D>::repeat).into();
+        for x in positions {
+            (first, last) = (first.inf(x), last.sup(x));
+        }
+        let bins = Bins::new(positions, depth);
+        for (low, high) in boxes {
+            let is_near = |p: usize| {
+                let x = &positions[p];
+                let outside = (low - x).sup(&(x - high)).sup(&Vector::zeros());
+                outside.norm() <= depth
+            };
+            // an element may be far larger than all that has points
+            let from = low.add_scalar(-depth).sup(&first);
+            let to = high.add_scalar(depth).inf(&last);
+            if (0..D).all(|a| from[a] <= to[a]) {
+                for p in bins.in_box(from, to) {
+                    beside[p] = beside[p] || is_near(p);
+                }
+            }
+        }
+        beside
+    }
+
     /// The body; collective where its families are spread over processes: if a process could not make its own, the error of the first of them, on all.
     pub(super) fn held_body(
         &mut self,
@@ -21,8 +124,12 @@ impl<const D: usize> Model<D> {
         if let Some(message) = first_text(ranks, own.as_deref()) {
             return Err(ModelError::OfProcess { message });
         }
-        let body = body?;
+        let mut body = body?;
         shared.count(ranks, site_of_point, &body.families);
+        let sizes = shared.sizes().iter().enumerate();
+        let is_elsewhere = |(p, n): (usize, &u32)| *n > 0 && body.families.of(p).is_empty();
+        let elsewhere = sizes.map(is_elsewhere).collect();
+        body.set_elsewhere(elsewhere);
         self.shared = Some(shared);
         Ok(body)
     }

@@ -64,6 +64,8 @@ pub struct PdBody<const D: usize> {
     pairwise: bool,
     /// Where families end on the faces of elements, if they do.
     ends: Option<FamilyEnds>,
+    /// Whether the family of each point lies with another process; empty where none does.
+    elsewhere: Vec<bool>,
 }
 
 /// One family, in memory that the next one takes over.
@@ -199,7 +201,13 @@ impl<const D: usize> PdBody<D> {
             state,
             pairwise,
             ends: None,
+            elsewhere: Vec::new(),
         })
+    }
+
+    /// Marks the points whose families lie with other processes: rows of these are refused.
+    pub(crate) fn set_elsewhere(&mut self, elsewhere: Vec<bool>) {
+        self.elsewhere = elsewhere;
     }
 
     /// Number of directed bonds.
@@ -275,6 +283,11 @@ impl<const D: usize> PdBody<D> {
         counts: impl Fn(usize) -> bool,
         row: &mut Row<D>,
     ) {
+        let lies_elsewhere = self.elsewhere.get(i).is_some_and(|is| *is);
+        assert!(
+            !lies_elsewhere,
+            "the family of point {i} lies with another process"
+        );
         let transfer = &self.cloud.transfer;
         let volume = self.cloud.volume[i];
         let (pair, omega) = self.kernel(i);

@@ -79,9 +79,9 @@ fn shares<const D: usize>(
         _ => None,
     };
     let (problem, rest) = setup::problem(scene);
-    let is_shared = match is_static {
-        true => may_share_rows(&problem, &rest),
-        false => explicit.is_some() && may_share(&problem, &rest),
+    let is_shared = match &explicit {
+        Some(_) => may_share(&problem, &rest),
+        None => is_static && may_share_rows(&problem, &rest),
     };
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let Distribution { partition, why } = model.distribute(count, is_shared, partitioner);
@@ -92,18 +92,12 @@ fn shares<const D: usize>(
         false if has_own_families => Spreading::Families,
         _ => Spreading::Work,
     };
-    let per_bond = match has_own_families {
-        true => per_bond(&model),
-        false => 0.0,
-    };
-    let moves_own = |spec| moves_own_sites(spec, &rest);
-    let are_points = (0..model.sites.len()).all(|site| model.point_of(site).is_some());
-    let is_of_points = spreading == Spreading::Families && are_points;
-    if is_of_points && explicit.as_ref().is_some_and(moves_own) {
+    let per_bond = f64::from(u8::from(has_own_families)) * per_bond(&model);
+    let moves_own = (explicit.as_ref()).is_some_and(|spec| moves_own_sites(spec, &rest));
+    if spreading == Spreading::Families && are_points(&model) && moves_own {
         progress.finish();
-        let shares = parallel::map(partition.ranks(), 1, |rank| {
-            of_points(&model, &partition, rank)
-        });
+        let of_rank = |rank| of_points(&model, &partition, rank);
+        let shares = parallel::map(partition.ranks(), 1, of_rank);
         return Ok(Processes {
             shares,
             distribution: why,
@@ -112,8 +106,8 @@ fn shares<const D: usize>(
         });
     }
     let operator = coupling.operator(&model)?;
-    let system = match &explicit {
-        Some(spec) if moves_own_sites(spec, &rest) => {
+    let system = match moves_own {
+        true => {
             let start = LayoutStart {
                 sharing: Sharing::Steps,
                 ..LayoutStart::default()
@@ -123,7 +117,7 @@ fn shares<const D: usize>(
             let moving = dynamic(&model, coupling, operator, &rest, start, choices, progress)?;
             Some(moving.system)
         }
-        _ => None,
+        false => None,
     };
     let pattern = model.pattern(operator.as_ref(), &[], progress);
     if spreading == Spreading::Rows {
@@ -154,6 +148,11 @@ fn shares<const D: usize>(
     })
 }
 
+/// Whether every site is a point.
+fn are_points<const D: usize>(model: &Model<D>) -> bool {
+    (0..model.sites.len()).all(|site| model.point_of(site).is_some())
+}
+
 /// What PETSc has of a static scene with linear forces.
 fn of_statics<const D: usize>(
     model: &Model<D>,
@@ -162,14 +161,13 @@ fn of_statics<const D: usize>(
     method: Method,
 ) -> Spreading {
     let sites = model.sites.len();
-    let is_point = |site: usize| model.point_of(site).is_some();
     let counts = [sites, pattern.stored, pattern.distinct].map(|n| n as f64);
     let symmetry = equilibrium::symmetry(coupling, || pattern.asymmetry, &mut Vec::new());
     match method {
         Method::Direct => Spreading::Factors,
         _ if symmetry == Symmetry::Symmetric
             && model.is_lattice()
-            && (0..sites).all(is_point)
+            && are_points(model)
             && share_long_rows(D, counts) =>
         {
             Spreading::Products

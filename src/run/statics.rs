@@ -13,7 +13,7 @@ use crate::run::placed_scene::PlacedScene;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::coupling::{Coupling, Model, Operator, SiteKind};
+use crate::coupling::{Coupling, Model, Operator, Problem, SiteKind};
 use crate::dimension;
 use crate::observe::ObserveError;
 use crate::observe::pieces::agreed;
@@ -32,7 +32,7 @@ use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
 use crate::solve::statics::StaticInfo;
-use crate::system::{Ranks, SemiDiscrete, all_say};
+use crate::system::{Ranks, SemiDiscrete};
 use crate::tensor::Vector;
 
 /// Runs a scene and writes its outputs.
@@ -128,20 +128,17 @@ fn solve_chosen<const D: usize>(
     let (model, coupling) = match &kept {
         Some(k) => (&k.model, k.coupling.as_ref()),
         None => {
-            let holders =
-                ranks.filter(|&ranks| all_say(ranks, motion::may_share_rows(&problem, &rest)));
-            fresh = shared_model(problem, &rest, holders, progress)?;
+            fresh = laid_out(problem, &rest, ranks, progress)?;
             (&fresh.0, fresh.1.as_ref())
         }
     };
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(model)?;
     let mut choices: Vec<Decision> = rest.made().cloned().collect();
-    let what = (model, operator.as_ref(), ranks);
-    definiteness::check(what, rest.ratio, &mut choices, progress)?;
+    let rows = (model, operator.as_ref(), ranks);
+    definiteness::check(rows, rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
     let mut system = motion::dynamic_system::still(model, coupling, operator.as_ref(), &rest)?;
-    let is_linear = system.is_none();
     let body = StaticBody {
         model,
         coupling,
@@ -150,10 +147,10 @@ fn solve_chosen<const D: usize>(
         ranks,
     };
     // what placed the zone was solved with linear forces
-    let cached = kept.as_ref().filter(|_| is_linear).map(|k| &k.equilibrium);
+    let cached = kept.as_ref().filter(|_| system.is_none());
     let moving = system.as_mut().map(|s| s as &mut dyn SemiDiscrete);
     let computed;
-    let (equilibrium, proof) = match cached {
+    let (equilibrium, proof) = match cached.map(|known| &known.equilibrium) {
         Some(known) => (known, body.prove_cached(known, &mut timings, progress)?),
         None => {
             let (solved, proof) = body.solve(moving, &mut timings, progress)?;
@@ -190,6 +187,20 @@ fn solve_chosen<const D: usize>(
         sections,
         ..body.summary(equilibrium, joining, proof)
     })
+}
+
+/// The model of a static scene; collective, with its families spread over processes where they can be.
+///
+/// # Errors
+/// [`RunError::Model`] for one that cannot be laid out.
+fn laid_out<const D: usize>(
+    problem: Problem<D>,
+    rest: &RunSettings<D>,
+    ranks: Option<&dyn Ranks>,
+    progress: &dyn Progress,
+) -> Result<(Model<D>, Box<dyn Coupling<D>>), RunError> {
+    let holders = motion::holders_at_rest(ranks, &problem, rest);
+    shared_model(problem, rest, holders, progress)
 }
 
 /// A model with its rows and conditions, about to be solved.

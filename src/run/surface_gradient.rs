@@ -4,7 +4,7 @@ use crate::material::Kinematics;
 use crate::observe::report::number;
 use crate::shape::Barrier;
 use crate::system::Ranks;
-use crate::tensor::{Tensor, Vector, inverse};
+use crate::tensor::{Tensor, Tensor4, Vector, inverse};
 use crate::{
     coupling::{Model, SiteKind},
     parallel,
@@ -23,6 +23,7 @@ const ONE_SIDED: f64 = 0.2;
 /// What a family knows of a deformation is its mean, that at its centroid, for fields that are linear over it. At a free surface the centroid lies inside by 0.42 of a horizon in plates and 3/8 in solids, so that a stress that falls off into the body,
 /// as beside a hole or in bending, is wrong by its gradient times that distance, too low by correspondence; by an LPS, which strains more at surfaces, it may be too high. The gradient of the points is one of means, too, so that this is a lower bound: Kirsch's peak at a hole whose radius
 /// is 3.3 horizons is 24 % above that of points by correspondence, of which 10 to 11 % are told (`tests/loads/stresses.rs`). Cracks are left out: their stress has no bound that a mesh could resolve. `elements` says what elements can do instead.
+///
 /// Collective where families are spread over processes.
 pub(super) fn missed_peak<const D: usize>(
     model: &Model<D>,
@@ -55,14 +56,7 @@ pub(super) fn missed_peak<const D: usize>(
             .sum();
         let strain = sum * moment(p)?;
         let stress = tensor.contract(&(0.5 * (strain + strain.transpose())));
-        let across = match kinematics {
-            // ν = λ/(2 (λ + μ)), and σ_zz = ν (σ_xx + σ_yy)
-            Kinematics::PlaneStrain => {
-                let [axial, lateral] = [tensor.get(0, 0, 0, 0), tensor.get(0, 0, 1, 1)];
-                stress.trace() * lateral / (axial + lateral)
-            }
-            _ => 0.0,
-        };
+        let across = stress_across(kinematics, &tensor, &stress);
         Some(von_mises(&principal(&stress, across)))
     };
     let points: Vec<u32> = (0..u.len() as u32).collect();
@@ -107,6 +101,22 @@ pub(super) fn missed_peak<const D: usize>(
             100.0 * missed / stresses[p]
         )
     })
+}
+
+/// The stress across the plane of a plate.
+fn stress_across<const D: usize>(
+    kinematics: Kinematics,
+    tensor: &Tensor4<D>,
+    stress: &Tensor<D>,
+) -> f64 {
+    match kinematics {
+        // ν = λ/(2 (λ + μ)), and σ_zz = ν (σ_xx + σ_yy)
+        Kinematics::PlaneStrain => {
+            let [axial, lateral] = [tensor.get(0, 0, 0, 0), tensor.get(0, 0, 1, 1)];
+            stress.trace() * lateral / (axial + lateral)
+        }
+        _ => 0.0,
+    }
 }
 
 /// Whether a point lies within a horizon of a crack.

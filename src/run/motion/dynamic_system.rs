@@ -74,12 +74,8 @@ pub(crate) fn dynamic<'a, const D: usize>(
         && breaking.bonds == BondsSpec::Linear
         && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
         && !rest.has_nonlinear_elements(model);
-    definiteness::check(
-        (model, operator, start.ranks),
-        rest.ratio,
-        choices,
-        progress,
-    )?;
+    let rows = (model, operator, start.ranks);
+    definiteness::check(rows, rest.ratio, choices, progress)?;
     let moving = CoupledSystem::of_processes(
         model,
         operator,
@@ -100,9 +96,8 @@ pub(crate) fn dynamic<'a, const D: usize>(
     );
     match moving {
         Ok(motion) => {
-            let laws = model.local_laws(&rest.local_laws);
-            let motion = motion.with_local_laws(&laws)?.with_ranks(start.ranks);
-            let motion = sharing_steps(motion, start.sharing);
+            let motion = motion.with_local_laws(&model.local_laws(&rest.local_laws))?;
+            let motion = sharing_steps(motion.with_ranks(start.ranks), start.sharing);
             if critical_stretch.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms

@@ -56,7 +56,7 @@ mod way;
 pub mod writer;
 pub(crate) mod zone_monitor;
 
-pub(crate) use sharing::{Sharing, may_share, may_share_rows, moves_own_sites};
+pub(crate) use sharing::{Sharing, holders_at_rest, may_share, may_share_rows, moves_own_sites};
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

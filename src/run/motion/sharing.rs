@@ -7,7 +7,7 @@ use crate::run::setup::RunSettings;
 use crate::scene::conditions::Prescribed;
 use crate::scene::solve::Explicit;
 use crate::scene::spec::{ElementsSpec, PrecisionSpec};
-use crate::system::all_say;
+use crate::system::{Ranks, all_say};
 
 /// What each process of a run in time has to itself, where the system lets it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,6 +49,15 @@ pub(crate) fn may_share_rows<const D: usize>(problem: &Problem<D>, rest: &RunSet
         && law.is_some_and(|law| law.is_linear())
         && rest.elements == ElementsSpec::Linear
         && families_of_all(problem, rest).is_some()
+}
+
+/// Collective: the processes over which the families of a static scene are spread, if they can be.
+pub(crate) fn holders_at_rest<'a, const D: usize>(
+    ranks: Option<&'a dyn Ranks>,
+    problem: &Problem<D>,
+    rest: &RunSettings<D>,
+) -> Option<&'a dyn Ranks> {
+    ranks.filter(|&ranks| all_say(ranks, may_share_rows(problem, rest)))
 }
 
 /// Whether a process then moves its own sites and their ghosts alone, and not all: no sub-steps, no springs, nothing that strikes.
