@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """processes.py PROGRAM [CELLS] [STEPS]: what a block of points takes on one program and on 1, 2 and 4 processes under mpirun.
+processes.py --coupled PROGRAM [CELLS] [STEPS]: the same of a block twice as long with elements at both ends, in motion and at rest.
 processes.py --speed PROGRAM [CELLS] [STEPS] [ROUNDS] [COUNTS...]: how fast its steps are on 1 process, on COUNTS (2) processes, and on these with a block as many times as long.
 
 The block has CELLS (48) points along each edge, three spacings in a horizon, bond-based and LPS. For each run: the peak memory of each process, the same less that of a block with the
@@ -13,6 +14,7 @@ of processes. "apart" are as many programs at once, each with a block of its own
 and bytes of a step are the most that a process has, counted in the run; it fails where `bondline check --processes` predicts others.
 """
 
+import itertools
 import json
 import math
 import os
@@ -25,7 +27,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 SCENE = """
 kinematics = "solid"
-coupling = "nonlocal"
+coupling = "{coupling}"
 
 [mesh.box]
 min = [0, 0, 0]
@@ -43,17 +45,40 @@ density = 1
 horizon = {spacings}
 points.lattice = {{ spacing = 1, origin = [0.5, 0.5, 0.5] }}
 
-[solve.explicit]
-duration = {duration}
-outputs = 1
-history-interval = {duration}
-
-[initial.hump.displacement]
-x = "0.01 * exp(-((x - 8) / 4)^2)"
+{zone}
+{motion}
 
 [output]
 name = "block"
 vtu = false
+"""
+
+
+MOTION = """
+[solve.explicit]
+duration = {duration}
+outputs = 1
+history-interval = {duration}
+growing-modes = "warn"
+
+[initial.hump.displacement]
+x = "0.01 * exp(-((x - 8) / 4)^2)"
+"""
+
+REST = """
+[conditions.left.displacement]
+on = "left"
+x = 0
+y = 0
+z = 0
+
+[conditions.right.traction]
+on = "right"
+x = 1e-3
+
+[solver]
+method = "krylov"
+unproven = "warn"
 """
 
 
@@ -90,9 +115,13 @@ def run(program, scene, folder, count):
 LAWS = (("bond-based", "critical-stretch = 0.5"), ("lps", "poisson-ratio = 0.3\ncritical-stretch = 0.5"))
 
 
-def text_of(law, more, n, steps, spacings=3, times=1):
-    """The scene; the step is about half a spacing over the speed of waves, which is one."""
-    return SCENE.format(n=n, long=n * times, law=law, more=more, spacings=spacings, duration=0.5 * steps)
+def text_of(law, more, n, steps, spacings=3, times=1, coupling="nonlocal"):
+    """The scene; the step is about half a spacing over the speed of waves, which is one. It is at rest without steps, and coupled has four layers of elements at either end."""
+    long = n * times
+    motion = MOTION.format(duration=0.5 * steps) if steps else REST
+    ends = f"zones.nonlocal.box = {{ min = [4, 0, 0], max = [{long - 4}, {n}, {n}] }}"
+    zone = "" if coupling == "nonlocal" else ends
+    return SCENE.format(n=n, long=long, law=law, more=more, spacings=spacings, coupling=coupling, zone=zone, motion=motion)
 
 
 def memory(program, n=48, steps=4):
@@ -109,6 +138,22 @@ def memory(program, n=48, steps=4):
                 words = [" ".join(f"{a[0]:.0f}" for a in many), " ".join(f"{a[0] - b[0]:.0f}" for a, b in zip(many, few))]
                 words.append(" ".join(f"{user:.1f}+{system:.1f}" for _, user, system in many))
                 print(f"| {law} | {count or 'one program'} | {' | '.join(words)} |", flush=True)
+
+
+def coupled(program, n=24, steps=4):
+    print("| block | law | processes | peak memory [MiB] | predicted [MiB] | bonds held [%] | user + system [s] |\n|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        scene = os.path.join(folder, "block.toml")
+        for (law, more), coupling, moves in itertools.product(LAWS, ("nonlocal", "splice", "truncated"), (steps, 0)):
+            # bonds that break have no place at rest
+            pathlib.Path(scene).write_text(text_of(law, more if moves else more.replace("critical-stretch = 0.5", ""), n, moves, 3, 2, coupling))
+            for count in (None, 1, 2, 4):
+                each, summary = run(program, scene, os.path.join(folder, "out"), count)
+                shares = json.loads(checked(program, scene, count or 1))["processes"] if count else []
+                words = [" ".join(f"{a[0]:.0f}" for a in each), " ".join(f"{share['memory_bytes'] / 2**20:.0f}" for share in shares)]
+                words.append(" ".join(f"{100 * share['bonds'] / summary['sizes']['bonds']:.0f}" for share in shares))
+                words.append(" ".join(f"{user:.1f}+{system:.1f}" for _, user, system in each))
+                print(f"| {coupling}, {'in motion' if moves else 'at rest'} | {law} | {count or 'one program'} | {' | '.join(words)} |", flush=True)
 
 
 def of_steps(runs):
@@ -128,10 +173,15 @@ def apart(program, scene, folder, count):
     return max(runs, key=lambda one: sum(stage["seconds"] for stage in one[1]["timings"] if stage["name"] == "steps"))
 
 
+def checked(program, scene, count):
+    """What a check tells of so many processes."""
+    command = [program, "check", scene, "--json", "--processes", str(count)]
+    return subprocess.run(command, env={**os.environ, **THREADS}, stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
 def predicted(program, scene, count):
     """Sites, ghosts and bytes of a step of each process, as a check tells."""
-    done = subprocess.run([program, "check", scene, "--json", "--processes", str(count)], env={**os.environ, **THREADS}, stdout=subprocess.PIPE, text=True, check=True)
-    shares = json.loads(done.stdout)["processes"]
+    shares = json.loads(checked(program, scene, count))["processes"]
     return [(share["sites"], share["ghosts"], share["received_bytes"]) for share in shares]
 
 
@@ -175,5 +225,6 @@ def exchanges(program, scene, count, motion):
 if __name__ == "__main__":
     if sys.argv[1] == "--measured":
         sys.exit(measured(sys.argv[2:]))
-    what, rest = (speed, sys.argv[2:]) if sys.argv[1] == "--speed" else (memory, sys.argv[1:])
+    tables = {"--speed": speed, "--coupled": coupled}
+    what, rest = (tables[sys.argv[1]], sys.argv[2:]) if sys.argv[1] in tables else (memory, sys.argv[1:])
     what(os.path.abspath(rest[0]), *map(int, rest[1:]))

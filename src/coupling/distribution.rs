@@ -1,10 +1,13 @@
 //! Which of several processes computes which sites of a model.
 
+use super::bins::Bins;
+use super::held_families::HeldFamilies;
 use crate::{
-    coupling::{Model, Site},
+    coupling::{Distribution, Model, Site, SiteKind},
     parallel,
+    peridynamics::TIE_TOLERANCE,
     system::{NeighbourGraph, Partition, Ranks, first_text},
-    tensor::padded,
+    tensor::{Vector, padded},
 };
 
 /// A graph partitioner decides where the process with the most sites of others beside its own has at most this part of those that bisection leaves it. Where both do the same, as in blocks, the cuts of
@@ -14,31 +17,14 @@ const FEWER: f64 = 0.9;
 /// Points fill the box around them where they take this part of its places.
 const FULL: f64 = 0.9;
 
-/// Which of several processes has which sites, and why.
-#[derive(Clone, Debug)]
-pub struct Distribution {
-    /// The sites of each process.
-    pub partition: Partition,
-    /// In words.
-    pub why: String,
-}
-
 impl<const D: usize> Model<D> {
-    /// Which of `count` processes computes which sites; `is_shared` where families shall be spread over these as well.
-    ///
-    /// Sites are weighted by the bonds and cells around them, points by those of a family that lacks none where families are not known before they are spread.
-    pub fn partition(&self, count: usize, is_shared: bool) -> Partition {
-        let work = match &self.held.filter(|_| is_shared) {
-            Some(held) => self.work_before_families(&self.sites, held),
-            None => self.work_of_sites(),
-        };
-        by_work(&self.sites, &work, count)
+    /// Which of `count` processes computes which sites, weighted by the bonds and cells around them.
+    pub fn partition(&self, count: usize) -> Partition {
+        by_work(&self.sites, &self.work_of_sites(), count)
     }
 
-    /// Collective: which of `count` processes computes which sites: as families are distributed, where they are; else as a graph partitioner has it where that leaves fewer sites of others beside those of each; without `ranks`, by bisection.
-    ///
-    /// Sites are distributed by bisection also where families shall be spread, since then no process knows the graph, and where points on a lattice fill a box, since then the graph
-    /// does no better and takes as long to cut as families to find.
+    /// Collective: which of `count` processes computes which sites: as families are distributed, where they are, or will be if `is_shared`; else as a graph partitioner has it where that leaves fewer sites of others
+    /// beside those of each; without `ranks`, by bisection.
     pub fn distribute(
         &self,
         count: usize,
@@ -46,64 +32,73 @@ impl<const D: usize> Model<D> {
         ranks: Option<&dyn Ranks>,
     ) -> Distribution {
         if let Some(shared) = self.shared_families() {
-            return Distribution {
-                partition: shared.partition().clone(),
-                why: "coordinate bisection".to_owned(),
-            };
+            return shared.distribution().clone();
         }
-        let bisected = self.partition(count, is_shared);
-        let is_told_by_axes = is_shared && self.can_spread_families() || self.fills_a_box();
-        let Some(ranks) = ranks.filter(|_| count > 1 && !is_told_by_axes) else {
-            return Distribution {
-                partition: bisected,
-                why: "coordinate bisection".to_owned(),
-            };
-        };
-        // one process decides, for a partitioner need not do the same twice
-        let decided = (ranks.rank() == 0).then(|| self.by_graph(&bisected, ranks));
-        let (owners, why) = decided.unwrap_or_default();
-        let owners = ranks.gather_words(&owners).swap_remove(0);
-        let why = first_text(ranks, Some(&why)).unwrap_or_default();
-        let partition = match owners.is_empty() {
-            true => bisected,
-            false => Partition::of_owners(owners.iter().map(|&r| r as u32).collect(), count),
-        };
-        Distribution { partition, why }
+        if let Some(held) = self.held.filter(|_| is_shared) {
+            return self.distribute_before_families(&self.sites, &held, count, ranks);
+        }
+        let bisected = self.partition(count);
+        // the graph does no better there, and takes as long to cut as families to find
+        let is_full = self.is_lattice() && self.fills_a_box(&self.sites, self.spacing());
+        decided(bisected, ranks.filter(|_| !is_full), || self.site_graph())
     }
 
-    /// Whether all sites are points on a lattice, and these leave next to nothing of the box around them empty.
-    fn fills_a_box(&self) -> bool {
-        let is_point = |site: usize| self.point_of(site).is_some();
-        if !self.is_lattice() || !(0..self.sites.len()).all(is_point) {
-            return false;
-        }
+    /// Collective: the same of sites whose families are not known, and of no process will be: a graph partitioner cuts what is next to each other.
+    pub(super) fn distribute_before_families(
+        &self,
+        sites: &[Site<D>],
+        held: &HeldFamilies,
+        count: usize,
+        ranks: Option<&dyn Ranks>,
+    ) -> Distribution {
+        let bisected = by_work(sites, &self.work_before_families(sites, held), count);
+        let is_full = self.fills_a_box(sites, held.spacing);
+        decided(bisected, ranks.filter(|_| !is_full), || {
+            self.graph_before_families(sites, held.spacing)
+        })
+    }
+
+    /// Whether all sites are points, and leave next to nothing of the box around them empty.
+    fn fills_a_box(&self, sites: &[Site<D>], spacing: f64) -> bool {
+        let is_point = |site: &Site<D>| matches!(site.kind, SiteKind::Point(_));
         let (low, high) = self.mesh.bounds();
-        let places = ((high - low) / self.spacing()).product();
-        self.sites.len() as f64 >= FULL * places
+        let places = ((high - low) / spacing).product();
+        sites.iter().all(is_point) && sites.len() as f64 >= FULL * places
     }
 
-    /// The process of each site by a graph partitioner, nothing where bisection is as good, and the reason.
-    fn by_graph(&self, bisected: &Partition, ranks: &dyn Ranks) -> (Vec<u64>, String) {
-        let most = |each: &[usize]| each.iter().copied().max().unwrap_or(0);
-        let graph = self.site_graph();
-        let count = bisected.ranks();
-        let owners = match ranks.parts(&graph, count) {
-            Ok(owners) => owners,
-            Err(why) => return (Vec::new(), format!("coordinate bisection: {why}")),
-        };
-        let words = owners.iter().map(|&r| u64::from(r)).collect();
-        let [cut, other] = [bisected, &Partition::of_owners(owners, count)];
-        let [cut, other] = [cut, other].map(|partition| most(&partition.neighbours(&graph)));
-        if other as f64 <= FEWER * cut as f64 {
-            let why = format!(
-                "a graph partitioner: no process has more than {other} sites of others beside its own, {cut} by coordinate bisection"
-            );
-            return (words, why);
+    /// Which sites are next to each other: points a spacing apart, nodes of one element, and nodes and points between which no point lies.
+    fn graph_before_families(&self, sites: &[Site<D>], spacing: f64) -> NeighbourGraph {
+        let positions: Vec<Vector<D>> = sites.iter().map(|site| site.position).collect();
+        let mut site_of_node = vec![None; self.mesh.nodes.len()];
+        for (site, of) in (0..).zip(sites) {
+            if let SiteKind::Node(n) = of.kind {
+                site_of_node[n as usize] = Some(site);
+            }
         }
-        let why = format!(
-            "coordinate bisection: no process has more than {cut} sites of others beside its own, {other} by a graph partitioner"
-        );
-        (Vec::new(), why)
+        let bins = Bins::new(&positions, spacing);
+        let next = spacing * (1.0 + TIE_TOLERANCE);
+        let across = next * (D as f64).sqrt();
+        let is_point = |site: usize| matches!(sites[site].kind, SiteKind::Point(_));
+        let of_site = |site: usize| -> Vec<u32> {
+            let x = &positions[site];
+            let is_next = |other: &usize| match [site, *other].map(is_point) {
+                [true, true] => (positions[*other] - x).norm() <= next,
+                [false, false] => false,
+                _ => (positions[*other] - x).norm() <= across,
+            };
+            let near = bins
+                .around(x, across)
+                .filter(is_next)
+                .map(|other| other as u32);
+            let mut row: Vec<u32> = near.collect();
+            if let SiteKind::Node(n) = sites[site].kind {
+                let cells = self.cells_of_node(n).filter(|(c, _)| self.is_element(*c));
+                let nodes = cells.flat_map(|(c, _)| self.mesh.cell(c));
+                row.extend(nodes.filter_map(|&n| site_of_node[n as usize]));
+            }
+            row
+        };
+        NeighbourGraph::of_rows(parallel::map(sites.len(), 64, of_site))
     }
 
     /// Which sites take part in the forces of which others: the ends of bonds, and the nodes of elements.
@@ -124,8 +119,56 @@ impl<const D: usize> Model<D> {
     }
 }
 
+/// Collective: as a graph partitioner has it where that leaves fewer sites of others beside those of each than bisection does; without `ranks`, by bisection.
+fn decided(
+    bisected: Partition,
+    ranks: Option<&dyn Ranks>,
+    graph: impl FnOnce() -> NeighbourGraph,
+) -> Distribution {
+    let count = bisected.ranks();
+    let Some(ranks) = ranks.filter(|_| count > 1) else {
+        return Distribution {
+            partition: bisected,
+            why: "coordinate bisection".to_owned(),
+        };
+    };
+    // one process decides, for a partitioner need not do the same twice
+    let decided = (ranks.rank() == 0).then(|| by_graph(&graph(), &bisected, ranks));
+    let (owners, why) = decided.unwrap_or_default();
+    let owners = ranks.gather_words(&owners).swap_remove(0);
+    let why = first_text(ranks, Some(&why)).unwrap_or_default();
+    let partition = match owners.is_empty() {
+        true => bisected,
+        false => Partition::of_owners(owners.iter().map(|&r| r as u32).collect(), count),
+    };
+    Distribution { partition, why }
+}
+
+/// The process of each site by a graph partitioner, nothing where bisection is as good, and the reason.
+fn by_graph(graph: &NeighbourGraph, bisected: &Partition, ranks: &dyn Ranks) -> (Vec<u64>, String) {
+    let most = |each: &[usize]| each.iter().copied().max().unwrap_or(0);
+    let count = bisected.ranks();
+    let owners = match ranks.parts(graph, count) {
+        Ok(owners) => owners,
+        Err(why) => return (Vec::new(), format!("coordinate bisection: {why}")),
+    };
+    let words = owners.iter().map(|&r| u64::from(r)).collect();
+    let [cut, other] = [bisected, &Partition::of_owners(owners, count)];
+    let [cut, other] = [cut, other].map(|partition| most(&partition.neighbours(graph)));
+    if other as f64 <= FEWER * cut as f64 {
+        let why = format!(
+            "a graph partitioner: no process has more than {other} sites of others beside its own, {cut} by coordinate bisection"
+        );
+        return (words, why);
+    }
+    let why = format!(
+        "coordinate bisection: no process has more than {cut} sites of others beside its own, {other} by a graph partitioner"
+    );
+    (Vec::new(), why)
+}
+
 /// Sites over processes by what they cost.
-pub(super) fn by_work<const D: usize>(sites: &[Site<D>], work: &[f64], count: usize) -> Partition {
+fn by_work<const D: usize>(sites: &[Site<D>], work: &[f64], count: usize) -> Partition {
     let positions: Vec<[f64; 3]> = sites.iter().map(|s| padded(&s.position)).collect();
     Partition::by_bisection(&positions, work, count)
 }

@@ -22,6 +22,8 @@ pub(super) struct HeldFamilies {
     pub depth: f64,
     /// Bonds of a family that lacks none.
     pub full: usize,
+    /// Distance of neighbouring points \[m\].
+    pub spacing: f64,
 }
 
 impl HeldFamilies {
@@ -42,6 +44,7 @@ impl HeldFamilies {
             with_neighbours: reach == Reach::Neighbours || !law.is_pairwise(),
             depth: families as f64 * longest * (1.0 + TIE_TOLERANCE),
             full: places_within::<D>(longest / spacing * (1.0 + TIE_TOLERANCE)),
+            spacing,
         })
     }
 }

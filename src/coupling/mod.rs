@@ -74,7 +74,6 @@ pub mod zone_distance;
 pub use balanced::Balanced;
 pub use bins::Bins;
 pub use blending::{Blending, BlendingFunction};
-pub use distribution::Distribution;
 pub use exact_stresses::ExactStresses;
 pub use field_evaluation::{Carrier, Sampler};
 pub use impact::{ContactPatch, Impact, ImpactedSystem, ImpactorShape, RigidImpactor};
@@ -86,7 +85,7 @@ pub use problem::{
     HorizonField, Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces,
 };
 pub use semidiscrete::CoupledSystem;
-pub use shared_families::SharedFamilies;
+pub use shared_families::{Distribution, SharedFamilies};
 pub use splice::Splice;
 pub use state_transfer::{BrokenBonds, Carried, CarryError, Carrying};
 pub use tributary::Tributary;

@@ -3,8 +3,7 @@
 use crate::{
     coupling::{
         CellRole, Model, ModelError, SharedFamilies, Site, SiteKind, bins::Bins,
-        distribution::by_work, held_families::HeldFamilies, point_cloud::PointCloud,
-        shared_families::NONE,
+        held_families::HeldFamilies, point_cloud::PointCloud, shared_families::NONE,
     },
     peridynamics::{Accelerator, Families, PdBody, TIE_TOLERANCE, Wanted},
     system::{Ranks, Spread, first_text},
@@ -33,9 +32,9 @@ impl<const D: usize> Model<D> {
                 volume: cloud.volume[p],
             });
         }
-        let work = self.work_before_families(&sites, held);
-        let partition = by_work(&sites, &work, ranks.count());
-        let shared = SharedFamilies::new(partition, ranks.rank(), site_of_point);
+        let count = ranks.count();
+        let distribution = self.distribute_before_families(&sites, held, count, Some(ranks));
+        let shared = SharedFamilies::new(distribution, ranks.rank(), site_of_point);
         let mut own = shared.own();
         let mut others = self.beside_elements(&cloud.position, held.depth);
         // those in elements complete families of the seam

@@ -8,11 +8,20 @@ use crate::system::{Partition, Ranks, Spread};
 /// The site of a point that is none.
 pub(super) const NONE: u32 = u32::MAX;
 
+/// Which of several processes has which sites, and why.
+#[derive(Clone, Debug)]
+pub struct Distribution {
+    /// The sites of each process.
+    pub partition: Partition,
+    /// In words.
+    pub why: String,
+}
+
 /// Which process has the families of which points.
 #[derive(Clone, Debug)]
 pub struct SharedFamilies {
     /// Of the sites.
-    partition: Partition,
+    distribution: Distribution,
     rank: usize,
     /// The site of each point.
     site_of_point: Vec<u32>,
@@ -22,9 +31,9 @@ pub struct SharedFamilies {
 
 impl SharedFamilies {
     /// Of sites that have been distributed, by the site of each point; this process is number `rank`.
-    pub(super) fn new(partition: Partition, rank: usize, site_of_point: Vec<u32>) -> Self {
+    pub(super) fn new(distribution: Distribution, rank: usize, site_of_point: Vec<u32>) -> Self {
         Self {
-            partition,
+            distribution,
             rank,
             site_of_point,
             sizes: Vec::new(),
@@ -41,13 +50,18 @@ impl SharedFamilies {
     pub fn spread<'a>(&'a self, ranks: &'a dyn Ranks) -> Spread<'a> {
         Spread {
             ranks,
-            partition: &self.partition,
+            partition: self.partition(),
         }
     }
 
     /// Which process has which sites.
     pub fn partition(&self) -> &Partition {
-        &self.partition
+        &self.distribution.partition
+    }
+
+    /// The same, and why.
+    pub fn distribution(&self) -> &Distribution {
+        &self.distribution
     }
 
     /// The site of a point that is one.
@@ -60,7 +74,7 @@ impl SharedFamilies {
     pub fn own(&self) -> Vec<bool> {
         let owner = |&site: &u32| match site {
             NONE => 0,
-            site => self.partition.owner(site),
+            site => self.partition().owner(site),
         };
         let sites = self.site_of_point.iter();
         sites.map(|site| owner(site) == self.rank).collect()
@@ -69,7 +83,7 @@ impl SharedFamilies {
     /// Collective: the bonds of each point in `families` over the points, whoever holds them.
     pub fn sizes_of(&self, ranks: &dyn Ranks, families: &Families) -> Vec<u32> {
         let size = |p: usize| families.of(p).len();
-        let mut by_site = vec![0.0; self.partition.sites()];
+        let mut by_site = vec![0.0; self.partition().sites()];
         let points = self.site_of_point.iter().enumerate();
         for (p, &site) in points.clone().filter(|(_, site)| **site != NONE) {
             by_site[site as usize] = size(p) as f64;
