@@ -119,8 +119,7 @@ def text_of(law, more, n, steps, spacings=3, times=1, coupling="nonlocal"):
     """The scene; the step is about half a spacing over the speed of waves, which is one. It is at rest without steps, and coupled has four layers of elements at either end."""
     long = n * times
     motion = MOTION.format(duration=0.5 * steps) if steps else REST
-    ends = f"zones.nonlocal.box = {{ min = [4, 0, 0], max = [{long - 4}, {n}, {n}] }}"
-    zone = "" if coupling == "nonlocal" else ends
+    zone = "" if coupling == "nonlocal" else f"[zones.nonlocal]\nbox = {{ min = [4, 0, 0], max = [{long - 4}, {n}, {n}] }}"
     return SCENE.format(n=n, long=long, law=law, more=more, spacings=spacings, coupling=coupling, zone=zone, motion=motion)
 
 

@@ -76,8 +76,7 @@ pub(crate) fn factorised<const D: usize>(
 ) -> Result<(), Open> {
     let mut matrix = match model.spread(ranks) {
         Some(spread) => {
-            let all: Vec<u32> = (0..model.sites.len() as u32).collect();
-            spread.gather_rows(&all, |own| model.assemble_sites(operator, own, &Silent))
+            spread.gather_all_rows(D, |own| model.assemble_sites(operator, own, &Silent))
         }
         None => model.assemble(operator, progress),
     };

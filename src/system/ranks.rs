@@ -3,7 +3,7 @@
 //! All of them do the same, in the same order, with the same mesh; each computes the rows of its own sites. Whoever starts them supplies [`Ranks`]: the library
 //! knows no message passing. Sites are numbered anew for such a run, rank by rank, so that the rows of a rank follow one another.
 
-use super::{BlockCsr, NeighbourGraph, Partition, Symmetry};
+use super::{BlockCsr, NeighbourGraph, Partition, RowBatch, SharedRows, Symmetry};
 
 /// The processes of a run, as one of them sees them.
 ///
@@ -236,6 +236,24 @@ impl<'a> Spread<'a> {
             self.append_rows(sites, &own(&self.own_among(sites)), &mut all);
         }
         all
+    }
+
+    /// Collective: the rows of all sites, each from the rank that has it, with equal rows stored once.
+    pub fn gather_all_rows(&self, block: usize, own: impl Fn(&[u32]) -> BlockCsr) -> BlockCsr {
+        /// Rows of a batch.
+        const BATCH: usize = 256;
+        let sites: Vec<u32> = (0..self.partition.sites() as u32).collect();
+        let mut gathered = SharedRows::gather(block, sites.len());
+        for sites in sites.chunks(BATCH) {
+            let rows = self.gather_rows(sites, &own);
+            let mut batch = RowBatch::new(block);
+            for r in 0..rows.rows() {
+                let (columns, blocks) = rows.row(r);
+                batch.push(columns, blocks);
+            }
+            gathered.append(batch);
+        }
+        gathered.finish()
     }
 
     /// Collective: appends the rows of some sites to `all`, of which `own` are those of this rank.

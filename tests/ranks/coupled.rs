@@ -252,3 +252,26 @@ fn cracks_run_alike_where_families_of_a_coupled_zone_are_held_by_their_owner() {
         }
     }
 }
+
+/// Bonds that pass through a corner of the zone, from element to element, break too; no point at their ends is a site.
+#[test]
+fn broken_bonds_from_element_to_element_are_counted() {
+    let text = r#"
+kinematics = "plane-stress"
+coupling = "truncated"
+mesh.rectangle = { min = [0, 0], max = [16, 16], x = { cells = 16 }, y = { cells = 16 } }
+materials.m.bond-based = { youngs-modulus = 1000, density = 1, critical-stretch = 0.05 }
+peridynamics = { horizon = 2, points.lattice = { spacing = 1, origin = [0, 0] } }
+zones.nonlocal.box = { min = [-1, 4], max = [12, 13] }
+zones.damage-at-edge = "warn"
+conditions.right.traction = { on = "right", x = 80 }
+conditions.left.traction = { on = "left", x = -80 }
+solver.unproven = "warn"
+[solve.explicit]
+duration = 0.6
+outputs = 2
+history-interval = 0.1
+growing-modes = "warn"
+"#;
+    assert_same(text, &[1, 3]);
+}

@@ -1,7 +1,7 @@
 //! Bonds of a seam whose sites are moved by several processes, each its own: which of them a process computes, and what it has to know for these.
 //!
 //! The force on a site takes the parts that end there and the dilatations to which these hand their elongation, hence all parts of such a dilatation. A bond of which a part is known breaks wherever it is, by the same
-//! numbers; its cost is counted by the process of its first point, that of a dilatation by the process of its point, or of the first node of its element.
+//! numbers; its cost is counted by the process of its first end that is a site, that of a dilatation by the process of its point, or of the first node of its element.
 
 use super::{NonlinearSeam, counted_bonds::OwnBonds};
 use crate::system::ExactSum;
@@ -27,13 +27,16 @@ impl<const D: usize> NonlinearSeam<D> {
             let ends = self.ends[self.offsets[s]..self.offsets[s + 1]].iter();
             ends.for_each(|(part, _)| parts[*part as usize] = true);
         }
-        let counts = |ends: &[u32; 2]| {
-            let mut ends = ends.iter().map(|&p| site_of_point[p as usize]);
-            // a point that is no site has no process
-            ends.find(|&site| (site as usize) < own.len())
+        let counts = |bond: usize| {
+            let ends = self.bonds[bond].iter().map(|&p| site_of_point[p as usize]);
+            // a point in an element is no site; a bond between two of these ends on faces with all its parts
+            let on_faces = self.difference.row(self.first[bond] as usize);
+            let mut sites = ends.chain(on_faces.map(|(site, _)| site));
+            sites
+                .find(|&site| (site as usize) < own.len())
                 .is_some_and(is_own)
         };
-        let counted_bonds: Vec<bool> = self.bonds.iter().map(counts).collect();
+        let counted_bonds: Vec<bool> = (0..self.bonds.len()).map(counts).collect();
         for bond in (0..self.bonds.len()).filter(|&bond| counted_bonds[bond]) {
             parts[self.parts_of(bond)].fill(true);
         }
