@@ -56,7 +56,7 @@ pub(super) fn missed_peak<const D: usize>(
             .sum();
         let strain = sum * moment(p)?;
         let stress = tensor.contract(&(0.5 * (strain + strain.transpose())));
-        let across = stress_across(kinematics, &tensor, &stress);
+        let across = stress_across(kinematics, tensor, &stress);
         Some(von_mises(&principal(&stress, across)))
     };
     let points: Vec<u32> = (0..u.len() as u32).collect();
