@@ -131,11 +131,16 @@ const COUPLINGS: [&str; 4] = ["splice", "truncated", "blending", "partial-stress
 
 #[test]
 fn coupled_points_are_told_of_alike() {
-    for coupling in COUPLINGS {
-        for material in ["bond-based", "lps"] {
-            println!("{coupling} {material}");
-            assert_alike(&plate(coupling, material), &[3], &[]);
-        }
+    // of rows that are the body's own, one law each
+    for (coupling, material) in [
+        ("splice", "lps"),
+        ("truncated", "bond-based"),
+        ("truncated", "lps"),
+        ("blending", "lps"),
+        ("partial-stress", "bond-based"),
+    ] {
+        println!("{coupling} {material}");
+        assert_alike(&plate(coupling, material), &[3], &[]);
     }
 }
 
