@@ -8,7 +8,7 @@
 #![allow(unsafe_code)]
 
 use bondline::peridynamics::bond_force::{
-    BlockSetup, BondForce, BondPass, BondSetup, CriticalStretch, Failure, Kinematics, Layout,
+    BlockSetup, BondCriterion, BondForce, BondKinematics, BondPass, BondSetup, Failure, Layout,
     Storage, block_pass, bond_pass, instructions,
 };
 use bondline::peridynamics::contact::{Contact, ContactSetup};
@@ -111,7 +111,7 @@ fn lattice<const D: usize>(
     m: f64,
     law: Law,
     critical: Option<f64>,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
 ) -> Box<dyn BondPass<D>> {
     block_pass(&BlockSetup {
         counts,
@@ -151,9 +151,9 @@ fn list<const D: usize>(
         rows: &[],
         without_energy: &[],
         force: law.force(),
-        kinematics: Kinematics::Exact,
+        kinematics: BondKinematics::Exact,
         failure: critical.map(|s| Failure {
-            critical: CriticalStretch::Uniform(s),
+            critical: BondCriterion::Uniform(s),
             no_fail: &[],
         }),
         precracked: None,
@@ -353,7 +353,7 @@ fn roofline() {
     );
     println!("|---|---|---|---|---|---|---|");
     for law in [Law::Pmb, Law::Lps] {
-        let mut pass = lattice([80; 3], 3.0, law, Some(0.01), Kinematics::Exact);
+        let mut pass = lattice([80; 3], 3.0, law, Some(0.01), BondKinematics::Exact);
         let bonds = pass.bonds() as f64 / pass.points() as f64;
         // per point: u read, force written, both also in the box (once more read), numbers of points twice; LPS: dilatation, two coefficients and what neighbours see
         let point = 4.0 * 24.0
@@ -379,11 +379,11 @@ fn roofline() {
 fn row<const D: usize>(counts: [usize; D], m: f64) {
     for law in [Law::Pmb, Law::Lps] {
         let mut cells = Vec::new();
-        let exact = Kinematics::Exact;
+        let exact = BondKinematics::Exact;
         for (critical, kinematics) in [
             (Some(0.01), exact),
             (None, exact),
-            (None, Kinematics::Linear),
+            (None, BondKinematics::Linear),
         ] {
             let mut pass = lattice(counts, m, law, critical, kinematics);
             cells.push(median(time(&mut *pass, 7)));
@@ -422,7 +422,7 @@ fn threads() {
         let mut cases: Vec<(&str, Box<dyn BondPass<3>>)> = vec![
             (
                 "lattice 80³",
-                lattice([80; 3], 3.0, law, Some(0.01), Kinematics::Exact),
+                lattice([80; 3], 3.0, law, Some(0.01), BondKinematics::Exact),
             ),
             (
                 "list 46³",
@@ -491,8 +491,8 @@ fn against_lammps() {
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for law in [Law::Pmb, Law::Lps] {
         let mut passes = [
-            lattice([n; 3], 3.0, law, Some(0.01), Kinematics::Exact),
-            lattice([n; 3], 3.0, law, None, Kinematics::Exact),
+            lattice([n; 3], 3.0, law, Some(0.01), BondKinematics::Exact),
+            lattice([n; 3], 3.0, law, None, BondKinematics::Exact),
             list([n; 3], 3.0, law, Some(0.01), Storage::Double),
             list([n; 3], 3.0, law, Some(0.01), Storage::Single),
         ];
@@ -540,7 +540,7 @@ fn memory() {
     };
     for law in [Law::Pmb, Law::Lps] {
         measure(&format!("{} lattice", law.name()), &|| {
-            lattice([80; 3], 3.0, law, Some(0.01), Kinematics::Exact)
+            lattice([80; 3], 3.0, law, Some(0.01), BondKinematics::Exact)
         });
     }
     for law in [Law::Pmb, Law::Lps] {
@@ -564,7 +564,7 @@ fn scaling() {
         let mut cells = Vec::new();
         let mut bonds = 0.0;
         for (law, curve) in laws.into_iter().zip(&mut curves) {
-            let mut pass = lattice([n; 3], 3.0, law, Some(0.01), Kinematics::Exact);
+            let mut pass = lattice([n; 3], 3.0, law, Some(0.01), BondKinematics::Exact);
             bonds = pass.bonds() as f64;
             let nanoseconds = median(time(&mut *pass, if n < 50 { 25 } else { 7 }));
             // a pass over all bonds, which is what a step waits for

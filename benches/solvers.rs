@@ -7,7 +7,7 @@ use bondline::solve::krylov::{KrylovParams, conjugate_gradients, gmres};
 use bondline::solve::multigrid::{Multigrid, MultigridParams};
 use bondline::solve::ordering::{Ordering, SiteGraph};
 use bondline::solve::statics::{Method, StaticParams, StaticProblem, solve};
-use bondline::solve::stencils::{Lattice, splice};
+use bondline::solve::stencils::{StencilGrid, splice};
 use bondline::solve::{FreeDofs, FreeOperator};
 use bondline::system::{BlockCsr, Symmetry};
 use faer::Side;
@@ -22,13 +22,13 @@ mod symmetric;
 
 /// A matrix with the sites that belong to it.
 struct Case {
-    lattice: Lattice,
+    lattice: StencilGrid,
     matrix: BlockCsr,
     symmetry: Symmetry,
 }
 
 impl Case {
-    fn symmetric(lattice: Lattice, matrix: BlockCsr) -> Case {
+    fn symmetric(lattice: StencilGrid, matrix: BlockCsr) -> Case {
         Case {
             lattice,
             matrix,
@@ -37,7 +37,7 @@ impl Case {
     }
 
     /// PD in the middle half along each axis, FE around it.
-    fn spliced(lattice: Lattice, m: usize) -> Case {
+    fn spliced(lattice: StencilGrid, m: usize) -> Case {
         let inside = |x: [f64; 3]| {
             (0..lattice.dimension).all(|k| {
                 let half = 0.5 * (lattice.counts[k] - 1) as f64;
@@ -58,35 +58,37 @@ type Make = fn() -> Case;
 
 const CASES: [(&str, Make); 9] = [
     ("pd2d", || {
-        let l = Lattice::rectangle(240, 240);
+        let l = StencilGrid::rectangle(240, 240);
         Case::symmetric(l.clone(), l.bonds(6))
     }),
     ("pd2d-large", || {
-        let l = Lattice::rectangle(480, 480);
+        let l = StencilGrid::rectangle(480, 480);
         Case::symmetric(l.clone(), l.bonds(6))
     }),
     ("fe2d", || {
-        let l = Lattice::rectangle(400, 400);
+        let l = StencilGrid::rectangle(400, 400);
         Case::symmetric(l.clone(), l.elements())
     }),
     ("fe3d", || {
-        let l = Lattice::block(40, 40, 40);
+        let l = StencilGrid::block(40, 40, 40);
         Case::symmetric(l.clone(), l.elements())
     }),
     ("pd3d", || {
-        let l = Lattice::block(30, 30, 30);
+        let l = StencilGrid::block(30, 30, 30);
         Case::symmetric(l.clone(), l.bonds(3))
     }),
     ("splice2d-small", || {
-        Case::spliced(Lattice::rectangle(120, 120), 6)
+        Case::spliced(StencilGrid::rectangle(120, 120), 6)
     }),
     ("splice2d", || {
-        Case::spliced(Lattice::rectangle(240, 240), 6)
+        Case::spliced(StencilGrid::rectangle(240, 240), 6)
     }),
     ("splice3d-small", || {
-        Case::spliced(Lattice::block(18, 18, 18), 3)
+        Case::spliced(StencilGrid::block(18, 18, 18), 3)
     }),
-    ("splice3d", || Case::spliced(Lattice::block(30, 30, 30), 3)),
+    ("splice3d", || {
+        Case::spliced(StencilGrid::block(30, 30, 30), 3)
+    }),
 ];
 
 fn main() {
@@ -160,8 +162,8 @@ fn main() {
 
 /// Direct against Krylov over a range of sizes: where `Method::Auto` should change over.
 fn crossover() {
-    let flat = [40, 60, 80, 120, 160].map(|n| Lattice::rectangle(n, n));
-    let solid = [8, 10, 12, 16, 20].map(|n| Lattice::block(n, n, n));
+    let flat = [40, 60, 80, 120, 160].map(|n| StencilGrid::rectangle(n, n));
+    let solid = [8, 10, 12, 16, 20].map(|n| StencilGrid::block(n, n, n));
     for lattice in flat.into_iter().chain(solid) {
         let m = if lattice.dimension == 2 { 4 } else { 3 };
         let models = [

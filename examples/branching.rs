@@ -8,7 +8,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use bondline::observe::{
-    report::{self, Row, Table},
+    report::{self, Table, TableRow},
     summary::{Ended, MotionSummary},
 };
 use bondline_study::{
@@ -222,11 +222,11 @@ fn couplings() -> Result<Vec<Table>, Failure> {
         for (quantity, value) in rows {
             // what stopped early may have no branches
             if value.is_finite() {
-                table.push(Row::info(name, quantity, value));
+                table.push(TableRow::info(name, quantity, value));
             }
         }
         if let Some(why) = run.stopped() {
-            table.push(Row::refused(name, "dissipated, J/m", why));
+            table.push(TableRow::refused(name, "dissipated, J/m", why));
         }
     };
     push("full PD", &full);
@@ -234,7 +234,7 @@ fn couplings() -> Result<Vec<Table>, Failure> {
     for (number, (name, overrides)) in COUPLINGS.into_iter().enumerate() {
         match crack(&format!("coupling-{number}"), overrides, &output) {
             Ok(run) => push(name, &run),
-            Err(why) => refused.push(Row::refused(name, "dissipated, J/m", why.to_string())),
+            Err(why) => refused.push(TableRow::refused(name, "dissipated, J/m", why.to_string())),
         }
     }
     refused.into_iter().for_each(|row| table.push(row));
@@ -244,36 +244,36 @@ fn couplings() -> Result<Vec<Table>, Failure> {
 /// Where and when the crack branches, what it takes and how thin it is, against full peridynamics.
 fn push_accuracy(table: &mut Table, name: &str, full: &Crack, coupled: &Crack) {
     let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0).abs();
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         name,
         "branch point against full PD, mm",
         1e3 * (coupled.point - full.point).abs(),
         2.0,
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         name,
         "branch time against full PD, us",
         1e6 * (coupled.time - full.time).abs(),
         2.0,
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         name,
         "dissipated energy against full PD, %",
         percent(coupled.dissipated, full.dissipated),
         5.0,
     ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         name,
         "broken bonds against full PD, %",
         percent(coupled.broken, full.broken),
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         name,
         "asymmetry of the two tips at the end, mm",
         1e3 * coupled.asymmetry(),
         1.0,
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         name,
         "extent of the upper branch across at x = 85 mm: one branch, mm",
         1e3 * coupled.thickness,
@@ -301,9 +301,13 @@ fn tables() -> Result<Vec<Table>, Failure> {
     );
     let mut series = vec![];
     let alone = "full PD";
-    table.push(Row::info(alone, "branch point, mm", full.point * 1e3));
-    table.push(Row::info(alone, "branch time, us", full.time * 1e6));
-    table.push(Row::info(alone, "dissipated energy, J/m", full.dissipated));
+    table.push(TableRow::info(alone, "branch point, mm", full.point * 1e3));
+    table.push(TableRow::info(alone, "branch time, us", full.time * 1e6));
+    table.push(TableRow::info(
+        alone,
+        "dissipated energy, J/m",
+        full.dissipated,
+    ));
     let mut paths = |name: &str, crack: &Crack, stroke| {
         for (half, path) in ["upper", "lower"].iter().zip(&crack.paths) {
             let path = path.iter().map(|p| (p.0 * 1e3, p.1 * 1e3)).collect();
@@ -317,19 +321,19 @@ fn tables() -> Result<Vec<Table>, Failure> {
     for (k, what) in ["total time", "time of the steps alone"].iter().enumerate() {
         let ratio = full.seconds[k] / coupled.seconds[k];
         let what = format!("{what}, full PD over coupled");
-        let row = Row::info(name, &what, ratio);
+        let row = TableRow::info(name, &what, ratio);
         table.push(if ratio < 1.8 {
             row.differs("1.8 is wanted; docs/fracture.md says what it is lost to")
         } else {
             row
         });
     }
-    table.push(Row::info(
+    table.push(TableRow::info(
         name,
         "points over those of full PD",
         coupled.points as f64 / full.points as f64,
     ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         name,
         "sites over those of full PD",
         coupled.sites as f64 / full.sites as f64,

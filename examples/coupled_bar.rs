@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use bondline::coupling::Zone;
-use bondline::observe::report::{Columns, Format, Row, Table, exit_code, render};
+use bondline::observe::report::{Columns, Format, Table, TableRow, exit_code, render};
 use bondline_terminal::progress::TerminalProgress;
 use bondline_verify::bar::{self, Bar, ENCLOSED, EXACT, METHODS, PLANE_MEANS, Write};
 use bondline_verify::variable_horizon;
@@ -118,13 +118,13 @@ fn solve(arguments: &Arguments, scene: &str, name: &str, choice: &[&str]) -> mie
     bar::solve_and(scene, write, &TerminalProgress::on_stderr()).map_err(|e| miette::miette!("{e}"))
 }
 
-fn rows_1d(case: &str, bar: &Bar, exact: bool) -> Vec<Row> {
+fn rows_1d(case: &str, bar: &Bar, exact: bool) -> Vec<TableRow> {
     let error = "largest distance from the straight line, of the largest displacement";
     let value = bar.pointwise(|_| true);
     let first = if exact {
-        Row::at_most(case, error, value, EXACT)
+        TableRow::at_most(case, error, value, EXACT)
     } else {
-        Row::info(case, error, value)
+        TableRow::info(case, error, value)
             .because("bonds are missing at the two ends of the bar: a surface effect of peridynamics, not of a seam")
     };
     let mut rows = vec![first];
@@ -132,48 +132,53 @@ fn rows_1d(case: &str, bar: &Bar, exact: bool) -> Vec<Row> {
     rows
 }
 
-fn rows_3d(case: &str, bar: &Bar, exact: bool) -> Vec<Row> {
+fn rows_3d(case: &str, bar: &Bar, exact: bool) -> Vec<TableRow> {
     let all = |_| true;
     let means = "plane means: distance from the straight line";
-    let mut rows = vec![Row::at_most(case, means, bar.plane_means(all), PLANE_MEANS)];
+    let mut rows = vec![TableRow::at_most(
+        case,
+        means,
+        bar.plane_means(all),
+        PLANE_MEANS,
+    )];
     let sites = "every site: distance from the straight line";
     rows.push(if exact {
-        Row::at_most(case, sites, bar.pointwise(all), EXACT)
+        TableRow::at_most(case, sites, bar.pointwise(all), EXACT)
     } else {
-        Row::info(case, sites, bar.pointwise(all))
+        TableRow::info(case, sites, bar.pointwise(all))
             .because("bonds are missing at the free sides: a surface effect of peridynamics, which the enclosed bar does not have")
     });
     for zone in [Zone::Local, Zone::Transition, Zone::Nonlocal] {
         let name = bar::model_name(zone);
         let of = |z| z == zone;
-        rows.push(Row::info(
+        rows.push(TableRow::info(
             case,
             format!("{name}: plane means"),
             bar.plane_means(of),
         ));
-        rows.push(Row::info(
+        rows.push(TableRow::info(
             case,
             format!("{name}: every site"),
             bar.pointwise(of),
         ));
     }
     if let Some(pull) = bar.pull {
-        rows.push(Row::info(case, "pulling force / (E A u')", pull).with_reference(1.0));
+        rows.push(TableRow::info(case, "pulling force / (E A u')", pull).with_reference(1.0));
     }
     rows.extend(common(case, bar));
     rows
 }
 
-fn common(case: &str, bar: &Bar) -> Vec<Row> {
+fn common(case: &str, bar: &Bar) -> Vec<TableRow> {
     let summary = &bar.summary;
     vec![
-        Row::info(
+        TableRow::info(
             case,
             "out-of-balance force, of the applied force",
             summary.out_of_balance_relative,
         )
         .with_reference(0.0),
-        Row::info(case, "bonds", summary.sizes.bonds as f64),
-        Row::info(case, "sites", summary.sizes.sites as f64),
+        TableRow::info(case, "bonds", summary.sizes.bonds as f64),
+        TableRow::info(case, "sites", summary.sizes.sites as f64),
     ]
 }

@@ -5,7 +5,7 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use bondline::observe::report::{self, Row, Table};
+use bondline::observe::report::{self, Table, TableRow};
 use shared::{Columns, Failure, argument, between, run};
 
 mod shared;
@@ -58,7 +58,7 @@ fn tables() -> Result<Vec<Table>, Failure> {
                 73.0,
             ));
         }
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             "time at which it has run 30 mm, us",
             time * 1e6,
@@ -67,13 +67,13 @@ fn tables() -> Result<Vec<Table>, Failure> {
             None => reference = Some(([lower, upper], summary.total_seconds)),
             Some((angles, seconds)) => {
                 let off = (lower - angles[0]).abs().max((upper - angles[1]).abs());
-                table.push(Row::at_most(
+                table.push(TableRow::at_most(
                     name,
                     "angle against full PD, degrees",
                     off,
                     4.0,
                 ));
-                table.push(Row::info(
+                table.push(TableRow::info(
                     name,
                     "total time of full PD over coupled",
                     seconds / summary.total_seconds,

@@ -18,7 +18,7 @@ use bondline::{
     coupling::{CellRole, Sampler, SiteKind},
     fem,
     observe::{
-        report::{Columns, Format, Row, Table, exit_code, render},
+        report::{Columns, Format, Table, TableRow, exit_code, render},
         summary::RunSummary,
     },
     progress::Progress,
@@ -196,12 +196,12 @@ fn compare(table: &mut Table, name: &str, coupled: &Case, pd: &Case, limits: Opt
     ];
     for (k, (quantity, value)) in rows.into_iter().enumerate() {
         table.push(match limits {
-            Some(limits) => Row::at_most(name, quantity, value, limits[k]),
-            None => Row::info(name, quantity, value),
+            Some(limits) => TableRow::at_most(name, quantity, value, limits[k]),
+            None => TableRow::info(name, quantity, value),
         });
     }
     // the seam's opposite sides cancel where the plate is symmetric; `verify balance` has one side alone
-    table.push(Row::info(
+    table.push(TableRow::info(
         name,
         "out-of-balance force, relative",
         coupled.summary.out_of_balance_relative,
@@ -211,16 +211,16 @@ fn compare(table: &mut Table, name: &str, coupled: &Case, pd: &Case, limits: Opt
 /// Rows of what a case costs.
 fn costs(table: &mut Table, name: &str, case: &Case) {
     let s = &case.summary;
-    table.push(Row::info(name, "bonds", s.sizes.bonds as f64));
-    table.push(Row::info(name, "non-zeros", s.sizes.nonzeros as f64));
+    table.push(TableRow::info(name, "bonds", s.sizes.bonds as f64));
+    table.push(TableRow::info(name, "non-zeros", s.sizes.nonzeros as f64));
     for stage in ["sites and bonds", "assembly", "factorisation", "solve"] {
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             format!("{stage} [s]"),
             s.timings.seconds(stage),
         ));
     }
-    table.push(Row::info(name, "total [s]", case.seconds()));
+    table.push(TableRow::info(name, "total [s]", case.seconds()));
 }
 
 const METHODS: [(&str, &str); 7] = [
@@ -256,7 +256,7 @@ fn push_gmsh(accuracy: &mut Table, n: usize, progress: &dyn Progress) -> Result<
         progress,
         None,
     )?;
-    accuracy.push(Row::at_most(
+    accuracy.push(TableRow::at_most(
         "blending on the graded Gmsh mesh against the generated one",
         "slit opening, relative",
         (gmsh.lattice.opening() / generated.lattice.opening() - 1.0).abs(),
@@ -288,7 +288,7 @@ fn push_uncut(accuracy: &mut Table, n: usize, progress: &dyn Progress) -> Result
         &pd,
         Some(LIMITS),
     );
-    accuracy.push(Row::info(
+    accuracy.push(TableRow::info(
         "bonds across the slit cut / uncut",
         "slit opening, ratio",
         cut_opening / coupled.lattice.opening(),
@@ -325,7 +325,7 @@ fn same_lattice(progress: &dyn Progress, figures: Option<&Path>) -> Result<Vec<T
             name.starts_with("blending").then_some(LIMITS),
         );
         costs(&mut cost, name, &coupled);
-        cost.push(Row::info(
+        cost.push(TableRow::info(
             *name,
             "full PD / coupled, total",
             pd.seconds() / coupled.seconds(),
@@ -445,13 +445,13 @@ fn graded(
     );
     costs(&mut table, "splice, direct", &a);
     costs(&mut table, "full PD, direct", &pd);
-    table.push(Row::at_least(
+    table.push(TableRow::at_least(
         "splice, direct",
         "full PD / coupled, total",
         pd.seconds() / a.seconds(),
         least_ratio,
     ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         "splice, direct",
         "full PD / coupled, bonds",
         pd.summary.sizes.bonds as f64 / a.summary.sizes.bonds as f64,
@@ -469,7 +469,7 @@ fn graded(
     }
     costs(&mut table, "splice, multigrid", &krylov);
     costs(&mut table, "full PD, multigrid", &krylov_pd);
-    table.push(Row::info(
+    table.push(TableRow::info(
         "best solver of each",
         "full PD / coupled, total",
         totals[1] / totals[0],

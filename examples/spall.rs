@@ -9,7 +9,7 @@ use std::{
     process::ExitCode,
 };
 
-use bondline::observe::report::{self, Row, Table};
+use bondline::observe::report::{self, Table, TableRow};
 use bondline_study::line_plot::{LinePlot, Series, Stroke};
 use shared::{Columns, Failure, argument, at, between, run, running_mean};
 
@@ -110,7 +110,7 @@ fn push_surface(
         .copied()
         .unwrap_or_default();
     table.push(between(name, "time of the pullback dip", dip.0, 79.5, 82.0));
-    table.push(Row::info(
+    table.push(TableRow::info(
         name,
         "depth of the dip, running mean over 1.2",
         level - dip.1,
@@ -121,7 +121,7 @@ fn push_surface(
             .filter(|p| !(39.0..45.0).contains(&p.0) && !(79.0..90.0).contains(&p.0))
             .map(|p| (p.1 - at(reference, p.0)).abs() / IMPACT)
             .fold(0.0, f64::max);
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             name,
             "surface velocity against full PD, relative to the impact, running mean over 1.2",
             worst,
@@ -199,7 +199,7 @@ fn tables() -> Result<Vec<Table>, Failure> {
             .collect::<Result<Vec<_>, Failure>>()?;
         // the crack is a jump of velocity, both sides of it behind the release pulses at rest relative to each other
         let jump = at(&columns.history("x42_vx")?, 70.0) - at(&columns.history("x38_vx")?, 70.0);
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             "velocity at x = 42 less that at x = 38, t = 70",
             jump,

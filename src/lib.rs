@@ -78,6 +78,8 @@
 //! | [`observe`] | the only writers: VTU, CSV, JSON |
 //! | [`scene`] | TOML to a validated scene; the only module that knows TOML |
 //! | [`run`] | one run of a scene: laid out, proved, solved, written |
+//! | [`predict`] | what a run will need, without solving |
+//! | [`regular_file`] | refuses pipes, devices and folders in the place of a file |
 //!
 //! Other crates of the workspace stand on this one: `bondline-study` (many runs, `accuracy`, plots), `bondline-cli` (the program), `bondline-verify` (the suites that
 //! `bondline verify` prints), `bondline-python` (the Python package) and `bondline-terminal` (what programs share).

@@ -1,16 +1,336 @@
-//! Parallel loops whose machinery is compiled once for each type of item.
+//! Parallel loops whose machinery is compiled once.
 //!
-//! rayon compiles its splitting of work anew for each closure that it is given, and the closure itself several times within: where code is generic over the dimension, the
-//! law and the kind of pass, one loop came to dozens of copies, and all of them to a fifth of the program. Here the closure is called through a pointer. That costs a
-//! nanosecond for each item: a loop over single numbers goes by chunks of them.
+//! rayon compiles its splitting of work anew for each closure that it is given, for each type of item, and the closure itself several times within: where code is
+//! generic over the dimension, the law and the kind of pass, one loop came to dozens of copies, and all of them to a fifth of the program. Here one function splits
+//! a range of numbers, as rayon splits its own, and calls what a loop does with each part through a pointer. Loops over several slices at once
+//! ([`for_each`], [`for_each_with`], [`map_each`], [`list_each`], [`try_map_with`]) are rayon's, compiled once for each type of item.
 //!
 //! `at_least` is the least number of items of a task, one where nothing is gained by more. Where tasks end depends on the threads that are free, so that no result may.
 
-use rayon::iter::{
-    FromParallelIterator, IndexedParallelIterator, IntoParallelIterator,
-    IntoParallelRefMutIterator, MinLen, ParallelIterator,
-};
-use rayon::slice::ParallelSliceMut;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use rayon::iter::{FromParallelIterator, IndexedParallelIterator, ParallelIterator};
+
+/// Calls `body` with parts of the numbers below `count`, each number in one of them.
+#[inline(never)]
+fn for_parts(count: usize, at_least: usize, body: &(dyn Fn(Range<usize>) + Sync)) {
+    let parts = rayon::current_num_threads();
+    halve(0..count, (at_least.max(1), parts), false, body);
+}
+
+/// As rayon's own loops: a part is halved until there are as many as threads, and again where another thread has taken it.
+fn halve(
+    numbers: Range<usize>,
+    (at_least, parts): (usize, usize),
+    is_taken: bool,
+    body: &(dyn Fn(Range<usize>) + Sync),
+) {
+    let half = numbers.len() / 2;
+    if half < at_least || (parts == 0 && !is_taken) {
+        if !numbers.is_empty() {
+            body(numbers);
+        }
+        return;
+    }
+    let parts = match is_taken {
+        true => (parts / 2).max(rayon::current_num_threads()),
+        false => parts / 2,
+    };
+    let (first, middle, last) = (numbers.start, numbers.start + half, numbers.end);
+    let both = (at_least, parts);
+    rayon::join_context(
+        |left| halve(first..middle, both, left.migrated(), body),
+        |right| halve(middle..last, both, right.migrated(), body),
+    );
+}
+
+/// What `fill` adds to lists for parts of the numbers below `count`, in their order.
+fn gathered<T: Send>(
+    count: usize,
+    at_least: usize,
+    fill: &(dyn Fn(Range<usize>, &mut Vec<T>) + Sync),
+) -> Vec<T> {
+    let lists: Mutex<Vec<(usize, Vec<T>)>> = Mutex::default();
+    for_parts(count, at_least, &|numbers| {
+        let (first, mut list) = (numbers.start, Vec::new());
+        fill(numbers, &mut list);
+        // a list without an entry takes no memory
+        if !list.is_empty() {
+            let mut lists = lists.lock().unwrap_or_else(PoisonError::into_inner);
+            lists.push((first, list));
+        }
+    });
+    let mut lists = lists.into_inner().unwrap_or_else(PoisonError::into_inner);
+    lists.sort_unstable_by_key(|(first, _)| *first);
+    let total: usize = lists.iter().map(|(_, list)| list.len()).sum();
+    let mut lists = lists.into_iter().map(|(_, list)| list);
+    let mut all = lists.next().unwrap_or_default();
+    all.reserve_exact(total - all.len());
+    lists.for_each(|list| all.extend(list));
+    all
+}
+
+/// Loops whose tasks write to places of their own, without waiting for each other.
+// what makes a place belong to one task is that each number is in one part
+#[allow(unsafe_code)]
+mod places {
+    use super::for_parts;
+
+    /// Where values of the numbers below a count lie, each for the task that has its number.
+    struct Places<T>(*mut T);
+
+    // SAFETY: each value is used by one thread at a time, as if it had been sent there
+    unsafe impl<T: Send> Sync for Places<T> {}
+
+    impl<T> Places<T> {
+        /// The place of a value. By a method: closures would take the pointer alone, which is not to be shared.
+        ///
+        /// # Safety
+        /// There are more than `k` values.
+        unsafe fn of(&self, k: usize) -> *mut T {
+            // SAFETY: as the caller promises
+            unsafe { self.0.add(k) }
+        }
+    }
+
+    /// See [`super::map_with`]. Values that are there when a task panics are not dropped.
+    #[inline]
+    pub(crate) fn map_with<S, T: Send>(
+        count: usize,
+        at_least: usize,
+        new: impl Fn() -> S + Sync,
+        of: impl Fn(&mut S, usize) -> T + Sync,
+    ) -> Vec<T> {
+        let mut all: Vec<T> = Vec::with_capacity(count);
+        let places = Places(all.as_mut_ptr());
+        for_parts(count, at_least, &|numbers| {
+            let mut own = new();
+            for k in numbers {
+                let value = of(&mut own, k);
+                // SAFETY: k is below the capacity, and in one part
+                unsafe { places.of(k).write(value) };
+            }
+        });
+        // SAFETY: all parts together are all numbers
+        unsafe { all.set_len(count) };
+        all
+    }
+
+    /// See [`super::for_each_chunk`].
+    #[inline]
+    pub(crate) fn for_each_chunk<A: Send>(
+        values: &mut [A],
+        size: usize,
+        at_least: usize,
+        body: impl Fn(usize, &mut [A]) + Sync,
+    ) {
+        let count = values.len();
+        let places = Places(values.as_mut_ptr());
+        for_parts(count.div_ceil(size), at_least, &|chunks| {
+            for k in chunks {
+                let (first, size) = (k * size, size.min(count - k * size));
+                // SAFETY: chunks lie within the values and do not overlap, and each is in one part
+                body(k, unsafe {
+                    std::slice::from_raw_parts_mut(places.of(first), size)
+                });
+            }
+        });
+    }
+
+    /// See [`super::for_each_task`]. Tasks that are left when one panics are not dropped.
+    #[inline]
+    pub(crate) fn for_each_task<T: Send>(
+        mut tasks: Vec<T>,
+        at_least: usize,
+        body: impl Fn(usize, T) + Sync,
+    ) {
+        let count = tasks.len();
+        // SAFETY: from here on a task belongs to the part that has its number
+        unsafe { tasks.set_len(0) };
+        let places = Places(tasks.as_mut_ptr());
+        for_parts(count, at_least, &|numbers| {
+            for k in numbers {
+                // SAFETY: k is below the count, and in one part
+                body(k, unsafe { places.of(k).read() });
+            }
+        });
+    }
+}
+
+/// Calls `body` with the number of each chunk of `size` values, the last of which may be shorter, and the chunk.
+///
+/// # Panics
+/// For chunks without a value.
+#[inline]
+pub(crate) fn for_each_chunk<A: Send>(
+    values: &mut [A],
+    size: usize,
+    at_least: usize,
+    body: impl Fn(usize, &mut [A]) + Sync,
+) {
+    places::for_each_chunk(values, size, at_least, body);
+}
+
+/// Calls `body` with the number of each value and the value.
+#[inline]
+pub(crate) fn for_each_mut<A: Send>(
+    values: &mut [A],
+    at_least: usize,
+    body: impl Fn(usize, &mut A) + Sync,
+) {
+    places::for_each_chunk(values, 1, at_least, |k, value| body(k, &mut value[0]));
+}
+
+/// Calls `body` with the number of each task and the task.
+#[inline]
+pub(crate) fn for_each_task<T: Send>(
+    tasks: Vec<T>,
+    at_least: usize,
+    body: impl Fn(usize, T) + Sync,
+) {
+    places::for_each_task(tasks, at_least, body);
+}
+
+/// `of` each number below `count`, in their order.
+#[inline]
+pub(crate) fn map<T: Send>(
+    count: usize,
+    at_least: usize,
+    of: impl Fn(usize) -> T + Sync,
+) -> Vec<T> {
+    places::map_with(count, at_least, || (), |(), k| of(k))
+}
+
+/// `of` each value, in their order.
+#[inline]
+pub(crate) fn map_slice<'a, A: Sync, T: Send>(
+    values: &'a [A],
+    of: impl Fn(&'a A) -> T + Sync,
+) -> Vec<T> {
+    map(values.len(), 1, |k| of(&values[k]))
+}
+
+/// `of` the number of each chunk of `size` values, the last of which may be shorter, and the chunk, in their order.
+#[inline]
+pub(crate) fn map_chunks<'a, A: Sync, T: Send>(
+    values: &'a [A],
+    size: usize,
+    of: impl Fn(usize, &'a [A]) -> T + Sync,
+) -> Vec<T> {
+    let count = values.len();
+    map(count.div_ceil(size), 1, |k| {
+        of(k, &values[k * size..count.min((k + 1) * size)])
+    })
+}
+
+/// `of` each number below `count`, in their order, with what `new` makes for each task.
+#[inline]
+pub(crate) fn map_with<S, T: Send>(
+    count: usize,
+    at_least: usize,
+    new: impl Fn() -> S + Sync,
+    of: impl Fn(&mut S, usize) -> T + Sync,
+) -> Vec<T> {
+    places::map_with(count, at_least, new, of)
+}
+
+/// `of` each number below `count`, in their order.
+///
+/// # Errors
+/// One of those of `of`; not always the same where there are several.
+#[inline]
+pub(crate) fn try_map<T: Send, E: Send>(
+    count: usize,
+    at_least: usize,
+    of: impl Fn(usize) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
+    let has_failed = AtomicBool::new(false);
+    let error = Mutex::new(None);
+    let all = gathered(count, at_least, &|numbers, list| {
+        list.reserve_exact(numbers.len());
+        for k in numbers {
+            if has_failed.load(Ordering::Relaxed) {
+                return;
+            }
+            match of(k) {
+                Ok(value) => list.push(value),
+                Err(e) => {
+                    has_failed.store(true, Ordering::Relaxed);
+                    *error.lock().unwrap_or_else(PoisonError::into_inner) = Some(e);
+                }
+            }
+        }
+    });
+    match error.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(e) => Err(e),
+        None => Ok(all),
+    }
+}
+
+/// What `of` finds for numbers below `count`, in their order.
+#[inline]
+pub(crate) fn filter_map<T: Send>(
+    count: usize,
+    at_least: usize,
+    of: impl Fn(usize) -> Option<T> + Sync,
+) -> Vec<T> {
+    gathered(count, at_least, &|numbers, list| {
+        list.extend(numbers.filter_map(&of));
+    })
+}
+
+/// What `add` adds to a list for the numbers below `count`, in their order.
+#[inline]
+pub(crate) fn listed<T: Send>(
+    count: usize,
+    at_least: usize,
+    add: impl Fn(usize, &mut Vec<T>) + Sync,
+) -> Vec<T> {
+    gathered(count, at_least, &|numbers, list| {
+        for k in numbers {
+            add(k, list);
+        }
+    })
+}
+
+/// What `of` finds for the first number below `count` for which it finds something.
+#[inline]
+pub(crate) fn find_first<T: Send>(
+    count: usize,
+    at_least: usize,
+    of: impl Fn(usize) -> Option<T> + Sync,
+) -> Option<T> {
+    let first = AtomicUsize::new(usize::MAX);
+    let found: Mutex<Option<(usize, T)>> = Mutex::new(None);
+    for_parts(count, at_least, &|mut numbers| {
+        let mut sought = numbers
+            .by_ref()
+            .take_while(|k| *k < first.load(Ordering::Relaxed));
+        if let Some((k, value)) = sought.find_map(|k| of(k).map(|value| (k, value))) {
+            first.fetch_min(k, Ordering::Relaxed);
+            let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
+            if found.as_ref().is_none_or(|(other, _)| k < *other) {
+                *found = Some((k, value));
+            }
+        }
+    });
+    let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    found.map(|(_, value)| value)
+}
+
+/// Whether all numbers below `count` are as asked.
+#[inline]
+pub(crate) fn all(count: usize, at_least: usize, is: impl Fn(usize) -> bool + Sync) -> bool {
+    let are = AtomicBool::new(true);
+    for_parts(count, at_least, &|mut numbers| {
+        if !numbers.all(|k| are.load(Ordering::Relaxed) && is(k)) {
+            are.store(false, Ordering::Relaxed);
+        }
+    });
+    are.into_inner()
+}
 
 /// Calls `body` with each item of what rayon iterates over.
 #[inline]
@@ -84,107 +404,6 @@ where
     })
 }
 
-/// Calls `body` with the number of each chunk of `size` values, the last of which may be shorter, and the chunk.
-///
-/// # Panics
-/// For chunks without a value.
-#[inline]
-pub(crate) fn for_each_chunk<A: Send>(
-    values: &mut [A],
-    size: usize,
-    at_least: usize,
-    body: impl Fn(usize, &mut [A]) + Sync,
-) {
-    let chunks = values.par_chunks_mut(size).enumerate();
-    for_each(chunks.with_min_len(at_least), |(k, chunk)| body(k, chunk));
-}
-
-/// Calls `body` with the number of each value and the value.
-#[inline]
-pub(crate) fn for_each_mut<A: Send>(
-    values: &mut [A],
-    at_least: usize,
-    body: impl Fn(usize, &mut A) + Sync,
-) {
-    let all = values.par_iter_mut().enumerate();
-    for_each(all.with_min_len(at_least), |(k, value)| body(k, value));
-}
-
-/// Calls `body` with the number of each task and the task.
-#[inline]
-pub(crate) fn for_each_task<T: Send>(
-    tasks: Vec<T>,
-    at_least: usize,
-    body: impl Fn(usize, T) + Sync,
-) {
-    let all = tasks.into_par_iter().enumerate();
-    for_each(all.with_min_len(at_least), |(k, task)| body(k, task));
-}
-
-fn numbers(count: usize, at_least: usize) -> MinLen<rayon::range::Iter<usize>> {
-    (0..count).into_par_iter().with_min_len(at_least)
-}
-
-/// `of` each number below `count`, in their order.
-#[inline]
-pub(crate) fn map<T: Send>(
-    count: usize,
-    at_least: usize,
-    of: impl Fn(usize) -> T + Sync,
-) -> Vec<T> {
-    mapped(numbers(count, at_least), &of)
-}
-
-/// `of` each value, in their order.
-#[inline]
-pub(crate) fn map_slice<'a, A: Sync, T: Send>(
-    values: &'a [A],
-    of: impl Fn(&'a A) -> T + Sync,
-) -> Vec<T> {
-    map(values.len(), 1, |k| of(&values[k]))
-}
-
-/// `of` each number below `count`, in their order, with what `new` makes for each task.
-#[inline]
-pub(crate) fn map_with<S, T: Send>(
-    count: usize,
-    at_least: usize,
-    new: impl Fn() -> S + Sync,
-    of: impl Fn(&mut S, usize) -> T + Sync,
-) -> Vec<T> {
-    mapped_with(numbers(count, at_least), &new, &of)
-}
-
-#[inline(never)]
-fn mapped_with<S, T: Send>(
-    numbers: MinLen<rayon::range::Iter<usize>>,
-    new: &(dyn Fn() -> S + Sync),
-    of: &(dyn Fn(&mut S, usize) -> T + Sync),
-) -> Vec<T> {
-    numbers.map_init(new, of).collect()
-}
-
-/// `of` each number below `count`, in their order.
-///
-/// # Errors
-/// One of those of `of`; not always the same where there are several.
-#[inline]
-pub(crate) fn try_map<T: Send, E: Send>(
-    count: usize,
-    at_least: usize,
-    of: impl Fn(usize) -> Result<T, E> + Sync,
-) -> Result<Vec<T>, E> {
-    tried(numbers(count, at_least), &of)
-}
-
-#[inline(never)]
-fn tried<T: Send, E: Send>(
-    numbers: MinLen<rayon::range::Iter<usize>>,
-    of: &(dyn Fn(usize) -> Result<T, E> + Sync),
-) -> Result<Vec<T>, E> {
-    numbers.map(of).collect()
-}
-
 /// `of` each item of what rayon iterates over, in their order, with what `new` makes for each task.
 ///
 /// # Errors
@@ -217,85 +436,10 @@ where
     items.map_init(new, of).collect()
 }
 
-/// What `of` finds for numbers below `count`, in their order.
-#[inline]
-pub(crate) fn filter_map<T: Send>(
-    count: usize,
-    at_least: usize,
-    of: impl Fn(usize) -> Option<T> + Sync,
-) -> Vec<T> {
-    filtered(numbers(count, at_least), &of)
-}
-
-#[inline(never)]
-fn filtered<T: Send>(
-    numbers: MinLen<rayon::range::Iter<usize>>,
-    of: &(dyn Fn(usize) -> Option<T> + Sync),
-) -> Vec<T> {
-    numbers.filter_map(of).collect()
-}
-
-/// What `add` adds to a list for the numbers below `count`, in their order.
-#[inline]
-pub(crate) fn listed<T: Send>(
-    count: usize,
-    at_least: usize,
-    add: impl Fn(usize, &mut Vec<T>) + Sync,
-) -> Vec<T> {
-    all_listed(numbers(count, at_least), &add)
-}
-
-#[inline(never)]
-fn all_listed<T: Send>(
-    numbers: MinLen<rayon::range::Iter<usize>>,
-    add: &(dyn Fn(usize, &mut Vec<T>) + Sync),
-) -> Vec<T> {
-    let lists = numbers.fold(Vec::new, |mut list, k| {
-        add(k, &mut list);
-        list
-    });
-    // a list without an entry takes no memory
-    lists.reduce(Vec::new, |mut all, more| {
-        all.extend(more);
-        all
-    })
-}
-
-/// What `of` finds for the first number below `count` for which it finds something.
-#[inline]
-pub(crate) fn find_first<T: Send>(
-    count: usize,
-    at_least: usize,
-    of: impl Fn(usize) -> Option<T> + Sync,
-) -> Option<T> {
-    found_first(numbers(count, at_least), &of)
-}
-
-#[inline(never)]
-fn found_first<T: Send>(
-    numbers: MinLen<rayon::range::Iter<usize>>,
-    of: &(dyn Fn(usize) -> Option<T> + Sync),
-) -> Option<T> {
-    numbers.find_map_first(of)
-}
-
-/// Whether all numbers below `count` are as asked.
-#[inline]
-pub(crate) fn all(count: usize, at_least: usize, is: impl Fn(usize) -> bool + Sync) -> bool {
-    are_all(numbers(count, at_least), &is)
-}
-
-#[inline(never)]
-fn are_all(
-    numbers: MinLen<rayon::range::Iter<usize>>,
-    is: &(dyn Fn(usize) -> bool + Sync),
-) -> bool {
-    numbers.all(is)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rayon::prelude::*;
 
     const COUNT: usize = 1000;
 

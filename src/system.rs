@@ -2,6 +2,13 @@
 //!
 //! A solver sees sites with positions, a block-sparse stiffness `K` with `K u = f`, and whether `K` is symmetric.
 //! It never learns that coupling exists.
+//!
+//! | file | what |
+//! |---|---|
+//! | `shared_blocks.rs`, `spmv.rs`, `exact_sum.rs`, `segments.rs` | rows that share blocks; products, exact sums, ranges of sites |
+//! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | what elements and springs add to the tangent |
+//! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
+//! | `wrapped.rs` | a system around another one |
 
 use crate::parallel;
 

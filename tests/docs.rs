@@ -1,4 +1,4 @@
-//! The pages under `docs/` and the sources say the same: keys of the literature resolve, links lead somewhere, scenes in the pages are valid.
+//! The pages under `docs/` and the sources say the same: keys of the literature resolve, links and paths lead somewhere, scenes in the pages are valid.
 
 use bondline::AnyScene;
 use bondline::scene::{SceneSpec, Source};
@@ -114,6 +114,101 @@ fn links_between_pages_lead_somewhere() {
         }
     }
     assert!(count > 10, "only {count} links found");
+}
+
+/// Folders with which a path in the repository begins.
+const FOLDERS: [&str; 7] = [
+    "src", "crates", "tests", "examples", "benches", "docs", ".ci",
+];
+
+/// Text in backticks, outside of fenced blocks.
+fn spans(text: &str) -> impl Iterator<Item = &str> {
+    text.split("\n```")
+        .step_by(2)
+        .flat_map(|prose| prose.split('`').skip(1).step_by(2))
+}
+
+/// The path in the repository that a text in backticks is, up to a name in capitals, which stands for any.
+fn repository_path(span: &str) -> Option<PathBuf> {
+    let is_of_path = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
+    let (folder, _) = span.split_once('/')?;
+    if !FOLDERS.contains(&folder) || !span.chars().all(is_of_path) {
+        return None;
+    }
+    let is_name = |name: &&str| name.is_empty() || !name.chars().all(|c| c.is_ascii_uppercase());
+    Some(span.split('/').take_while(is_name).collect())
+}
+
+/// The comment of a module, without `//!`.
+fn header(source: &str) -> String {
+    let lines = source.lines().filter_map(|l| l.strip_prefix("//!"));
+    lines
+        .flat_map(|l| [l.strip_prefix(' ').unwrap_or(l), "\n"])
+        .collect()
+}
+
+/// All sources, with the comments of their modules.
+fn headers() -> Vec<(PathBuf, String)> {
+    ["src", "crates", "tests", "examples", "benches"]
+        .iter()
+        .flat_map(|folder| files(&root().join(folder), &["rs"]))
+        .map(|path| {
+            let source = fs::read_to_string(&path).unwrap();
+            (path, header(&source))
+        })
+        .collect()
+}
+
+#[test]
+fn paths_in_backticks_are_in_the_repository() {
+    // these two tell of what was: a file that they name may have gone since
+    let past = ["docs/notes.md", "CHANGELOG.md"].map(|p| root().join(p));
+    let mut texts = headers();
+    for page in pages().into_iter().filter(|page| !past.contains(page)) {
+        let text = fs::read_to_string(&page).unwrap();
+        texts.push((page, text));
+    }
+    let mut count = 0;
+    for (file, text) in &texts {
+        for path in spans(text).filter_map(repository_path) {
+            assert!(
+                root().join(&path).exists(),
+                "{} in {} is not there",
+                path.display(),
+                file.display()
+            );
+            count += 1;
+        }
+    }
+    assert!(count > 100, "only {count} paths found");
+}
+
+/// Files and folders in the first column of the tables of a module's comment.
+fn rows(header: &str) -> impl Iterator<Item = &str> {
+    header
+        .lines()
+        .filter_map(|line| line.strip_prefix('|')?.split_once('|'))
+        .flat_map(|(cell, _)| cell.split('`').skip(1).step_by(2))
+        .filter(|name| name.ends_with(".rs") || name.ends_with('/'))
+}
+
+#[test]
+fn tables_of_modules_name_files_beside_them() {
+    let mut count = 0;
+    for (file, header) in headers() {
+        // a module `x.rs` has its parts in `x/`
+        let own = file.with_extension("");
+        let folders = [file.parent().unwrap(), own.as_path()];
+        for name in rows(&header) {
+            assert!(
+                folders.iter().any(|folder| folder.join(name).exists()),
+                "{name} in the table of {} is not there",
+                file.display()
+            );
+            count += 1;
+        }
+    }
+    assert!(count > 300, "only {count} rows found");
 }
 
 /// Fenced blocks of TOML.

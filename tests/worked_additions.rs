@@ -113,7 +113,7 @@ fn rows(path: &Path) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// What the program needs, without tests and suites.
+/// What the program needs, without tests and suites, and the page of keys, which additions change too.
 fn packages(root: &Path) -> Files {
     let mut files = Files::new();
     read(root, Path::new("src"), &mut files);
@@ -140,6 +140,9 @@ fn packages(root: &Path) -> Files {
     }
     let lock = fs::read_to_string(root.join("Cargo.lock")).unwrap();
     files.insert("Cargo.lock".into(), lock);
+    let reference = Path::new("docs/scene.md");
+    let keys = fs::read_to_string(root.join(reference)).unwrap();
+    files.insert(reference.into(), keys);
     let program = Path::new("src/bin").join(NAME).with_extension("rs");
     files.insert(program, PROGRAM.to_owned());
     files

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use bondline::observe::{
-    report::{Format, Row, Table, exit_code, render},
+    report::{Format, Table, TableRow, exit_code, render},
     summary::RunSummary,
 };
 use bondline_terminal::progress::TerminalProgress;
@@ -90,9 +90,15 @@ pub fn run(
 }
 
 /// A figure that must lie from `low` to `high`.
-pub fn between(case: &str, quantity: impl Into<String>, value: f64, low: f64, high: f64) -> Row {
+pub fn between(
+    case: &str,
+    quantity: impl Into<String>,
+    value: f64,
+    low: f64,
+    high: f64,
+) -> TableRow {
     let middle = 0.5 * (low + high);
-    Row::within(
+    TableRow::within(
         case,
         quantity,
         value,

@@ -4,6 +4,11 @@ use rustc_hash::FxHashMap;
 
 use crate::tensor::Vector;
 
+/// The bin of a position, of cubes of that edge from the origin on.
+pub fn bin_of<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {
+    std::array::from_fn(|i| (x[i] / size).floor() as i64)
+}
+
 /// Positions sorted into bins, to find those near a node without looking at all of them.
 pub struct Bins<const D: usize> {
     size: f64,
@@ -15,13 +20,9 @@ impl<const D: usize> Bins<D> {
     pub fn new(positions: &[Vector<D>], size: f64) -> Self {
         let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
         for (k, x) in positions.iter().enumerate() {
-            bins.entry(Self::bin(x, size)).or_default().push(k as u32);
+            bins.entry(bin_of(x, size)).or_default().push(k as u32);
         }
         Self { size, bins }
-    }
-
-    fn bin(x: &Vector<D>, size: f64) -> [i64; D] {
-        std::array::from_fn(|i| (x[i] / size).floor() as i64)
     }
 
     /// The numbers of all positions in bins that a ball meets, and of no others.
@@ -32,7 +33,7 @@ impl<const D: usize> Bins<D> {
 
     /// The numbers of all positions in bins that a box meets, and of no others.
     pub fn in_box(&self, low: Vector<D>, high: Vector<D>) -> impl Iterator<Item = usize> + '_ {
-        let (low, high) = (Self::bin(&low, self.size), Self::bin(&high, self.size));
+        let (low, high) = (bin_of(&low, self.size), bin_of(&high, self.size));
         let counts: [usize; D] = std::array::from_fn(|i| (high[i] - low[i] + 1) as usize);
         (0..counts.iter().product::<usize>())
             .map(move |index| {

@@ -3,7 +3,8 @@
 use crate::{
     assembly::Row,
     coupling::{
-        CellRole, Coupling, Model, ModelError, Operator, Rows, Zone,
+        CellRole, Coupling, ExactStresses, MixedRows, Model, ModelError, Operator, Rows, SeamBonds,
+        Zone,
         held_families::depth_of_seam,
         least_squares_gradient::{self, DerivativeWeights},
         zone_distance::Edge,
@@ -30,7 +31,7 @@ pub enum BlendingFunction {
 }
 
 impl BlendingFunction {
-    /// `β̂` at the relative distance `s` from the local side.
+    /// `β̂` of [SAND2015-7998] eq. (3.9) at the relative distance `s` from the local side.
     pub fn value(self, s: f64) -> f64 {
         match self {
             Self::Constant => 0.5,
@@ -40,7 +41,7 @@ impl BlendingFunction {
     }
 }
 
-/// Force-based blending, [SAND2015-7998] eq. (3.9)–(3.14), and the same idea carried to state-based laws.
+/// Force-based blending, [SAND2015-7998] eq. (3.14), and the same idea carried to state-based laws: β of (3.9), weights of (3.12), the expansion of (3.13).
 ///
 /// The transition zone of the scene is the blending region `B_b`. Points fill it and a collar of one horizon around it, since a bond is weighted by
 /// `w = (β(x) + β(x′))/2`, which is not 0 there. What the weights `w` take from the force state is given back through the Taylor expansion of the
@@ -108,6 +109,8 @@ pub(super) const CLOSED: f64 = 1.0 + 1e-6;
 const OPEN: f64 = 1.0 - 1e-9;
 
 /// The roles of cells where points fill the nonlocal and transition zones, or the first alone, and a collar of width `reach` around them.
+///
+/// With a collar of one horizon the points cover `B_t` of [SAND2015-7998] eq. (3.11), where the mean (3.10) of β over a family lies between 0 and 1.
 pub(super) fn with_collar<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],
@@ -133,7 +136,7 @@ pub(super) fn with_collar<const D: usize>(
         .collect()
 }
 
-/// β at every point of the cloud: 1 in the nonlocal zone, 0 in the local one, `function` in between or, without one, 0.
+/// β of [SAND2015-7998] eq. (3.9) at every point of the cloud: 1 in the nonlocal zone, 0 in the local one, `function` in between or, without one, 0.
 pub(super) fn at_points<const D: usize>(
     function: Option<BlendingFunction>,
     model: &Model<D>,
@@ -217,7 +220,7 @@ impl<'a, const D: usize> Blended<'a, D> {
         })
     }
 
-    /// The weights of the bond from point `i` to point `j`, for what it does by itself and for the state part.
+    /// The weights of the bond from point `i` to point `j`, for what it does by itself and for the state part: `(β(x) + β(x′))/2` of [SAND2015-7998] eq. (3.12) where no share is that of a splice.
     fn weights(&self, i: usize, j: usize) -> [f64; 2] {
         let (own, mean) = (self.beta[i], 0.5 * (self.beta[i] + self.beta[j]));
         [self.share.pair, self.share.state].map(|s| s * own + (1.0 - s) * mean)
@@ -243,13 +246,25 @@ impl<const D: usize> Operator<D> for Blended<'_, D> {
             .is_some_and(|(_, i)| self.beta[i] == 1.0 && self.derivatives[i].is_none())
     }
 
+    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
+        None
+    }
+
+    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
+        None
+    }
+
+    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
+        None
+    }
+
     fn beta(&self, site: usize) -> f64 {
         self.model.point_of(site).map_or(0.0, |(_, i)| self.beta[i])
     }
 }
 
 impl<const D: usize> Blended<'_, D> {
-    /// Adds what the weights took away, expanded at the point: the second and third terms of [SAND2015-7998] eq. (3.14).
+    /// Adds what the weights took away, expanded at the point by [SAND2015-7998] eq. (3.13): the second and third terms of (3.14), whose first is the weighted row.
     fn add_remainder(&self, i: usize, at: &DerivativeWeights<D>, row: &mut Row<D>) {
         let body = self.body;
         let (pair, omega) = body.kernel(i);

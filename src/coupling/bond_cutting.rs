@@ -3,7 +3,7 @@
 use rustc_hash::FxHashSet;
 
 use crate::{
-    coupling::{ModelError, Peridynamics, PointSource, point_cloud::PointCloud},
+    coupling::{ModelError, Peridynamics, PointSource, bins::bin_of, point_cloud::PointCloud},
     mesh::{Mesh, boundary::BoundaryFacet, visibility::SegmentCutter},
     parallel,
     peridynamics::{
@@ -64,8 +64,8 @@ impl<const D: usize> NearBins<D> {
             let (low, high) = mesh.bounds_of(&facet.nodes);
             let margin = Vector::repeat(size * (1.0 + 1e-6));
             let (from, to) = (
-                Self::bin(&(low - margin), size),
-                Self::bin(&(high + margin), size),
+                bin_of(&(low - margin), size),
+                bin_of(&(high + margin), size),
             );
             let counts: [usize; D] = std::array::from_fn(|i| (to[i] - from[i] + 1) as usize);
             for index in 0..counts.iter().product::<usize>() {
@@ -80,12 +80,8 @@ impl<const D: usize> NearBins<D> {
         Self { size, bins }
     }
 
-    fn bin(x: &Vector<D>, size: f64) -> [i64; D] {
-        std::array::from_fn(|i| (x[i] / size).floor() as i64)
-    }
-
     fn contains(&self, x: &Vector<D>) -> bool {
-        self.bins.contains(&Self::bin(x, self.size))
+        self.bins.contains(&bin_of(x, self.size))
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     coupling::{Model, ModelError},
     material::LocalLaw,
-    peridynamics::{Accelerator, BondWeights, CauchyBorn, Law, bond_force::Kinematics},
+    peridynamics::{Accelerator, BondWeights, CauchyBorn, Law, bond_force::BondKinematics},
 };
 
 /// Largest difference, over the size of the tensor, between what a family carries and the elements' own stiffness that is taken for round-off.
@@ -16,7 +16,7 @@ impl<const D: usize> Model<D> {
     ///
     /// # Errors
     /// [`ModelError::Unsupported`] for points that have no such family in common, and for a law that remembers; [`ModelError::Family`] for a family that is too small.
-    pub fn follow_bonds(&mut self, kinematics: Kinematics) -> Result<(), ModelError> {
+    pub fn follow_bonds(&mut self, kinematics: BondKinematics) -> Result<(), ModelError> {
         let Some(p) = &self.peridynamics else {
             return Ok(());
         };
@@ -68,7 +68,7 @@ impl<const D: usize> Model<D> {
             };
             let law = Arc::new(law);
             let is_solid = matches!(p.accelerator(), Some(Accelerator::Solid { .. }));
-            if is_solid && p.law.several().is_none() && kinematics == Kinematics::Exact {
+            if is_solid && p.law.several().is_none() && kinematics == BondKinematics::Exact {
                 dilatation = Some(Arc::clone(&law));
             }
             laws[usize::from(material)] = Some(law);

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use super::model::Model;
 use crate::{
     parallel,
-    peridynamics::{Law, PdBody, WholeFamily, bond_force::Kinematics},
+    peridynamics::{Law, PdBody, WholeFamily, bond_force::BondKinematics},
     tensor::{Tensor, Vector},
 };
 
@@ -159,7 +159,7 @@ impl<const D: usize> ExactStresses<D> {
             material: body.cloud.material.get(j).copied().unwrap_or(0),
         };
         let exact = |difference: &[Vector<D>]| {
-            let (stress, _) = family.stress(states, Kinematics::Exact, difference);
+            let (stress, _) = family.stress(states, BondKinematics::Exact, difference);
             stress
         };
         let apart = |l: usize| places[l] - places[j];

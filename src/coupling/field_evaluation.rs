@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use rustc_hash::FxHashMap;
 
 use crate::{
-    coupling::{FitDegree, Model, SiteKind, least_squares_gradient},
+    coupling::{FitDegree, Model, SiteKind, bins::bin_of, least_squares_gradient},
     fem::Locator,
     shape::Barriers,
     tensor::{Vector, padded},
@@ -140,7 +140,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
         if h <= 0.0 {
             return Vec::new();
         }
-        let (centre, reach) = (bin(x, h), spacings.ceil() as usize);
+        let (centre, reach) = (bin_of(x, h), spacings.ceil() as usize);
         let width = 2 * reach + 1;
         let mut found = Vec::new();
         for index in 0..width.pow(D as u32) {
@@ -167,14 +167,10 @@ fn bins<const D: usize>(model: &Model<D>, wanted: impl Fn(&SiteKind) -> bool) ->
     if h > 0.0 {
         for (s, site) in model.sites.iter().enumerate() {
             if wanted(&site.kind) {
-                let list: &mut Vec<u32> = bins.entry(bin(&site.position, h)).or_default();
+                let list: &mut Vec<u32> = bins.entry(bin_of(&site.position, h)).or_default();
                 list.push(s as u32);
             }
         }
     }
     bins
-}
-
-fn bin<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {
-    std::array::from_fn(|i| (x[i] / size).floor() as i64)
 }

@@ -205,14 +205,13 @@ impl<const D: usize> Impact<D> {
     /// Energy stored in the contact, `½ k g²` of each pair that touches \[J\].
     pub fn energy(&self, u: &[f64]) -> f64 {
         let (u, moved) = u.split_at(self.sites() * D);
-        let parts: Vec<f64> =
-            parallel::map_each(u.par_chunks(CHUNK * D).enumerate(), |(chunk, u)| {
-                let mut sum = 0.0;
-                self.each(chunk, u, moved, |_, _, k, depth, _| {
-                    sum += 0.5 * k * depth * depth;
-                });
-                sum
+        let parts: Vec<f64> = parallel::map_chunks(u, CHUNK * D, |chunk, u| {
+            let mut sum = 0.0;
+            self.each(chunk, u, moved, |_, _, k, depth, _| {
+                sum += 0.5 * k * depth * depth;
             });
+            sum
+        });
         parts.iter().sum()
     }
 
@@ -222,7 +221,7 @@ impl<const D: usize> Impact<D> {
     pub fn contact(&self, u: &[f64], impactor: usize) -> ContactPatch {
         let (u, moved) = u.split_at(self.sites() * D);
         let touched: Vec<Vec<(usize, Vector<D>)>> =
-            parallel::map_each(u.par_chunks(CHUNK * D).enumerate(), |(chunk, u)| {
+            parallel::map_chunks(u, CHUNK * D, |chunk, u| {
                 let mut found = Vec::new();
                 self.each(chunk, u, moved, |i, k, _, _, out| {
                     if k == impactor {

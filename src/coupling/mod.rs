@@ -4,11 +4,11 @@
 //! |---|---|---|
 //! | `uncoupled.rs` | pure FE, pure PD: ordinary values of the same switch | |
 //! | `splice.rs` | each site takes the equation of its own model | [SAND2015-7998] eq. (2.30) |
-//! | `blending.rs` | force-based blending with a blending function β | eq. (3.9)–(3.14) |
+//! | `blending.rs` | force-based blending with a blending function β | eq. (3.9), (3.11), (3.12), (3.13), (3.14) |
 //! | `balanced.rs` | half of a splice's rows, half of a blending's: no force out of balance under quartic fields | `docs/methods.md` |
 //! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
 //! | `truncated_families/` | the same of laws whose points have a stress: symmetric, patch-exact at any strain, in equilibrium | `docs/truncated.md` |
-//! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19)–(2.29), sections 7.2, 7.3 |
+//! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19), (2.20), (2.29), sections 7.2, 7.3 |
 //! | `exact_stresses.rs` | partial stresses of geometrically exact bonds | eq. (2.19) |
 //! | `problem.rs` | what a coupled problem consists of | |
 //! | `model.rs`, `sites.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
@@ -16,12 +16,15 @@
 //! | `shared_families.rs`, `shared_body.rs`, `held_families.rs` | families that are spread over processes; which of them each has | |
 //! | `multi_lattice.rs`, `completed_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
 //! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
+//! | `point_materials.rs` | shared: the materials of points, in a body of several | |
+//! | `seam_order.rs` | shared: cells of second order, which are linear at the seam | |
 //! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
 //! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs`, `bins.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
 //! | `sparse_factors.rs` | factors of the conditions that the fits at a seam have to meet | |
 //! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
-//! | `semidiscrete.rs`, `motion/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
+//! | `tributary/` | the part of the body that each site stands for: its mass, and the loads on it | |
+//! | `semidiscrete.rs`, `semidiscrete/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
 //! | `impact.rs`, `impact/` | rigid impactors that push the sites of a model that moves | |
 //! | `state_transfer.rs` | a motion handed from one layout of zones to another | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
@@ -72,7 +75,7 @@ pub mod uncoupled;
 pub mod zone_distance;
 
 pub use balanced::Balanced;
-pub use bins::Bins;
+pub use bins::{Bins, bin_of};
 pub use blending::{Blending, BlendingFunction};
 pub use exact_stresses::ExactStresses;
 pub use field_evaluation::{Carrier, Sampler};
@@ -206,6 +209,26 @@ pub enum Definiteness {
     NegativeTerms,
 }
 
+/// Rows that hold bonds of the body among other terms: a nonlinear system computes the forces of those bonds, and the rest stays a row.
+pub trait MixedRows<const D: usize>: Sync {
+    /// Whether the row of a site, not that of the body alone, holds bonds of the body.
+    fn has_body_bonds(&self, site: usize) -> bool;
+
+    /// Whether a bond between two points of the body's cloud, the first with [`MixedRows::has_body_bonds`], is one of those. A bond that the seam cuts is not: as one of the body it would pull at its point as it rotates, and at the finite elements as if it did not.
+    fn is_body_bond(&self, i: usize, j: usize) -> bool;
+
+    /// Adds the row of a site that [`MixedRows::has_body_bonds`], less the bonds of the body.
+    fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>);
+}
+
+/// Bonds of a seam that a nonlinear system takes over.
+pub struct SeamBonds<'a, const D: usize> {
+    /// The bonds, which may be geometrically exact, and break.
+    pub bonds: NonlinearSeam<D>,
+    /// Adds what is left of the row of a site without them.
+    pub add_rest: Box<dyn Fn(usize, &mut Row<D>) + Sync + 'a>,
+}
+
 /// The rows of a coupled model.
 pub trait Operator<const D: usize>: Sync {
     /// Adds the internal force of a site, times −1 (`K u = f`).
@@ -217,31 +240,14 @@ pub trait Operator<const D: usize>: Sync {
     /// Whether the row of a site is that of the peridynamic body alone, all of its bonds whole: only there may bonds be geometrically exact, and break.
     fn is_body_row(&self, site: usize) -> bool;
 
-    /// Whether the row of a site, not that of the body alone, holds the bonds of the body among its other terms: a motion then passes over them, and the rest stays a row.
-    fn has_body_bonds(&self, _site: usize) -> bool {
-        false
-    }
+    /// The bonds of the body that rows hold among other terms, where the operator has such rows.
+    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>>;
 
-    /// Whether a bond between two points of the body's cloud, the first with [`Operator::has_body_bonds`], is one of those. A bond that the seam cuts is not: passed over, it would pull at its point as it turns, and at the finite elements as if it did not.
-    fn is_body_bond(&self, _i: usize, _j: usize) -> bool {
-        true
-    }
+    /// The bonds of a seam that may be geometrically exact, and break, where the operator has such, and what rows are without them.
+    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>>;
 
-    /// Adds the row of a site that [`Operator::has_body_bonds`], less the bonds of the body.
-    fn add_row_beside_bonds(&self, _site: usize, _row: &mut Row<D>) {}
-
-    /// The bonds of a seam that may be geometrically exact, and break, where the operator has such: a motion takes them over, and the rest of the rows from [`Operator::add_row_without_bonds`].
-    fn seam_bonds(&self) -> Option<NonlinearSeam<D>> {
-        None
-    }
-
-    /// Adds what is left of the row of a site without its bonds, for an operator that has [`Operator::seam_bonds`].
-    fn add_row_without_bonds(&self, _site: usize, _row: &mut Row<D>) {}
-
-    /// The partial stresses that rows of sites have, where the operator has such: of geometrically exact bonds a motion adds what is not linear in them.
-    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
-        None
-    }
+    /// The partial stresses that rows of sites have, where the operator has such: of geometrically exact bonds a nonlinear system adds what is not linear in them.
+    fn exact_stresses(&self) -> Option<ExactStresses<D>>;
 
     /// What shows that the energy behind symmetric rows is never negative.
     fn definiteness(&self) -> Definiteness {

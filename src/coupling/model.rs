@@ -150,6 +150,7 @@ impl<const D: usize> Model<D> {
             coupling,
         } = problem;
         problem::takes_law(coupling.as_ref(), peridynamics.as_ref())?;
+        problem::is_calibrated(peridynamics.as_ref(), &tensors, peridynamic_material)?;
         let largest = peridynamics.as_ref().map_or(0.0, |p| {
             (0..mesh.cell_count())
                 .map(|c| p.reach(p.horizon.at(&mesh.centroid(c))))

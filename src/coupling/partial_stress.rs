@@ -3,8 +3,8 @@
 use crate::{
     assembly::Row,
     coupling::{
-        CellRole, Coupling, ExactStresses, Model, ModelError, Operator, Reach, Rows, Zone,
-        held_families::depth_of_seam,
+        CellRole, Coupling, ExactStresses, MixedRows, Model, ModelError, Operator, Reach, Rows,
+        SeamBonds, Zone, held_families::depth_of_seam,
     },
     dimension,
     mesh::Mesh,
@@ -14,7 +14,7 @@ use crate::{
 
 /// Partial stress with a meshfree divergence.
 ///
-/// Source: [SAND2015-7998] eq. (2.29) and section 7.2: in the transition zone
+/// Source: [SAND2015-7998] eq. (2.29), with the divergence (2.20) of the partial stress (2.19) as in section 7.2: in the transition zone
 /// `L(x) = Tr(∇ν^ps) = Σ ω {ν(x′) − ν(x)} K⁻¹ ξ V`, with `K = Σ ω ξ⊗ξ V`; peridynamic in the nonlocal zone, finite elements in the local zone.
 /// The horizon may vary in the transition zone.
 #[derive(Clone, Copy, Debug)]
@@ -108,6 +108,14 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
         }
     }
 
+    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
+        None
+    }
+
+    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
+        None
+    }
+
     fn exact_stresses(&self) -> Option<ExactStresses<D>> {
         let of_site = |site: usize| match self.model.point_of(site) {
             Some((body, i)) if self.model.zone_of_point(i) != Zone::Nonlocal => {
@@ -120,7 +128,7 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
 }
 
 impl<const D: usize> Meshfree<'_, D> {
-    /// The points whose stresses the divergence at a transition point takes, with their weights.
+    /// The points whose stresses the divergence at a transition point takes, with their weights: `∇·ν^ps` of [SAND2015-7998] eq. (2.20), as section 7.2 discretises it.
     fn divergence(&self, body: &PdBody<D>, i: usize) -> Vec<(usize, Vector<D>)> {
         let horizon = body.cloud.horizon.of(i);
         let weigh = |j: usize, xi: &Vector<D>| {

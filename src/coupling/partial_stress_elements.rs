@@ -5,17 +5,17 @@ use std::sync::Arc;
 use crate::{
     assembly::Row,
     coupling::{
-        CellRole, Coupling, ExactStresses, FitDegree, Interface, Model, ModelError, Operator, Rows,
-        Zone,
+        CellRole, Coupling, ExactStresses, FitDegree, Interface, MixedRows, Model, ModelError,
+        Operator, Rows, SeamBonds, Zone,
     },
     dimension,
     fem::{self, QuadraturePoint},
     mesh::Mesh,
     parallel,
     peridynamics::{
-        Bound, Cloud, Conditions, Ends, Factors, Families, Family, LinearForceState, PdBody,
+        Bound, Cloud, Ends, Factors, Families, Family, LinearForceState, MomentConditions, PdBody,
         PdError, StressFit, TIE_TOLERANCE,
-        alike::{self, Shape},
+        alike::{self, FamilyShape},
         moment_fitted_weights,
     },
     tensor::{Tensor, Vector},
@@ -24,7 +24,7 @@ use crate::{
 /// Partial stress in finite elements.
 ///
 /// Source: [SAND2015-7998] section 7.3: the cells of the transition zone are finite elements; the material points at their Gauss points are peridynamic points, and
-/// their partial stress, eq. (2.19), is the element's stress. Nodes at the seam to the peridynamic zone follow a least-squares fit.
+/// their partial stress, eq. (2.19), is the element's stress, whose weak form gives the divergence (2.20) in `B_ps` of (2.29). Nodes at the seam to the peridynamic zone follow a least-squares fit.
 /// Differs from it by: the family of a Gauss point holds the points of the peridynamic zone and of its lattice continued through the elements, not other
 /// Gauss points, which would be too few in cells coarser than the lattice (9 bonds at m = 2 in cells of 3 h, where 15 conditions have to be met) and eight times too many in matching ones.
 ///
@@ -195,8 +195,8 @@ fn shapes<const D: usize>(
     families: &Families,
     points: &[usize],
     horizon: impl Fn(usize) -> f64 + Sync,
-) -> Vec<Shape<D>> {
-    parallel::map_slice(points, |&i| Shape {
+) -> Vec<FamilyShape<D>> {
+    parallel::map_slice(points, |&i| FamilyShape {
         bonds: families
             .of(i)
             .iter()
@@ -240,7 +240,7 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         &self,
         bonds: &[(Vector<D>, f64)],
         horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)> {
+    ) -> Option<(Vec<f64>, MomentConditions<D>)> {
         let (base, conditions) = self.law.moment_conditions(bonds, horizon)?;
         let conditions = match &self.lattice {
             Some((vectors, g)) => conditions.with_values_of(vectors, g),
@@ -283,7 +283,7 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         &self,
         bonds: &[(Vector<D>, f64)],
         base: &[f64],
-        affine: &Conditions<D>,
+        affine: &MomentConditions<D>,
     ) -> Option<moment_fitted_weights::Fit> {
         let conditions = affine.clone().with_vanishing_moments(5);
         if !self.between_nodes || bonds.len() < 2 * conditions.rows.len() {
@@ -303,8 +303,9 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         let Some((base, conditions)) = self.conditions(bonds, horizon) else {
             return Ok(vec![1.0; bonds.len()]);
         };
-        let positive =
-            |c: &Conditions<D>| moment_fitted_weights::fit(bonds, &base, c, Bound::AtLeast(0.0));
+        let positive = |c: &MomentConditions<D>| {
+            moment_fitted_weights::fit(bonds, &base, c, Bound::AtLeast(0.0))
+        };
         let fit = match self.quadratic(bonds, &base, &conditions) {
             Some(fit) => Ok(fit),
             None => positive(&conditions),
@@ -320,7 +321,7 @@ const WIDENING: f64 = 1.25;
 const WIDEST: f64 = 1.9;
 
 impl<const D: usize> Elements<'_, D> {
-    /// The Gauss points whose stresses the force of a node takes, with the weighted gradients of its shape function; none for a point.
+    /// The Gauss points whose stresses the force of a node takes, with the weighted gradients of its shape function: [SAND2015-7998] eq. (2.20) in weak form; none for a point.
     fn stresses_on(&self, site: usize) -> Vec<(usize, Vector<D>)> {
         let (mut on, mut quadrature) = (Vec::new(), Vec::new());
         for (c, local) in self.model.cells_of_site(site) {
@@ -344,6 +345,14 @@ impl<const D: usize> Operator<D> for Elements<'_, D> {
         }
         self.model.add_element_rows(site, row);
         self.body.add_partial_stresses(self.stresses_on(site), row);
+    }
+
+    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
+        None
+    }
+
+    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
+        None
     }
 
     fn exact_stresses(&self) -> Option<ExactStresses<D>> {

@@ -169,6 +169,39 @@ pub(super) fn takes_law<const D: usize>(
     }
 }
 
+/// Relative difference up to which two stiffness tensors are one.
+const SAME_STIFFNESS: f64 = 1e-9;
+
+/// Refuses a law that is calibrated to other constants than the elements of its material have: a uniform strain would leave forces at the seam. With plain weights elements take the tensor of the lattice.
+pub(super) fn is_calibrated<const D: usize>(
+    peridynamics: Option<&Peridynamics<D>>,
+    tensors: &[Tensor4<D>],
+    material: u16,
+) -> Result<(), ModelError> {
+    let Some(p) = peridynamics.filter(|p| p.weights != BondWeights::Plain) else {
+        return Ok(());
+    };
+    let of_points: Vec<(u16, &dyn Law<D>)> = match p.law.several() {
+        Some(several) => (several.used().iter())
+            .map(|&material| (material, several.law(material)))
+            .collect(),
+        None => vec![(material, p.law.as_ref())],
+    };
+    for (material, law) in of_points {
+        let (of_law, of_cells) = (law.linearised().tensor(), &tensors[usize::from(material)]);
+        let mut difference = *of_law;
+        difference.add_scaled(-1.0, of_cells);
+        if difference.amax() > SAME_STIFFNESS * of_cells.amax() {
+            return Err(ModelError::OtherConstants {
+                material,
+                of_law: of_law.amax(),
+                of_cells: of_cells.amax(),
+            });
+        }
+    }
+    Ok(())
+}
+
 /// Why a model cannot be built.
 #[derive(Debug, Error)]
 pub enum ModelError {
@@ -319,6 +352,18 @@ pub enum ModelError {
         "the faces of the nonlocal zone cut the lattice, and truncated bonds are fitted to such faces for one dilatation, where a position-aware solid has two; let the faces follow the lattice (element edges a whole number of spacings long, halfway between points), or use coupling.splice, coupling.balanced, coupling.blending or coupling.partial-stress, or the law lps"
     )]
     TwoDilatations,
+    /// A law of other constants than those of the elements of its material.
+    #[error(
+        "the peridynamic law of material {material} is calibrated to a stiffness whose largest entry is {of_law:e}, the elements of that material have {of_cells:e}, or the two differ in another entry; make the law from the tensor in `tensors`, or use plain weights, with which elements take the stiffness of the lattice"
+    )]
+    OtherConstants {
+        /// The material, an index into [`Problem::tensors`].
+        material: u16,
+        /// The largest entry of the law's tensor \[Pa\].
+        of_law: f64,
+        /// That of the elements \[Pa\].
+        of_cells: f64,
+    },
     /// A combination that is not offered.
     #[error("{what} is not offered: {remedy}")]
     Unsupported {

@@ -17,7 +17,7 @@ use crate::{
     },
     mesh::Mesh,
     parallel,
-    peridynamics::alike::{Shape, first_alike},
+    peridynamics::alike::{FamilyShape, first_alike},
     tensor::Vector,
 };
 
@@ -217,7 +217,7 @@ impl<const D: usize> Around<'_, D> {
         sharing: usize,
         patches: &mut FxHashMap<u32, Patch<D>>,
     ) {
-        let places: Vec<(Vec<u32>, Shape<D>)> =
+        let places: Vec<(Vec<u32>, FamilyShape<D>)> =
             parallel::map_each(sought.par_iter_mut(), |(cell, cells)| {
                 let (centre, size) = centre_and_size(self.at, *cell);
                 self.grow(cells, sharing);
@@ -229,7 +229,7 @@ impl<const D: usize> Around<'_, D> {
                 let bonds = data.collect();
                 (
                     sites,
-                    Shape {
+                    FamilyShape {
                         bonds,
                         horizon: 1.0,
                     },

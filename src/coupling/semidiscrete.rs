@@ -1,5 +1,13 @@
 //! A coupled model that moves: bonds that stretch, and break, beside the rows of finite elements and of the seam.
 //!
+//! | file | what |
+//! |---|---|
+//! | `behaviour.rs` | how bonds deform and break, as a run asks for it |
+//! | `body.rs`, `force_states.rs`, `elements.rs` | the points and their bonds, nonlinear force states, nonlinear finite elements |
+//! | `rows.rs`, `tangent_pattern.rs` | linear rows of the sites, blocks of the elements' tangent |
+//! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, what breaking costs |
+//! | `split.rs`, `shared_work.rs`, `own_steps.rs`, `reached_sites.rs`, `spread_families.rs` | the same on several processes |
+//!
 //! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`]) take their force from a pass over the bonds, which may be geometrically exact
 //! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
 //!
@@ -16,14 +24,16 @@ use self::{
 use crate::{
     coupling::{ExactStresses, Model, NonlinearSeam, Operator},
     material::LocalLaw,
-    peridynamics::bond_force::{BondPass, Kinematics},
+    peridynamics::bond_force::{BondKinematics, BondPass},
     system::{
         BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, Ranks,
         SemiDiscrete, SharedSteps, Symmetry,
     },
 };
 use behaviour::NONE;
-pub use behaviour::{BondBehaviour, ContactBehaviour, Critical, StretchOfMaterials, SystemError};
+pub use behaviour::{
+    BondBehaviour, ContactBehaviour, FailureCriterion, StretchOfMaterials, SystemError,
+};
 pub use rows::scale_rows;
 
 pub(crate) mod behaviour;
@@ -106,23 +116,23 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     ) -> Result<Self, SystemError> {
         let sites = model.sites.len();
         let law = model.peridynamics.as_ref().map(|p| &p.law);
-        let is_linear = behaviour.critical_stretch.is_none()
-            && behaviour.kinematics == Kinematics::Linear
+        let is_linear = behaviour.failure.is_none()
+            && behaviour.kinematics == BondKinematics::Linear
             && law.is_none_or(|law| law.is_linear());
         // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear
         let follows = (model.peridynamics.as_ref()).is_some_and(|p| p.accelerator().is_some());
-        let mut seam = if is_linear || !follows {
-            None
-        } else {
-            operator.seam_bonds()
+        let of_seam = (!is_linear && follows).then(|| operator.seam_bonds());
+        let (mut seam, add_rest) = match of_seam.flatten() {
+            Some(of_seam) => (Some(of_seam.bonds), Some(of_seam.add_rest)),
+            None => (None, None),
         };
         let body = MovingBody::new(model, operator, behaviour, seam.as_ref(), ranks)?;
         if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
             let cloud = &body.cloud;
             seam.follow_motion(behaviour.kinematics);
-            if let Some(critical) = &behaviour.critical_stretch {
+            if let Some(critical) = &behaviour.failure {
                 let critical = |[i, j]: [u32; 2]| match critical {
-                    Critical::ByMaterials(stretch) => {
+                    FailureCriterion::ByMaterials(stretch) => {
                         stretch.at(cloud.material[i as usize], cloud.material[j as usize])
                     }
                     of_lattice => of_lattice.at(cloud.horizon.lattice_of(i as usize)),
@@ -131,26 +141,24 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                 seam.let_break(model, body, critical, never);
             }
         }
+        let mixed = operator.mixed_rows();
         let linear = SiteRows::assemble(
             sites,
             |site| match seam {
                 Some(_) => model.point_of(site).is_none(),
                 None => !operator.is_body_row(site),
             },
-            |site, row| {
-                if seam.is_some() {
-                    operator.add_row_without_bonds(site, row);
-                } else if operator.has_body_bonds(site) {
-                    // the body's are passed over
-                    operator.add_row_beside_bonds(site, row);
-                } else {
-                    operator.add_row(site, row);
+            |site, row| match (&add_rest, mixed) {
+                (Some(add_rest), _) => add_rest(site, row),
+                (None, Some(mixed)) if mixed.has_body_bonds(site) => {
+                    mixed.add_row_beside_bonds(site, row);
                 }
+                _ => operator.add_row(site, row),
             },
         );
         let mass = masses(model, density);
         let energy = ElementEnergy::new(model);
-        let is_linear_unless_broken = behaviour.kinematics == Kinematics::Linear
+        let is_linear_unless_broken = behaviour.kinematics == BondKinematics::Linear
             && behaviour.contact.is_none()
             && law.is_none_or(|law| law.is_linear());
         Ok(Self {
@@ -164,7 +172,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             body,
             seam,
             stresses: match behaviour.kinematics {
-                Kinematics::Exact if model.follows_bonds() => operator.exact_stresses(),
+                BondKinematics::Exact if model.follows_bonds() => operator.exact_stresses(),
                 _ => None,
             },
             energy,
@@ -218,7 +226,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// Whether bonds can break.
     fn breaks(&self) -> bool {
         let body = self.body.as_ref();
-        body.is_some_and(|b| b.critical_stretch.is_some() || b.damages)
+        body.is_some_and(|b| b.failure.is_some() || b.damages)
     }
 
     /// Whether the law remembers.

@@ -7,7 +7,7 @@ use crate::coupling::{
 };
 use crate::mesh::Mesh;
 use crate::mesh::generate::{Axis, rectangle};
-use crate::peridynamics::bond_force::Kinematics;
+use crate::peridynamics::bond_force::BondKinematics;
 use crate::peridynamics::{BondBased, BondWeights, Micromodulus, PartialVolume};
 use crate::progress::Silent;
 use crate::solve::explicit::{Explicit, ExplicitParams, State, Undriven};
@@ -198,8 +198,8 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
         [5.0, 5.0, 9.0, 8.0],
     ];
     let behaviour = BondBehaviour::<2> {
-        kinematics: Kinematics::Linear,
-        critical_stretch: None,
+        kinematics: BondKinematics::Linear,
+        failure: None,
         no_fail: &|_| false,
         contact: None,
         storage: crate::peridynamics::bond_force::Storage::Double,
@@ -260,4 +260,20 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
         drop(operator);
         problem = model.into_problem(coupling);
     }
+}
+
+#[test]
+fn a_law_of_other_constants_than_its_elements_is_refused() {
+    let with = |tensor: Tensor4<2>, weights: BondWeights| {
+        let splice = Box::new(Splice);
+        let mut problem = problem(plate(0.0), [4.0, 4.0, 12.0, 8.0], splice);
+        problem.tensors = vec![tensor];
+        problem.peridynamics.as_mut().unwrap().weights = weights;
+        Model::new(problem, &Silent).map(|_| ())
+    };
+    with(Tensor4::isotropic(1.0, 1.0), BondWeights::Isotropic).unwrap();
+    let refused = with(Tensor4::isotropic(2.0, 1.0), BondWeights::Isotropic).unwrap_err();
+    assert!(refused.to_string().contains("calibrated to"), "{refused}");
+    // elements take the tensor of the lattice
+    with(Tensor4::isotropic(2.0, 1.0), BondWeights::Plain).unwrap();
 }

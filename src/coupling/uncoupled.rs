@@ -2,7 +2,9 @@
 
 use crate::{
     assembly::Row,
-    coupling::{CellRole, Coupling, Model, ModelError, Operator, Zone},
+    coupling::{
+        CellRole, Coupling, ExactStresses, MixedRows, Model, ModelError, Operator, SeamBonds, Zone,
+    },
     dimension,
     mesh::Mesh,
     peridynamics::LinearForceState,
@@ -71,7 +73,7 @@ impl<const D: usize> Coupling<D> for Nonlocal {
 
 type Own<const D: usize> = for<'a> fn(&'a Model<D>) -> Box<dyn Operator<D> + 'a>;
 
-/// The rows of a model of which each site takes the equation of its own model.
+/// The rows of a model of which each site takes the equation of its own model, [SAND2015-7998] eq. (2.30).
 pub(super) fn own_model<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
     fn rows<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
         Box::new(OwnModel { model })
@@ -80,7 +82,7 @@ pub(super) fn own_model<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Oper
     dimension::of::<Own<D>>(&OWN)(model)
 }
 
-/// Each site takes the equation of its own model.
+/// Each site takes the equation of its own model: `L^pd` of [SAND2015-7998] eq. (2.5) at points, `L⁰` of (2.11) at nodes.
 struct OwnModel<'a, const D: usize> {
     model: &'a Model<D>,
 }
@@ -95,6 +97,18 @@ impl<const D: usize> Operator<D> for OwnModel<'_, D> {
 
     fn is_body_row(&self, site: usize) -> bool {
         self.model.point_of(site).is_some()
+    }
+
+    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
+        None
+    }
+
+    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
+        None
+    }
+
+    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
+        None
     }
 
     fn beta(&self, site: usize) -> f64 {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::element::cell_volume;
 use crate::{
     material::{LocalLaw, WideBand},
-    mesh::{CellShape, Mesh},
+    mesh::Mesh,
 };
 
 /// Why a cell cannot have a law that softens.
@@ -58,11 +58,7 @@ pub fn banded_law<const D: usize>(
 
 /// The width of the crack band of a cell \[m\].
 pub fn crack_band<const D: usize>(mesh: &Mesh<D>, cell: usize) -> f64 {
-    let in_box = match mesh.shapes[cell] {
-        CellShape::Tri3 | CellShape::Tri6 => 2.0,
-        CellShape::Tet4 | CellShape::Tet10 => 6.0,
-        _ => 1.0,
-    };
+    let in_box = mesh.shapes[cell].in_box().len() as f64;
     (in_box * cell_volume(mesh, cell).abs()).powf(1.0 / D as f64)
 }
 
@@ -125,6 +121,7 @@ mod tests {
     use crate::material::{
         EquivalentStrain, Kinematics, Reduced, ScalarDamage, ScalarDamageSettings, SofteningCurve,
     };
+    use crate::mesh::CellShape;
 
     fn widths<const D: usize>(shapes: &[CellShape]) {
         for &shape in shapes {

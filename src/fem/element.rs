@@ -144,7 +144,7 @@ pub fn shape_values<const D: usize>(
     }
 }
 
-/// Adds one quadrature point's share of the block row `K_ab = ∫ ∂N_a/∂x · C · ∂N_b/∂x dV`, `a = local_node`.
+/// Adds one quadrature point's share of the block row `K_ab = ∫ ∂N_a/∂x · C · ∂N_b/∂x dV`, `a = local_node`: `L⁰ = ∇·σ` of [SAND2015-7998] eq. (2.11) in weak form.
 ///
 /// Shapes: `blocks[b]` is the block of local node b. Units: \[N/m^(4−D)\], the forces being per unit of thickness in a plane and of area on a line.
 pub fn row_at<const D: usize>(

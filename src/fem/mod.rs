@@ -40,11 +40,11 @@
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
 //! | `superconvergent.rs` | the displacement gradient anywhere in a cell, from where it is most accurate |
 //! | `crack_band.rs` | the width in which a law that softens localises in a cell |
-//! | `nonlinear.rs` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
+//! | `nonlinear.rs`, `nonlinear/` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
 //! | `locate.rs` | from a point in space to a cell and its shape functions |
 //! | `lumping.rs` | lumped volumes and masses |
-//! | `body.rs` | a whole body: checks, stiffness, internal force |
+//! | `body.rs` | the check that elements can live on the cells of a body |
 //!
 //! A new cell is one file, one line in [`CELLS`], and its variant of [`CellShape`].
 
@@ -73,7 +73,7 @@ pub(crate) mod sample;
 #[cfg(test)]
 mod second_order_tests;
 
-pub use body::{FemError, assemble, check, internal_force};
+pub use body::{FemError, check};
 pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
 pub use crack_band::{CellBandError, banded_law, crack_band};
 pub use element::{

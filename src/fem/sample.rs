@@ -1,8 +1,11 @@
 //! Small meshes for the tests of this folder, with closed-form geometry.
 
+use std::collections::BTreeMap;
+
+use super::element::stiffness_into;
 use crate::mesh::{CellShape, Mesh};
 use crate::system::BlockCsr;
-use crate::tensor::Vector;
+use crate::tensor::{Tensor, Tensor4, Vector};
 
 /// A number in [-1, 1] that depends on its arguments only.
 pub fn noise(a: usize, b: usize) -> f64 {
@@ -40,22 +43,7 @@ pub fn unit_box<const D: usize>(shape: CellShape, n: usize, jitter: f64) -> Mesh
             at(i + 1, j + 1, k + 1),
             at(i, j + 1, k + 1),
         ];
-        let picks: &[&[usize]] = match shape.linear() {
-            CellShape::Tri3 => &[&[0, 1, 2], &[0, 2, 3]],
-            // six tetrahedra around the diagonal from node 0 to node 6
-            CellShape::Tet4 => &[
-                &[0, 1, 2, 6],
-                &[0, 2, 3, 6],
-                &[0, 3, 7, 6],
-                &[0, 7, 4, 6],
-                &[0, 4, 5, 6],
-                &[0, 5, 1, 6],
-            ],
-            CellShape::Line2 => &[&[0, 1]],
-            CellShape::Quad4 => &[&[0, 1, 2, 3]],
-            _ => &[&[0, 1, 2, 3, 4, 5, 6, 7]],
-        };
-        for pick in picks {
+        for pick in shape.in_box() {
             let nodes: Vec<u32> = pick.iter().map(|&p| hex[p]).collect();
             mesh.push_cell(shape.linear(), &nodes);
         }
@@ -73,6 +61,43 @@ pub fn boxes<const D: usize>(n: usize, jitter: f64) -> Vec<Mesh<D>> {
         .filter(|cell| cell.shape.dimension() == D)
         .map(|cell| unit_box(cell.shape, n, jitter))
         .collect()
+}
+
+/// The stiffness of the cells that have a tangent, `K u = f_external`: one block row per node.
+pub fn assemble<'a, const D: usize>(
+    mesh: &Mesh<D>,
+    tangent: impl Fn(usize) -> Option<&'a Tensor4<D>>,
+) -> BlockCsr {
+    let mut rows = vec![BTreeMap::<u32, Tensor<D>>::new(); mesh.nodes.len()];
+    let mut blocks = Vec::new();
+    for c in 0..mesh.cell_count() {
+        let Some(tangent) = tangent(c) else {
+            continue;
+        };
+        stiffness_into(mesh, c, tangent, &mut blocks);
+        let nodes = mesh.cell(c);
+        for (a, row) in nodes.iter().zip(blocks.chunks_exact(nodes.len())) {
+            for (b, block) in nodes.iter().zip(row) {
+                *rows[*a as usize].entry(*b).or_insert_with(Tensor::zeros) += block;
+            }
+        }
+    }
+    let mut k = BlockCsr {
+        block: D,
+        row_offsets: vec![0],
+        columns: Vec::new(),
+        values: Vec::new(),
+        shared: None,
+    };
+    for row in rows {
+        for (column, block) in row {
+            k.columns.push(column);
+            let entries = (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
+            k.values.extend(entries.map(|at| block[at]));
+        }
+        k.row_offsets.push(k.columns.len());
+    }
+    k
 }
 
 /// Solves `K u = f` by dense LU with some unknowns prescribed.

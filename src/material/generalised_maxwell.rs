@@ -36,7 +36,7 @@ const SHEARS: f64 = 0.1;
 
 /// Generalised Maxwell solid for small strains, `σ = K tr ε I + 2 μ [(1 − Σ λ_i) e + Σ λ_i q_i]` with the deviator `e = dev ε` and `q̇_i = ė − q_i/τ_i` of each arm.
 ///
-/// Source: [SAND2015-7998] eq. (4.12)–(4.15), whose deviatoric extension is here the deviator of the classical strain (\[SimoHughes1998\] chapter 10): the share `λ_i` of the shear modulus relaxes with the time `τ_i`; K and μ are those at once.
+/// Source: [SAND2015-7998] eq. (4.12), (4.13), (4.14), (4.15), whose deviatoric extension is here the deviator of the classical strain (\[SimoHughes1998\] chapter 10): the share `λ_i` of the shear modulus relaxes with the time `τ_i`; K and μ are those at once.
 /// The update is exact for a strain that is linear over the step ([`PronyStep::follow`]).
 ///
 /// For solids; [`super::Reduced`] makes it a law of bars, plates and long bodies.

@@ -11,7 +11,7 @@
 //! | `generalised_maxwell.rs`, `prony.rs` | linear viscoelasticity: a Prony series of the shear modulus, for small strains |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
 //! | `algorithmic_tangent.rs` | differences of any law, for its algorithmic tangent |
-//! | `umat.rs`, `umat/` | a user's routine with the calling convention of Abaqus' UMAT (feature `umat`) |
+//! | `user_routine.rs` | what a scene asks of a user's compiled routine; crate `bondline-umat` loads it and makes a law of it |
 //!
 //! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] at the end of a step and what it remembers, and gives the first Piola–Kirchhoff stress `P` \[Pa\] (for small strains there is but one stress),
 //! the energies stored and dissipated \[J/m^D\], and the tangent of the undeformed body `C = ∂P/∂G` \[Pa\]. It serves the points of a correspondence material and the quadrature points of finite elements.

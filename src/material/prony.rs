@@ -2,7 +2,7 @@
 
 /// A Prony series: the share `λ_i` of a modulus relaxes with the time `τ_i`, each in a Maxwell arm of its own, and the rest `1 − Σ λ_i` lasts.
 ///
-/// Under a strain e that is held it leaves `1 − Σ λ_i + Σ λ_i exp(−t/τ_i)` of the modulus. With `q_i` the strain of the spring in arm i, [SAND2015-7998] eq. (4.12)–(4.15):
+/// Under a strain e that is held it leaves `1 − Σ λ_i + Σ λ_i exp(−t/τ_i)` of the modulus. With `q_i` the strain of the spring in arm i, [SAND2015-7998] eq. (4.12), (4.14):
 ///
 /// ```text
 /// (1 − Σ λ_i) e + Σ λ_i q_i ,     q̇_i = ė − q_i/τ_i
@@ -104,7 +104,7 @@ impl PronyStep {
     }
 }
 
-/// A Maxwell arm over a step: its spring's strain `q̇ = ė − q/τ` for a strain e that is linear in time.
+/// A Maxwell arm over a step, [SAND2015-7998] eq. (4.13): its spring's strain `q̇ = ė − q/τ` for a strain e that is linear in time.
 #[derive(Clone, Copy, Debug)]
 pub struct Arm {
     /// `e^−x`, with x the length of the step over τ.

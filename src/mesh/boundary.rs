@@ -82,11 +82,6 @@ impl Waiting {
 }
 
 impl<const D: usize> Mesh<D> {
-    /// The facets of cell `c`, normals outwards.
-    pub fn facets_of_cell(&self, c: usize) -> impl Iterator<Item = BoundaryFacet> + '_ {
-        (0..self.shapes[c].facets().len()).map(move |local| self.facet((c as u32, local as u8)))
-    }
-
     /// The facet of a cell with this number in [`CellShape::facets`](super::CellShape::facets), its normal outwards.
     pub fn facet(&self, (cell, local): (u32, u8)) -> BoundaryFacet {
         let nodes = self.cell(cell as usize);

@@ -2,6 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `cell_shape.rs` | the shapes of cells, each with its facets, edges, volume, and names in files |
 //! | `generate.rs` | line, rectangle and box with cut-outs and grading |
 //! | `read.rs` | one entry for all files |
 //! | `raw.rs` | what a file holds before it is a mesh |
@@ -22,6 +23,7 @@
 use std::collections::BTreeMap;
 
 pub mod boundary;
+mod cell_shape;
 mod conformity;
 mod dilate_erode;
 mod error;
@@ -42,103 +44,12 @@ mod vtu;
 mod vtu_data;
 mod xml;
 
+pub use cell_shape::CellShape;
 pub use error::{MeshError, Place};
 pub use order::{Order, Tie, facet_corners};
 pub use parts::MeshParts;
 
 use crate::tensor::Vector;
-
-/// The shapes of cells. Node order is that of VTK: corners first, then the nodes in the middle of edges.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum CellShape {
-    /// A single point; only in output, where each peridynamic point is one.
-    Vertex,
-    /// Two-node line.
-    Line2,
-    /// Three-node triangle.
-    Tri3,
-    /// Four-node quadrilateral, counter-clockwise.
-    Quad4,
-    /// Four-node tetrahedron.
-    Tet4,
-    /// Eight-node hexahedron: bottom face counter-clockwise, then top face.
-    Hex8,
-    /// Three-node line: both ends, then the middle.
-    Line3,
-    /// Six-node triangle.
-    Tri6,
-    /// Eight-node quadrilateral.
-    Quad8,
-    /// Ten-node tetrahedron.
-    Tet10,
-    /// Twenty-node hexahedron: the edges of the bottom face, of the top face, then those between.
-    Hex20,
-}
-
-impl CellShape {
-    /// Number of nodes.
-    pub fn node_count(self) -> usize {
-        match self {
-            Self::Vertex => 1,
-            Self::Line2 => 2,
-            Self::Tri3 => 3,
-            Self::Quad4 | Self::Tet4 => 4,
-            Self::Hex8 => 8,
-            Self::Line3 => 3,
-            Self::Tri6 => 6,
-            Self::Quad8 => 8,
-            Self::Tet10 => 10,
-            Self::Hex20 => 20,
-        }
-    }
-
-    /// Topological dimension.
-    pub fn dimension(self) -> usize {
-        match self {
-            Self::Vertex => 0,
-            Self::Line2 | Self::Line3 => 1,
-            Self::Tri3 | Self::Quad4 | Self::Tri6 | Self::Quad8 => 2,
-            Self::Tet4 | Self::Hex8 => 3,
-            Self::Tet10 | Self::Hex20 => 3,
-        }
-    }
-
-    /// Local node numbers of each facet (point, edge or face), ordered so that the facet's normal points outwards.
-    pub fn facets(self) -> &'static [&'static [usize]] {
-        match self {
-            Self::Vertex => &[],
-            Self::Line2 => &[&[0], &[1]],
-            Self::Tri3 => &[&[0, 1], &[1, 2], &[2, 0]],
-            Self::Quad4 => &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]],
-            Self::Tet4 => &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[0, 3, 2]],
-            Self::Hex8 => &[
-                &[0, 3, 2, 1],
-                &[4, 5, 6, 7],
-                &[0, 1, 5, 4],
-                &[1, 2, 6, 5],
-                &[2, 3, 7, 6],
-                &[3, 0, 4, 7],
-            ],
-            Self::Line3 => &[&[0], &[1]],
-            Self::Tri6 => &[&[0, 1, 3], &[1, 2, 4], &[2, 0, 5]],
-            Self::Quad8 => &[&[0, 1, 4], &[1, 2, 5], &[2, 3, 6], &[3, 0, 7]],
-            Self::Tet10 => &[
-                &[0, 2, 1, 6, 5, 4],
-                &[0, 1, 3, 4, 8, 7],
-                &[1, 2, 3, 5, 9, 8],
-                &[0, 3, 2, 7, 9, 6],
-            ],
-            Self::Hex20 => &[
-                &[0, 3, 2, 1, 11, 10, 9, 8],
-                &[4, 5, 6, 7, 12, 13, 14, 15],
-                &[0, 1, 5, 4, 8, 17, 12, 16],
-                &[1, 2, 6, 5, 9, 18, 13, 17],
-                &[2, 3, 7, 6, 10, 19, 14, 18],
-                &[3, 0, 4, 7, 11, 16, 15, 19],
-            ],
-        }
-    }
-}
 
 /// A facet of the mesh: its nodes, one in 1D, two in 2D, three or four in 3D; of a cell of second order also those in the middle of its edges, after the corners.
 pub type Facet = Vec<u32>;

@@ -1,10 +1,8 @@
 //! Cells of first and second order: corners, nodes in the middle of edges, and from the one to the other.
-//!
-//! In every shape the corners come first, in the order of the linear shape, so that a cell of second order without its other nodes is a linear cell.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{CellShape, Facet, Mesh};
+use super::{Facet, Mesh};
 use crate::tensor::Vector;
 
 /// What becomes of cells of second order that are read.
@@ -24,62 +22,6 @@ pub struct Tie {
     pub node: u32,
     /// The ends of its edge.
     pub ends: [u32; 2],
-}
-
-impl CellShape {
-    /// The shape of the corners alone.
-    pub fn linear(self) -> Self {
-        match self {
-            Self::Line3 => Self::Line2,
-            Self::Tri6 => Self::Tri3,
-            Self::Quad8 => Self::Quad4,
-            Self::Tet10 => Self::Tet4,
-            Self::Hex20 => Self::Hex8,
-            linear => linear,
-        }
-    }
-
-    /// The shape with nodes in the middle of its edges too.
-    pub fn quadratic(self) -> Self {
-        match self {
-            Self::Line2 => Self::Line3,
-            Self::Tri3 => Self::Tri6,
-            Self::Quad4 => Self::Quad8,
-            Self::Tet4 => Self::Tet10,
-            Self::Hex8 => Self::Hex20,
-            other => other,
-        }
-    }
-
-    /// Whether it has nodes in the middle of its edges.
-    pub fn is_quadratic(self) -> bool {
-        self != self.linear()
-    }
-
-    /// The local ends of the edge of each node after the corners.
-    pub fn mid_sides(self) -> &'static [[usize; 2]] {
-        match self {
-            Self::Line3 => &[[0, 1]],
-            Self::Tri6 => &[[0, 1], [1, 2], [2, 0]],
-            Self::Quad8 => &[[0, 1], [1, 2], [2, 3], [3, 0]],
-            Self::Tet10 => &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
-            Self::Hex20 => &[
-                [0, 1],
-                [1, 2],
-                [2, 3],
-                [3, 0],
-                [4, 5],
-                [5, 6],
-                [6, 7],
-                [7, 4],
-                [0, 4],
-                [1, 5],
-                [2, 6],
-                [3, 7],
-            ],
-            _ => &[],
-        }
-    }
 }
 
 /// The corners of a facet of a mesh of dimension `D`, without the nodes in the middle of its edges.
@@ -259,6 +201,7 @@ impl<const D: usize> Mesh<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::CellShape;
     use crate::mesh::generate::{Axis, Grid};
 
     const QUADRATIC: [CellShape; 5] = [

@@ -1,8 +1,8 @@
 //! Sizes and shapes of cells, and the checks that refuse a mesh no element can live on.
 
 use super::error::position;
-use super::{CellShape, Mesh, MeshError, conformity};
-use crate::tensor::{Tensor, Vector};
+use super::{Mesh, MeshError, conformity};
+use crate::tensor::{Tensor, Vector, determinant, padded};
 
 /// A corner whose scaled Jacobian is at or below this counts as degenerate.
 ///
@@ -29,52 +29,6 @@ pub struct Quality {
     pub volume: f64,
 }
 
-/// For each corner, its neighbours along edges, ordered so that their determinant is positive in a good cell.
-fn corners(shape: CellShape) -> &'static [(usize, &'static [usize])] {
-    match shape.linear() {
-        CellShape::Line2 => &[(0, &[1])],
-        CellShape::Tri3 => &[(0, &[1, 2]), (1, &[2, 0]), (2, &[0, 1])],
-        CellShape::Quad4 => &[(0, &[1, 3]), (1, &[2, 0]), (2, &[3, 1]), (3, &[0, 2])],
-        CellShape::Tet4 => &[
-            (0, &[1, 2, 3]),
-            (1, &[2, 0, 3]),
-            (2, &[0, 1, 3]),
-            (3, &[0, 2, 1]),
-        ],
-        CellShape::Hex8 => &[
-            (0, &[1, 3, 4]),
-            (1, &[2, 0, 5]),
-            (2, &[3, 1, 6]),
-            (3, &[0, 2, 7]),
-            (4, &[7, 5, 0]),
-            (5, &[4, 6, 1]),
-            (6, &[5, 7, 2]),
-            (7, &[6, 4, 3]),
-        ],
-        // no linear shape is one of these
-        CellShape::Vertex
-        | CellShape::Line3
-        | CellShape::Tri6
-        | CellShape::Quad8
-        | CellShape::Tet10
-        | CellShape::Hex20 => &[],
-    }
-}
-
-/// Determinant of a matrix of at most 3 × 3.
-fn determinant<const D: usize>(m: &Tensor<D>) -> f64 {
-    match D {
-        1 => m[(0, 0)],
-        2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
-        _ => (0..3)
-            .map(|k| {
-                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                m[(0, k)] * (m[(1, i)] * m[(2, j)] - m[(1, j)] * m[(2, i)])
-            })
-            .sum(),
-    }
-}
-
 impl<const D: usize> Mesh<D> {
     /// Exact signed volume of cell `c` (area in 2D, length in 1D); negative if its nodes run the wrong way round. Of a cell of second order that of its corners.
     ///
@@ -85,55 +39,14 @@ impl<const D: usize> Mesh<D> {
             return 0.0;
         }
         let nodes = self.corners(c);
-        let x = |i: usize| self.nodes[nodes[i] as usize];
-        let spanned = |edges: &[Vector<D>]| determinant(&Tensor::<D>::from_columns(edges));
-        match shape.linear() {
-            CellShape::Line2 => spanned(&[x(1) - x(0)]),
-            CellShape::Tri3 => spanned(&[x(1) - x(0), x(2) - x(0)]) / 2.0,
-            CellShape::Quad4 => spanned(&[x(2) - x(0), x(3) - x(1)]) / 2.0,
-            CellShape::Tet4 => spanned(&[x(1) - x(0), x(2) - x(0), x(3) - x(0)]) / 6.0,
-            CellShape::Hex8 => {
-                // the Jacobian's determinant is quadratic in each coordinate, hence two Gauss points are exact
-                let g = 0.5 / 3.0f64.sqrt();
-                let mut volume = 0.0;
-                for point in 0..8 {
-                    let at = [0, 1, 2].map(|k| {
-                        if point >> k & 1 == 0 {
-                            0.5 - g
-                        } else {
-                            0.5 + g
-                        }
-                    });
-                    let mut jacobian = Tensor::<D>::zeros();
-                    for i in 0..8 {
-                        // corners in VTK order: x of corners 1, 2, 5, 6; y of 2, 3, 6, 7; z of 4 to 7
-                        let bit = [(i & 1) ^ (i >> 1 & 1), i >> 1 & 1, i >> 2];
-                        let factor = |k: usize| if bit[k] == 0 { 1.0 - at[k] } else { at[k] };
-                        for (k, side) in bit.iter().enumerate() {
-                            let sign = if *side == 0 { -1.0 } else { 1.0 };
-                            let slope = sign * factor((k + 1) % 3) * factor((k + 2) % 3);
-                            let mut column = jacobian.column_mut(k);
-                            column += x(i) * slope;
-                        }
-                    }
-                    volume += determinant(&jacobian) / 8.0;
-                }
-                volume
-            }
-            CellShape::Vertex
-            | CellShape::Line3
-            | CellShape::Tri6
-            | CellShape::Quad8
-            | CellShape::Tet10
-            | CellShape::Hex20 => 0.0,
-        }
+        shape.volume_of_corners(&|i| padded(&self.nodes[nodes[i] as usize]).into())
     }
 
     /// Smallest determinant of the edges at any corner of cell `c`, divided by their lengths; 0 if an edge has no length.
     pub fn scaled_jacobian(&self, c: usize) -> f64 {
         let nodes = self.cell(c);
         let mut smallest = f64::INFINITY;
-        for (corner, neighbours) in corners(self.shapes[c]) {
+        for (corner, neighbours) in self.shapes[c].corner_edges() {
             let mut edges = Tensor::<D>::zeros();
             if neighbours.len() != D {
                 return 0.0;
@@ -218,7 +131,7 @@ pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
 pub(crate) fn edges<const D: usize>(mesh: &Mesh<D>, cell: usize) -> (f64, f64) {
     let nodes = mesh.cell(cell);
     let (mut shortest, mut longest) = (f64::INFINITY, 0.0f64);
-    for (corner, neighbours) in corners(mesh.shapes[cell]) {
+    for (corner, neighbours) in mesh.shapes[cell].corner_edges() {
         for &n in *neighbours {
             let edge = mesh.nodes[nodes[n] as usize] - mesh.nodes[nodes[*corner] as usize];
             shortest = shortest.min(edge.norm());
@@ -322,6 +235,7 @@ fn check_coincidence<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
 mod tests {
     use super::super::generate::{Axis, Grid};
     use super::*;
+    use crate::mesh::CellShape;
 
     fn unit(cells: usize) -> Axis {
         Axis::Uniform {

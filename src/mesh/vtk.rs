@@ -25,24 +25,6 @@ pub(super) enum Flavour {
     Xml,
 }
 
-/// Our shape for VTK's, or its name and a remedy.
-fn shape(kind: u8) -> Option<CellShape> {
-    Some(match kind {
-        1 => CellShape::Vertex,
-        3 => CellShape::Line2,
-        5 => CellShape::Tri3,
-        9 => CellShape::Quad4,
-        10 => CellShape::Tet4,
-        12 => CellShape::Hex8,
-        21 => CellShape::Line3,
-        22 => CellShape::Tri6,
-        23 => CellShape::Quad8,
-        24 => CellShape::Tet10,
-        25 => CellShape::Hex20,
-        _ => return None,
-    })
-}
-
 /// Parses a file.
 pub(super) fn parse<'a>(
     path: &Path,
@@ -83,7 +65,7 @@ fn add_piece(
     let mut start = 0;
     for (c, (&kind, &end)) in grid.types.iter().zip(&grid.ends).enumerate() {
         let element = (first + c) as u64;
-        let Some(shape) = shape(kind) else {
+        let Some(shape) = CellShape::of_vtk(kind) else {
             return Err(MeshError::UnsupportedElement {
                 path: source.path.clone(),
                 place: source.place(grid.at),

@@ -12,6 +12,7 @@
 //! | `csv.rs` | values along a line or at probes, row by row |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs`, `motion_summary.rs` | what one run did: sizes, choices, timings, balance; energies over time |
+//! | `cracks.rs` | what breaking bonds cost, in a summary |
 //! | `proof.rs` | what was shown about a model before it was solved |
 //! | `rezoning_event.rs` | changes of the nonlocal zone during a run |
 //! | `observer.rs` | results handed to the program that started a run |

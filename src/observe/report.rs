@@ -51,7 +51,7 @@ pub enum Bound {
 
 /// One figure of one case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct TableRow {
     /// What was run.
     pub case: String,
     /// What was measured, with its unit if it has one.
@@ -72,7 +72,7 @@ pub struct Row {
     pub bound: Bound,
 }
 
-impl Row {
+impl TableRow {
     fn new(case: impl Into<String>, quantity: impl Into<String>, value: f64) -> Self {
         Self {
             case: case.into(),
@@ -223,7 +223,7 @@ pub struct Table {
     /// What the rows are about.
     pub title: String,
     /// The rows, in the order they are printed.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// Layout for people.
     pub columns: Columns,
 }
@@ -239,7 +239,7 @@ impl Table {
     }
 
     /// Appends a row.
-    pub fn push(&mut self, row: Row) {
+    pub fn push(&mut self, row: TableRow) {
         self.rows.push(row);
     }
 
@@ -423,7 +423,7 @@ pub fn render(tables: &[Table], format: Format) -> String {
     }
 }
 
-fn row_json(row: &Row) -> String {
+fn row_json(row: &TableRow) -> String {
     // a row holds only strings and numbers, which always serialise
     serde_json::to_string(row).unwrap_or_else(|_| "null".to_owned())
 }

@@ -4,12 +4,12 @@ use super::*;
 
 fn sample() -> Table {
     let mut table = Table::new("Patch tests", Columns::Full);
-    table.push(Row::at_most("splice 2d", "residual", 3e-13, 1e-11));
-    table.push(Row::at_most("blending 2d", "residual", 2e-9, 1e-11));
-    table.push(Row::at_least("plate", "speed-up", 12.5, 11.0).with_reference(11.0));
-    table.push(Row::within("plate", "opening", 1.004, 1.0, 0.005));
-    table.push(Row::refused("tets", "residual", "too few bonds"));
-    table.push(Row::info("plate", "bonds", 1_234_567.0).differs("the figure counts halves"));
+    table.push(TableRow::at_most("splice 2d", "residual", 3e-13, 1e-11));
+    table.push(TableRow::at_most("blending 2d", "residual", 2e-9, 1e-11));
+    table.push(TableRow::at_least("plate", "speed-up", 12.5, 11.0).with_reference(11.0));
+    table.push(TableRow::within("plate", "opening", 1.004, 1.0, 0.005));
+    table.push(TableRow::refused("tets", "residual", "too few bonds"));
+    table.push(TableRow::info("plate", "bonds", 1_234_567.0).differs("the figure counts halves"));
     table
 }
 
@@ -18,31 +18,34 @@ fn verdicts_follow_the_limits() {
     let verdicts: Vec<Verdict> = sample().rows.iter().map(|r| r.verdict).collect();
     use Verdict::{Differs, Pass, Refused, Short};
     assert_eq!(verdicts, [Pass, Short, Pass, Pass, Refused, Differs]);
-    assert_eq!(Row::at_most("", "", 1.0, 1.0).verdict, Pass);
-    assert_eq!(Row::at_least("", "", 10.99, 11.0).verdict, Short);
-    assert_eq!(Row::within("", "", -1.02, -1.0, 0.01).verdict, Short);
-    assert_eq!(Row::within("", "", -0.995, -1.0, 0.01).verdict, Pass);
-    assert_eq!(Row::within("", "", 2e-9, 0.0, 1e-9).verdict, Short);
-    assert_eq!(Row::within("", "", 5e-10, 0.0, 1e-9).verdict, Pass);
+    assert_eq!(TableRow::at_most("", "", 1.0, 1.0).verdict, Pass);
+    assert_eq!(TableRow::at_least("", "", 10.99, 11.0).verdict, Short);
+    assert_eq!(TableRow::within("", "", -1.02, -1.0, 0.01).verdict, Short);
+    assert_eq!(TableRow::within("", "", -0.995, -1.0, 0.01).verdict, Pass);
+    assert_eq!(TableRow::within("", "", 2e-9, 0.0, 1e-9).verdict, Short);
+    assert_eq!(TableRow::within("", "", 5e-10, 0.0, 1e-9).verdict, Pass);
 }
 
 #[test]
 fn what_is_not_finite_is_short_whatever_the_limit() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for row in [
-            Row::info("", "", bad),
-            Row::at_most("", "", bad, 1.0),
-            Row::at_least("", "", bad, 1.0),
-            Row::within("", "", bad, 1.0, 1.0),
-            Row::within("", "", bad, 0.0, 1.0),
-            Row::info("", "", bad).differs("no"),
+            TableRow::info("", "", bad),
+            TableRow::at_most("", "", bad, 1.0),
+            TableRow::at_least("", "", bad, 1.0),
+            TableRow::within("", "", bad, 1.0, 1.0),
+            TableRow::within("", "", bad, 0.0, 1.0),
+            TableRow::info("", "", bad).differs("no"),
         ] {
             assert_eq!(row.verdict, Verdict::Short, "{row:?}");
         }
     }
-    assert_eq!(Row::at_most("", "", 1.0, f64::NAN).verdict, Verdict::Short);
     assert_eq!(
-        Row::within("", "", 1.0, f64::NAN, 1.0).verdict,
+        TableRow::at_most("", "", 1.0, f64::NAN).verdict,
+        Verdict::Short
+    );
+    assert_eq!(
+        TableRow::within("", "", 1.0, f64::NAN, 1.0).verdict,
         Verdict::Short
     );
 }

@@ -258,23 +258,6 @@ impl Snapshot {
     }
 }
 
-/// The number that VTK gives a shape.
-fn vtk_type(shape: CellShape) -> u8 {
-    match shape {
-        CellShape::Vertex => 1,
-        CellShape::Line2 => 3,
-        CellShape::Tri3 => 5,
-        CellShape::Quad4 => 9,
-        CellShape::Tet4 => 10,
-        CellShape::Hex8 => 12,
-        CellShape::Line3 => 21,
-        CellShape::Tri6 => 22,
-        CellShape::Quad8 => 23,
-        CellShape::Tet10 => 24,
-        CellShape::Hex20 => 25,
-    }
-}
-
 /// The attributes of an array of a type: its type, name and components.
 fn attributes(kind: &str, name: &str, components: usize) -> String {
     // meshio takes one component that is named for a matrix of one column
@@ -348,7 +331,7 @@ pub fn write_vtu(
             Some(*end)
         });
         let ends: Vec<i64> = ends.collect();
-        let types: Vec<u8> = snapshot.shapes.iter().map(|&s| vtk_type(s)).collect();
+        let types: Vec<u8> = snapshot.shapes.iter().map(|s| s.vtk_type()).collect();
         let on_points = arrays(&snapshot.point_fields, compression)?;
         let on_cells = arrays(&snapshot.cell_fields, compression)?;
         let compressor = match compression {

@@ -13,14 +13,14 @@ const ALIKE: f64 = 1e-13;
 const ROUNDED: f64 = 1e-9;
 
 /// A family as it is compared: its bonds `(ξ, V)` \[m, m^D\] in the order of the family, and its horizon \[m\].
-pub struct Shape<const D: usize> {
+pub struct FamilyShape<const D: usize> {
     /// Bonds with the volumes of their far ends.
     pub bonds: Vec<(Vector<D>, f64)>,
     /// The horizon.
     pub horizon: f64,
 }
 
-impl<const D: usize> Shape<D> {
+impl<const D: usize> FamilyShape<D> {
     fn mark(&self) -> u64 {
         let mut hasher = FxHasher::default();
         self.bonds.len().hash(&mut hasher);
@@ -47,8 +47,8 @@ impl<const D: usize> Shape<D> {
 }
 
 /// For each family the first one of the list that is alike; the same for any number of threads.
-pub fn first_alike<const D: usize>(families: &[Shape<D>]) -> Vec<usize> {
-    let marks: Vec<u64> = parallel::map_slice(families, Shape::mark);
+pub fn first_alike<const D: usize>(families: &[FamilyShape<D>]) -> Vec<usize> {
+    let marks: Vec<u64> = parallel::map_slice(families, FamilyShape::mark);
     let mut known: FxHashMap<u64, Vec<usize>> = FxHashMap::default();
     families
         .iter()
@@ -67,12 +67,12 @@ pub fn first_alike<const D: usize>(families: &[Shape<D>]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Shape, first_alike};
+    use super::{FamilyShape, first_alike};
     use crate::tensor::Vector;
 
     #[test]
     fn translated_families_are_alike_and_others_are_not() {
-        let family = |at: f64, volume: f64, second: f64| Shape {
+        let family = |at: f64, volume: f64, second: f64| FamilyShape {
             bonds: [0.1, second]
                 .map(|x| (Vector::<2>::new((at + x) - at, 0.0), volume))
                 .to_vec(),

@@ -259,7 +259,7 @@ impl<const D: usize> PdBody<D> {
 
     /// Adds the row of the internal force of point `i`, times `−1` (so that `K u = f`), each bond weighted by `weight(j)`.
     ///
-    /// Source: [SAND2015-7998] eq. (2.5) times the point's volume: `Σ_j w_ij V_i V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)`.
+    /// Source: [SAND2015-7998] eq. (2.5), as the sum (5.5), times the point's volume: `Σ_j w_ij V_i V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)`.
     /// The second sum runs over the points whose families contain `i`, so horizons may differ.
     pub fn add_force_row(&self, i: usize, weight: impl Fn(usize) -> f64, row: &mut Row<D>) {
         self.add_force_row_of_parts(i, |j| [weight(j); 2], row);

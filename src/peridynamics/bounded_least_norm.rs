@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 /// Eigenvalues of the scaled normal equations below this fraction of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
-/// Conditions count as met when they miss by at most this fraction of the sum of magnitudes of their terms.
+/// MomentConditions count as met when they miss by at most this fraction of the sum of magnitudes of their terms.
 const MET_TOLERANCE: f64 = 1e-13;
 
 /// Steps of the dual Newton method; unbounded problems need two or three, bounded ones up to 8 on 60 one-sided families, where

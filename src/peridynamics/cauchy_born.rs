@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use super::bond_force::{Kinematics, stretch::psi};
+use super::bond_force::{BondKinematics, stretch::psi};
 use crate::{
     material::{LocalLaw, LocalResponse, central_differences},
     peridynamics::{Accelerator, EnergyDensity, Law, StatePart, WholeFamily},
@@ -67,7 +67,7 @@ struct FastBond<const D: usize> {
 pub struct CauchyBorn<const D: usize> {
     law: Arc<dyn Law<D>>,
     material: u16,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     tangent: Tensor4<D>,
     half: LatticeBonds<D>,
     /// The same bonds, and `κ` of `½ κ θ²`, for exact bonds of a law with an accelerator.
@@ -81,10 +81,10 @@ impl<const D: usize> CauchyBorn<D> {
         material: u16,
         family: &LatticeBonds<D>,
         tangent: Tensor4<D>,
-        kinematics: Kinematics,
+        kinematics: BondKinematics,
     ) -> Option<Self> {
         let states = law.force_state()?;
-        let is_exact = kinematics == Kinematics::Exact;
+        let is_exact = kinematics == BondKinematics::Exact;
         if !states.history().is_empty() || (is_exact && !states.is_objective()) {
             return None;
         }
@@ -213,11 +213,11 @@ impl<const D: usize> LocalLaw<D> for CauchyBorn<D> {
     }
 
     fn is_linear(&self) -> bool {
-        self.kinematics == Kinematics::Linear && self.law.is_linear()
+        self.kinematics == BondKinematics::Linear && self.law.is_linear()
     }
 
     fn is_objective(&self) -> bool {
-        self.kinematics == Kinematics::Exact
+        self.kinematics == BondKinematics::Exact
     }
 
     fn history(&self) -> &'static [&'static str] {
@@ -280,8 +280,8 @@ impl<const D: usize> LocalLaw<D> for CauchyBorn<D> {
             // bonds of a plane know nothing of what is out of it
             across: 0.0,
             volume_ratio: match self.kinematics {
-                Kinematics::Exact => determinant(&deformation),
-                Kinematics::Linear => 1.0,
+                BondKinematics::Exact => determinant(&deformation),
+                BondKinematics::Linear => 1.0,
             },
             stored,
             dissipated: 0.0,

@@ -40,7 +40,7 @@ fn lattice<const D: usize>(law: &dyn Law<D>) -> (LatticeBonds<D>, Tensor4<D>) {
 
 /// The laws that have a Cauchy–Born law for a way to deform, each with its lattice.
 fn all<const D: usize>(
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
 ) -> Vec<(Arc<dyn Law<D>>, LatticeBonds<D>, CauchyBorn<D>)> {
     let found: Vec<_> = laws::every::<D>()
         .into_iter()
@@ -80,7 +80,7 @@ fn rotation<const D: usize>() -> Tensor<D> {
 }
 
 fn conforms<const D: usize>() {
-    for kinematics in [Kinematics::Exact, Kinematics::Linear] {
+    for kinematics in [BondKinematics::Exact, BondKinematics::Linear] {
         for (law, _, own) in all::<D>(kinematics) {
             let name = format!("{D}D {} {kinematics:?}", law.name());
             let scale = own.tangent.0.iter().flatten().map(|t| t.amax());
@@ -117,7 +117,7 @@ fn conforms<const D: usize>() {
                     assert!(skew < 1e-6, "{name}: not symmetric, {skew:e}");
                 }
             }
-            if kinematics == Kinematics::Exact {
+            if kinematics == BondKinematics::Exact {
                 let (f, q) = (Tensor::identity() + g, rotation::<D>());
                 let turned = respond(&own, &(q * f - Tensor::identity()));
                 let off = (turned.stress - q * stress).amax() / scale;
@@ -142,7 +142,7 @@ fn stress_energy_and_tangent_of_every_law_belong_together() {
 }
 
 fn is_accelerated<const D: usize>() {
-    for (law, _, own) in all::<D>(Kinematics::Exact) {
+    for (law, _, own) in all::<D>(BondKinematics::Exact) {
         if own.fast.is_none() {
             continue;
         }
@@ -201,7 +201,7 @@ fn an_lps_has_the_stress_of_the_printed_equations() {
         let law = LinearPeridynamicSolid::<D>::new(Influence::Gaussian, lambda, shear);
         let law: Arc<dyn Law<D>> = Arc::new(law);
         let (bonds, tensor) = lattice(law.as_ref());
-        let own = CauchyBorn::new(&law, 0, &bonds, tensor, Kinematics::Exact).unwrap();
+        let own = CauchyBorn::new(&law, 0, &bonds, tensor, BondKinematics::Exact).unwrap();
         let g = large::<D>();
         let bulk = lambda + 2.0 * shear / D as f64;
         let omega = |r: f64| Influence::Gaussian.value(r, 3.0 * H);
@@ -221,7 +221,7 @@ fn the_dilatation_of_an_lps_is_that_of_the_printed_equation_and_has_its_slope() 
         let law = LinearPeridynamicSolid::<D>::new(Influence::Gaussian, 1.7, 0.9);
         let law: Arc<dyn Law<D>> = Arc::new(law);
         let (bonds, tensor) = lattice(law.as_ref());
-        let own = CauchyBorn::new(&law, 0, &bonds, tensor, Kinematics::Exact).unwrap();
+        let own = CauchyBorn::new(&law, 0, &bonds, tensor, BondKinematics::Exact).unwrap();
         let g = large::<D>();
         let f = Tensor::identity() + g;
         let (mut m, mut sum) = (0.0, 0.0);
@@ -259,7 +259,7 @@ fn laws_that_remember_have_none() {
     let mut count = 0;
     for law in memories {
         let (bonds, tensor) = lattice(law.as_ref());
-        assert!(CauchyBorn::new(&law, 0, &bonds, tensor, Kinematics::Linear).is_none());
+        assert!(CauchyBorn::new(&law, 0, &bonds, tensor, BondKinematics::Linear).is_none());
         count += 1;
     }
     assert!(count > 0);

@@ -1,11 +1,11 @@
 //! The nonlinear response of a law: force states of deformed families, and what points and bonds remember.
 //!
-//! A law gives the force state `T⟨ξ⟩` of one family at a time, [SAND2015-7998] eq. (2.3). [`crate::peridynamics::bond_force`] passes over all families, adds `T_i⟨ξ⟩ − T_j⟨−ξ⟩` up,
+//! A law gives the force state `T⟨ξ⟩` of one family at a time, [SAND2015-7998] eq. (2.6): the Fréchet derivative (2.3) of the energy density. [`crate::peridynamics::bond_force`] passes over all families, adds `T_i⟨ξ⟩ − T_j⟨−ξ⟩` up,
 //! breaks bonds, and keeps the history. So a law that is written here runs in load steps and in explicit motion, beside every seam, with damage, energies and checkpoints.
 
 use crate::{
     material::LocalLaw,
-    peridynamics::{StatePart, ZeroEnergyControl, bond_force::Kinematics},
+    peridynamics::{StatePart, ZeroEnergyControl, bond_force::BondKinematics},
     tensor::{Tensor, Vector},
 };
 
@@ -77,7 +77,7 @@ pub struct DeformedFamily<'a, const D: usize> {
     /// The material of the point, 0 in a body of one.
     pub material: u16,
     /// Whether extensions and directions are those of linear bonds.
-    pub kinematics: Kinematics,
+    pub kinematics: BondKinematics,
 }
 
 impl<const D: usize> DeformedFamily<'_, D> {

@@ -13,7 +13,7 @@
 //! density `W = ½ Σ [p (ξ · η)² + q ω η²] V + ½ Ḡ : 𝓜 : Ḡ`, so a body of such points alone has a symmetric stiffness.
 
 use crate::{
-    peridynamics::{Conditions, Influence, PdError, ShellTarget},
+    peridynamics::{Influence, MomentConditions, PdError, ShellTarget},
     tensor::{Tensor, Tensor4, Vector},
 };
 
@@ -107,7 +107,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
         &self,
         bonds: &[(Vector<D>, f64)],
         horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)>;
+    ) -> Option<(Vec<f64>, MomentConditions<D>)>;
 
     /// Overwrites `pair` (`p` per bond) and `omega` (`ω` per bond; untouched by a pairwise law) and returns the state part, if the law has one.
     ///

@@ -5,23 +5,26 @@
 //! | `influence.rs` | influence functions ω, micromoduli λ | [SAND2015-7998] eq. (5.8), (3.1) |
 //! | `horizon.rs` | the horizon of all points, of a lattice, or of each point | |
 //! | `families.rs` | neighbour search with a horizon per point | eq. (5.2) |
+//! | `cell_list.rs` | the grid of cells behind that search | |
 //! | `lattice_families.rs` | the same for points of one lattice and one horizon, without a search | |
 //! | `offset_table.rs` | a value for each bond of a lattice | |
+//! | `bounded_least_norm.rs` | the smallest change of weights that meets linear conditions | |
+//! | `alike.rs` | families that are translations of each other | |
 //! | `shell_weights.rs` | isotropic weights of a lattice, shell by shell | eq. (3.6) as a sum |
 //! | `moment_fitted_weights.rs` | moment-fitted weights of one irregular family | |
 //! | `position_aware_influence.rs` | ω and σ of a position-aware family | section 4.2 |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is | |
-//! | `linear_force_state.rs` | its linearisation at rest | eq. (2.19), (5.16) |
-//! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.3) |
-//! | `laws/` | the laws, one file each | eq. (3.1), (5.16), section 7.2 |
+//! | `linear_force_state.rs` | its linearisation at rest; the collapsed tensor | eq. (2.10) |
+//! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.6) |
+//! | `laws/` | the laws, one file each | eq. (3.1), (4.11), (5.16), sections 6.2, 7.2 |
 //! | `critical_stretch.rs` | critical stretch from the fracture energy | \[Silling2005\] |
 //! | `softening.rs` | softening of bonds from strength and fracture energy | \[BazantOh1983\] |
 //! | `zero_energy.rs` | what resists the zero-energy modes of correspondence | section 6.3 |
 //! | `tearing_parameter.rs` | failure of ductile materials | eq. (6.33) |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
-//! | `body.rs` | internal force and partial stress | eq. (2.5), (2.19) |
+//! | `body.rs`, `body/` | the body: rows of the internal force, and partial stress | eq. (2.5), (2.19) |
 //! | `cauchy_born.rs` | a law of elements with the stress of whole families | eq. (2.10) |
 //! | `whole_family.rs` | the stress of a family without memory | eq. (2.19) |
 //! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |
@@ -76,7 +79,7 @@ pub use laws::{
 pub use linear_force_state::{
     Family, FamilyMaterials, LinearForceState, StatePart, StressFit, collapsed_tensor,
 };
-pub use moment_fitted_weights::{Bound, Conditions, FitError};
+pub use moment_fitted_weights::{Bound, FitError, MomentConditions};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use position_aware_influence::{CalibrationFields, NotPositionAware};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};

@@ -17,7 +17,7 @@ use crate::tensor::{Tensor4, Vector};
 
 /// One condition `Σ g |ξ|^radial Π_i ξ_i^exponents[i] V = value` on the coefficients `g` of a family.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Condition<const D: usize> {
+pub struct MomentCondition<const D: usize> {
     /// Powers of the bond's components.
     pub exponents: [u8; D],
     /// Power of the bond's length.
@@ -28,14 +28,14 @@ pub struct Condition<const D: usize> {
 
 /// What the moments of one family should be.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Conditions<const D: usize> {
+pub struct MomentConditions<const D: usize> {
     /// The conditions; consistent repetitions do no harm.
-    pub rows: Vec<Condition<D>>,
+    pub rows: Vec<MomentCondition<D>>,
     /// A bond's relative change counts by its share `g |ξ|^share V`.
     pub share: i32,
 }
 
-impl<const D: usize> Conditions<D> {
+impl<const D: usize> MomentConditions<D> {
     /// `Σ λ ξ⊗ξ⊗ξ⊗ξ V = 2 C`, for a bond-based law; `stiffness` must have all the symmetries of `ξ⊗ξ⊗ξ⊗ξ`
     /// (an isotropic one: λ = μ), of which only `C_ijkl` with `i ≤ j ≤ k ≤ l` is read.
     ///
@@ -45,7 +45,7 @@ impl<const D: usize> Conditions<D> {
             .into_iter()
             .map(|e| {
                 let [i, j, k, l] = indices(&e);
-                Condition {
+                MomentCondition {
                     exponents: e,
                     radial: 0,
                     value: 2.0 * stiffness.get(i, j, k, l),
@@ -71,11 +71,11 @@ impl<const D: usize> Conditions<D> {
         conditions
     }
 
-    /// Adds `Σ g ξ⊗…⊗ξ V = 0` (for [`Conditions::lps`]: `Σ ω ξ⊗…⊗ξ/|ξ|² V = 0`) of an odd degree, which a family lacks when it is not symmetric about its point: 1, 4 or 10 conditions of degree
+    /// Adds `Σ g ξ⊗…⊗ξ V = 0` (for [`MomentConditions::lps`]: `Σ ω ξ⊗…⊗ξ/|ξ|² V = 0`) of an odd degree, which a family lacks when it is not symmetric about its point: 1, 4 or 10 conditions of degree
     /// three, 1, 6 or 21 of degree five. With the latter its partial stress is exact for quadratic fields (the trace of those of an LPS holds the third moments of ω).
     pub fn with_vanishing_moments(mut self, degree: u8) -> Self {
         let radial = self.share - 4;
-        let zero = |exponents| Condition {
+        let zero = |exponents| MomentCondition {
             exponents,
             radial,
             value: 0.0,
@@ -85,7 +85,7 @@ impl<const D: usize> Conditions<D> {
         self
     }
 
-    /// The same conditions with the values that another family has, of coefficients `g` on the bonds `(ξ, V)`; those of [`Conditions::lps`] at the weighted volume that they ask for.
+    /// The same conditions with the values that another family has, of coefficients `g` on the bonds `(ξ, V)`; those of [`MomentConditions::lps`] at the weighted volume that they ask for.
     pub fn with_values_of(mut self, bonds: &[(Vector<D>, f64)], g: &[f64]) -> Self {
         let values: Vec<f64> = self
             .rows
@@ -115,7 +115,7 @@ impl<const D: usize> Conditions<D> {
     pub fn with_second_moments(mut self, weighted_volume: f64) -> Self {
         self.rows.extend(exponents::<D>(2).into_iter().map(|e| {
             let diagonal = e.contains(&2);
-            Condition {
+            MomentCondition {
                 exponents: e,
                 radial: 0,
                 value: if diagonal {
@@ -224,7 +224,7 @@ pub(super) fn place(point: &Option<usize>) -> String {
 pub fn fit<const D: usize>(
     bonds: &[(Vector<D>, f64)],
     base: &[f64],
-    conditions: &Conditions<D>,
+    conditions: &MomentConditions<D>,
     bound: Bound,
 ) -> Result<Fit, FitError> {
     let reach = bonds.iter().map(|(xi, _)| xi.norm()).fold(0.0, f64::max);
@@ -288,7 +288,7 @@ pub fn fit<const D: usize>(
 }
 
 /// `|ξ|^radial Π ξ_i^e_i`.
-fn monomial<const D: usize>(row: &Condition<D>, xi: &Vector<D>) -> f64 {
+fn monomial<const D: usize>(row: &MomentCondition<D>, xi: &Vector<D>) -> f64 {
     let mut value = xi.norm().powi(row.radial);
     for (x, &e) in xi.iter().zip(&row.exponents) {
         value *= x.powi(i32::from(e));
@@ -422,7 +422,7 @@ mod tests {
             let c = Tensor4::isotropic(third, third);
             let plain = largest_miss(&fourth_moments(&bonds, &base).scaled(0.5), &c);
 
-            let conditions = Conditions::bond_based(&c);
+            let conditions = MomentConditions::bond_based(&c);
             let fit_plain = fit(&bonds, &base, &conditions, Bound::Free).unwrap();
             let got = fourth_moments(&bonds, &fit_plain.values).scaled(0.5);
             let miss = largest_miss(&got, &c);
@@ -454,7 +454,7 @@ mod tests {
         let bonds = irregular::<D>(3.0, 1e-3, 3);
         let omega: Vec<f64> = bonds.iter().map(|(x, _)| 1.0 - x.norm() / 3.5e-3).collect();
         let m = weighted_volume(&bonds, &omega);
-        let fitted = fit(&bonds, &omega, &Conditions::lps(m), Bound::Free).unwrap();
+        let fitted = fit(&bonds, &omega, &MomentConditions::lps(m), Bound::Free).unwrap();
         let d = D as f64;
         // Σ ω ξ⊗ξ V = (m/D) I follows, and with it the dilatation of every affine field.
         let k = shape_tensor(&bonds, &fitted.values);
@@ -468,13 +468,13 @@ mod tests {
         let wanted = Tensor4::isotropic(third, third);
         assert!(largest_miss(&fourth_moments(&bonds, &per_square), &wanted) < 1e-13);
         // Asking for what follows anyway changes nothing, although the normal equations are then singular.
-        let twice = Conditions::lps(m).with_second_moments(m);
+        let twice = MomentConditions::lps(m).with_second_moments(m);
         let again = fit(&bonds, &omega, &twice, Bound::Free).unwrap();
         for (a, b) in fitted.values.iter().zip(&again.values) {
             assert!((a - b).abs() < 1e-11);
         }
         // Asking for another value than what follows is refused, and says so by its rank.
-        let contradiction = Conditions::lps(m).with_second_moments(1.1 * m);
+        let contradiction = MomentConditions::lps(m).with_second_moments(1.1 * m);
         let error = fit(&bonds, &omega, &contradiction, Bound::Free).unwrap_err();
         assert!(
             matches!(error, FitError::Deficient { rank, conditions, .. } if rank < conditions),
@@ -483,7 +483,7 @@ mod tests {
         let third = fit(
             &bonds,
             &omega,
-            &Conditions::lps(m).with_vanishing_moments(3),
+            &MomentConditions::lps(m).with_vanishing_moments(3),
             Bound::Free,
         )
         .unwrap();
@@ -527,7 +527,8 @@ mod tests {
                 }
             }
             let c = Tensor4::isotropic(1.0, 1.0);
-            let fitted = fit(&bonds, &base, &Conditions::bond_based(&c), Bound::Free).unwrap();
+            let conditions = MomentConditions::bond_based(&c);
+            let fitted = fit(&bonds, &base, &conditions, Bound::Free).unwrap();
             for (a, b) in fitted.values.iter().zip(&expected) {
                 assert!((a / b - 1.0).abs() < 1e-12, "m = {m}: {a} {b}");
             }
@@ -544,7 +545,7 @@ mod tests {
         let base = vec![1.0; bonds.len()];
         let trace: f64 = bonds.iter().map(|(x, v)| v * x.norm().powi(4)).sum();
         let c = Tensor4::isotropic(trace / 16.0, trace / 16.0);
-        let conditions = Conditions::bond_based(&c).with_vanishing_moments(3);
+        let conditions = MomentConditions::bond_based(&c).with_vanishing_moments(3);
         let free = fit(&bonds, &base, &conditions, Bound::Free).unwrap();
         assert!(free.smallest_factor < 0.05, "{}", free.smallest_factor);
         let bounded = fit(&bonds, &base, &conditions, Bound::AtLeast(0.05)).unwrap();
@@ -573,7 +574,7 @@ mod tests {
             .iter()
             .map(|&(x, y)| (Vector::<2>::new(x, y), 1.0))
             .collect();
-        let conditions = Conditions::bond_based(&Tensor4::isotropic(1.0, 1.0));
+        let conditions = MomentConditions::bond_based(&Tensor4::isotropic(1.0, 1.0));
         let error = fit(&bonds, &[1.0; 4], &conditions, Bound::Free).unwrap_err();
         assert_eq!(
             error,

@@ -111,7 +111,7 @@ enum Odd {
     Vanishing,
 }
 
-/// Conditions on moments of even order.
+/// MomentConditions on moments of even order.
 #[derive(Clone, Copy)]
 struct Even<'a, const D: usize> {
     /// What a bond of this direction adds to a condition, over its share.

@@ -10,7 +10,7 @@ pub const SHAPE_CONDITION_LIMIT: f64 = 1e10;
 
 /// Shape tensor `K = Σ ω ξ⊗ξ V` over the bonds `(ξ, V)` of one family.
 ///
-/// Source: [SAND2015-7998] section 7.2. Units: ξ \[m\], V [m^D] → [m^(D+2)] times those of ω.
+/// Source: [SAND2015-7998] eq. (6.30) and section 7.2. Units: ξ \[m\], V [m^D] → [m^(D+2)] times those of ω.
 pub fn shape_tensor<const D: usize>(bonds: &[(Vector<D>, f64)], omega: &[f64]) -> Tensor<D> {
     let mut k = Tensor::zeros();
     for ((xi, volume), w) in bonds.iter().zip(omega) {

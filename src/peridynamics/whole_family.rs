@@ -1,6 +1,6 @@
 //! The force state of one whole family of a law without memory.
 
-use super::bond_force::{Kinematics, stretch::psi};
+use super::bond_force::{BondKinematics, stretch::psi};
 use crate::{
     peridynamics::{DeformedFamily, EnergyDensity, ForceState, Past, Present, StatePart},
     tensor::{Tensor, Vector},
@@ -30,7 +30,7 @@ impl<const D: usize> WholeFamily<'_, D> {
     pub fn stress(
         &self,
         law: &dyn ForceState<D>,
-        kinematics: Kinematics,
+        kinematics: BondKinematics,
         difference: &[Vector<D>],
     ) -> (Tensor<D>, EnergyDensity) {
         let bonds = self.bonds.len();
@@ -40,13 +40,13 @@ impl<const D: usize> WholeFamily<'_, D> {
             let length = xi.norm();
             let cross = 2.0 * xi.dot(eta);
             match kinematics {
-                Kinematics::Exact => {
+                BondKinematics::Exact => {
                     let t = (cross + eta.norm_squared()) / (length * length);
                     let psi = psi(t);
                     extension[k] = length * t * (1.0 - (1.0 + t) * psi);
                     direction[k] = (xi + eta) * ((1.0 - t * psi) / length);
                 }
-                Kinematics::Linear => {
+                BondKinematics::Linear => {
                     extension[k] = 0.5 * cross / length;
                     direction[k] /= length;
                 }

@@ -1,6 +1,6 @@
 //! Zero-energy modes: what resists the part of a deformation that a correspondence stress does not see.
 
-use super::bond_force::Kinematics;
+use super::bond_force::BondKinematics;
 use crate::tensor::{Tensor, Vector};
 
 /// How the part of a family's deformation that is not uniform is resisted.
@@ -55,15 +55,15 @@ pub(crate) fn excess_length<const D: usize>(
     xi: &Vector<D>,
     eta: &Vector<D>,
     gradient: &Tensor<D>,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
 ) -> f64 {
     let uniform = gradient * xi;
     let beyond = eta - uniform;
     match kinematics {
-        Kinematics::Exact => {
+        BondKinematics::Exact => {
             let (deformed, smooth) = (xi + eta, xi + uniform);
             beyond.dot(&(deformed + smooth)) / (deformed.norm() + smooth.norm())
         }
-        Kinematics::Linear => beyond.dot(xi) / xi.norm(),
+        BondKinematics::Linear => beyond.dot(xi) / xi.norm(),
     }
 }

@@ -20,24 +20,24 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
     if lay_out <= ANSWERS.max(TENTH * (lay_out + run)) {
         return None;
     }
-    let joining = scene.coupling.joining();
+    let traits = scene.coupling.traits();
     let whole = |x: f64| x.round() as usize;
     let mut timings = Timings::default();
     timings.add("sites and bonds", lay_out);
     timings.add("solve", run);
     let mut choices = scene.choices.clone();
     choices.push(Decision {
-        choice: format!("coupling {}", joining.name),
+        choice: format!("coupling {}", traits.name),
         why: scene
             .coupling_why
             .clone()
-            .unwrap_or_else(|| joining.about.to_owned()),
+            .unwrap_or_else(|| traits.about.to_owned()),
     });
     Some(Prediction {
         scene: scene.title.clone(),
         counted: Some(format!("laying it out would take about {lay_out:.0} s")),
         dimension: D,
-        coupling: joining.name.to_owned(),
+        coupling: traits.name.to_owned(),
         sizes: Sizes {
             nodes: counts.nodes,
             cells: counts.cells,

@@ -101,7 +101,7 @@ fn prediction<const D: usize>(
     ];
     memory.extend(state.map(|bytes| share("state", bytes)));
     memory.push(share("output", output));
-    let mut choices = vec![laid_out.rest.coupling(laid_out.joining)];
+    let mut choices = vec![laid_out.rest.coupling(laid_out.traits)];
     // a coupling that was chosen is told already
     let told = choices[0].clone();
     choices.extend(laid_out.choices.iter().filter(|c| **c != told).cloned());
@@ -109,7 +109,7 @@ fn prediction<const D: usize>(
         scene: laid_out.title.clone(),
         counted: None,
         dimension: D,
-        coupling: laid_out.joining.name.to_owned(),
+        coupling: laid_out.traits.name.to_owned(),
         sizes,
         method: None,
         symmetry: laid_out.moving.system.symmetry(),
@@ -329,7 +329,7 @@ fn steps<const D: usize>(
         motion: Some(motion_of(model, &pace, seconds_per_step)),
         ..prediction(&laid_out, held.len(), files, Some(state_bytes))
     };
-    prediction.warnings = warnings(model, laid_out.rest, laid_out.joining, &prediction)?;
+    prediction.warnings = warnings(model, laid_out.rest, laid_out.traits, &prediction)?;
     holds(&prediction)?;
     Ok(prediction)
 }
@@ -387,7 +387,7 @@ pub(crate) fn load_steps<const D: usize>(
         let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);
         factors(&laid_out, spec, &held, &mut prediction, progress)?;
         prediction.warnings =
-            warnings(laid_out.model, laid_out.rest, laid_out.joining, &prediction)?;
+            warnings(laid_out.model, laid_out.rest, laid_out.traits, &prediction)?;
         prediction.warnings.push(format!(
             "the time of {} load steps is not in the estimate: it depends on the bonds that break",
             spec.steps

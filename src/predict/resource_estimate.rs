@@ -123,7 +123,7 @@ pub(crate) fn predict<const D: usize>(
 ) -> Result<Prediction, RunError> {
     let (mut timings, mut watch) = (Timings::default(), Stopwatch::start());
     let title = scene.title.clone();
-    let joining = scene.coupling.joining();
+    let traits = scene.coupling.traits();
     let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
     let (problem, rest) = setup::problem(scene);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
@@ -145,7 +145,7 @@ pub(crate) fn predict<const D: usize>(
     )?;
     watch.lap(&mut timings, "proof");
     let mut choices: Vec<_> = rest.choices.iter().chain(&rest.placed).cloned().collect();
-    choices.push(rest.coupling(joining));
+    choices.push(rest.coupling(traits));
     let symmetry = equilibrium::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
     let nonzeros = pattern.stored * D * D;
     let plan = Planned::of(&model, &pattern, &free, &rest, symmetry)?;
@@ -172,7 +172,7 @@ pub(crate) fn predict<const D: usize>(
         scene: title,
         counted: None,
         dimension: D,
-        coupling: joining.name.to_owned(),
+        coupling: traits.name.to_owned(),
         sizes,
         method: Some(plan.method),
         symmetry,
@@ -193,7 +193,7 @@ pub(crate) fn predict<const D: usize>(
         processes: Vec::new(),
         distribution: String::new(),
     };
-    prediction.warnings = warnings(&model, &rest, joining, &prediction)?;
+    prediction.warnings = warnings(&model, &rest, traits, &prediction)?;
     holds(&prediction)?;
     Ok(prediction)
 }
@@ -353,7 +353,7 @@ const MANY_BONDS: usize = 100_000_000;
 pub(crate) fn warnings<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
-    joining: CouplingTraits,
+    traits: CouplingTraits,
     prediction: &Prediction,
 ) -> Result<Vec<String>, RunError> {
     let mut list = Vec::new();
@@ -381,7 +381,7 @@ pub(crate) fn warnings<const D: usize>(
         }
         if let Some(width) = transition_width(&model.mesh, &model.zones) {
             let largest = body.cloud.horizon.largest();
-            let (wanted, why) = match joining.zones {
+            let (wanted, why) = match traits.zones {
                 ZonesNeeded::Transition { width, why } => (width, why),
                 _ => (0.0, ""),
             };
@@ -393,7 +393,7 @@ pub(crate) fn warnings<const D: usize>(
             }
         }
     }
-    list.extend(doubts(model, joining));
+    list.extend(doubts(model, traits));
     list.extend(of_elements(model, &model.local_laws(&rest.local_laws)));
     list.extend(unusual_stretch(model, rest)?);
     let proof = &prediction.proof;

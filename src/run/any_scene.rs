@@ -5,19 +5,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::budget;
+use super::chosen::with_choice;
 use super::error::RunError;
-use super::motion::RunOptions;
+use super::motion::{self, RunOptions};
 use super::placed_scene::PlacedScene;
 use super::statics;
 use super::zone_placement::{self};
 use crate::material::Kinematics;
 use crate::observe::checkpoint::Fingerprint;
+use crate::observe::pieces::agreed;
 use crate::observe::summary::{Decision, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
 use crate::scene::source::read;
 use crate::scene::spec::KinematicsSpec;
 use crate::scene::{Scene, SceneError, SceneErrorKind, SceneSpec, Solve, Source};
+use crate::system::Ranks;
 
 /// Validates a scene and places its zone, if it leaves that to the program.
 fn placed<const D: usize>(
@@ -35,6 +38,23 @@ fn placed<const D: usize>(
     scene.placement = Some(found.placement);
     let kept = found.kept.map(Arc::new);
     Ok(Box::new(PlacedScene { scene, kept }))
+}
+
+/// Claims the files that a scene will write, and runs it: at rest, in time or in load steps.
+fn run<const D: usize>(
+    scene: PlacedScene<D>,
+    options: &RunOptions<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, RunError> {
+    let is_static = scene.solve == Solve::Static;
+    let processes = options.writers().map_or(1, Ranks::count);
+    let claim = || scene.output.claim(&scene.title, !is_static, processes);
+    let claimed = options.writes().then(claim).transpose();
+    let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
+    if is_static {
+        return statics::run(scene, options, progress);
+    }
+    with_choice(scene.scene, |scene| motion::run(scene, options, progress))
 }
 
 /// A validated scene of any dimension.
@@ -161,9 +181,9 @@ impl AnyScene {
         }
         let unused = self.unused().to_vec();
         let mut summary = match self {
-            Self::Bar(s) => statics::run(*s, options, progress),
-            Self::Plane(s) => statics::run(*s, options, progress),
-            Self::Solid(s) => statics::run(*s, options, progress),
+            Self::Bar(s) => run(*s, options, progress),
+            Self::Plane(s) => run(*s, options, progress),
+            Self::Solid(s) => run(*s, options, progress),
         }?;
         summary.warnings.extend(unused);
         Ok(summary)

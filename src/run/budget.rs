@@ -2,7 +2,7 @@
 //!
 //! Points follow from the volume of the cells that hold them, bonds from points times the size of a family, the stiffness from the families that a row
 //! sees. None of this needs the points themselves, so a spacing that is ten times too small is refused in milliseconds instead of ending in an allocation
-//! that fails. `predict.rs` counts exactly once the model is laid out.
+//! that fails. `src/predict/` counts exactly once the model is laid out.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

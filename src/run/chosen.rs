@@ -20,7 +20,7 @@ pub fn with_choice<const D: usize, T>(
     other.solve = scene.solve.clone();
     other.solver = scene.solver;
     other.title = scene.title.clone();
-    let (first, second) = (scene.coupling.joining().name, other.coupling.joining().name);
+    let (first, second) = (scene.coupling.traits().name, other.coupling.traits().name);
     match then(scene) {
         Err(reason) if reason.is_of_coupling() => {
             other.coupling_why = Some(format!(

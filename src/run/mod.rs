@@ -3,7 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `any_scene.rs`, `placed_scene.rs` | a scene of any dimension with its zone placed: what is run |
-//! | `placement/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
+//! | `zone_placement/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `setup.rs` | `Scene` to the problem that is coupled, and the settings that a run keeps |
 //! | `budget.rs` | the memory that a run may take, and the refusal of what needs more before anything is laid out |
 //! | `chosen.rs` | the next coupling where the one that was chosen does not hold |
@@ -13,13 +13,16 @@
 //! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
 //! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
 //! | `results.rs` | a solution that a program keeps: fields and tables by name |
+//! | `solution_samples.rs` | a solution along lines and at probes, as tables |
 //! | `samples.rs` | displacements of a static scene at places, for studies of convergence |
 //! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
 //! | `stresses.rs`, `stress_settings.rs`, `stress_probes.rs` | stress as outputs show it, and with each row of a history |
+//! | `thermal.rs` | the force on each site that a change of temperature gives |
 //! | `springs.rs` | springs between the body and the ground, on the sites of a model |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
 //! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | whether loads and reactions balance; how far elements rotate; stresses that families do not resolve; what of a model makes its results doubtful |
 //! | `write.rs` | the files of a run |
+//! | `pieces.rs`, `point_cells.rs` | what a process writes into its piece of a VTU file; the cells shown around points |
 //! | `error.rs` | what cannot be run, with place and remedy |
 //! | `block.rs`, `observed_tests.rs` | a block from a scene, for unit tests; what an observer sees |
 

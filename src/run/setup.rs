@@ -6,7 +6,7 @@ use crate::coupling::{self, Coupling, HorizonField, Model, PointSource, Problem,
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
-use crate::peridynamics::bond_force::Kinematics;
+use crate::peridynamics::bond_force::BondKinematics;
 use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::progress::Progress;
 use crate::run::error::RunError;
@@ -114,7 +114,7 @@ impl<const D: usize> RunSettings<D> {
     pub fn has_linear_point(&self, model: &Model<D>, point: usize) -> bool {
         match model.local_law_at(point) {
             Some(law) => !law.is_objective(),
-            None => self.kinematics() == Kinematics::Linear,
+            None => self.kinematics() == BondKinematics::Linear,
         }
     }
 
@@ -146,18 +146,18 @@ impl<const D: usize> RunSettings<D> {
     }
 
     /// How bonds deform.
-    pub fn kinematics(&self) -> Kinematics {
+    pub fn kinematics(&self) -> BondKinematics {
         match self.breaking.bonds {
-            BondsSpec::Exact => Kinematics::Exact,
-            BondsSpec::Linear => Kinematics::Linear,
+            BondsSpec::Exact => BondKinematics::Exact,
+            BondsSpec::Linear => BondKinematics::Linear,
         }
     }
 
     /// The coupling as a choice: why it was made, or what it does if the scene names it.
-    pub fn coupling(&self, joining: CouplingTraits) -> Decision {
+    pub fn coupling(&self, traits: CouplingTraits) -> Decision {
         self.chosen.clone().unwrap_or_else(|| Decision {
-            choice: format!("coupling {}", joining.name),
-            why: joining.about.to_owned(),
+            choice: format!("coupling {}", traits.name),
+            why: traits.about.to_owned(),
         })
     }
 }
@@ -177,7 +177,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
     let ratio = least.unwrap_or_else(|| Ratio::new(first.lame, scene.kinematics));
     let method = scene.coupling.build_for(law.linearised());
     let chosen = scene.coupling_why.map(|why| Decision {
-        choice: format!("coupling {}", scene.coupling.joining().name),
+        choice: format!("coupling {}", scene.coupling.traits().name),
         why,
     });
     let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();

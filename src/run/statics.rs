@@ -1,4 +1,4 @@
-//! From a validated scene to its solution: the only place where scene, core, solver and observers meet.
+//! From a static scene to its solution.
 
 use super::chosen::with_choice;
 use super::equilibrium::{Assembled, Equilibrium, StaticInput, equilibrium};
@@ -16,7 +16,6 @@ use std::sync::Arc;
 use crate::coupling::{Coupling, Model, Operator, Problem, SiteKind};
 use crate::dimension;
 use crate::observe::ObserveError;
-use crate::observe::pieces::agreed;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
     Decision, Reaction, Rotation, RunSummary, SectionForce, Sizes, Stopwatch, Timings,
@@ -28,30 +27,21 @@ use crate::run::definiteness;
 use crate::run::error::RunError;
 use crate::run::surface_gradient::missed_peak;
 use crate::run::warnings::{indefinite, of_elements, out_of_balance, warnings};
-use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
 use crate::solve::statics::StaticInfo;
 use crate::system::{Ranks, SemiDiscrete};
 use crate::tensor::Vector;
 
-/// Runs a scene and writes its outputs.
+/// Solves a static scene and writes its outputs.
 ///
 /// # Errors
 /// [`RunError`], each with place and remedy.
-pub(crate) fn run<const D: usize>(
+pub(super) fn run<const D: usize>(
     scene: PlacedScene<D>,
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    let moves = scene.solve != Solve::Static;
-    let processes = options.writers().map_or(1, Ranks::count);
-    let claim = || scene.output.claim(&scene.title, moves, processes);
-    let claimed = options.writes().then(claim).transpose();
-    let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
-    if moves {
-        return with_choice(scene.scene, |scene| motion::run(scene, options, progress));
-    }
     solve_over(scene, options.ranks, progress, &mut |output, solved| {
         super::write::write_for(output, solved, options)
     })
@@ -117,7 +107,7 @@ fn solve_chosen<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
-    let (name, joining) = (scene.title.clone(), scene.coupling.joining());
+    let (name, traits) = (scene.title.clone(), scene.coupling.traits());
     let counts = [scene.mesh.nodes.len(), scene.mesh.cell_count()];
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
@@ -185,7 +175,7 @@ fn solve_chosen<const D: usize>(
         peak_memory_bytes: peak_memory_bytes(),
         files,
         sections,
-        ..body.summary(equilibrium, joining, proof)
+        ..body.summary(equilibrium, traits, proof)
     })
 }
 
@@ -319,7 +309,7 @@ impl<const D: usize> StaticBody<'_, D> {
     fn summary(
         &self,
         equilibrium: &Equilibrium,
-        joining: CouplingTraits,
+        traits: CouplingTraits,
         proof: Proof,
     ) -> RunSummary {
         let solution = &equilibrium.solution;
@@ -331,7 +321,7 @@ impl<const D: usize> StaticBody<'_, D> {
         let reactions = &equilibrium.solution.reactions;
         let balance = Balance::<D>::of(&equilibrium.internal, &equilibrium.load, reactions);
         let (force, relative) = (balance.force.as_slice(), balance.relative());
-        let mut told = warnings(self.model, joining, &proof);
+        let mut told = warnings(self.model, traits, &proof);
         told.extend(of_elements(
             self.model,
             &self.model.local_laws(&self.rest.local_laws),
@@ -341,7 +331,7 @@ impl<const D: usize> StaticBody<'_, D> {
         // what is left of the forces of a body that only turns is round-off
         let least = round_off(self.model, furthest(&solution.displacement));
         let is_loaded = balance.scale > least;
-        told.extend(out_of_balance(force, relative, joining).filter(|_| is_loaded));
+        told.extend(out_of_balance(force, relative, traits).filter(|_| is_loaded));
         let stresses = &self.rest.stresses;
         // strains of free expansion are no stress
         if stresses.thermal.is_none() {
@@ -359,7 +349,7 @@ impl<const D: usize> StaticBody<'_, D> {
         }
         RunSummary {
             dimension: D,
-            coupling: joining.name.to_owned(),
+            coupling: traits.name.to_owned(),
             warnings: told,
             proof,
             rotation,

@@ -16,8 +16,8 @@ use crate::solve::statics::MethodUsed;
 use crate::system::{SemiDiscrete, Symmetry};
 
 /// All doubts about a model.
-pub fn doubts<const D: usize>(model: &Model<D>, joining: CouplingTraits) -> Vec<String> {
-    let all = [one_sided(model), crack_beside_seam(model, joining)];
+pub fn doubts<const D: usize>(model: &Model<D>, traits: CouplingTraits) -> Vec<String> {
+    let all = [one_sided(model), crack_beside_seam(model, traits)];
     let notes = model.mesh.notes.iter().cloned();
     notes.chain(all.into_iter().flatten()).collect()
 }
@@ -25,11 +25,11 @@ pub fn doubts<const D: usize>(model: &Model<D>, joining: CouplingTraits) -> Vec<
 /// The warnings of a proof, then all doubts.
 pub(crate) fn warnings<const D: usize>(
     model: &Model<D>,
-    joining: CouplingTraits,
+    traits: CouplingTraits,
     proof: &Proof,
 ) -> Vec<String> {
     let proved = proof.messages(Severity::Warning).map(str::to_owned);
-    proved.chain(doubts(model, joining)).collect()
+    proved.chain(doubts(model, traits)).collect()
 }
 
 /// Stretches at which bonds of solids break: the least is that of concrete (100 J/m², 30 GPa) with a horizon of 10 m, brittle parts
@@ -75,7 +75,7 @@ const OUT_OF_BALANCE: f64 = 0.002;
 pub(crate) fn out_of_balance(
     force: &[f64],
     relative: f64,
-    joining: CouplingTraits,
+    traits: CouplingTraits,
 ) -> Option<String> {
     (relative > OUT_OF_BALANCE).then(|| {
         let force: Vec<String> = force.iter().map(|f| number(*f)).collect();
@@ -83,7 +83,7 @@ pub(crate) fn out_of_balance(
             "loads and reactions are out of balance by {:.2} % of the sum of them all, by the force ({}): the seam of coupling `{}` balances affine fields only, and displacements may be wrong by three times as much; couple by truncated, or enclose the zone in more elements, further from surfaces and supports",
             100.0 * relative,
             force.join(", "),
-            joining.name
+            traits.name
         )
     })
 }
@@ -206,9 +206,9 @@ fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
 }
 
 /// Cracks and voids so near to the seam that what is computed on this side of it lacks bonds: `bondline verify extremes`, "Cracks beside the seam".
-fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: CouplingTraits) -> Option<String> {
+fn crack_beside_seam<const D: usize>(model: &Model<D>, traits: CouplingTraits) -> Option<String> {
     let p = model.peridynamics.as_ref()?;
-    let horizons = match joining.name {
+    let horizons = match traits.name {
         "splice" => SPLICE,
         "partial-stress" if model.roles.contains(&CellRole::StressElement) => STRESS_ELEMENTS,
         "partial-stress" => MESHFREE,
@@ -237,7 +237,7 @@ fn crack_beside_seam<const D: usize>(model: &Model<D>, joining: CouplingTraits) 
             "a crack or void lies {:.2} horizons from the seam at ({}), where {} wants more than {horizons}: displacements are off by a few per cent to all of their size (docs/methods.md); enlarge [zones.nonlocal], or use coupling.truncated",
             nearest.0,
             place.join(", "),
-            joining.name
+            traits.name
         )
     })
 }

@@ -3,7 +3,6 @@
 use std::cell::LazyCell;
 use std::path::{Path, PathBuf};
 
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::RunOptions;
@@ -425,10 +424,9 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             Field::tensor("stress", &self.stresses),
         ];
         let derived: Vec<Vec<f64>> = match self.solved.has_derived() {
-            true => {
-                let each = self.stresses.par_iter().zip(&self.places);
-                parallel::map_each(each, |(s, place)| self.solved.derived(s, *place))
-            }
+            true => parallel::map(shown, 1, |k| {
+                self.solved.derived(&self.stresses[k], self.places[k])
+            }),
             false => Vec::new(),
         };
         for (k, name) in self.solved.derived_names().into_iter().enumerate() {

@@ -47,7 +47,7 @@ pub struct Follow {
 /// Refuses scenes whose zone cannot follow the crack; the peridynamic side and its law of one whose zone can.
 fn supported<'a, const D: usize>(
     span: Span,
-    joined: &mut SelectedCoupling,
+    selected: &mut SelectedCoupling,
     solve: &Solve,
     breaking: &Breaking<D>,
     bonds: Option<(&'a Peridynamics<D>, &'a dyn Law<D>)>,
@@ -85,17 +85,17 @@ fn supported<'a, const D: usize>(
             "remove one of the two",
         ));
     }
-    let (ZonesNeeded::Nonlocal, Some((p, law))) = (joined.joining.zones, bonds) else {
+    let (ZonesNeeded::Nonlocal, Some((p, law))) = (selected.traits.zones, bonds) else {
         return Err(refused(
             format!(
                 "`zones.follow` is set, and coupling `{}` has a transition zone",
-                joined.joining.name
+                selected.traits.name
             ),
             "moves the border of two zones",
             "use coupling.truncated, or remove it",
         ));
     };
-    if let CouplingSpec::Truncated(truncated) = &mut joined.coupling {
+    if let CouplingSpec::Truncated(truncated) = &mut selected.coupling {
         // the zone changes before damage comes near, and nothing that broke at the seam would be carried over
         if truncated.cut_bonds == Some(CutBondsSpec::Breaking) {
             return Err(refused(
@@ -120,7 +120,7 @@ fn supported<'a, const D: usize>(
 /// How the zone follows, if the scene wants it to.
 pub(crate) fn follow<const D: usize>(
     spec: &SceneSpec,
-    joined: &mut SelectedCoupling,
+    selected: &mut SelectedCoupling,
     solve: &Solve,
     breaking: &Breaking<D>,
     bonds: Option<(&Peridynamics<D>, &dyn Law<D>)>,
@@ -130,11 +130,11 @@ pub(crate) fn follow<const D: usize>(
     let Some(typed) = &spec.zones.follow else {
         return Ok(None);
     };
-    if let ZonesNeeded::Everywhere(_) = joined.joining.zones {
+    if let ZonesNeeded::Everywhere(_) = selected.traits.zones {
         // one zone ignores what is said of zones
         return Ok(None);
     }
-    let (p, law) = supported(typed.span(), joined, solve, breaking, bonds)?;
+    let (p, law) = supported(typed.span(), selected, solve, breaking, bonds)?;
     let horizon = (0..mesh.cell_count())
         .map(|c| p.horizon_at(&mesh.centroid(c)))
         .fold(0.0, f64::max);

@@ -22,10 +22,10 @@ pub(crate) fn balanced_seam<const D: usize>(
     cell_material: &[u16],
     peridynamic: u16,
 ) -> Result<(), SceneError> {
-    let joining = coupling.joining();
+    let traits = coupling.traits();
     let material = &materials[peridynamic as usize];
     let balances = matches!(coupling, CouplingSpec::Truncated(_))
-        || matches!(joining.zones, ZonesNeeded::Everywhere(_));
+        || matches!(traits.zones, ZonesNeeded::Everywhere(_));
     // a splice gives both sides the stress of one local law, and of the bonds; partial stress that of the bonds
     let is_same = |m: &u16| std::ptr::eq(material, &raw const materials[*m as usize]);
     let elements = spec.peridynamics.as_ref().and_then(|p| p.elements.as_ref());
@@ -63,7 +63,7 @@ pub(crate) fn balanced_seam<const D: usize>(
             "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
             material.name,
             material.law.name(),
-            joining.name
+            traits.name
         ),
     )
     .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")

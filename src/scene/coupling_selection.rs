@@ -2,7 +2,7 @@
 //!
 //! Left to the program, it is `truncated` wherever that holds, for it alone is symmetric, in exact equilibrium and bounded in time. Where the scene shows that it
 //! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere, an LPS has a low
-//! Poisson's ratio, or points have a stress, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`chosen.rs`).
+//! Poisson's ratio, or points have a stress, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`src/run/chosen.rs`).
 
 use super::error::{SceneError, SceneErrorKind};
 use super::material_interfaces;
@@ -35,7 +35,7 @@ enum Obstacle {
 ///
 /// # Errors
 /// Those of the zones and of the lattice, which the choice looks at.
-pub(crate) fn joined<const D: usize>(
+pub(crate) fn selected<const D: usize>(
     spec: &SceneSpec,
     (found, cell_material): (&[Material<D>], &[u16]),
     mesh: &Mesh<D>,
@@ -43,7 +43,7 @@ pub(crate) fn joined<const D: usize>(
     instead: Option<&CouplingSpec>,
 ) -> Result<SelectedCoupling, SceneError> {
     let of = |coupling: CouplingSpec, span: Span, why: Option<String>| SelectedCoupling {
-        joining: coupling.joining(),
+        traits: coupling.traits(),
         otherwise: None,
         coupling,
         span,
@@ -174,7 +174,7 @@ fn obstacle<const D: usize>(
     if used.len() > 1 && (D == 3 || !found[usize::from(used[0])].law.linearised().is_pairwise()) {
         return certain("points of several materials in space, or of a law with dilatations");
     }
-    let lattice = peridynamics::peridynamics(p, truncated.joining.lattice, mesh, &zones)?;
+    let lattice = peridynamics::peridynamics(p, truncated.traits.lattice, mesh, &zones)?;
     let Points::Lattice { spacing, origin } = lattice.points else {
         return certain("points that are no lattice");
     };
@@ -250,7 +250,7 @@ y = 0
             source.push_override(o).expect("an override");
         }
         match AnyScene::from_source(&source, Path::new("."), "plate").expect("a scene") {
-            AnyScene::Plane(s) => (s.coupling.joining().name, s.scene.coupling_why),
+            AnyScene::Plane(s) => (s.coupling.traits().name, s.scene.coupling_why),
             other => panic!("a plate is plane: {other:?}"),
         }
     }

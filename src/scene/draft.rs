@@ -141,16 +141,16 @@ impl<'a, const D: usize> Draft<'a, D> {
     }
 
     /// Refuses a coupling with a peridynamic side in a scene without [peridynamics].
-    fn refuse_missing_peridynamics(&self, joined: &SelectedCoupling) -> Result<(), SceneError> {
-        let joining = joined.joining;
+    fn refuse_missing_peridynamics(&self, selected: &SelectedCoupling) -> Result<(), SceneError> {
+        let traits = selected.traits;
         if self.spec.peridynamics.is_none()
-            && !matches!(joining.zones, ZonesNeeded::Everywhere(Zone::Local))
+            && !matches!(traits.zones, ZonesNeeded::Everywhere(Zone::Local))
         {
             return Err(SceneError::new(
                 SceneErrorKind::Missing,
-                format!("coupling `{}` needs [peridynamics]", joining.name),
+                format!("coupling `{}` needs [peridynamics]", traits.name),
             )
-            .label(joined.span.clone(), "has a peridynamic side")
+            .label(selected.span.clone(), "has a peridynamic side")
             .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
         }
         Ok(())
@@ -243,24 +243,24 @@ impl<'a, const D: usize> Draft<'a, D> {
         instead: Option<&CouplingSpec>,
     ) -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
         let (spec, mesh) = (self.spec, &self.mesh);
-        let mut joined = coupling_selection::joined(
+        let mut selected = coupling_selection::selected(
             spec,
             (&self.materials, &self.cell_material),
             mesh,
             placed,
             instead,
         )?;
-        let joining = joined.joining;
-        self.refuse_missing_peridynamics(&joined)?;
-        let mut zones = zones::zones(spec, &joined, mesh, placed)?;
+        let traits = selected.traits;
+        self.refuse_missing_peridynamics(&selected)?;
+        let mut zones = zones::zones(spec, &selected, mesh, placed)?;
         let peridynamics = (spec.peridynamics.as_ref())
-            .map(|p| peridynamics::peridynamics(p, joining.lattice, mesh, &zones))
+            .map(|p| peridynamics::peridynamics(p, traits.lattice, mesh, &zones))
             .transpose()?;
         let choices: Vec<Decision> = peridynamics.iter().flat_map(lattice_choices).collect();
         let peridynamics = peridynamics
-            .map(|p| lattice_regions::bodies(spec, joining, p, mesh, &mut zones))
+            .map(|p| lattice_regions::bodies(spec, traits, p, mesh, &mut zones))
             .transpose()?;
-        let points = self.point_materials(&joined.coupling, peridynamics.as_ref(), &zones)?;
+        let points = self.point_materials(&selected.coupling, peridynamics.as_ref(), &zones)?;
         let (used, law) = (points.used, points.law);
         let (interfaces, told) = (points.interfaces, points.told);
         self.check_horizon(peridynamics.as_ref(), &used, &zones)?;
@@ -269,13 +269,13 @@ impl<'a, const D: usize> Draft<'a, D> {
             densities(spec, &self.materials)?;
         }
         let peridynamic = used[0];
-        self.check_laws(&joined.coupling, &used, &zones)?;
+        self.check_laws(&selected.coupling, &used, &zones)?;
         let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
-        let elements = self.elements(&joined.coupling, &used, law.as_ref(), breaking.bonds)?;
+        let elements = self.elements(&selected.coupling, &used, law.as_ref(), breaking.bonds)?;
         self.check_heat(&breaking, peridynamics.is_some(), &zones)?;
         let follow = adaptive_zone::follow(
             spec,
-            &mut joined,
+            &mut selected,
             &self.solve,
             &breaking,
             (peridynamics.as_ref()).map(|p| (p, law.as_ref())),
@@ -293,8 +293,8 @@ impl<'a, const D: usize> Draft<'a, D> {
             point_materials: used,
             point_law: law,
             peridynamics,
-            coupling: joined.coupling,
-            coupling_why: joined.why,
+            coupling: selected.coupling,
+            coupling_why: selected.why,
             placement: None,
             choices: choices.into_iter().chain(told).collect(),
             conditions: self.conditions.clone(),
@@ -313,7 +313,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             unused: Vec::new(),
             fingerprint: self.fingerprint.clone(),
         };
-        Ok((scene, joined.otherwise))
+        Ok((scene, selected.otherwise))
     }
 }
 

@@ -42,8 +42,8 @@ type Obstacle = Option<(String, &'static str)>;
 
 /// What keeps a coupling from carrying the stress of elements that follow the bonds.
 fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn Law<D>) -> Obstacle {
-    let joining = coupling.joining();
-    match (joining.zones, coupling) {
+    let traits = coupling.traits();
+    match (traits.zones, coupling) {
         (ZonesNeeded::Everywhere(Zone::Local), _) => Some((
             "there are no points whose bonds the elements could follow".to_owned(),
             "draw a nonlocal zone and couple it by splice, or remove this",
@@ -61,7 +61,7 @@ fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn La
         _ => Some((
             format!(
                 "the rows of coupling `{}` at the seam are linear: elements and points would rotate, and the seam would not",
-                joining.name
+                traits.name
             ),
             "use coupling = \"splice\", \"partial-stress\" or \"truncated\", or elements = \"linear\" for rotations below 2 degrees",
         )),

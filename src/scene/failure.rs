@@ -176,7 +176,7 @@ pub(crate) fn breaking<const D: usize>(
                 .iter()
                 .any(|&m| has_energy(materials[usize::from(m)].fracture))
                 || interfaces.iter().any(|i| has_energy(i.fracture)));
-    let is_of_stretch = !matches!(fracture, Some(Fracture::Tearing(_)));
+    let is_of_stretch = fracture.is_none_or(Fracture::is_of_stretch);
     if let (Some(typed), false, true) = (calibration, has_energy, is_of_stretch) {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,

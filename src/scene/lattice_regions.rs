@@ -62,7 +62,7 @@ fn refuse_empty_zones<const D: usize>(
 /// Gives the bodies of `zones.bodies` their lattices, and makes elements of the cells that touch a body from the rest of the zone.
 pub(crate) fn bodies<const D: usize>(
     spec: &SceneSpec,
-    joining: CouplingTraits,
+    traits: CouplingTraits,
     p: Peridynamics<D>,
     mesh: &Mesh<D>,
     zones: &mut [Zone],
@@ -70,12 +70,12 @@ pub(crate) fn bodies<const D: usize>(
     let Some(first) = spec.zones.bodies.keys().next() else {
         return Ok(p);
     };
-    if joining.lattice != LatticeStart::Halfway {
+    if traits.lattice != LatticeStart::Halfway {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
             format!(
                 "`zones.bodies` needs bonds that end on faces; coupling `{}` completes families across a seam",
-                joining.name
+                traits.name
             ),
         )
         .label(first.span.clone(), "has a horizon of its own")

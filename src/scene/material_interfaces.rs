@@ -338,7 +338,7 @@ impl<const D: usize> Pair<'_, D> {
             )),
             CouplingSpec::Truncated(_) => Ok(()),
             _ => Err(self.refused(
-                &format!("the coupling is `{}`", coupling.joining().name),
+                &format!("the coupling is `{}`", coupling.traits().name),
                 "another, whose bonds the rows of that seam do not know",
                 "use coupling = \"truncated\", \"splice\" or \"nonlocal\", or keep the nonlocal and transition zones within one material",
             )),
@@ -381,7 +381,7 @@ pub(crate) fn check<const D: usize>(
             "draw a zone that is wide enough, or remove it",
         ));
     }
-    let tears = |m: &&u16| matches!(of(**m).fracture, Some(Fracture::Tearing(_)));
+    let tears = |m: &&u16| of(**m).fracture.is_some_and(|f| !f.is_of_stretch());
     if used.iter().find(tears).is_some() {
         return Err(pair.refused(
             "one breaks by a tearing parameter",

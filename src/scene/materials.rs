@@ -8,7 +8,7 @@ use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics;
 use super::region::region;
-use super::spec::{CellsSpec, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
+use super::spec::{CellsSpec, FractureKey, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
 use super::user_material;
 use super::value::Text;
 use crate::material::{Elastic, Kinematics};
@@ -68,6 +68,16 @@ pub enum Fracture {
     Stretch(f64),
     /// At this tearing parameter.
     Tearing(f64),
+}
+
+impl Fracture {
+    /// Whether a stretch breaks the bond, typed or calibrated to an energy.
+    pub fn is_of_stretch(self) -> bool {
+        match self {
+            Self::Energy(_) | Self::Stretch(_) => true,
+            Self::Tearing(_) => false,
+        }
+    }
 }
 
 impl<const D: usize> Material<D> {
@@ -326,17 +336,22 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
     if let Some((other, second)) = typed.next() {
         return Err(SceneError::new(
             SceneErrorKind::Choice,
-            format!("`materials.{name}.{law}` holds `{key}`, `{other}` at once"),
+            format!(
+                "`materials.{name}.{law}` holds `{}`, `{}` at once",
+                key.key(),
+                other.key()
+            ),
         )
         .label(number.span.clone(), "one")
         .label(second.span.clone(), "and another")
         .help("keep one of them: bonds break by one criterion"));
     }
-    let value = bounds_checks::positive(&format!("materials.{name}.{law}.{key}"), number)?;
+    let place = format!("materials.{name}.{law}.{}", key.key());
+    let value = bounds_checks::positive(&place, number)?;
     Ok(Some(match key {
-        "fracture-energy" => Fracture::Energy(value),
-        "critical-stretch" => Fracture::Stretch(value),
-        _ => Fracture::Tearing(value),
+        FractureKey::Energy => Fracture::Energy(value),
+        FractureKey::Stretch => Fracture::Stretch(value),
+        FractureKey::Tearing => Fracture::Tearing(value),
     }))
 }
 

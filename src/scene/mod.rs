@@ -9,8 +9,10 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `conditions.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `condition_list.rs`, `conditions.rs`, `surface_conditions.rs` | the conditions that are typed; each of them; those that depend on geometry: pressure, symmetry, rotation |
+//! | `temperature.rs` | the temperature of the body |
 //! | `impactors.rs` | rigid bodies that strike or press |
 //! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
@@ -18,7 +20,7 @@
 //! | `agreement.rs` | whether parts that are right alone agree |
 //! | `unused.rs` | parts of a scene that touch nothing |
 //! | `build/` | scenes that a program makes |
-//! | `template.rs` | commented scenes to start from |
+//! | `template.rs`, `templates/` | commented scenes to start from |
 //! | `error.rs` | place, value and remedy of what is typed |
 
 pub(crate) mod adaptive_zone;

@@ -178,9 +178,9 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::coupling::semidiscrete::behaviour::{BondBehaviour, Critical};
+    use crate::coupling::semidiscrete::behaviour::{BondBehaviour, FailureCriterion};
     use crate::coupling::{CoupledSystem, Sampler};
-    use crate::peridynamics::bond_force::Kinematics as BondKinematics;
+    use crate::peridynamics::bond_force::BondKinematics;
     use crate::progress::Silent;
     use crate::run::AnyScene;
     use crate::run::{Solved, solve_with};
@@ -423,7 +423,7 @@ y = 0.01
                 let model = solved.model;
                 let behaviour = BondBehaviour {
                     kinematics,
-                    critical_stretch: Some(Critical::Uniform(1.0)),
+                    failure: Some(FailureCriterion::Uniform(1.0)),
                     no_fail: &|_| false,
                     contact: None,
                     storage: crate::peridynamics::bond_force::Storage::Double,

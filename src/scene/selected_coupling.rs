@@ -8,7 +8,7 @@ pub(crate) struct SelectedCoupling {
     /// The coupling to go on with if this one turns out not to hold.
     pub otherwise: Option<CouplingSpec>,
     pub coupling: CouplingSpec,
-    pub joining: CouplingTraits,
+    pub traits: CouplingTraits,
     /// Where the scene names it, or its kinematics if it does not.
     pub span: Span,
     pub why: Option<String>,

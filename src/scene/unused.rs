@@ -29,15 +29,15 @@ pub(crate) struct Parts<'a, const D: usize> {
 impl<const D: usize> Parts<'_, D> {
     /// A warning for each part that touches nothing.
     pub fn unused(&self) -> Vec<String> {
-        let (mut list, joining) = (Vec::new(), self.scene.coupling.joining());
+        let (mut list, traits) = (Vec::new(), self.scene.coupling.traits());
         let has_points = (0..self.scene.mesh.cell_count()).any(|c| self.holds(c));
         if !has_points {
             list.extend(self.without_points());
         }
-        if self.spec.zones.transition.is_some() && matches!(joining.zones, ZonesNeeded::Nonlocal) {
+        if self.spec.zones.transition.is_some() && matches!(traits.zones, ZonesNeeded::Nonlocal) {
             list.push(format!(
                 "`zones.transition` is not used: coupling `{}` has no transition zone, and its cells are elements",
-                joining.name
+                traits.name
             ));
         }
         let (materials, used) = (&self.scene.materials, &self.scene.point_materials);
@@ -49,7 +49,7 @@ impl<const D: usize> Parts<'_, D> {
         let Some(p) = &self.scene.peridynamics else {
             return list;
         };
-        if !matches!(joining.zones, ZonesNeeded::Everywhere(_)) {
+        if !matches!(traits.zones, ZonesNeeded::Everywhere(_)) {
             list.extend(self.narrow(p));
             list.extend(self.beyond());
         }
@@ -101,7 +101,8 @@ impl<const D: usize> Parts<'_, D> {
             let mut typed = material.fracture().into_iter().flat_map(|f| f.typed);
             if let Some((key, _)) = typed.find(|(_, number)| number.is_some()) {
                 list.push(format!(
-                    "`{key}` of the material `{name}` is not used: the body is all finite elements, and they do not break"
+                    "`{}` of the material `{name}` is not used: the body is all finite elements, and they do not break",
+                    key.key()
                 ));
             }
         }

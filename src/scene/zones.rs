@@ -24,7 +24,7 @@ pub(crate) struct Placed {
 /// The region of the nonlocal zone: placed, or drawn in the scene.
 fn nonlocal_region<const D: usize>(
     spec: &SceneSpec,
-    joined: &SelectedCoupling,
+    selected: &SelectedCoupling,
     mesh: &Mesh<D>,
     placed: Option<&Placed>,
 ) -> Result<(Region<D>, Span), SceneError> {
@@ -40,9 +40,9 @@ fn nonlocal_region<const D: usize>(
         (None, None) => {
             return Err(SceneError::new(
                 SceneErrorKind::Missing,
-                format!("coupling `{}` needs a nonlocal zone", joined.joining.name),
+                format!("coupling `{}` needs a nonlocal zone", selected.traits.name),
             )
-            .label(joined.span.clone(), "couples a local and a nonlocal zone")
+            .label(selected.span.clone(), "couples a local and a nonlocal zone")
             .help(
                 "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }, or zones = \"auto\"",
             ));
@@ -62,14 +62,14 @@ struct NonlocalZone<const D: usize> {
 /// Marks the cells of the transition zone: those that the scene draws, or around a zone that was placed as many as the coupling asks for.
 fn mark_transition<const D: usize>(
     spec: &SceneSpec,
-    joined: &SelectedCoupling,
+    selected: &SelectedCoupling,
     mesh: &Mesh<D>,
     placed: Option<&Placed>,
     nonlocal: &NonlocalZone<D>,
     zones: &mut [Zone],
 ) -> Result<(), SceneError> {
-    let (joining, count) = (joined.joining, mesh.cell_count());
-    let needs_transition = matches!(joining.zones, ZonesNeeded::Transition { .. });
+    let (traits, count) = (selected.traits, mesh.cell_count());
+    let needs_transition = matches!(traits.zones, ZonesNeeded::Transition { .. });
     let NonlocalZone {
         region,
         inner,
@@ -102,7 +102,7 @@ fn mark_transition<const D: usize>(
         if !any && needs_transition {
             return Err(empty("zones.transition", span, mesh));
         }
-    } else if let (Some(_), ZonesNeeded::Transition { width, .. }) = (placed, joining.zones) {
+    } else if let (Some(_), ZonesNeeded::Transition { width, .. }) = (placed, traits.zones) {
         // the width that the method asks for, and half a cell, so that cells make it up
         let horizon = (spec.peridynamics.as_ref()).map(|p| horizon_of(p, mesh, zones).0);
         let reach = |x: &Vector<D>| horizon.as_ref().map_or(0.0, |h| h.eval(&padded(x)));
@@ -122,9 +122,9 @@ fn mark_transition<const D: usize>(
     } else if needs_transition {
         return Err(SceneError::new(
             SceneErrorKind::Missing,
-            format!("coupling `{}` needs a transition zone", joining.name),
+            format!("coupling `{}` needs a transition zone", traits.name),
         )
-        .label(joined.span.clone(), "works where both models overlap")
+        .label(selected.span.clone(), "works where both models overlap")
         .help("add [zones.transition] with around = ..., at least one horizon"));
     }
     Ok(())
@@ -133,16 +133,16 @@ fn mark_transition<const D: usize>(
 /// The model of each cell; `placed` is the nonlocal zone of a scene that does not draw it.
 pub(crate) fn zones<const D: usize>(
     spec: &SceneSpec,
-    joined: &SelectedCoupling,
+    selected: &SelectedCoupling,
     mesh: &Mesh<D>,
     placed: Option<&Placed>,
 ) -> Result<Vec<Zone>, SceneError> {
-    let joining = joined.joining;
+    let traits = selected.traits;
     let count = mesh.cell_count();
-    if let ZonesNeeded::Everywhere(zone) = joining.zones {
+    if let ZonesNeeded::Everywhere(zone) = traits.zones {
         return Ok(vec![zone; count]);
     }
-    let (region, span) = nonlocal_region(spec, joined, mesh, placed)?;
+    let (region, span) = nonlocal_region(spec, selected, mesh, placed)?;
     let inner = region.select(mesh);
     if !inner.contains(&true) {
         return Err(empty("zones.nonlocal", span, mesh));
@@ -171,9 +171,9 @@ pub(crate) fn zones<const D: usize>(
         inner,
         span: span.clone(),
     };
-    mark_transition(spec, joined, mesh, placed, &nonlocal, &mut zones)?;
+    mark_transition(spec, selected, mesh, placed, &nonlocal, &mut zones)?;
     // partial stress needs no elements: it lets the horizon vary throughout a body
-    let needs_elements = !matches!(joined.coupling, CouplingSpec::PartialStress(_));
+    let needs_elements = !matches!(selected.coupling, CouplingSpec::PartialStress(_));
     if needs_elements && !zones.contains(&Zone::Local) {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,

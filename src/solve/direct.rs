@@ -301,11 +301,11 @@ impl LinearMap for Factor {
 mod tests {
     use super::*;
     use crate::progress::Silent;
-    use crate::solve::stencils::{Lattice, splice};
+    use crate::solve::stencils::{StencilGrid, splice};
 
     #[test]
     fn the_prediction_from_a_pattern_is_what_is_stored() {
-        let lattice = Lattice::rectangle(50, 40);
+        let lattice = StencilGrid::rectangle(50, 40);
         let x = lattice.positions();
         let spliced = splice(&lattice.bonds(3), &lattice.elements(), |i| x[i][0] > 20.0);
         for (matrix, symmetry) in [
@@ -353,14 +353,17 @@ mod tests {
         let mut held = f64::INFINITY;
         for (lattice, matrix) in [
             (
-                Lattice::rectangle(60, 60),
-                Lattice::rectangle(60, 60).bonds(3),
+                StencilGrid::rectangle(60, 60),
+                StencilGrid::rectangle(60, 60).bonds(3),
             ),
             (
-                Lattice::rectangle(200, 4),
-                Lattice::rectangle(200, 4).elements(),
+                StencilGrid::rectangle(200, 4),
+                StencilGrid::rectangle(200, 4).elements(),
             ),
-            (Lattice::block(9, 8, 7), Lattice::block(9, 8, 7).elements()),
+            (
+                StencilGrid::block(9, 8, 7),
+                StencilGrid::block(9, 8, 7).elements(),
+            ),
         ] {
             let d = lattice.dimension;
             let x = lattice.positions();

@@ -171,13 +171,13 @@ mod tests {
     use crate::solve::direct::Factor;
     use crate::solve::direct_params::DirectParams;
     use crate::solve::ordering::Ordering;
-    use crate::solve::stencils::Lattice;
+    use crate::solve::stencils::StencilGrid;
 
     /// Against a factorisation that runs, in alternation, the median of three ratios: within a factor of three. Other tests run at the same time, so that
     /// three times in a row it has to miss before it counts.
     #[test]
     fn a_rehearsal_takes_as_long_as_the_factorisation() {
-        let lattice = Lattice::rectangle(120, 120);
+        let lattice = StencilGrid::rectangle(120, 120);
         let (matrix, positions) = (lattice.bonds(3), lattice.positions());
         // held at one side
         let prescribed: Vec<Option<f64>> = (0..matrix.dofs())

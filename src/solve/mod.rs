@@ -1,5 +1,22 @@
 //! Solvers of `K u = f`: elimination orders, a multifrontal direct solver, Krylov methods with multigrid, and the
 //! static problem that chooses among them; explicit dynamics with its stable step and sub-cycling; quasi-static load steps.
+//!
+//! | file | what |
+//! |---|---|
+//! | `statics.rs`, `statics/` | the static problem: `K u = f` on free dofs, solved directly or by iteration, by one process or several |
+//! | `quasi_static.rs`, `quasi_static/` | load steps: equilibrium by Newton's method or by relaxation, then breaking bonds |
+//! | `explicit.rs`, `explicit/` | explicit dynamics by velocity Verlet |
+//! | `stable_step.rs`, `sub_cycling.rs` | its stable step; several steps of stiff sites within one of the others |
+//! | `instability_growth.rs` | modes that grow at any step |
+//! | `direct.rs`, `direct_params.rs` | the multifrontal direct solver; what it is asked and refuses |
+//! | `ordering.rs`, `symbolic.rs` | elimination orders; elimination tree, supernodes and costs |
+//! | `multifrontal.rs`, `frontal_matrix.rs` | numerical factorisation over that tree; of one dense front |
+//! | `factor_time_estimate.rs` | how long it will take |
+//! | `krylov.rs` | conjugate gradients and restarted GMRES |
+//! | `multigrid.rs`, `aggregation.rs`, `smoother.rs` | smoothed-aggregation multigrid, its coarse matrices, its smoothers |
+//! | `singularity_diagnosis.rs` | what is free to move in a singular system |
+//! | `neighbourhood.rs` | the surroundings of one site as a small model |
+//! | `stencils.rs` | model matrices on lattices, for tests and benchmarks |
 
 mod aggregation;
 pub mod direct;

@@ -208,9 +208,9 @@ impl LinearMap for Multigrid<'_> {
 mod tests {
     use super::*;
     use crate::solve::krylov::{KrylovParams, conjugate_gradients, dot};
-    use crate::solve::stencils::Lattice;
+    use crate::solve::stencils::StencilGrid;
 
-    fn held(lattice: &Lattice) -> FreeDofs {
+    fn held(lattice: &StencilGrid) -> FreeDofs {
         let d = lattice.dimension;
         let x = lattice.positions();
         let prescribed: Vec<Option<f64>> = (0..lattice.len() * d)
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn the_cycle_is_symmetric_and_positive_for_a_symmetric_matrix() {
         // conjugate gradients need both
-        let lattice = Lattice::rectangle(40, 30);
+        let lattice = StencilGrid::rectangle(40, 30);
         for matrix in [lattice.elements(), lattice.bonds(2)] {
             let free = held(&lattice);
             let params = MultigridParams {
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn iterations_hardly_grow_with_the_size() {
         let count = |n: usize| {
-            let lattice = Lattice::rectangle(n, n);
+            let lattice = StencilGrid::rectangle(n, n);
             let (matrix, free) = (lattice.elements(), held(&lattice));
             let params = MultigridParams {
                 coarsest: 100,
@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn a_site_without_stiffness_is_named() {
-        let lattice = Lattice::rectangle(60, 40);
+        let lattice = StencilGrid::rectangle(60, 40);
         let mut matrix = lattice.elements();
         let (a, b) = (matrix.row_offsets[77], matrix.row_offsets[78]);
         matrix.values[4 * a..4 * b].fill(0.0);

@@ -426,15 +426,15 @@ fn minimum_degree(graph: &SiteGraph) -> Result<Vec<u32>, OrderingError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::stencils::{Lattice, splice};
+    use crate::solve::stencils::{StencilGrid, splice};
 
-    fn graph_of(lattice: &Lattice, matrix: &BlockCsr) -> SiteGraph {
+    fn graph_of(lattice: &StencilGrid, matrix: &BlockCsr) -> SiteGraph {
         SiteGraph::new(matrix, &FreeDofs::all(lattice.len(), lattice.dimension))
     }
 
     #[test]
     fn every_ordering_is_a_permutation() {
-        let lattice = Lattice::rectangle(23, 17);
+        let lattice = StencilGrid::rectangle(23, 17);
         let graph = graph_of(&lattice, &lattice.bonds(2));
         for ordering in [
             Ordering::CoordinateNestedDissection,
@@ -455,7 +455,7 @@ mod tests {
     #[test]
     fn the_last_sites_separate_the_others() {
         // 40 × 20 sites with bonds of two spacings: the first cut is a strip of 2 × 20 sites across the long axis
-        let lattice = Lattice::rectangle(40, 20);
+        let lattice = StencilGrid::rectangle(40, 20);
         let graph = graph_of(&lattice, &lattice.bonds(2));
         let order = Ordering::CoordinateNestedDissection
             .order(&graph, &lattice.positions())
@@ -479,7 +479,7 @@ mod tests {
 
     #[test]
     fn coincident_sites_do_not_stop_the_bisection() {
-        let lattice = Lattice::rectangle(30, 30);
+        let lattice = StencilGrid::rectangle(30, 30);
         let graph = graph_of(&lattice, &lattice.elements());
         let order = Ordering::CoordinateNestedDissection
             .order(&graph, &[[1.0; 3]; 900])
@@ -489,7 +489,7 @@ mod tests {
 
     #[test]
     fn the_graph_is_symmetric_and_leaves_out_what_is_prescribed() {
-        let lattice = Lattice::rectangle(12, 9);
+        let lattice = StencilGrid::rectangle(12, 9);
         let matrix = splice(&lattice.bonds(3), &lattice.elements(), |i| i % 12 > 5);
         let mut prescribed = vec![None; matrix.dofs()];
         prescribed[2 * 40] = Some(0.0);

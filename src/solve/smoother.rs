@@ -165,12 +165,12 @@ impl Chebyshev {
 mod tests {
     use super::*;
     use crate::solve::FreeOperator;
-    use crate::solve::stencils::Lattice;
+    use crate::solve::stencils::StencilGrid;
 
     #[test]
     fn the_largest_eigenvalue_is_not_underestimated() {
-        let plane = Lattice::rectangle(14, 9);
-        let solid = Lattice::block(6, 5, 4);
+        let plane = StencilGrid::rectangle(14, 9);
+        let solid = StencilGrid::block(6, 5, 4);
         for (lattice, matrix) in [
             (&plane, plane.elements()),
             (&plane, plane.bonds(2)),
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn smoothing_damps_what_oscillates_and_keeps_the_residual() {
-        let lattice = Lattice::rectangle(20, 20);
+        let lattice = StencilGrid::rectangle(20, 20);
         let matrix = lattice.elements();
         let free = FreeDofs::all(400, 2);
         let operator = FreeOperator::new(&matrix, &free);

@@ -7,25 +7,25 @@ use crate::system::BlockCsr;
 
 /// A box of lattice sites with unit spacing in two or three dimensions.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lattice {
+pub struct StencilGrid {
     /// Sites along each axis; 1 along the third in two dimensions.
     pub counts: [usize; 3],
     /// Number of dimensions, which is the number of dofs of a site.
     pub dimension: usize,
 }
 
-impl Lattice {
+impl StencilGrid {
     /// A rectangle of `nx × ny` sites.
-    pub fn rectangle(nx: usize, ny: usize) -> Lattice {
-        Lattice {
+    pub fn rectangle(nx: usize, ny: usize) -> StencilGrid {
+        StencilGrid {
             counts: [nx, ny, 1],
             dimension: 2,
         }
     }
 
     /// A box of `nx × ny × nz` sites.
-    pub fn block(nx: usize, ny: usize, nz: usize) -> Lattice {
-        Lattice {
+    pub fn block(nx: usize, ny: usize, nz: usize) -> StencilGrid {
+        StencilGrid {
             counts: [nx, ny, nz],
             dimension: 3,
         }

@@ -382,7 +382,7 @@ mod tests {
     use super::*;
     use crate::solve::FreeDofs;
     use crate::solve::ordering::Ordering;
-    use crate::solve::stencils::Lattice;
+    use crate::solve::stencils::StencilGrid;
 
     /// Marks the entries of the factor by elimination on a dense pattern, vertex by vertex.
     fn dense_fill(graph: &SiteGraph, symbolic: &Symbolic) -> Vec<Vec<bool>> {
@@ -408,14 +408,17 @@ mod tests {
     fn supernodes_hold_all_fill_and_few_zeros() {
         for (lattice, matrix) in [
             (
-                Lattice::rectangle(16, 13),
-                Lattice::rectangle(16, 13).elements(),
+                StencilGrid::rectangle(16, 13),
+                StencilGrid::rectangle(16, 13).elements(),
             ),
             (
-                Lattice::rectangle(16, 13),
-                Lattice::rectangle(16, 13).bonds(2),
+                StencilGrid::rectangle(16, 13),
+                StencilGrid::rectangle(16, 13).bonds(2),
             ),
-            (Lattice::block(6, 5, 5), Lattice::block(6, 5, 5).elements()),
+            (
+                StencilGrid::block(6, 5, 5),
+                StencilGrid::block(6, 5, 5).elements(),
+            ),
         ] {
             let graph = SiteGraph::new(&matrix, &FreeDofs::all(lattice.len(), lattice.dimension));
             for ordering in [
@@ -465,7 +468,7 @@ mod tests {
     #[test]
     fn costs_of_a_dense_matrix_are_the_textbook_ones() {
         // every site of a 3 × 3 lattice sees every other within four spacings: one front of 18 dofs
-        let lattice = Lattice::rectangle(3, 3);
+        let lattice = StencilGrid::rectangle(3, 3);
         let graph = SiteGraph::new(&lattice.bonds(4), &FreeDofs::all(9, 2));
         let symbolic = Symbolic::new(&graph, &(0..9).collect::<Vec<u32>>());
         assert_eq!(symbolic.nodes.len(), 1);

@@ -223,11 +223,11 @@ impl BlockCsr {
 
 #[cfg(test)]
 mod tests {
-    use crate::solve::stencils::Lattice;
+    use crate::solve::stencils::StencilGrid;
 
     #[test]
     fn rows_without_blocks_stay_empty() {
-        let mut matrix = Lattice::rectangle(9, 7).bonds(2).unshare();
+        let mut matrix = StencilGrid::rectangle(9, 7).bonds(2).unshare();
         // every third row loses its blocks, the first and the last among them
         let mut emptied = crate::system::BlockCsr {
             block: matrix.block,
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn shared_rows_are_those_of_the_matrix_and_have_its_products() {
-        for lattice in [Lattice::rectangle(31, 29), Lattice::block(18, 9, 8)] {
+        for lattice in [StencilGrid::rectangle(31, 29), StencilGrid::block(18, 9, 8)] {
             for matrix in [lattice.bonds(2), lattice.elements()] {
                 let shared = matrix.share();
                 assert!(shared.values.len() * 4 < matrix.values.len());
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn rows_that_differ_by_more_than_round_off_stay_apart() {
-        let lattice = Lattice::rectangle(20, 20);
+        let lattice = StencilGrid::rectangle(20, 20);
         let mut matrix = lattice.bonds(2);
         let middle = 4 * matrix.row_offsets[10 * 20 + 10];
         matrix.values[middle] *= 1.0 + 1e-9;

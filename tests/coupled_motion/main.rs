@@ -1,10 +1,10 @@
 //! A moving model against the assembled one, closed forms and momentum.
 
-use bondline::coupling::semidiscrete::{BondBehaviour, Critical};
+use bondline::coupling::SiteKind;
+use bondline::coupling::semidiscrete::{BondBehaviour, FailureCriterion};
 use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
-use bondline::coupling::{BlendingFunction, SiteKind};
 use bondline::fem;
-use bondline::peridynamics::bond_force::Kinematics;
+use bondline::peridynamics::bond_force::BondKinematics;
 use bondline::peridynamics::{Influence, Micromodulus};
 use bondline::system::{FailureUpdate, Interval, SemiDiscrete};
 use bondline::tensor::Vector;
@@ -15,12 +15,12 @@ mod seam;
 const DENSITY: f64 = 2.5;
 
 fn behaviour<const D: usize>(
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     critical_stretch: Option<f64>,
 ) -> BondBehaviour<'static, D> {
     BondBehaviour {
         kinematics,
-        critical_stretch: critical_stretch.map(Critical::Uniform),
+        failure: critical_stretch.map(FailureCriterion::Uniform),
         no_fail: &|_| false,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,
@@ -42,30 +42,23 @@ fn case(method: Method, law: Law) -> Case {
     }
 }
 
-fn cases() -> Vec<Case> {
+/// Every coupling: what an operator says of its rows decides which forces a motion computes bond by bond.
+fn all_cases() -> Vec<Case> {
     let laws = [
         Law::BondBased(Micromodulus::InverseDistance),
         Law::StateBased(Influence::Gaussian),
     ];
-    let methods = [
-        Method::Splice,
-        Method::Blending(BlendingFunction::Smooth),
-        Method::Meshfree,
-    ];
-    methods
+    Method::ALL
         .into_iter()
         .flat_map(|m| laws.map(|l| case(m, l)))
         .collect()
 }
 
-/// Those, and the seam that shares the bonds of the body.
-fn cases_with_shared_bonds() -> Vec<Case> {
-    let laws = [
-        Law::BondBased(Micromodulus::InverseDistance),
-        Law::StateBased(Influence::Gaussian),
-    ];
-    let shared = laws.map(|law| case(Method::Truncated, law));
-    cases().into_iter().chain(shared).collect()
+/// Those whose seam has no bonds of its own.
+fn cases() -> Vec<Case> {
+    let mut cases = all_cases();
+    cases.retain(|case| case.method != Method::Truncated);
+    cases
 }
 
 fn with_motion<const D: usize, T>(
@@ -120,7 +113,7 @@ fn linear_bonds_are_the_assembled_stiffness() {
     fn check<const D: usize>(case: &Case) {
         with_motion::<D, _>(
             case,
-            &behaviour(Kinematics::Linear, None),
+            &behaviour(BondKinematics::Linear, None),
             |enclosed, motion| {
                 let u = wave(enclosed, 1.0);
                 let wanted = scaled(enclosed, enclosed.stiffness.multiply(&u));
@@ -145,16 +138,21 @@ fn linear_bonds_are_the_assembled_stiffness() {
                         case.law.name()
                     );
                 }
-                // row sums bound those of the matrix, and not by much
+                // row sums bound those of the matrix, and not by much; partial stresses of the Gauss points of one cell cancel in part
+                let slack = match case.method {
+                    Method::Elements(_) => 16.0,
+                    _ => 4.0,
+                };
                 let exact = scaled(enclosed, enclosed.stiffness.row_sums());
                 for (bound, exact) in motion.row_sums().iter().zip(&exact) {
                     assert!(*bound >= exact * (1.0 - 1e-12), "{bound} {exact}");
-                    assert!(*bound <= 4.0 * exact, "{bound} {exact}");
+                    let what = case.method.name();
+                    assert!(*bound <= slack * exact, "{what}: {bound} {exact}");
                 }
             },
         );
     }
-    for case in cases_with_shared_bonds() {
+    for case in all_cases() {
         check::<1>(&case);
         check::<2>(&case);
     }
@@ -162,10 +160,10 @@ fn linear_bonds_are_the_assembled_stiffness() {
 
 #[test]
 fn exact_bonds_are_the_stiffness_to_first_order() {
-    for case in cases_with_shared_bonds() {
+    for case in all_cases() {
         with_motion::<2, _>(
             &case,
-            &behaviour(Kinematics::Exact, None),
+            &behaviour(BondKinematics::Exact, None),
             |enclosed, motion| {
                 let mut off = [0.0; 2];
                 for (off, amplitude) in off.iter_mut().zip([1e-4, 1e-5]) {
@@ -194,7 +192,7 @@ fn uniform_strain_stores_its_energy_across_the_seam() {
     fn check<const D: usize>(case: &Case) {
         with_motion::<D, _>(
             case,
-            &behaviour(Kinematics::Linear, None),
+            &behaviour(BondKinematics::Linear, None),
             |enclosed, motion| {
                 let strain = 1e-3;
                 let u: Vec<f64> = enclosed
@@ -267,7 +265,7 @@ fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
         let strain = 0.02;
         with_motion::<2, _>(
             &case,
-            &behaviour(Kinematics::Exact, Some(0.01)),
+            &behaviour(BondKinematics::Exact, Some(0.01)),
             |enclosed, motion| {
                 // uniform tension everywhere: every bond along x that may break does, up to the edge
                 let u: Vec<f64> = enclosed
@@ -318,7 +316,7 @@ fn an_exact_body_turns_without_force() {
     let case = case(Method::Splice, Law::StateBased(Influence::Gaussian));
     with_motion::<2, _>(
         &case,
-        &behaviour(Kinematics::Exact, None),
+        &behaviour(BondKinematics::Exact, None),
         |enclosed, motion| {
             let (s, c) = 1f64.sin_cos();
             let turned = |x: &Vector<2>| [c * x[0] - s * x[1] - x[0], s * x[0] + c * x[1] - x[1]];

@@ -1,12 +1,12 @@
 //! Bonds at a truncated seam that turn, stretch and break: gradients, energies, a crack beside the seam.
 
 use super::{
-    BondBehaviour, CoupledSystem, Critical, DENSITY, behaviour, case, largest, wave, with_motion,
-    with_motion_by,
+    BondBehaviour, CoupledSystem, DENSITY, FailureCriterion, behaviour, case, largest, wave,
+    with_motion, with_motion_by,
 };
 use bondline::{
     coupling::SiteKind,
-    peridynamics::{Influence, Micromodulus, bond_force::Kinematics},
+    peridynamics::{Influence, Micromodulus, bond_force::BondKinematics},
     system::{FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
     tensor::Vector,
 };
@@ -46,7 +46,7 @@ fn is_gradient<const D: usize>(motion: &CoupledSystem<'_, D>, u: &[f64], force: 
 #[test]
 fn the_force_of_a_seam_that_stretches_is_the_gradient_of_its_energy_and_adds_up_to_zero() {
     fn check<const D: usize>(case: &Case) {
-        let exact = behaviour(Kinematics::Exact, Some(0.002));
+        let exact = behaviour(BondKinematics::Exact, Some(0.002));
         with_motion::<D, _>(case, &exact, |enclosed, motion| {
             // the largest gradient is some 0.01
             let amplitude = 0.003;
@@ -103,7 +103,7 @@ fn moments_of_a_seam_that_moves_add_up_to_zero() {
                 .collect()
         };
         // linear bonds, whatever moves: about the places at rest
-        let linear = behaviour(Kinematics::Linear, Some(0.5));
+        let linear = behaviour(BondKinematics::Linear, Some(0.5));
         with_motion::<D, _>(case, &linear, |enclosed, motion| {
             let u = random(enclosed, 0.4 * SPACING);
             let mut force = vec![0.0; u.len()];
@@ -119,7 +119,7 @@ fn moments_of_a_seam_that_moves_add_up_to_zero() {
             assert!(forces.max(moments) < 1e-13, "{D} {forces:e} {moments:e}");
         });
         // exact bonds turn: about the places to which the points have moved; the elements, which are linear, all go the same way
-        let exact = behaviour(Kinematics::Exact, Some(0.5));
+        let exact = behaviour(BondKinematics::Exact, Some(0.5));
         with_motion::<D, _>(case, &exact, |enclosed, motion| {
             let mut u = random(enclosed, 0.4 * SPACING);
             for (site, u) in enclosed.model.sites.iter().zip(u.chunks_exact_mut(D)) {
@@ -156,7 +156,7 @@ fn forces_are_gradients_and_add_up_to_zero_where_cut_bonds_are_linear_and_others
             ..Otherwise::default()
         };
         let enclosed = Enclosed::<D>::with(&case, &linear).unwrap();
-        let exact = behaviour(Kinematics::Exact, Some(0.5));
+        let exact = behaviour(BondKinematics::Exact, Some(0.5));
         with_motion_by(&enclosed, &exact, |enclosed, motion| {
             let u = random(enclosed, 0.4 * SPACING);
             let mut force = vec![0.0; u.len()];
@@ -182,7 +182,7 @@ fn forces_are_gradients_and_add_up_to_zero_where_cut_bonds_are_linear_and_others
 
 #[test]
 fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
-    fn check<const D: usize>(kinematics: Kinematics) {
+    fn check<const D: usize>(kinematics: BondKinematics) {
         let critical = 0.01;
         let breaking = behaviour(kinematics, Some(critical));
         with_motion::<D, _>(&breaking_at_the_seam(), &breaking, |enclosed, motion| {
@@ -233,7 +233,7 @@ fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
         let some = damage.iter().filter(|d| **d > 0.0);
         some.fold((f64::INFINITY, 0.0), |(a, b), &d| (a.min(d), b.max(d)))
     }
-    for kinematics in [Kinematics::Linear, Kinematics::Exact] {
+    for kinematics in [BondKinematics::Linear, BondKinematics::Exact] {
         check::<1>(kinematics);
         check::<2>(kinematics);
         check::<3>(kinematics);
@@ -243,7 +243,7 @@ fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
 #[test]
 fn linear_bonds_that_may_break_are_the_assembled_stiffness_until_they_do() {
     fn check<const D: usize>(case: &Case) {
-        let never = behaviour(Kinematics::Linear, Some(1e9));
+        let never = behaviour(BondKinematics::Linear, Some(1e9));
         with_motion::<D, _>(case, &never, |enclosed, motion| {
             let u = wave(enclosed, 1.0);
             let wanted = enclosed.stiffness.multiply(&u);
@@ -278,8 +278,8 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
         let e = layers::bodies::<2>(law, 2).unwrap();
         let operator = e.coupling.operator(&e.model).unwrap();
         let behaviour = BondBehaviour {
-            critical_stretch: Some(Critical::PerLattice(vec![0.01, 0.015])),
-            ..behaviour(Kinematics::Exact, None)
+            failure: Some(FailureCriterion::PerLattice(vec![0.01, 0.015])),
+            ..behaviour(BondKinematics::Exact, None)
         };
         let density = |_| DENSITY;
         let (model, operator) = (&e.model, operator.as_ref());
@@ -367,8 +367,8 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
     let is_held = |x: &Vector<2>| x[1].abs() > 0.17 - 1e-9;
     let outside = |x: &Vector<2>| x.amax() > 0.1;
     let behaviour = BondBehaviour {
-        kinematics: Kinematics::Exact,
-        critical_stretch: Some(Critical::Uniform(critical)),
+        kinematics: BondKinematics::Exact,
+        failure: Some(FailureCriterion::Uniform(critical)),
         no_fail: &outside,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,

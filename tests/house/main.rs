@@ -89,6 +89,22 @@ const CIRCLES: [&[&str]; 3] = [
     &["scene/error", "scene/source", "scene/tagged_table"],
 ];
 
+/// Names that two public types of the library have, most of them what a scene says beside what is made of it; their number may only fall.
+const SHARED_NAMES: [&str; 12] = [
+    "Bound",
+    "Carried",
+    "Contact",
+    "Explicit",
+    "Field",
+    "Hardening",
+    "Impactor",
+    "Peridynamics",
+    "Ratio",
+    "Reach",
+    "Region",
+    "Table",
+];
+
 /// Where the sources of a crate lie; of the library without a name.
 fn folder(name: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -276,6 +292,34 @@ fn no_file_is_longer_than_it_should_be() {
         .map(|(path, lines)| format!("{}: {lines}", path.display()))
         .collect();
     assert!(long.is_empty(), "{long:#?}");
+}
+
+#[test]
+fn a_name_of_a_public_type_means_one_thing() {
+    let mut files = Vec::new();
+    sources(&folder(""), &mut files);
+    let mut names = Vec::new();
+    for path in files {
+        let text = fs::read_to_string(path).expect("a source file");
+        for line in text.lines() {
+            let mut words = line.split_whitespace();
+            if words.next() == Some("pub")
+                && matches!(words.next(), Some("struct" | "enum" | "trait" | "type"))
+                && let Some(name) = words.next()
+            {
+                let end = name.find(|c: char| !c.is_alphanumeric());
+                names.push(name[..end.unwrap_or(name.len())].to_owned());
+            }
+        }
+    }
+    names.sort();
+    let mut shared: Vec<&str> = names
+        .windows(2)
+        .filter(|pair| pair[0] == pair[1])
+        .map(|pair| pair[0].as_str())
+        .collect();
+    shared.dedup();
+    assert_eq!(shared, SHARED_NAMES);
 }
 
 #[test]

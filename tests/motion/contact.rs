@@ -81,3 +81,70 @@ fn equal_bodies_exchange_their_velocities() {
         assert!((mean / 0.004 - expected).abs() < 0.04, "{name}: {mean}");
     }
 }
+
+/// Points of bodies with horizons of their own: whichever comes first, contact is as stiff.
+#[test]
+fn contact_does_not_depend_on_the_order_of_bodies() {
+    let strip = |fine: &str, coarse: &str| {
+        format!(
+            r#"
+kinematics = "plane-stress"
+coupling = "truncated"
+[mesh.rectangle]
+min = [0, 0]
+max = [34, 4]
+x = {{ cells = 34 }}
+y = {{ cells = 4 }}
+[materials.plate.bond-based]
+youngs-modulus = 1
+density = 1
+critical-stretch = 0.5
+[peridynamics]
+horizon = 1.5
+points.lattice = {{ spacing = 0.5 }}
+[zones]
+nonlocal = {{ any = [{{ box = {{ min = [2, -1], max = [10, 5] }} }}, {{ box = {{ min = [13, -1], max = [21, 5] }} }}, {{ box = {{ min = [24, -1], max = [30, 5] }} }}] }}
+[zones.bodies.{fine}]
+inside = {{ box = {{ min = [2, -1], max = [10, 5] }} }}
+spacing = 0.5
+horizon = 1.5
+[zones.bodies.{coarse}]
+inside = {{ box = {{ min = [13, -1], max = [21, 5] }} }}
+spacing = 1
+horizon = 3
+[cracks.gap]
+segment = {{ from = [6, -1], to = [6, 5] }}
+[contact]
+stiffness-factor = 15
+[initial.strike.velocity]
+inside = {{ box = {{ min = [0, 0], max = [6, 4] }} }}
+x = 0.02
+[solve.explicit]
+duration = 20
+outputs = 1
+[output]
+vtu = false
+"#
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let run_of = |name: &str, text: &str| {
+        write(folder.path(), name, text);
+        let said = run(folder.path(), &[name, "--json"]);
+        let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+        let history = format!("out/{}_history.csv", name.trim_end_matches(".toml"));
+        let kinetic = column(&folder.path().join(history), "kinetic_energy");
+        let step = summary["motion"]["stable_step"].as_f64().unwrap();
+        (step, *kinetic.last().unwrap())
+    };
+    let first = run_of("first.toml", &strip("a", "b"));
+    let second = run_of("second.toml", &strip("b", "a"));
+    assert!(
+        (first.0 / second.0 - 1.0).abs() < 1e-12,
+        "{first:?} {second:?}"
+    );
+    assert!(
+        (first.1 / second.1 - 1.0).abs() < 1e-9,
+        "{first:?} {second:?}"
+    );
+}

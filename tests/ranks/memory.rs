@@ -4,9 +4,9 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use bondline::coupling::semidiscrete::{BondBehaviour, CoupledSystem, Critical};
+use bondline::coupling::semidiscrete::{BondBehaviour, CoupledSystem, FailureCriterion};
 use bondline::coupling::{Model, Operator};
-use bondline::peridynamics::bond_force::{Kinematics, Storage};
+use bondline::peridynamics::bond_force::{BondKinematics, Storage};
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, setup};
 use bondline::scene::Source;
@@ -123,8 +123,8 @@ fn lay_out<T>(
         coupling.symmetry(),
         |_| 1.0,
         &BondBehaviour {
-            kinematics: Kinematics::Exact,
-            critical_stretch: Some(Critical::Uniform(0.1)),
+            kinematics: BondKinematics::Exact,
+            failure: Some(FailureCriterion::Uniform(0.1)),
             no_fail: &|_| false,
             contact: None,
             storage: Storage::Double,

@@ -11,7 +11,6 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::attend::Table;
 use crate::errors::defect;
-use crate::mesh::SHAPES;
 
 /// Numbers of `columns` per entry as an array that cannot be written to: of one dimension for one column, else of two.
 fn array<T: Element>(
@@ -76,14 +75,17 @@ pub fn columns(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
 pub fn frame(py: Python<'_>, snapshot: Snapshot) -> PyResult<Bound<'_, PyTuple>> {
     let cells = PyDict::new(py);
     let mut types = vec![0u8; snapshot.shapes.len()];
-    for (shape, name, number) in SHAPES {
+    // a file has points last, too
+    let is_cell = |shape: &CellShape| *shape != CellShape::Vertex;
+    let last = [CellShape::Vertex];
+    for shape in CellShape::all().filter(is_cell).chain(last) {
         if !snapshot.shapes.contains(&shape) {
             continue;
         }
         let of_shape = types.iter_mut().zip(&snapshot.shapes);
         of_shape
             .filter(|(_, s)| **s == shape)
-            .for_each(|(t, _)| *t = number);
+            .for_each(|(t, _)| *t = shape.vtk_type());
         // VTK and meshio take node numbers as signed
         let mut nodes: Vec<i64> = Vec::new();
         let mut at = 0;
@@ -104,7 +106,7 @@ pub fn frame(py: Python<'_>, snapshot: Snapshot) -> PyResult<Bound<'_, PyTuple>>
             }
             _ => array(py, nodes, shape.node_count())?,
         };
-        cells.set_item(name, nodes)?;
+        cells.set_item(shape.meshio_name(), nodes)?;
     }
     (
         snapshot.time,

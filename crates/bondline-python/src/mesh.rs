@@ -7,22 +7,6 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Name in meshio, name in a `Mesh`, and number in VTK of each shape.
-pub const SHAPES: [(CellShape, &str, u8); 11] = [
-    (CellShape::Line2, "line", 3),
-    (CellShape::Tri3, "triangle", 5),
-    (CellShape::Quad4, "quad", 9),
-    (CellShape::Tet4, "tetra", 10),
-    (CellShape::Hex8, "hexahedron", 12),
-    (CellShape::Line3, "line3", 21),
-    (CellShape::Tri6, "triangle6", 22),
-    (CellShape::Quad8, "quad8", 23),
-    (CellShape::Tet10, "tetra10", 24),
-    (CellShape::Hex20, "hexahedron20", 25),
-    // a file has them last, too
-    (CellShape::Vertex, "vertex", 1),
-];
-
 type Blocks<'py> = Vec<(String, PyReadonlyArray2<'py, u64>)>;
 type Sets<'py> = Vec<(String, PyReadonlyArray1<'py, u64>)>;
 
@@ -71,8 +55,7 @@ impl Mesh {
 }
 
 fn shape(name: &str) -> PyResult<CellShape> {
-    let found = SHAPES.iter().find(|(_, known, _)| *known == name);
-    found
-        .map(|(shape, _, _)| *shape)
+    CellShape::all()
+        .find(|shape| shape.meshio_name() == name)
         .ok_or_else(|| PyValueError::new_err(format!("no cells of the type {name}")))
 }

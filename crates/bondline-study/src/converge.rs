@@ -10,7 +10,7 @@ use bondline::{
     observe::{
         ObserveError,
         csv::{CsvTable, Entry},
-        report::{Columns, Row, Table},
+        report::{Columns, Table, TableRow},
     },
     progress::Progress,
     regular_file,
@@ -360,17 +360,17 @@ impl Converged {
         let orders = self.orders();
         for (l, level) in self.levels.iter().enumerate() {
             let case = format!("level {l}");
-            table.push(Row::info(&case, "horizon [m]", level.horizon));
-            table.push(Row::info(&case, "spacing [m]", level.spacing));
-            table.push(Row::info(&case, "m", level.horizon / level.spacing));
-            table.push(Row::info(&case, "unknowns", level.dofs as f64));
+            table.push(TableRow::info(&case, "horizon [m]", level.horizon));
+            table.push(TableRow::info(&case, "spacing [m]", level.spacing));
+            table.push(TableRow::info(&case, "m", level.horizon / level.spacing));
+            table.push(TableRow::info(&case, "unknowns", level.dofs as f64));
             if let (Some(d), Some(largest)) = (level.difference, level.largest) {
-                table.push(Row::info(&case, "difference, L2 over samples", d));
-                table.push(Row::info(&case, "difference, max", largest));
+                table.push(TableRow::info(&case, "difference, L2 over samples", d));
+                table.push(TableRow::info(&case, "difference, max", largest));
             }
             match orders.get(l) {
-                Some(Some(p)) => table.push(Row::info(&case, "observed order", *p)),
-                Some(None) => table.push(Row::refused(
+                Some(Some(p)) => table.push(TableRow::info(&case, "observed order", *p)),
+                Some(None) => table.push(TableRow::refused(
                     &case,
                     "observed order",
                     "levels agree to round-off",

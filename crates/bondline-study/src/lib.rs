@@ -6,7 +6,7 @@
 //! | `variants/` | the scene with another value of a key, and how far outputs are apart |
 //! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
 //! | `converge.rs` | one scene at several refinements |
-//! | `trade/` | what speed costs in accuracy |
+//! | `pareto/` | what speed costs in accuracy |
 //! | `line_plot.rs`, `field_plot.rs` | line plots and coloured fields as SVG |
 
 pub mod accuracy;

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use crate::Effort;
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::progress::{Progress, Silent};
 use bondline::run::AnyScene;
 use bondline::scene::{SceneSpec, Source};
@@ -177,7 +177,7 @@ fn push_outcome(
     outcome: &Outcome,
 ) {
     let (error, wanted) = (outcome.error, outcome.wanted);
-    table.push(Row::info(label, "error over wanted", error / wanted).because(what));
+    table.push(TableRow::info(label, "error over wanted", error / wanted).because(what));
     progress.note(&format!(
             "{label}: error {:.2} of it, predicted {:.2}; cost {:.2} of the cheapest; time predicted {:.2}",
             error / wanted,
@@ -185,13 +185,17 @@ fn push_outcome(
             outcome.cost,
             outcome.time
         ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         label,
         "predicted error over measured",
         outcome.predicted / error,
     ));
-    table.push(Row::info(label, "cost over the cheapest", outcome.cost));
-    table.push(Row::info(
+    table.push(TableRow::info(
+        label,
+        "cost over the cheapest",
+        outcome.cost,
+    ));
+    table.push(TableRow::info(
         label,
         "predicted time over measured",
         outcome.time,
@@ -204,8 +208,8 @@ fn push_outcome(
         ("the same from coarser runs alone", outcome.checked.coarser),
     ] {
         table.push(match error {
-            Some(e) => Row::info(label, what, e / outcome.error),
-            None => Row::refused(label, what, "no versions that can be paid for"),
+            Some(e) => TableRow::info(label, what, e / outcome.error),
+            None => TableRow::refused(label, what, "no versions that can be paid for"),
         });
     }
 }
@@ -362,7 +366,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
                     checked: Checked::default(),
                 });
             }
-            table.push(Row::refused(case.name, "choice", why));
+            table.push(TableRow::refused(case.name, "choice", why));
         }
         progress.advance(1);
     }
@@ -373,7 +377,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         let mut share = |what: &str, good: &dyn Fn(&Outcome) -> bool| {
             let value = of_half.iter().filter(|o| good(o)).count() as f64 / of_half.len() as f64;
             let case = format!("{} ({} choices)", half.name(), of_half.len());
-            shares.push(Row::at_least(case, what, value, SHARE_LIMIT));
+            shares.push(TableRow::at_least(case, what, value, SHARE_LIMIT));
         };
         share("meet the wanted error", &|o| o.error <= o.wanted);
         share("cost at most 1.5 times the cheapest that meets it", &|o| {
@@ -404,7 +408,7 @@ mod tests {
         let AnyScene::Bar(scene) = scene else {
             panic!("a bar")
         };
-        assert_eq!(scene.coupling.joining().name, "local");
+        assert_eq!(scene.coupling.traits().name, "local");
         assert!(scene.choices.iter().any(|c| c.choice.contains("cells")));
         // linear elements are exact at nodes here; between them they miss by h²/8 of the curvature: 1 % wants 10 to 30 cells
         let n = scene.mesh.cell_count();
@@ -464,6 +468,6 @@ mod tests {
             panic!("a bar")
         };
         assert_eq!(scene.mesh.cell_count(), 7);
-        assert_eq!(scene.coupling.joining().name, "local");
+        assert_eq!(scene.coupling.traits().name, "local");
     }
 }

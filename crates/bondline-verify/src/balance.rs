@@ -21,7 +21,7 @@ use crate::{
 };
 use bondline::{
     coupling::{BlendingFunction, FitDegree},
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::Progress,
     system::Ranks,
@@ -217,22 +217,29 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress, ranks: Option<&dyn
                 .map(|(degree, quantity)| {
                     let force = out_of_balance(&bar, degree);
                     match leading_term(case, degree) {
-                        Some(term) => Row::within(&name, quantity, force, term, LEADING_TERM_LIMIT),
+                        Some(term) => {
+                            TableRow::within(&name, quantity, force, term, LEADING_TERM_LIMIT)
+                        }
                         None if is_in_balance(case.method, degree) => {
                             let force = relative_out_of_balance(&bar, degree).abs();
                             let quantity = match degree {
                                 3 => "cubic, over the force on a face",
                                 _ => "quartic, over the force on a face",
                             };
-                            Row::at_most(&name, quantity, force, equilibrium_limit(&bar, degree))
+                            TableRow::at_most(
+                                &name,
+                                quantity,
+                                force,
+                                equilibrium_limit(&bar, degree),
+                            )
                         }
-                        None => Row::info(&name, quantity, force),
+                        None => TableRow::info(&name, quantity, force),
                     }
                 })
                 .to_vec(),
             Err(e) => quantities
                 .map(|(_, q)| {
-                    Row::at_most(&name, q, f64::NAN, LEADING_TERM_LIMIT).because(e.to_string())
+                    TableRow::at_most(&name, q, f64::NAN, LEADING_TERM_LIMIT).because(e.to_string())
                 })
                 .to_vec(),
         }
@@ -359,15 +366,15 @@ fn push_spurious<const D: usize>(
     });
     for (case, force) in cases.iter().zip(&forces) {
         table.push(match force {
-            Ok(force) => Row::info(name, case.method.name(), *force),
-            Err(why) => Row::info(name, case.method.name(), f64::NAN).because(why),
+            Ok(force) => TableRow::info(name, case.method.name(), *force),
+            Err(why) => TableRow::info(name, case.method.name(), f64::NAN).because(why),
         });
     }
     if let (Ok(splice), Ok(smooth)) = (&forces[0], &forces[3]) {
         let quantity = "splice over blending smooth";
         table.push(match limit {
-            Some(limit) => Row::at_least(name, quantity, splice / smooth, limit),
-            None => Row::info(name, quantity, splice / smooth),
+            Some(limit) => TableRow::at_least(name, quantity, splice / smooth, limit),
+            None => TableRow::info(name, quantity, splice / smooth),
         });
     }
 }
@@ -389,7 +396,7 @@ pub fn every_method(progress: &dyn Progress, ranks: Option<&dyn Ranks>) -> Table
     table
 }
 
-fn every_method_rows<const D: usize>(law: Law, ranks: Option<&dyn Ranks>) -> Vec<Row> {
+fn every_method_rows<const D: usize>(law: Law, ranks: Option<&dyn Ranks>) -> Vec<TableRow> {
     let rows = each(ranks, &offered(&Method::ALL, law), |&method| {
         let case = Case {
             method,
@@ -401,14 +408,14 @@ fn every_method_rows<const D: usize>(law: Law, ranks: Option<&dyn Ranks>) -> Vec
         let name = format!("{D}D {}, {}", law.name(), method.name());
         let e = match Enclosed::<D>::on(&case, ranks) {
             Ok(e) => e,
-            Err(e) => return vec![Row::refused(name, "forces", e.to_string())],
+            Err(e) => return vec![TableRow::refused(name, "forces", e.to_string())],
         };
         let places: Vec<_> = e.positions().copied().collect();
         let (forces, moments) = momentum(&e.stiffness, &places);
         let exact = method == Method::Truncated;
         let row = |quantity: &str, value: f64, limit: Option<f64>| match limit {
-            Some(limit) => Row::at_most(&name, quantity, value.abs(), limit),
-            None => Row::info(&name, quantity, value),
+            Some(limit) => TableRow::at_most(&name, quantity, value.abs(), limit),
+            None => TableRow::info(&name, quantity, value),
         };
         let sums = exact.then_some(EQUILIBRIUM_LIMIT);
         let mut rows = vec![row("forces", forces, sums)];

@@ -11,7 +11,7 @@ use std::{fmt, path::Path};
 use crate::Effort;
 use bondline::coupling::{SiteKind, Zone};
 use bondline::observe::ObserveError;
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::observe::summary::RunSummary;
 use bondline::progress::Progress;
 use bondline::run::AnyScene;
@@ -315,37 +315,37 @@ pub enum Expected {
 }
 
 /// The rows of one bar.
-pub fn rows(case: &str, bar: &Bar, expected: Expected) -> Vec<Row> {
+pub fn rows(case: &str, bar: &Bar, expected: Expected) -> Vec<TableRow> {
     let mut rows = Vec::new();
     let all = |_| true;
     let means = bar.plane_means(all);
     rows.push(match expected {
-        Expected::Surface => Row::info(case, "plane means", means),
-        _ => Row::at_most(case, "plane means", means, PLANE_MEANS),
+        Expected::Surface => TableRow::info(case, "plane means", means),
+        _ => TableRow::at_most(case, "plane means", means, PLANE_MEANS),
     });
     let pointwise = bar.pointwise(all);
     rows.push(match expected {
-        Expected::Line => Row::at_most(case, "pointwise", pointwise, EXACT),
-        _ => Row::info(case, "pointwise", pointwise),
+        Expected::Line => TableRow::at_most(case, "pointwise", pointwise, EXACT),
+        _ => TableRow::info(case, "pointwise", pointwise),
     });
     for zone in [Zone::Local, Zone::Transition, Zone::Nonlocal] {
         if bar.planes.iter().any(|p| p.zone == zone) {
             let of = |z| z == zone;
             let (mean, point) = (bar.plane_means(of), bar.pointwise(of));
             let name = model_name(zone);
-            rows.push(Row::info(case, format!("{name} means"), mean));
-            rows.push(Row::info(case, format!("{name} pointwise"), point));
+            rows.push(TableRow::info(case, format!("{name} means"), mean));
+            rows.push(TableRow::info(case, format!("{name} pointwise"), point));
         }
     }
     if let Some(pull) = bar.pull {
-        rows.push(Row::info(case, "pull/(E A u')", pull));
+        rows.push(TableRow::info(case, "pull/(E A u')", pull));
     }
     let summary = &bar.summary;
     let balance = summary.out_of_balance_relative;
-    rows.push(Row::info(case, "out of balance", balance));
-    rows.push(Row::info(case, "sites", summary.sizes.sites as f64));
-    rows.push(Row::info(case, "bonds", summary.sizes.bonds as f64));
-    rows.push(Row::info(case, "seconds", summary.total_seconds));
+    rows.push(TableRow::info(case, "out of balance", balance));
+    rows.push(TableRow::info(case, "sites", summary.sizes.sites as f64));
+    rows.push(TableRow::info(case, "bonds", summary.sizes.bonds as f64));
+    rows.push(TableRow::info(case, "seconds", summary.total_seconds));
     rows
 }
 
@@ -363,7 +363,7 @@ fn measure(
     match bar {
         Ok(bar) => table.rows.extend(rows(case, &bar, expected)),
         Err(e) => {
-            let row = Row::at_most(case, "plane means", f64::NAN, PLANE_MEANS);
+            let row = TableRow::at_most(case, "plane means", f64::NAN, PLANE_MEANS);
             table.push(row.because(e.to_string()));
         }
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use crate::Effort;
 use crate::observed::{Seen, run_scene};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 use bondline_study::line_plot::{LinePlot, Series, Stroke};
@@ -111,6 +111,9 @@ fn whole(material: &str, spacing: f64) -> Result<Seen, String> {
     plate(material, [spacing; 2], "nonlocal", &lattice)
 }
 
+/// Quantity of the rows that compare how long damage takes.
+const BETWEEN: &str = "strain between";
+
 /// Extents of damage and cracks by the nominal strain, and the growth from the first damage to a crack across.
 fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     let spacing = match effort {
@@ -130,7 +133,7 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     let (damaged, brittle) = match (damaged, brittle) {
         (Ok(damaged), Ok(brittle)) => (damaged, brittle),
         (Err(why), _) | (_, Err(why)) => {
-            table.push(Row::at_most("plate", "extent", f64::NAN, 0.0).because(why));
+            table.push(TableRow::at_most("plate", "extent", f64::NAN, 0.0).because(why));
             return vec![table];
         }
     };
@@ -140,8 +143,8 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         let case = |law: &str| format!("{law}, nominal strain {strain}");
         for (level, what) in TIPS.into_iter().zip(["damaged", "cracked"]) {
             let of = |seen: &Seen| extent(seen, level, strain);
-            table.push(Row::info(case("continuum damage"), what, of(&damaged)));
-            table.push(Row::info(case("critical stretch"), what, of(&brittle)));
+            table.push(TableRow::info(case("continuum damage"), what, of(&damaged)));
+            table.push(TableRow::info(case("critical stretch"), what, of(&brittle)));
         }
     }
     let mut found = Table::new(
@@ -150,19 +153,19 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     );
     let through = THROUGH - 0.5 * (spacing - 1.0);
     let case = "continuum damage";
-    found.push(Row::at_least(
+    found.push(TableRow::at_least(
         case,
         "damaged at 0.0057",
         extent(&damaged, TIPS[0], SHOWN[0]),
         1.0,
     ));
-    found.push(Row::at_most(
+    found.push(TableRow::at_most(
         case,
         "cracked at 0.0057",
         extent(&damaged, TIPS[1], SHOWN[0]),
         5.0,
     ));
-    found.push(Row::at_least(
+    found.push(TableRow::at_least(
         case,
         "cracked at 0.009",
         extent(&damaged, TIPS[1], SHOWN[1]),
@@ -175,15 +178,15 @@ fn plates(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     };
     for (case, seen) in [(case, &damaged), ("critical stretch", &brittle)] {
         let (begun, ended) = growth(seen);
-        found.push(Row::info(case, "strain of the first damage", begun));
-        found.push(Row::info(case, "strain when cracked through", ended));
+        found.push(TableRow::info(case, "strain of the first damage", begun));
+        found.push(TableRow::info(case, "strain when cracked through", ended));
         match case {
             "critical stretch" => {
-                found.push(Row::at_most(case, "strain between", ended - begun, 0.0012))
+                found.push(TableRow::at_most(case, BETWEEN, ended - begun, 0.0012))
             }
-            _ => found.push(Row::at_least(case, "strain between", ended - begun, 0.002)),
+            _ => found.push(TableRow::at_least(case, BETWEEN, ended - begun, 0.002)),
         }
-        found.push(Row::info(case, "seconds", seen.seconds));
+        found.push(TableRow::info(case, "seconds", seen.seconds));
     }
     if effort == Effort::Full {
         progress.advance(1);
@@ -248,12 +251,16 @@ fn coupled(whole: &Seen, spacing: f64, table: &mut Table) {
             };
             for (level, what) in TIPS.into_iter().zip(["damaged", "cracked"]) {
                 let quantity = format!("{what}, most beside points alone [mm]");
-                table.push(Row::at_most(case, quantity, off(level), spacing));
+                table.push(TableRow::at_most(case, quantity, off(level), spacing));
             }
             let ratio = seen.seconds / whole.seconds;
-            table.push(Row::info(case, "time over that of points alone", ratio));
+            table.push(TableRow::info(
+                case,
+                "time over that of points alone",
+                ratio,
+            ));
         }
-        Err(why) => table.push(Row::refused(case, "extent", why)),
+        Err(why) => table.push(TableRow::refused(case, "extent", why)),
     }
 }
 
@@ -266,8 +273,10 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     );
     progress.advance(1);
     table.push(match bar() {
-        Ok(off) => Row::at_most("bar", "error of the stress", off, STRESS_LIMIT),
-        Err(why) => Row::at_most("bar", "error of the stress", f64::NAN, STRESS_LIMIT).because(why),
+        Ok(off) => TableRow::at_most("bar", "error of the stress", off, STRESS_LIMIT),
+        Err(why) => {
+            TableRow::at_most("bar", "error of the stress", f64::NAN, STRESS_LIMIT).because(why)
+        }
     });
     let mut tables = vec![table];
     tables.extend(plates(effort, progress));

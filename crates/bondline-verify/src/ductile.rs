@@ -3,7 +3,7 @@
 use crate::observed::{Seen, run_scene_with};
 use crate::{Effort, tell};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 
@@ -115,24 +115,34 @@ fn coupled(bar: (f64, f64, &str)) -> Table {
                 ("largest load", bar.peak[0], alone.peak[0]),
                 ("load at the first break", bar.first[0], alone.first[0]),
             ] {
-                table.push(Row::within(&case, quantity, found, wanted, COUPLED_LIMIT));
+                table.push(TableRow::within(
+                    &case,
+                    quantity,
+                    found,
+                    wanted,
+                    COUPLED_LIMIT,
+                ));
             }
             for (case, bar) in [(&case, &bar), (&alone_case, &alone)] {
-                table.push(Row::info(case, "strain at the first break", bar.first[1]));
-                table.push(Row::info(case, "load at the end", bar.left[1]));
+                table.push(TableRow::info(
+                    case,
+                    "strain at the first break",
+                    bar.first[1],
+                ));
+                table.push(TableRow::info(case, "load at the end", bar.left[1]));
             }
             let quantity = "work not accounted for, largest share";
-            table.push(Row::at_most(
+            table.push(TableRow::at_most(
                 &case,
                 quantity,
                 bar.missing,
                 COUPLED_BALANCE_LIMIT,
             ));
             let quantity = "seconds over those of points alone";
-            table.push(Row::info(&case, quantity, seconds / of_points));
+            table.push(TableRow::info(&case, quantity, seconds / of_points));
         }
         Err(why) => {
-            table.push(Row::at_most(&case, "largest load", f64::NAN, 0.0).because(why));
+            table.push(TableRow::at_most(&case, "largest load", f64::NAN, 0.0).because(why));
         }
     }
     table
@@ -201,32 +211,50 @@ fn alone([spacing, drag, left_limit]: [f64; 3], reference: &[[f64; 2]], largest:
     match seen.and_then(|seen| Ok((pulled(&seen)?, seen.seconds))) {
         Ok((bar, seconds)) => {
             let quantity = "largest load";
-            table.push(Row::within(
+            table.push(TableRow::within(
                 &case,
                 quantity,
                 bar.peak[0],
                 largest,
                 PEAK_LIMIT,
             ));
-            table.push(Row::info(&case, "strain at it", bar.peak[1]));
-            table.push(Row::info(&case, "load at the first break", bar.first[0]));
-            table.push(Row::info(&case, "strain at the first break", bar.first[1]));
+            table.push(TableRow::info(&case, "strain at it", bar.peak[1]));
+            table.push(TableRow::info(
+                &case,
+                "load at the first break",
+                bar.first[0],
+            ));
+            table.push(TableRow::info(
+                &case,
+                "strain at the first break",
+                bar.first[1],
+            ));
             let quantity = "first damage from the axis [mm]";
-            table.push(Row::at_most(&case, quantity, bar.from_axis, AXIS_LIMIT));
+            table.push(TableRow::at_most(
+                &case,
+                quantity,
+                bar.from_axis,
+                AXIS_LIMIT,
+            ));
             let quantity = "work not accounted for, largest share";
-            table.push(Row::at_most(&case, quantity, bar.missing, BALANCE_LIMIT));
+            table.push(TableRow::at_most(
+                &case,
+                quantity,
+                bar.missing,
+                BALANCE_LIMIT,
+            ));
             let [strain, left] = bar.left;
-            table.push(Row::info(&case, "load at the end", left));
+            table.push(TableRow::info(&case, "load at the end", left));
             // the load of the bar without failure at the same strain
             let whole = reference.iter().find(|row| row[0] >= strain);
             let left = whole.map_or(f64::NAN, |row| left / row[1]);
             let quantity = "load at the end over that without failure";
-            table.push(Row::at_most(&case, quantity, left, left_limit));
-            table.push(Row::info(&case, "seconds", seconds));
+            table.push(TableRow::at_most(&case, quantity, left, left_limit));
+            table.push(TableRow::info(&case, "seconds", seconds));
         }
         Err(why) => {
             let quantity = "first damage from the axis [mm]";
-            table.push(Row::at_most(&case, quantity, f64::NAN, AXIS_LIMIT).because(why));
+            table.push(TableRow::at_most(&case, quantity, f64::NAN, AXIS_LIMIT).because(why));
         }
     }
     table

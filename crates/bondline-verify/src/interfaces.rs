@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::{Effort, meshes::scene};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 
@@ -158,13 +158,13 @@ fn openings(effort: Effort) -> Table {
         ("LPS, moduli 1:4", "lps]\npoisson-ratio = 0.2", [1.0, 4.0]),
     ];
     let count = if effort == Effort::Full { 4 } else { 2 };
-    let rows: Vec<Row> = all[..count]
+    let rows: Vec<TableRow> = all[..count]
         .par_iter()
         .map(|(name, law, moduli)| {
             let quantity = "energy over fracture energy";
             match opening(law, *moduli) {
-                Ok(ratio) => Row::within(*name, quantity, ratio, 1.0, PLANE_LIMIT),
-                Err(why) => Row::refused(*name, quantity, why),
+                Ok(ratio) => TableRow::within(*name, quantity, ratio, 1.0, PLANE_LIMIT),
+                Err(why) => TableRow::refused(*name, quantity, why),
             }
         })
         .collect();
@@ -194,15 +194,15 @@ fn cracks(effort: Effort) -> Table {
         table.push(match found {
             Ok(interval) => {
                 let half = 0.5 * (BOUNDS[1] - BOUNDS[0]) / RATIO;
-                Row::within(*coupling, quantity, middle(*interval), RATIO, half)
+                TableRow::within(*coupling, quantity, middle(*interval), RATIO, half)
                     .because(format!("between {} and {}", interval[0], interval[1]))
             }
-            Err(why) => Row::at_most(*coupling, quantity, f64::NAN, 1.0).because(why.clone()),
+            Err(why) => TableRow::at_most(*coupling, quantity, f64::NAN, 1.0).because(why.clone()),
         });
     }
     if let [Ok(full), Ok(coupled)] = found[..] {
         let difference = (middle(coupled) - middle(full)).abs();
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             "truncated less nonlocal",
             quantity,
             difference,

@@ -8,10 +8,10 @@ use bondline::{
         CoupledSystem, SiteKind,
         semidiscrete::{BondBehaviour, SystemError},
     },
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::{
         PdBody,
-        bond_force::{Kinematics, Storage},
+        bond_force::{BondKinematics, Storage},
     },
     progress::Progress,
     run::SceneModel,
@@ -272,8 +272,8 @@ pub fn measured<const D: usize>(
         .operator(&laid.model)
         .map_err(|e| e.to_string())?;
     let behaviour = BondBehaviour {
-        kinematics: Kinematics::Exact,
-        critical_stretch: None,
+        kinematics: BondKinematics::Exact,
+        failure: None,
         no_fail: &|_| false,
         contact: None,
         storage: Storage::Double,
@@ -324,7 +324,7 @@ pub fn measured<const D: usize>(
     })
 }
 
-fn rows(body: &Body, law: (&str, &str), coupling: &str) -> Vec<Row> {
+fn rows(body: &Body, law: (&str, &str), coupling: &str) -> Vec<TableRow> {
     let case = format!("{}, {coupling}, {}", body.name, law.0);
     let typed = text(body, law.1, coupling);
     let linear = matches!(law.0, "bond-based" | "LPS, 0.4");
@@ -339,20 +339,20 @@ fn rows(body: &Body, law: (&str, &str), coupling: &str) -> Vec<Row> {
         || (body.kinematics == "bar" && law.0 == "PALS");
     let found = match found {
         Ok(found) => found,
-        Err(why) if is_refused => return vec![Row::refused(case, "residual", why)],
-        Err(why) => return vec![Row::at_most(case, "residual", f64::NAN, LIMIT).because(why)],
+        Err(why) if is_refused => return vec![TableRow::refused(case, "residual", why)],
+        Err(why) => return vec![TableRow::at_most(case, "residual", f64::NAN, LIMIT).because(why)],
     };
     // where faces do not follow the lattice, and at edges in space, bonds that end on faces balance to first order
     let is_exact = coupling != "truncated"
         || law.0 == NEO_HOOKE
         || matches!(body.kinematics, "bar" | "plane-strain");
     let residual = match !is_exact {
-        true => Row::info(&case, "residual", found.residual),
-        false => Row::at_most(&case, "residual", found.residual, LIMIT),
+        true => TableRow::info(&case, "residual", found.residual),
+        false => TableRow::at_most(&case, "residual", found.residual, LIMIT),
     };
     let mut rows = vec![residual];
     if linear {
-        rows.push(Row::at_most(
+        rows.push(TableRow::at_most(
             &case,
             "stress, points less elements",
             found.stress,
@@ -360,13 +360,13 @@ fn rows(body: &Body, law: (&str, &str), coupling: &str) -> Vec<Row> {
         ));
     }
     if body.kinematics != "bar" {
-        rows.push(Row::at_most(
+        rows.push(TableRow::at_most(
             &case,
             "residual under rotation",
             found.rotation,
             LIMIT,
         ));
-        rows.push(Row::at_most(
+        rows.push(TableRow::at_most(
             &case,
             "energy of rotation",
             found.energy,
@@ -376,8 +376,8 @@ fn rows(body: &Body, law: (&str, &str), coupling: &str) -> Vec<Row> {
         let has_strings =
             coupling == "truncated" && law.0 != NEO_HOOKE && body.kinematics == "solid";
         rows.push(match has_strings {
-            true => Row::info(&case, "bent body, rotated", found.turned),
-            false => Row::at_most(&case, "bent body, rotated", found.turned, LIMIT),
+            true => TableRow::info(&case, "bent body, rotated", found.turned),
+            false => TableRow::at_most(&case, "bent body, rotated", found.turned, LIMIT),
         });
     }
     rows
@@ -400,7 +400,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             }
         }
     }
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<TableRow>> = cases
         .into_par_iter()
         .map(|(body, law, coupling)| rows(body, law, coupling))
         .collect();

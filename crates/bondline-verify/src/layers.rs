@@ -14,7 +14,7 @@ use crate::{
     typed,
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::Progress,
     solve::{
@@ -61,34 +61,39 @@ pub fn bodies<const D: usize>(law: Law, ratio: u32) -> Result<Enclosed<D>, Scene
     Enclosed::of_scene(&text, &[], end)
 }
 
-fn property_rows<const D: usize>(law: Law, ratio: u32) -> Vec<Row> {
+fn property_rows<const D: usize>(law: Law, ratio: u32) -> Vec<TableRow> {
     let name = format!("{D}D {}, m = {ratio}", law.name());
     let e = match bodies::<D>(law, ratio) {
         Ok(e) => e,
         Err(why) => {
-            let row = Row::at_most(name, "residual", f64::NAN, AFFINE_LIMIT);
+            let row = TableRow::at_most(name, "residual", f64::NAN, AFFINE_LIMIT);
             return vec![row.because(why.to_string())];
         }
     };
     let places: Vec<Vector<D>> = e.positions().copied().collect();
     let (forces, moments) = momentum(&e.stiffness, &places);
     let mut rows = vec![
-        Row::at_most(
+        TableRow::at_most(
             &name,
             "asymmetry",
             e.stiffness.asymmetry(),
             RECIPROCITY_LIMIT,
         ),
-        Row::at_most(&name, "forces", forces, RECIPROCITY_LIMIT),
-        Row::at_most(&name, "residual", affine_residual(&e), AFFINE_LIMIT),
-        Row::info(&name, "sites", e.model.sites.len() as f64),
+        TableRow::at_most(&name, "forces", forces, RECIPROCITY_LIMIT),
+        TableRow::at_most(&name, "residual", affine_residual(&e), AFFINE_LIMIT),
+        TableRow::info(&name, "sites", e.model.sites.len() as f64),
     ];
     if D > 1 {
-        rows.push(Row::at_most(&name, "moments", moments, RECIPROCITY_LIMIT));
+        rows.push(TableRow::at_most(
+            &name,
+            "moments",
+            moments,
+            RECIPROCITY_LIMIT,
+        ));
     }
     rows.push(match solution_error(&e) {
-        Ok(error) => Row::at_most(&name, "solution error", error, 1e-9),
-        Err(why) => Row::at_most(&name, "solution error", f64::NAN, 1e-9).because(why),
+        Ok(error) => TableRow::at_most(&name, "solution error", error, 1e-9),
+        Err(why) => TableRow::at_most(&name, "solution error", f64::NAN, 1e-9).because(why),
     });
     rows
 }
@@ -302,13 +307,15 @@ pub fn reflection(effort: Effort, progress: &dyn Progress) -> Table {
             let name = format!("{}, w = {width} delta", meeting.name());
             match reflected(meeting, width, 3) {
                 Ok([amplitude, ghost]) => {
-                    table.push(Row::info(&name, "reflected", amplitude));
+                    table.push(TableRow::info(&name, "reflected", amplitude));
                     table.push(match meeting {
-                        Meeting::Layer(_) => Row::at_most(&name, "affine", ghost, AFFINE_LIMIT),
-                        _ => Row::info(&name, "affine", ghost),
+                        Meeting::Layer(_) => {
+                            TableRow::at_most(&name, "affine", ghost, AFFINE_LIMIT)
+                        }
+                        _ => TableRow::info(&name, "affine", ghost),
                     });
                 }
-                Err(why) => table.push(Row::refused(&name, "reflected", why)),
+                Err(why) => table.push(TableRow::refused(&name, "reflected", why)),
             }
         }
     }

@@ -6,7 +6,7 @@ use std::{f64::consts::PI, hint::black_box, time::Instant};
 
 use crate::{Effort, convergence::norms::median};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::{
         BoxCell, Micromodulus, PartialVolume, ShellTarget, TIE_TOLERANCE, isotropic_shell_factors,
         partial_volume::{
@@ -58,7 +58,7 @@ fn add_tensors<const D: usize>(table: &mut Table, ratio: f64) {
         let (lattice, shares) = match lattice_shells::<D>(algorithm, ratio, TIE_TOLERANCE) {
             Ok(found) => found,
             Err(why) => {
-                table.push(Row::refused(case, "C1111 over typed", why.to_string()));
+                table.push(TableRow::refused(case, "C1111 over typed", why.to_string()));
                 continue;
             }
         };
@@ -70,8 +70,12 @@ fn add_tensors<const D: usize>(table: &mut Table, ratio: f64) {
             .collect();
         let plain = lattice.fourth_moments(1.0, &base).scaled(0.5);
         let (normal, across) = (plain.get(0, 0, 0, 0), plain.get(0, 0, 1, 1));
-        table.push(Row::info(&case, "C1111 over typed", normal / typed));
-        table.push(Row::info(&case, "C1122 over typed", 3.0 * across / typed));
+        table.push(TableRow::info(&case, "C1111 over typed", normal / typed));
+        table.push(TableRow::info(
+            &case,
+            "C1122 over typed",
+            3.0 * across / typed,
+        ));
         let target = ShellTarget::Strength(2.0 * typed);
         match isotropic_shell_factors(&lattice, 1.0, &base, target) {
             Ok(factors) => {
@@ -81,16 +85,16 @@ fn add_tensors<const D: usize>(table: &mut Table, ratio: f64) {
                 let (least, most) = factors
                     .iter()
                     .fold((f64::INFINITY, 0.0f64), |(a, b), &f| (a.min(f), b.max(f)));
-                table.push(Row::info(&case, "smallest factor", least));
-                table.push(Row::info(&case, "largest factor", most));
-                table.push(Row::at_most(
+                table.push(TableRow::info(&case, "smallest factor", least));
+                table.push(TableRow::info(&case, "largest factor", most));
+                table.push(TableRow::at_most(
                     &case,
                     "then off by",
                     miss.amax() / typed,
                     1e-12,
                 ));
             }
-            Err(why) => table.push(Row::refused(&case, "then off by", why.to_string())),
+            Err(why) => table.push(TableRow::refused(&case, "then off by", why.to_string())),
         }
     }
 }
@@ -122,18 +126,18 @@ fn add_sums<const D: usize>(table: &mut Table, step: usize) {
             })
             .collect();
         match defects {
-            Err(why) => table.push(Row::refused(case, "largest", why.to_string())),
+            Err(why) => table.push(TableRow::refused(case, "largest", why.to_string())),
             Ok(defects) => {
                 let largest = defects.iter().copied().fold(0.0, f64::max);
                 let exact = algorithm == PartialVolume::Exact
                     || (algorithm == PartialVolume::Hhb && D == 1);
                 let limit = if D == 3 { EXACT_SOLID } else { EXACT_PLANE };
                 table.push(if exact {
-                    Row::at_most(&case, "largest", largest, limit)
+                    TableRow::at_most(&case, "largest", largest, limit)
                 } else {
-                    Row::info(&case, "largest", largest)
+                    TableRow::info(&case, "largest", largest)
                 });
-                table.push(Row::info(&case, "median", median(defects)));
+                table.push(TableRow::info(&case, "median", median(defects)));
             }
         }
     }
@@ -179,13 +183,13 @@ fn partitions() -> Table {
         }
     }
     let relative = |sum: f64, whole: f64| (sum / whole - 1.0).abs();
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "144 rectangles",
         "sum against the disc, relative",
         relative(area, ball::<2>(1.0)),
         EXACT_PLANE,
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "1728 boxes",
         "sum against the ball, relative",
         relative(volume, ball::<3>(1.0)),
@@ -206,7 +210,7 @@ fn partitions() -> Table {
         worst = worst.max((measured - exact).abs() / cell.measure());
         count += 1;
     }
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         format!("{count} hexahedra"),
         "largest difference from the box's closed form, over the cell's volume",
         worst,
@@ -284,18 +288,18 @@ fn costs(effort: Effort) -> Table {
             sum += sampled - exact;
         }
         let case = format!("{level} levels, {SAND_SAMPLES_PER_EDGE}^3 samples");
-        table.push(Row::info(&case, "largest error of a cell", largest));
-        table.push(Row::info(
+        table.push(TableRow::info(&case, "largest error of a cell", largest));
+        table.push(TableRow::info(
             &case,
             "error of the family",
             sum.abs() / ball::<3>(ratio),
         ));
-        table.push(Row::info(
+        table.push(TableRow::info(
             &case,
             "microseconds a cell",
             1e6 * sampling_time / cells.len() as f64,
         ));
-        table.push(Row::info(
+        table.push(TableRow::info(
             &case,
             "closed form",
             1e6 * closed_time / cells.len() as f64,
@@ -303,9 +307,9 @@ fn costs(effort: Effort) -> Table {
         let times = sampling_time / closed_time;
         // with fewer levels the error of a cell is 0.1 % of its volume and more
         table.push(if level >= 3 {
-            Row::at_least(&case, "times as long", times, SPEED)
+            TableRow::at_least(&case, "times as long", times, SPEED)
         } else {
-            Row::info(&case, "times as long", times)
+            TableRow::info(&case, "times as long", times)
         });
     }
     table

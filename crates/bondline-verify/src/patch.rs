@@ -7,7 +7,7 @@ use crate::enclosed::{
 };
 use crate::fields::{Field, affine_modes, monomials, worst};
 use crate::{Effort, each};
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::progress::{Progress, Silent};
 use bondline::solve::FreeDofs;
 use bondline::solve::direct::DirectParams;
@@ -357,7 +357,7 @@ pub fn cases<const D: usize>(effort: Effort) -> Vec<Case> {
 }
 
 /// The rows of one case.
-fn rows<const D: usize>(case: &Case, ranks: Option<&dyn Ranks>) -> Vec<Row> {
+fn rows<const D: usize>(case: &Case, ranks: Option<&dyn Ranks>) -> Vec<TableRow> {
     let name = format!(
         "{}, {}, {}",
         case.method.name(),
@@ -372,11 +372,11 @@ fn rows<const D: usize>(case: &Case, ranks: Option<&dyn Ranks>) -> Vec<Row> {
     let enclosed = match Enclosed::<D>::on(case, ranks) {
         Ok(enclosed) => enclosed,
         Err(EnclosedError::Scene(e)) if e.is_seam() => {
-            return vec![Row::refused(&name, "residual", e.to_string())];
+            return vec![TableRow::refused(&name, "residual", e.to_string())];
         }
         Err(e) => {
             return ["residual", "solution error"]
-                .map(|q| Row::at_most(&name, q, f64::NAN, limit).because(e.to_string()))
+                .map(|q| TableRow::at_most(&name, q, f64::NAN, limit).because(e.to_string()))
                 .to_vec();
         }
     };
@@ -385,20 +385,22 @@ fn rows<const D: usize>(case: &Case, ranks: Option<&dyn Ranks>) -> Vec<Row> {
         Some(ranks) => solution_error_on(&enclosed, ranks),
     };
     let error = match error {
-        Ok(error) => Row::at_most(&name, "solution error", error, SOLUTION_LIMIT),
-        Err(why) => Row::at_most(&name, "solution error", f64::NAN, SOLUTION_LIMIT).because(why),
+        Ok(error) => TableRow::at_most(&name, "solution error", error, SOLUTION_LIMIT),
+        Err(why) => {
+            TableRow::at_most(&name, "solution error", f64::NAN, SOLUTION_LIMIT).because(why)
+        }
     };
     vec![
-        Row::at_most(&name, "residual", affine_residual(&enclosed), limit),
+        TableRow::at_most(&name, "residual", affine_residual(&enclosed), limit),
         error,
-        Row::info(&name, "quadratic", quadratic_residual(&enclosed)),
-        Row::info(&name, "cubic force", relative_out_of_balance(&enclosed, 3)),
-        Row::info(
+        TableRow::info(&name, "quadratic", quadratic_residual(&enclosed)),
+        TableRow::info(&name, "cubic force", relative_out_of_balance(&enclosed, 3)),
+        TableRow::info(
             &name,
             "quartic force",
             relative_out_of_balance(&enclosed, 4),
         ),
-        Row::info(&name, "sites", enclosed.model.sites.len() as f64),
+        TableRow::info(&name, "sites", enclosed.model.sites.len() as f64),
     ]
 }
 

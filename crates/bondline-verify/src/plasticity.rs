@@ -7,7 +7,7 @@ use crate::meshes::gmsh;
 use crate::observed::{Seen, run_scene_with};
 use bondline::{
     mesh::generate::{Axis, rectangle},
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
     tensor::Vector,
 };
@@ -125,15 +125,26 @@ fn membranes(effort: Effort, progress: &dyn Progress) -> Table {
             Ok((tip, seen)) => {
                 for (k, axis) in ["x", "y"].into_iter().enumerate() {
                     let quantity = format!("tip, {axis}");
-                    table.push(Row::within(&case, quantity, tip[k], reference[k], limit));
+                    table.push(TableRow::within(
+                        &case,
+                        quantity,
+                        tip[k],
+                        reference[k],
+                        limit,
+                    ));
                 }
                 let products = seen.iterations as f64;
-                table.push(Row::at_most(&case, "products", products, MOST_PRODUCTS));
-                table.push(Row::info(&case, "seconds", seen.seconds));
+                table.push(TableRow::at_most(
+                    &case,
+                    "products",
+                    products,
+                    MOST_PRODUCTS,
+                ));
+                table.push(TableRow::info(&case, "seconds", seen.seconds));
             }
             Err(why) => {
                 let quantity = "tip, y";
-                table.push(Row::at_most(&case, quantity, f64::NAN, limit).because(why));
+                table.push(TableRow::at_most(&case, quantity, f64::NAN, limit).because(why));
             }
         }
     }
@@ -236,15 +247,15 @@ fn cylinders(effort: Effort, progress: &dyn Progress) -> Table {
                 Ok(([bore, rim, last_bore, last_rim], seconds)) => {
                     for (what, off) in [("bore", bore), ("rim", rim)] {
                         let quantity = format!("{what}, largest");
-                        table.push(Row::at_most(&case, quantity, off, CYLINDER_LIMIT));
+                        table.push(TableRow::at_most(&case, quantity, off, CYLINDER_LIMIT));
                     }
-                    table.push(Row::info(&case, "bore at 0.95", last_bore));
-                    table.push(Row::info(&case, "rim at 0.95", last_rim));
-                    table.push(Row::info(&case, "seconds", seconds));
+                    table.push(TableRow::info(&case, "bore at 0.95", last_bore));
+                    table.push(TableRow::info(&case, "rim at 0.95", last_rim));
+                    table.push(TableRow::info(&case, "seconds", seconds));
                 }
                 Err(why) => {
                     let quantity = "bore, largest";
-                    let row = Row::at_most(&case, quantity, f64::NAN, CYLINDER_LIMIT);
+                    let row = TableRow::at_most(&case, quantity, f64::NAN, CYLINDER_LIMIT);
                     table.push(row.because(why));
                 }
             }

@@ -10,7 +10,7 @@ use bondline::{
     observe::{
         Observer,
         csv::Entry,
-        report::{Columns, Row, Table},
+        report::{Columns, Table, TableRow},
         vtu::{Snapshot, Values},
     },
     progress::{Progress, Silent},
@@ -140,14 +140,16 @@ fn energies(progress: &dyn Progress) -> Table {
             match cube(law, field, *exact) {
                 Ok([least, largest]) if law == "pals" => {
                     let off = least.abs().max(largest.abs());
-                    table.push(Row::at_most(case, "largest", off, ENERGY_LIMIT));
+                    table.push(TableRow::at_most(case, "largest", off, ENERGY_LIMIT));
                 }
                 Ok([least, largest]) => {
-                    table.push(Row::info(&case, "least", least));
-                    table.push(Row::info(&case, "largest", largest));
+                    table.push(TableRow::info(&case, "least", least));
+                    table.push(TableRow::info(&case, "largest", largest));
                 }
                 Err(why) => {
-                    table.push(Row::at_most(case, "largest", f64::NAN, ENERGY_LIMIT).because(why));
+                    table.push(
+                        TableRow::at_most(case, "largest", f64::NAN, ENERGY_LIMIT).because(why),
+                    );
                 }
             }
         }
@@ -198,16 +200,16 @@ fn tension(progress: &dyn Progress) -> Table {
         match modulus(law, more, coupling, zones) {
             Ok(off) if law == "pals" => {
                 let [least, largest] = MODULUS_LIMITS;
-                table.push(Row::at_least(case, "error of E, not below", off, least));
-                table.push(Row::at_most(case, "error of E, not above", off, largest));
+                table.push(TableRow::at_least(case, "error of E, not below", off, least));
+                table.push(TableRow::at_most(case, "error of E, not above", off, largest));
             }
             Ok(off) if case == "lps" => table.push(
-                Row::info(case, "error of E", off).because(
+                TableRow::info(case, "error of E", off).because(
                     "in figure 4.2 the LPS lies below the exact line; its horizon and the weighted volume of families at surfaces are not printed",
                 ),
             ),
-            Ok(off) => table.push(Row::info(case, "error of E", off)),
-            Err(why) => table.push(Row::refused(case, "error of E", why)),
+            Ok(off) => table.push(TableRow::info(case, "error of E", off)),
+            Err(why) => table.push(TableRow::refused(case, "error of E", why)),
         }
     }
     table
@@ -262,17 +264,17 @@ fn relaxations(progress: &dyn Progress) -> Table {
             Ok(rows) => {
                 let off = rows.iter().map(|[t, w]| (w - relaxed(share, *t)).abs());
                 let last = rows.last().map_or(f64::NAN, |row| row[1]);
-                table.push(Row::info(&case, "W(2 s)/W(0)", last));
+                table.push(TableRow::info(&case, "W(2 s)/W(0)", last));
                 let quantity = "W(t)/W(0) beside the closed form, largest difference of 21 steps";
                 let off = match rows.len() {
                     21 => off.fold(0.0, f64::max),
                     _ => f64::NAN,
                 };
-                table.push(Row::at_most(&case, quantity, off, RELAXATION_LIMIT));
+                table.push(TableRow::at_most(&case, quantity, off, RELAXATION_LIMIT));
             }
-            Err(why) => {
-                table.push(Row::at_most(case, "W(t)/W(0)", f64::NAN, RELAXATION_LIMIT).because(why))
-            }
+            Err(why) => table.push(
+                TableRow::at_most(case, "W(t)/W(0)", f64::NAN, RELAXATION_LIMIT).because(why),
+            ),
         }
     }
     table

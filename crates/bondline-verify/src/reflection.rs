@@ -15,7 +15,7 @@ use crate::{
     strip::{Kind, Strip, StripCase},
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::Progress,
     solve::{
@@ -260,20 +260,20 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
             format!("w={} delta", crossing.width),
         );
         match found {
-            Err(reason) => amplitude.push(Row::refused(&name, &width, reason)),
+            Err(reason) => amplitude.push(TableRow::refused(&name, &width, reason)),
             Ok(r) => {
                 amplitude.push(match limit(crossing) {
-                    Some(limit) => Row::at_most(&name, &width, r.amplitude, limit),
-                    None => Row::info(&name, &width, r.amplitude),
+                    Some(limit) => TableRow::at_most(&name, &width, r.amplitude, limit),
+                    None => TableRow::info(&name, &width, r.amplitude),
                 });
-                energy.push(Row::info(&name, &width, r.energy));
+                energy.push(TableRow::info(&name, &width, r.energy));
                 if crossing.method == Method::Splice {
                     let name = format!(
                         "{}, {law}, m={}",
                         crossing.side.pure().name(),
                         crossing.ratio
                     );
-                    background.push(Row::info(name, &width, r.background));
+                    background.push(TableRow::info(name, &width, r.background));
                 }
             }
         }
@@ -301,7 +301,7 @@ fn best(cases: &[(&str, Crossing)], measured: &[Result<Reflected, String>]) -> T
         }
     }
     for (group, form, amplitude) in groups {
-        table.push(Row::at_most(group, form, amplitude, BLENDING));
+        table.push(TableRow::at_most(group, form, amplitude, BLENDING));
     }
     table
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Effort, LONG_SUITES, Suite};
-use bondline::observe::report::{Row, Table, Verdict, number};
+use bondline::observe::report::{Table, TableRow, Verdict, number};
 
 /// Tables that would take more lines than this are counted, not printed; a line may hold many rows.
 const MOST_LINES: usize = 80;
@@ -80,7 +80,7 @@ fn section(table: &Table) -> String {
     }
     text.push_str("| case | quantity | printed, exact | ours | ratio | verdict | note |\n|---|---|---|---|---|---|---|\n");
     // what a paper prints first
-    let printed = |r: &&Row| r.reference.is_some();
+    let printed = |r: &&TableRow| r.reference.is_some();
     let rows = table.rows.iter().filter(printed);
     for r in rows.chain(table.rows.iter().filter(|r| r.reference.is_none())) {
         let _ = writeln!(
@@ -112,9 +112,9 @@ mod tests {
     #[test]
     fn printed_rows_come_first_with_their_ratio_and_note() {
         let mut table = Table::new("Table I", Columns::Full);
-        table.push(Row::info("a", "time", 3.0));
+        table.push(TableRow::info("a", "time", 3.0));
         table.push(
-            Row::info("b", "|u|", 2.0)
+            TableRow::info("b", "|u|", 2.0)
                 .with_reference(4.0)
                 .differs("misprint"),
         );
@@ -142,7 +142,7 @@ mod tests {
             let mut table = Table::new("T", columns);
             for row in 0..cases * quantities {
                 let (case, quantity) = (row / quantities, row % quantities);
-                table.push(Row::info(
+                table.push(TableRow::info(
                     format!("case {case}"),
                     format!("q{quantity}"),
                     1.0,

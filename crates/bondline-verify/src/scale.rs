@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use crate::Effort;
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::observe::summary::{RunSummary, peak_memory_bytes};
 use bondline::progress::Progress;
 use bondline::run::AnyScene;
@@ -138,13 +138,13 @@ fn gigabytes() -> f64 {
 }
 
 /// The rows of one solved case.
-fn rows_of(case: &Case, run: &RunSummary, stages: &Stages<'_>) -> Vec<Row> {
+fn rows_of(case: &Case, run: &RunSummary, stages: &Stages<'_>) -> Vec<TableRow> {
     let name = case.name();
-    let row = |quantity: &str, value: f64| Row::info(name.clone(), quantity, value);
+    let row = |quantity: &str, value: f64| TableRow::info(name.clone(), quantity, value);
     let mut rows = vec![
         row("unknowns", run.sizes.dofs as f64),
         row("iterations", run.iterations as f64),
-        Row::at_most(
+        TableRow::at_most(
             name.clone(),
             "relative residual",
             run.residual,
@@ -153,7 +153,7 @@ fn rows_of(case: &Case, run: &RunSummary, stages: &Stages<'_>) -> Vec<Row> {
         row("time of all stages [s]", run.total_seconds).because(stages.text()),
         row("time of the solver [s]", solver_seconds(run)),
     ];
-    rows.push(Row::at_most(
+    rows.push(TableRow::at_most(
         name.clone(),
         "peak memory of the process [GB]",
         gigabytes(),
@@ -215,7 +215,7 @@ impl Progress for Stages<'_> {
     }
 }
 
-fn measured(case: Case, progress: &dyn Progress, rows: &mut Vec<Row>) -> Option<RunSummary> {
+fn measured(case: Case, progress: &dyn Progress, rows: &mut Vec<TableRow>) -> Option<RunSummary> {
     let stages = Stages::new(progress);
     match case.run(&stages) {
         Ok(run) => {
@@ -223,13 +223,13 @@ fn measured(case: Case, progress: &dyn Progress, rows: &mut Vec<Row>) -> Option<
             Some(run)
         }
         Err(error) => {
-            rows.push(Row::refused(case.name(), "iterations", error));
+            rows.push(TableRow::refused(case.name(), "iterations", error));
             None
         }
     }
 }
 
-fn table(title: &str, rows: Vec<Row>) -> Table {
+fn table(title: &str, rows: Vec<TableRow>) -> Table {
     let mut table = Table::new(title, Columns::Full);
     table.rows = rows;
     table
@@ -258,8 +258,8 @@ fn against_direct(
             let quantity = "time of the direct solver over that of the iterative one";
             rows.push(match effort {
                 // small systems are the direct solver's own ground
-                Effort::Quick => Row::info(case.name(), quantity, ratio),
-                Effort::Full => Row::at_least(case.name(), quantity, ratio, SPEED_LIMIT),
+                Effort::Quick => TableRow::info(case.name(), quantity, ratio),
+                Effort::Full => TableRow::at_least(case.name(), quantity, ratio, SPEED_LIMIT),
             });
         }
     }
@@ -306,7 +306,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             [first, .., last] => last / first,
             _ => f64::NAN,
         };
-        rows.push(Row::at_most(
+        rows.push(TableRow::at_most(
             title,
             "iterations of the finest over those of the coarsest",
             growth,

@@ -3,7 +3,7 @@
 use crate::Effort;
 use crate::observed::{Seen, run_scene};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 
@@ -55,36 +55,36 @@ fn strips(effort: Effort, progress: &dyn Progress) -> Table {
             match run.and_then(|seen| found(seen, "right_reaction_x").ok_or("no rows".to_owned())) {
                 Ok([largest, last, work, spent]) => {
                     let off = (spent / ligament / energy - 1.0).abs();
-                    table.push(Row::at_most(
+                    table.push(TableRow::at_most(
                         &case,
                         "energy per area, deviation",
                         off,
                         ENERGY_LIMIT,
                     ));
-                    table.push(Row::info(
+                    table.push(TableRow::info(
                         &case,
                         "energy per area over what was typed",
                         spent / ligament / energy,
                     ));
-                    table.push(Row::info(
+                    table.push(TableRow::info(
                         &case,
                         "work over dissipated energy",
                         work / spent,
                     ));
-                    table.push(Row::info(
+                    table.push(TableRow::info(
                         &case,
                         "last load over the largest",
                         last.abs() / largest,
                     ));
                     let peak = largest / ligament / strength;
-                    table.push(Row::info(
+                    table.push(TableRow::info(
                         &case,
                         "largest nominal stress over the strength",
                         peak,
                     ));
                 }
                 Err(why) => table.push(
-                    Row::at_most(case, "energy per area, deviation", f64::NAN, ENERGY_LIMIT)
+                    TableRow::at_most(case, "energy per area, deviation", f64::NAN, ENERGY_LIMIT)
                         .because(why),
                 ),
             }
@@ -111,13 +111,15 @@ fn peaks(progress: &dyn Progress) -> Table {
         let quantity = "half the spacing over the whole, less 1";
         match both {
             Ok((coarse, fine)) => {
-                table.push(Row::info(softening, "spacing 1 mm", coarse));
-                table.push(Row::info(softening, "spacing 0.5 mm", fine));
+                table.push(TableRow::info(softening, "spacing 1 mm", coarse));
+                table.push(TableRow::info(softening, "spacing 0.5 mm", fine));
                 let change = (fine / coarse - 1.0).abs();
-                table.push(Row::at_most(softening, quantity, change, PEAK_LIMIT));
+                table.push(TableRow::at_most(softening, quantity, change, PEAK_LIMIT));
             }
             Err(why) => {
-                table.push(Row::at_most(softening, quantity, f64::NAN, PEAK_LIMIT).because(why));
+                table.push(
+                    TableRow::at_most(softening, quantity, f64::NAN, PEAK_LIMIT).because(why),
+                );
             }
         }
     }
@@ -138,24 +140,24 @@ fn beam(progress: &dyn Progress) -> Table {
     });
     match seen {
         Ok((seen, [largest, last, work, spent])) => {
-            table.push(Row::info("beam", "largest load", largest));
-            table.push(Row::info(
+            table.push(TableRow::info("beam", "largest load", largest));
+            table.push(TableRow::info(
                 "beam",
                 "load at the deflection 0.25 mm over it",
                 last.abs() / largest,
             ));
-            table.push(Row::info("beam", "work", work));
-            table.push(Row::info("beam", "dissipated energy", spent));
+            table.push(TableRow::info("beam", "work", work));
+            table.push(TableRow::info("beam", "dissipated energy", spent));
             for [load, u] in seen
                 .columns("history", ["load_reaction_y", "time"])
                 .iter()
                 .step_by(5)
             {
                 let case = format!("deflection {:.4} mm", 0.25 * u * u);
-                table.push(Row::info(case, "load", load.abs()));
+                table.push(TableRow::info(case, "load", load.abs()));
             }
         }
-        Err(why) => table.push(Row::refused("beam", "largest load", why)),
+        Err(why) => table.push(TableRow::refused("beam", "largest load", why)),
     }
     table
 }

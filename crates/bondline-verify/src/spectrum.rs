@@ -9,7 +9,7 @@ use crate::Effort;
 use crate::enclosed::{INFLUENCE, Law, Method};
 use crate::strip::{Kind, Strip, StripCase};
 use bondline::coupling::{BlendingFunction, FitDegree};
-use bondline::observe::report::{Columns, Row, Table, Verdict};
+use bondline::observe::report::{Columns, Table, TableRow, Verdict};
 use bondline::peridynamics::influence::{Alpha, Degree};
 use bondline::peridynamics::{Influence, Micromodulus};
 use bondline::progress::Progress;
@@ -146,7 +146,7 @@ fn partial_stress() -> [Kind; 3] {
 }
 
 /// The growth exponent per crossing, with the verdict that a run would get.
-fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row {
+fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> TableRow {
     let found = Strip::new::<D>(case).and_then(|strip| {
         let length: f64 = case.lengths.iter().map(|l| f64::from(*l)).sum();
         instability_growth::growth(&strip.motion, &[], 0.5, 0, None)
@@ -154,8 +154,8 @@ fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row 
             .map_err(|e| e.to_string())
     });
     match found {
-        Err(reason) => Row::refused(name, quantity, reason),
-        Ok(growth) if growth * CROSSINGS > LARGEST_GAIN => Row {
+        Err(reason) => TableRow::refused(name, quantity, reason),
+        Ok(growth) if growth * CROSSINGS > LARGEST_GAIN => TableRow {
             verdict: Verdict::Refused,
             reason: Some(
                 match case.kind {
@@ -164,9 +164,9 @@ fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row 
                 }
                 .to_owned(),
             ),
-            ..Row::info(name, quantity, growth)
+            ..TableRow::info(name, quantity, growth)
         },
-        Ok(growth) => Row::at_most(
+        Ok(growth) => TableRow::at_most(
             name,
             quantity,
             growth,
@@ -176,7 +176,7 @@ fn row<const D: usize>(name: String, quantity: String, case: &StripCase) -> Row 
 }
 
 /// A row for each m.
-fn rows<const D: usize>(name: &str, cases: &[StripCase]) -> Vec<Row> {
+fn rows<const D: usize>(name: &str, cases: &[StripCase]) -> Vec<TableRow> {
     cases
         .iter()
         .map(|case| row::<D>(name.to_owned(), format!("m={}", case.ratio), case))
@@ -192,7 +192,7 @@ fn tapered(case: StripCase) -> StripCase {
 
 fn table<const D: usize>(title: &str, cases: Vec<(String, Vec<StripCase>)>) -> Table {
     let mut table = Table::new(title, Columns::ByQuantity);
-    let all: Vec<Vec<Row>> = cases
+    let all: Vec<Vec<TableRow>> = cases
         .par_iter()
         .map(|(name, cases)| rows::<D>(name, cases))
         .collect();
@@ -329,7 +329,7 @@ fn steps(effort: Effort) -> Table {
             }
         }
     }
-    let all: Vec<Vec<Row>> = cases
+    let all: Vec<Vec<TableRow>> = cases
         .par_iter()
         .map(|(name, case)| step_rows(name, case))
         .collect();
@@ -341,8 +341,8 @@ fn steps(effort: Effort) -> Table {
     table
 }
 
-fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
-    let measured = || -> Result<Vec<Row>, String> {
+fn step_rows(name: &str, case: &StripCase) -> Vec<TableRow> {
+    let measured = || -> Result<Vec<TableRow>, String> {
         let strip = Strip::new::<1>(case).map_err(|e| e.to_string())?;
         let values =
             instability_growth::eigenvalues(&strip.motion, &[]).map_err(|e| e.to_string())?;
@@ -353,17 +353,17 @@ fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
         let found = stable_step::stable_step(&strip.motion, &[]).map_err(|e| e.to_string())?;
         let default = found.stable / limit;
         let mut rows = vec![
-            Row::info(name, "limit", limit),
-            Row::at_most(
+            TableRow::info(name, "limit", limit),
+            TableRow::at_most(
                 name,
                 "certified/limit",
                 found.certified / limit,
                 1.0 + 1e-12,
             ),
             if default > 0.9 {
-                Row::at_most(name, "default/limit", default, 1.0)
+                TableRow::at_most(name, "default/limit", default, 1.0)
             } else {
-                Row::at_least(name, "default/limit", default, 0.9)
+                TableRow::at_least(name, "default/limit", default, 0.9)
             },
         ];
         // a mode that grows at any step leaves no limit to bisect
@@ -375,14 +375,20 @@ fn step_rows(name: &str, case: &StripCase) -> Vec<Row> {
             > 1.0;
         if !grows {
             let bisected = limit_by_growth(&strip, limit) / limit;
-            rows.push(Row::within(name, "bisected/limit", bisected, 1.0, 2e-3));
+            rows.push(TableRow::within(
+                name,
+                "bisected/limit",
+                bisected,
+                1.0,
+                2e-3,
+            ));
         }
         let refused = found.admit(Some(1.02 * limit), &strip.motion, &[]).is_err();
         let refused = f64::from(u8::from(refused));
-        rows.push(Row::at_least(name, "1.02 refused", refused, 1.0));
+        rows.push(TableRow::at_least(name, "1.02 refused", refused, 1.0));
         Ok(rows)
     };
-    measured().unwrap_or_else(|reason| vec![Row::refused(name, "limit", reason)])
+    measured().unwrap_or_else(|reason| vec![TableRow::refused(name, "limit", reason)])
 }
 
 #[cfg(test)]

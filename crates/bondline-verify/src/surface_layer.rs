@@ -8,7 +8,7 @@ use crate::{
 };
 use bondline::{
     coupling::{Model, SiteKind},
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::{Progress, Silent},
     solve::statics::{self, StaticParams, StaticProblem},
@@ -173,14 +173,14 @@ pub fn table(progress: &dyn Progress) -> Table {
                         ("ratio", p.ratio),
                     ] {
                         table.push(if *limited {
-                            Row::at_most(&name, quantity, value.abs(), SKIN_LIMIT)
+                            TableRow::at_most(&name, quantity, value.abs(), SKIN_LIMIT)
                         } else {
-                            Row::info(&name, quantity, value)
+                            TableRow::info(&name, quantity, value)
                         });
                     }
                 }
                 Err(why) => {
-                    table.push(Row::at_most(&name, "field", f64::NAN, SKIN_LIMIT).because(why))
+                    table.push(TableRow::at_most(&name, "field", f64::NAN, SKIN_LIMIT).because(why))
                 }
             }
         }

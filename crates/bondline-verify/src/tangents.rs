@@ -9,7 +9,7 @@ use crate::{
 };
 use bondline::{
     assembly::{self, Transfer},
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::{
         CalibrationFields, Cloud, Ends, Factors, Families, Family, Influence, PdBody,
         TIE_TOLERANCE, position_aware_influence,
@@ -327,13 +327,14 @@ pub fn out_of_balance<const D: usize>(places: &[Vector<D>], force: &[f64]) -> (f
     (sum.amax() / forces, moment.amax() / moments)
 }
 
-fn body_rows<const D: usize>(law: Law) -> Result<Vec<Row>, String> {
+fn body_rows<const D: usize>(law: Law) -> Result<Vec<TableRow>, String> {
     let name = format!("{D}D {}, random cloud", law.name());
     let cloud = RandomCloud::<D>::new(11)?;
     let body = cloud.body(law)?;
     let k = stiffness(&body);
     let (linear, angular) = momentum(&k, &cloud.position);
-    let row = |quantity: &str, value: f64, limit: f64| Row::at_most(&name, quantity, value, limit);
+    let row =
+        |quantity: &str, value: f64, limit: f64| TableRow::at_most(&name, quantity, value, limit);
     Ok(vec![
         row(
             "stiffness less difference of energy",
@@ -383,11 +384,11 @@ fn thread_invariance<const D: usize>(case: &Case) -> Result<bool, String> {
         && bits(&one) == bits(&three))
 }
 
-fn coupled_rows<const D: usize>(method: Method, law: Law) -> Result<Vec<Row>, String> {
+fn coupled_rows<const D: usize>(method: Method, law: Law) -> Result<Vec<TableRow>, String> {
     let case = small::<D>(method, law, Cells::Coarse);
     let name = format!("{D}D {}, {}, coarse x3", method.name(), law.name());
     let same = thread_invariance::<D>(&case)?;
-    Ok(vec![Row::at_most(
+    Ok(vec![TableRow::at_most(
         name,
         "bits that differ between 1 and 3 threads",
         f64::from(u8::from(!same)),
@@ -396,7 +397,7 @@ fn coupled_rows<const D: usize>(method: Method, law: Law) -> Result<Vec<Row>, St
 }
 
 /// Finite elements alone: the rows of nodes whose cells are all local, outside a splice.
-fn local_rows<const D: usize>(cells: Cells) -> Result<Vec<Row>, String> {
+fn local_rows<const D: usize>(cells: Cells) -> Result<Vec<TableRow>, String> {
     let case = Case {
         widths: Widths {
             nonlocal: 6,
@@ -424,7 +425,7 @@ fn local_rows<const D: usize>(cells: Cells) -> Result<Vec<Row>, String> {
     let exact = 0.5
         * e.tensor.contract(&strain).component_mul(&strain).sum()
         * (2.0 * e.half).powi(D as i32);
-    let row = |quantity: &str, value: f64| Row::at_most(&name, quantity, value, BALANCE_LIMIT);
+    let row = |quantity: &str, value: f64| TableRow::at_most(&name, quantity, value, BALANCE_LIMIT);
     Ok(vec![
         row(
             "energy of an affine field, relative error",
@@ -448,9 +449,9 @@ pub fn tangents(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     );
     let mut threads = Table::new("Coupled stiffness by number of threads", Columns::Full);
     progress.stage("tangents", None);
-    let add = |table: &mut Table, rows: Result<Vec<Row>, String>, what: &str| match rows {
+    let add = |table: &mut Table, rows: Result<Vec<TableRow>, String>, what: &str| match rows {
         Ok(rows) => rows.into_iter().for_each(|row| table.push(row)),
-        Err(why) => table.push(Row::info(what, "model", f64::NAN).because(why)),
+        Err(why) => table.push(TableRow::info(what, "model", f64::NAN).because(why)),
     };
     for law in Law::all::<1>() {
         add(&mut bodies, body_rows::<1>(law), law.name());

@@ -17,7 +17,7 @@ use crate::tangents::momentum;
 use crate::typed;
 use bondline::coupling::SiteKind;
 use bondline::fem;
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::peridynamics::Micromodulus;
 use bondline::progress::{Progress, Silent};
 use bondline::solve::FreeDofs;
@@ -169,7 +169,7 @@ fn smallest_eigenvalue<const D: usize>(e: &Enclosed<D>) -> Result<Option<f64>, S
     Ok(Some(eigenvalue / largest))
 }
 
-fn property_rows<const D: usize>(case: &Case, material: Material) -> Vec<Row> {
+fn property_rows<const D: usize>(case: &Case, material: Material) -> Vec<TableRow> {
     let name = format!(
         "{D}D {}, m = {}, {}, zone {} h",
         material.name(),
@@ -181,7 +181,7 @@ fn property_rows<const D: usize>(case: &Case, material: Material) -> Vec<Row> {
         Ok(e) => e,
         Err(e) => {
             return vec![
-                Row::at_most(name, "residual", f64::NAN, AFFINE_LIMIT).because(e.to_string()),
+                TableRow::at_most(name, "residual", f64::NAN, AFFINE_LIMIT).because(e.to_string()),
             ];
         }
     };
@@ -195,27 +195,35 @@ fn rows_of<const D: usize>(
     material: Material,
     limit: f64,
     counts: impl Fn(&Vector<D>) -> bool,
-) -> Vec<Row> {
+) -> Vec<TableRow> {
     let places: Vec<Vector<D>> = e.positions().copied().collect();
     let (forces, moments) = momentum(&e.stiffness, &places);
     let asymmetry = e.stiffness.asymmetry();
     let residual = affine_residual_where(e, counts);
     let mut rows = vec![
-        Row::at_most(name, "asymmetry", asymmetry, SYMMETRY_LIMIT),
-        Row::at_most(name, "residual", residual, limit),
-        Row::at_most(name, "forces", forces, EQUILIBRIUM_LIMIT),
+        TableRow::at_most(name, "asymmetry", asymmetry, SYMMETRY_LIMIT),
+        TableRow::at_most(name, "residual", residual, limit),
+        TableRow::at_most(name, "forces", forces, EQUILIBRIUM_LIMIT),
     ];
     if D > 1 {
-        rows.push(Row::at_most(name, "moments", moments, EQUILIBRIUM_LIMIT));
+        rows.push(TableRow::at_most(
+            name,
+            "moments",
+            moments,
+            EQUILIBRIUM_LIMIT,
+        ));
     }
     rows.push(match (smallest_eigenvalue(e), material.is_definite()) {
-        (Ok(Some(v)), _) => Row::at_least(name, "smallest eigenvalue", v, f64::MIN_POSITIVE),
-        (Ok(None), true) => Row::at_least(name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE)
-            .because("not positive definite"),
-        (Ok(None), false) => Row::info(name, "smallest eigenvalue", -1.0)
+        (Ok(Some(v)), _) => TableRow::at_least(name, "smallest eigenvalue", v, f64::MIN_POSITIVE),
+        (Ok(None), true) => {
+            TableRow::at_least(name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE)
+                .because("not positive definite")
+        }
+        (Ok(None), false) => TableRow::info(name, "smallest eigenvalue", -1.0)
             .because("not positive definite: the LPS has a negative state modulus below nu = 1/4"),
         (Err(why), _) => {
-            Row::at_least(name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE).because(why)
+            TableRow::at_least(name, "smallest eigenvalue", f64::NAN, f64::MIN_POSITIVE)
+                .because(why)
         }
     });
     rows
@@ -267,7 +275,7 @@ fn properties<const D: usize>(effort: Effort, progress: &dyn Progress) -> Table 
     }
     let stage = format!("truncated bonds, {D}D");
     progress.stage(&stage, Some(cases.len() as u64));
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<TableRow>> = cases
         .par_iter()
         .map(|(case, material)| {
             let rows = property_rows::<D>(case, *material);
@@ -439,22 +447,22 @@ fn order_rows<const D: usize>(table: &mut Table, effort: Effort, progress: &dyn 
                     f64::from(*n) / f64::from(ratio)
                 );
                 table.push(match error {
-                    Ok(v) => Row::info(&name, quantity, *v),
-                    Err(why) => Row::info(&name, quantity, f64::NAN).because(why),
+                    Ok(v) => TableRow::info(&name, quantity, *v),
+                    Err(why) => TableRow::info(&name, quantity, f64::NAN).because(why),
                 });
             }
             if let [.., Ok(coarse), Ok(fine)] = errors.as_slice() {
                 let order = (coarse / fine).log2();
                 let quantity = "order on the last halving";
                 table.push(if method == Method::Truncated && effort == Effort::Full {
-                    Row::at_most(
+                    TableRow::at_most(
                         &name,
                         "order on the last halving less 2",
                         (order - ORDER).abs(),
                         ORDER_TOLERANCE,
                     )
                 } else {
-                    Row::info(&name, quantity, order)
+                    TableRow::info(&name, quantity, order)
                 });
             }
         }
@@ -483,7 +491,9 @@ fn saving_rows<const D: usize>(table: &mut Table, half: u32, ratio: u32) {
         let e = match Material::Lps(0.3).block::<D>(&case, None, "") {
             Ok(e) => e,
             Err(e) => {
-                table.push(Row::info(method.name(), "seconds", f64::NAN).because(e.to_string()));
+                table.push(
+                    TableRow::info(method.name(), "seconds", f64::NAN).because(e.to_string()),
+                );
                 continue;
             }
         };
@@ -506,15 +516,19 @@ fn saving_rows<const D: usize>(table: &mut Table, half: u32, ratio: u32) {
                     method: used,
                     ..
                 }) => {
-                    table.push(Row::info(&name, "seconds to build and assemble", built));
-                    table.push(Row::info(
+                    table.push(TableRow::info(
+                        &name,
+                        "seconds to build and assemble",
+                        built,
+                    ));
+                    table.push(TableRow::info(
                         &name,
                         format!("seconds to solve, {used}"),
                         seconds,
                     ));
-                    table.push(Row::info(&name, "bytes of factors", bytes as f64));
+                    table.push(TableRow::info(&name, "bytes of factors", bytes as f64));
                 }
-                Err(why) => table.push(Row::info(&name, "seconds", f64::NAN).because(why)),
+                Err(why) => table.push(TableRow::info(&name, "seconds", f64::NAN).because(why)),
             }
         }
     }

@@ -17,7 +17,7 @@ use bondline::{
     assembly::Row as MatrixRow,
     observe::{
         ObserveError,
-        report::{Columns, Row, Table},
+        report::{Columns, Table, TableRow},
     },
     peridynamics::{
         Influence,
@@ -262,13 +262,18 @@ fn rows(case: &str, model: BarModel, profile: &Profile, table: &mut Table) {
         ("u = 1e-3 x^2: largest |a rho/(E u'') - 1|", quadratic),
     ] {
         table.push(match model {
-            BarModel::PartialStress => Row::at_most(case, quantity, value, EXACT),
-            BarModel::Standard => Row::at_least(case, quantity, value, VISIBLE),
+            BarModel::PartialStress => TableRow::at_most(case, quantity, value, EXACT),
+            BarModel::Standard => TableRow::at_least(case, quantity, value, VISIBLE),
         });
     }
     if model == BarModel::PartialStress && profile.across > 0.0 {
         let quantity = "largest |a| across the bar, of E u''/rho";
-        table.push(Row::at_most(case, quantity, profile.across / exact, EXACT));
+        table.push(TableRow::at_most(
+            case,
+            quantity,
+            profile.across / exact,
+            EXACT,
+        ));
     }
 }
 
@@ -294,12 +299,12 @@ fn dimension<const D: usize>(
                 Ok(p) => {
                     rows(&case, model, &p, table);
                     if counted.replace(p.bonds).is_none() {
-                        table.push(Row::info(format!("{D}D"), "points", p.points as f64));
-                        table.push(Row::info(format!("{D}D"), "bonds", p.bonds as f64));
+                        table.push(TableRow::info(format!("{D}D"), "points", p.points as f64));
+                        table.push(TableRow::info(format!("{D}D"), "bonds", p.bonds as f64));
                     }
                 }
                 Err(e) => {
-                    let row = Row::at_most(case, "largest |a|", f64::NAN, EXACT);
+                    let row = TableRow::at_most(case, "largest |a|", f64::NAN, EXACT);
                     table.push(row.because(e.to_string()));
                 }
             }
@@ -331,10 +336,10 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     );
     if let Ok(p) = constant {
         let quantity = "bonds with delta = 0.25 everywhere";
-        table.push(Row::info("1D", quantity, p.bonds as f64));
+        table.push(TableRow::info("1D", quantity, p.bonds as f64));
         let quantity = "delta = 0.25 everywhere, u = 1e-3 x: largest |a| rho L/(E u')";
         let value = largest(p.linear.iter().copied()) / linear_scale();
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             "1D correspondence, standard PD",
             quantity,
             value,
@@ -356,7 +361,7 @@ fn push_weighted_volume(table: &mut Table) {
                 s.offsets.len() as f64 * Influence::Gaussian.value(r, 12.0) * r * r
             })
             .sum();
-        table.push(Row::within(
+        table.push(TableRow::within(
             "Gaussian of Algorithm 1",
             "weighted volume, closed form over the sum of a lattice of m = 12",
             Influence::Gaussian.weighted_volume::<3>(12.0) / sum,
@@ -380,7 +385,7 @@ fn printed(varying: &Option<usize>) -> Table {
     ];
     let constant = directed_bonds(cells, LARGE / SPACING_3D) as f64;
     let add = |table: &mut Table, case: &str, quantity: &str, ours: f64, theirs: f64| {
-        let row = Row::info(case, quantity, ours).with_reference(theirs);
+        let row = TableRow::info(case, quantity, ours).with_reference(theirs);
         table.push(row.differs(why));
     };
     add(
@@ -410,7 +415,7 @@ fn printed(varying: &Option<usize>) -> Table {
     // Silling and Askari: Δt = √(2ρ/Σ C V), C = 18 K/(π δ⁴ |ξ|), over a full family
     let bulk = YOUNGS_MODULUS / 3.0;
     let step = |horizon: f64| horizon * (DENSITY / (18.0 * bulk)).sqrt();
-    table.push(Row::within(
+    table.push(TableRow::within(
         "constant horizon",
         "stable step of a whole family of 0.25, delta sqrt(rho/(18 K)) [s]",
         step(LARGE),
@@ -418,7 +423,7 @@ fn printed(varying: &Option<usize>) -> Table {
         0.01,
     ));
     table.push(
-        Row::info(
+        TableRow::info(
             "varying horizon",
             "the same of our smallest horizon, 0.10 [s]",
             step(SMALL),
@@ -429,7 +434,7 @@ fn printed(varying: &Option<usize>) -> Table {
         ),
     );
     let implied = LARGE * 7.15e-6 / 2.03e-5;
-    table.push(Row::info(
+    table.push(TableRow::info(
         "varying horizon",
         "smallest horizon that the printed steps imply [m]",
         implied,

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::Effort;
 use crate::enclosed::{INFLUENCE, Law, Method};
 use crate::strip::{Kind, Strip, StripCase};
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::peridynamics::Micromodulus;
 use bondline::progress::Progress;
 use bondline::solve::explicit::{Explicit, ExplicitParams, State, Undriven};
@@ -130,8 +130,8 @@ fn go(
 }
 
 /// Discrete energy and momentum of a symmetric model in noise.
-fn symmetric_rows(name: &str, strip: Result<Strip, String>) -> Vec<Row> {
-    let measured = || -> Result<Vec<Row>, String> {
+fn symmetric_rows(name: &str, strip: Result<Strip, String>) -> Vec<TableRow> {
+    let measured = || -> Result<Vec<TableRow>, String> {
         let strip = strip?;
         let start = noise(&strip);
         let mut motion = strip.motion;
@@ -158,11 +158,11 @@ fn symmetric_rows(name: &str, strip: Result<Strip, String>) -> Vec<Row> {
             }
         })?;
         Ok(vec![
-            Row::at_most(name, "discrete energy", change, DISCRETE),
-            Row::at_most(name, "momentum", drift, MOMENTUM),
+            TableRow::at_most(name, "discrete energy", change, DISCRETE),
+            TableRow::at_most(name, "momentum", drift, MOMENTUM),
         ])
     };
-    measured().unwrap_or_else(|reason| vec![Row::refused(name, "discrete energy", reason)])
+    measured().unwrap_or_else(|reason| vec![TableRow::refused(name, "discrete energy", reason)])
 }
 
 /// What a pulse's energy did while it was clear of the seams.
@@ -234,12 +234,12 @@ pub fn own_energy(strip: &mut Strip, reach: f64) -> Result<OwnEnergy, String> {
     })
 }
 
-fn coupled_rows(name: &str, case: &StripCase) -> Vec<Row> {
+fn coupled_rows(name: &str, case: &StripCase) -> Vec<TableRow> {
     let remedy = match case.kind {
         Kind::Coupled(Method::Meshfree | Method::Elements(_)) => REMEDY,
         _ => REMEDY_SEAM,
     };
-    let measured = || -> Result<Vec<Row>, String> {
+    let measured = || -> Result<Vec<TableRow>, String> {
         let mut strip = Strip::new::<1>(case)?;
         let limit = stable_step::stable_step(&strip.motion, &[]).map_err(|e| e.to_string())?;
         let step = FRACTION * limit.stable;
@@ -250,16 +250,16 @@ fn coupled_rows(name: &str, case: &StripCase) -> Vec<Row> {
             .map_err(|e| e.to_string())?;
         let own = own_energy(&mut strip, 2.0 * case.ratio)?;
         let mut rows = vec![
-            Row::at_most(name, "own energy", own.change, OWN),
-            Row::at_most(name, "trend", own.trend.abs(), OWN),
-            Row::info(name, "clear", own.clear),
+            TableRow::at_most(name, "own energy", own.change, OWN),
+            TableRow::at_most(name, "trend", own.trend.abs(), OWN),
+            TableRow::info(name, "clear", own.clear),
         ];
         if strip.motion.symmetry == Symmetry::Symmetric {
             rows.extend(symmetric_rows(name, Ok(strip)));
         }
         Ok(rows)
     };
-    measured().unwrap_or_else(|reason| vec![Row::refused(name, "own energy", reason)])
+    measured().unwrap_or_else(|reason| vec![TableRow::refused(name, "own energy", reason)])
 }
 
 /// Runs the suite.
@@ -298,7 +298,7 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
         "symmetric models, free, in noise, 100 000 steps at 0.95 of the stable step: largest relative change",
         Columns::ByQuantity,
     );
-    let rows: Vec<Vec<Row>> = symmetric
+    let rows: Vec<Vec<TableRow>> = symmetric
         .into_par_iter()
         .map(|(name, strip)| symmetric_rows(&name, strip))
         .collect();
@@ -318,7 +318,7 @@ pub fn run(effort: Effort, _progress: &dyn Progress) -> Vec<Table> {
             }
         }
     }
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<TableRow>> = cases
         .par_iter()
         .map(|(name, case)| coupled_rows(name, case))
         .collect();

@@ -8,7 +8,7 @@ use crate::{
     patch::influence::influences,
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::{
         Influence, LatticeFamily, Micromodulus, ShellTarget, TIE_TOLERANCE, isotropic_shell_factors,
     },
@@ -176,19 +176,19 @@ pub fn table<const D: usize>(effort: Effort, progress: &dyn Progress) -> Table {
         .collect();
     let stage = format!("lattice weights, {D}D");
     progress.stage(&stage, Some(cases.len() as u64));
-    let rows: Vec<[Row; 2]> = cases
+    let rows: Vec<[TableRow; 2]> = cases
         .par_iter()
         .map(|(name, law, m)| {
             progress.advance(1);
             let case = format!("{D}D {name}, m = {m}");
             let isotropic = match deviation::<D>(*law, *m, Plain::No) {
-                Ok(value) => Row::at_most(&case, "isotropic", value, TENSOR_LIMIT),
-                Err(why) => Row::refused(&case, "isotropic", why),
+                Ok(value) => TableRow::at_most(&case, "isotropic", value, TENSOR_LIMIT),
+                Err(why) => TableRow::refused(&case, "isotropic", why),
             };
             let plain = match deviation::<D>(*law, *m, Plain::Yes) {
-                Ok(value) if value.is_finite() => Row::info(&case, "plain", value),
-                Ok(_) => Row::refused(&case, "plain", "no bond of the family has weight"),
-                Err(why) => Row::refused(&case, "plain", why),
+                Ok(value) if value.is_finite() => TableRow::info(&case, "plain", value),
+                Ok(_) => TableRow::refused(&case, "plain", "no bond of the family has weight"),
+                Err(why) => TableRow::refused(&case, "plain", why),
             };
             [isotropic, plain]
         })

@@ -3,7 +3,7 @@
 use crate::{
     coupling::BrokenBonds,
     peridynamics::{
-        bond_force::{KernelError, Kinematics, Storage},
+        bond_force::{BondKinematics, KernelError, Storage},
         contact::ContactError,
     },
     tensor::Vector,
@@ -17,9 +17,9 @@ pub(super) const CHUNK: usize = 4096;
 /// How the bonds of a moving model behave.
 pub struct BondBehaviour<'a, const D: usize> {
     /// Whether bonds turn with the body, or are linear in the displacement.
-    pub kinematics: Kinematics,
-    /// Critical stretch s_c; none if nothing breaks.
-    pub critical_stretch: Option<Critical>,
+    pub kinematics: BondKinematics,
+    /// What breaks bonds; none if nothing does.
+    pub failure: Option<FailureCriterion>,
     /// Where bonds never break.
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
     /// Contact of points that no bond joins; none if they may pass through each other.
@@ -32,7 +32,7 @@ pub struct BondBehaviour<'a, const D: usize> {
 
 /// What breaks bonds: a stretch, or a tearing parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Critical {
+pub enum FailureCriterion {
     /// The same everywhere.
     Uniform(f64),
     /// One for each lattice of the model: the same fracture energy takes a larger stretch where the horizon is smaller.
@@ -70,7 +70,7 @@ impl StretchOfMaterials {
     }
 }
 
-impl Critical {
+impl FailureCriterion {
     /// The stretch that breaks bonds of a lattice; infinite where none does, and where materials say so.
     pub fn at(&self, lattice: usize) -> f64 {
         match self {

@@ -3,7 +3,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::split::Split;
-use crate::coupling::semidiscrete::behaviour::{BondBehaviour, CHUNK, Critical, NONE, SystemError};
+use crate::coupling::semidiscrete::behaviour::{
+    BondBehaviour, CHUNK, FailureCriterion, NONE, SystemError,
+};
 use crate::{
     assembly::{Row, Transfer},
     coupling::{Model, NonlinearSeam, Operator, SiteKind},
@@ -11,8 +13,8 @@ use crate::{
     peridynamics::{
         Accelerator, Families, Law, PdBody,
         bond_force::{
-            BondForce, BondPass, BondSetup, CriticalStretch, Failure, Layout, SharedRows, Storage,
-            bond_pass,
+            BondCriterion, BondForce, BondPass, BondSetup, DistributedRows, Failure, Layout,
+            Storage, bond_pass,
         },
         contact::{Contact, ContactSetup, contact_stiffness},
     },
@@ -23,7 +25,7 @@ use crate::{
 /// The points and their bonds.
 pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
-    pub critical_stretch: Option<Critical>,
+    pub failure: Option<FailureCriterion>,
     /// Whether the law damages bonds.
     pub damages: bool,
     /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
@@ -62,8 +64,7 @@ fn contact_of<const D: usize>(
             rows: own_row,
             spacing,
             approach: c.approach,
-            stiffness: c.stiffness / 15.0
-                * contact_stiffness(bond_constant(body), body.cloud.horizon.of(0)),
+            stiffness: c.stiffness / 15.0 * stiffest_contact(body),
             skin: 0.25 * spacing,
         })?)),
         None => None,
@@ -86,7 +87,7 @@ struct PassInput<'a, const D: usize> {
     seam: Option<&'a NonlinearSeam<D>>,
     behaviour: &'a BondBehaviour<'a, D>,
     /// Who has which families, where they are spread over processes.
-    shared: Option<SharedRows<'a>>,
+    shared: Option<DistributedRows<'a>>,
 }
 
 impl<const D: usize> PassInput<'_, D> {
@@ -125,12 +126,12 @@ impl<const D: usize> PassInput<'_, D> {
             (None, None) => return Err(SystemError::Law { law: law.name() }),
         };
         let by_bond = |i: usize, _: usize, _: &Vector<D>| {
-            let critical = behaviour.critical_stretch.as_ref();
+            let critical = behaviour.failure.as_ref();
             critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon.lattice_of(i)))
         };
         let material = &body.cloud.material;
-        let by_materials = |i: usize, k: usize, _: &Vector<D>| match &behaviour.critical_stretch {
-            Some(Critical::ByMaterials(stretch)) => {
+        let by_materials = |i: usize, k: usize, _: &Vector<D>| match &behaviour.failure {
+            Some(FailureCriterion::ByMaterials(stretch)) => {
                 stretch.at(material[i], material[families.of(i)[k] as usize])
             }
             _ => f64::INFINITY,
@@ -147,13 +148,15 @@ impl<const D: usize> PassInput<'_, D> {
             without_energy: seam.map_or(&[], NonlinearSeam::without_energy),
             force,
             kinematics: behaviour.kinematics,
-            failure: match &behaviour.critical_stretch {
-                None if law.damages() => Some(CriticalStretch::Uniform(f64::INFINITY)),
+            failure: match &behaviour.failure {
+                None if law.damages() => Some(BondCriterion::Uniform(f64::INFINITY)),
                 None => None,
-                Some(Critical::Uniform(s)) => Some(CriticalStretch::Uniform(*s)),
-                Some(Critical::PerLattice(_)) => Some(CriticalStretch::PerBond(&by_bond)),
-                Some(Critical::ByMaterials(_)) => Some(CriticalStretch::PerBond(&by_materials)),
-                Some(Critical::Tearing(p)) => Some(CriticalStretch::TearingParameter(*p)),
+                Some(FailureCriterion::Uniform(s)) => Some(BondCriterion::Uniform(*s)),
+                Some(FailureCriterion::PerLattice(_)) => Some(BondCriterion::PerBond(&by_bond)),
+                Some(FailureCriterion::ByMaterials(_)) => {
+                    Some(BondCriterion::PerBond(&by_materials))
+                }
+                Some(FailureCriterion::Tearing(p)) => Some(BondCriterion::TearingParameter(*p)),
             }
             .map(|critical| Failure {
                 critical,
@@ -193,8 +196,8 @@ impl<'a> Holders<'a> {
         })
     }
 
-    fn rows(&self) -> SharedRows<'_> {
-        SharedRows {
+    fn rows(&self) -> DistributedRows<'_> {
+        DistributedRows {
             ranks: self.ranks,
             own: &self.own,
             sizes: &self.sizes,
@@ -209,10 +212,11 @@ fn passed_families<const D: usize>(
     body: &PdBody<D>,
     own_row: &[bool],
 ) -> Option<Families> {
-    let shares = |site: usize| operator.has_body_bonds(site);
-    (0..model.sites.len()).any(shares).then(|| {
+    let mixed = operator.mixed_rows()?;
+    let has_bonds = |site: usize| mixed.has_body_bonds(site);
+    (0..model.sites.len()).any(has_bonds).then(|| {
         let mut passed = body.families.clone();
-        passed.retain_of(|i| !own_row[i], |i, j| operator.is_body_bond(i, j as usize));
+        passed.retain_of(|i| !own_row[i], |i, j| mixed.is_body_bond(i, j as usize));
         passed.mirrored(&model.feet)
     })
 }
@@ -257,12 +261,13 @@ impl PointSites {
         let mut site_of_point = vec![NONE; points];
         let mut bonds_of_site = vec![NONE; model.sites.len()];
         let mut own_row = vec![false; points];
+        let mixed = operator.mixed_rows();
         for (site, s) in model.sites.iter().enumerate() {
             if let SiteKind::Point(point) = s.kind {
                 site_of_point[point as usize] = site as u32;
                 let is_own = is_seam || operator.is_body_row(site);
                 own_row[point as usize] = is_own;
-                if is_own || operator.has_body_bonds(site) {
+                if is_own || mixed.is_some_and(|mixed| mixed.has_body_bonds(site)) {
                     bonds_of_site[site] = point;
                 }
             }
@@ -310,7 +315,7 @@ impl<const D: usize> MovingBody<D> {
             (None, None) => &body.families,
         };
         let all_pass = seam.is_none() && passed.is_none();
-        let may_break = behaviour.critical_stretch.is_some() || p.law.damages();
+        let may_break = behaviour.failure.is_some() || p.law.damages();
         let edge = if may_break && seam.is_none() {
             edge_of(body, &own_row)
         } else {
@@ -336,7 +341,7 @@ impl<const D: usize> MovingBody<D> {
         let shift = shift_of(&site_of_point);
         Ok(Some(Self {
             pass,
-            critical_stretch: behaviour.critical_stretch.clone(),
+            failure: behaviour.failure.clone(),
             damages: p.law.damages(),
             contact,
             site_of_point,
@@ -468,21 +473,33 @@ impl<const D: usize> MovingBody<D> {
     }
 }
 
-/// `c` of `f = c s`, the largest of the bonds of the point with the most of them.
-fn bond_constant<const D: usize>(body: &PdBody<D>) -> f64 {
-    let of_point = |i: usize| {
+/// The stiffness of contact, [`contact_stiffness`]: of each lattice that of the point with the most bonds. The stiffest lattice or material keeps all apart.
+fn stiffest_contact<const D: usize>(body: &PdBody<D>) -> f64 {
+    // `c` of `f = c s`, the largest of the bonds of a point
+    let bond_constant = |i: usize| {
         let family = body.families.of(i).iter().zip(body.kernel(i).0);
         family
             .map(|(&j, p)| 2.0 * p * body.bond(i, j as usize).norm().powi(3))
             .fold(0.0, f64::max)
     };
+    let of_point = |i: usize| contact_stiffness(bond_constant(i), body.cloud.horizon.of(i));
     let points = 0..body.families.len();
     if !body.cloud.material.is_empty() {
-        // the stiffest material keeps all apart
         return points.map(of_point).fold(0.0, f64::max);
     }
-    let fullest = points.max_by_key(|&i| body.families.of(i).len());
-    fullest.map_or(0.0, of_point)
+    let mut fullest: Vec<Option<usize>> = Vec::new();
+    for i in points {
+        let lattice = body.cloud.horizon.lattice_of(i);
+        if fullest.len() <= lattice {
+            fullest.resize(lattice + 1, None);
+        }
+        let size = |i: usize| body.families.of(i).len();
+        if fullest[lattice].is_none_or(|other| size(i) >= size(other)) {
+            fullest[lattice] = Some(i);
+        }
+    }
+    let fullest = fullest.into_iter().flatten();
+    fullest.map(of_point).fold(0.0, f64::max)
 }
 
 /// Volume that the bonds of a point reach.

@@ -1,7 +1,5 @@
 //! Energy of the finite elements of a moving model, from rows that are there already where they are those of elements alone.
 
-use rayon::prelude::*;
-
 use super::rows::{SiteRows, row_product};
 use crate::coupling::semidiscrete::behaviour::CHUNK;
 use crate::{
@@ -56,7 +54,7 @@ impl ElementEnergy {
     }
 
     pub fn of<const D: usize>(&self, linear: &SiteRows, nodes: &Transfer, u: &[f64]) -> f64 {
-        let inner: f64 = parallel::map_each(self.inner.par_chunks(CHUNK), |sites| {
+        let inner: f64 = parallel::map_chunks(&self.inner, CHUNK, |_, sites| {
             sites
                 .iter()
                 .map(|&site| {

@@ -2,8 +2,6 @@
 
 use std::sync::PoisonError;
 
-use rayon::prelude::*;
-
 use super::{CoupledSystem, behaviour::CHUNK, body::MovingBody};
 use crate::{
     parallel,
@@ -52,9 +50,10 @@ impl<const D: usize> CoupledSystem<'_, D> {
             // rows have whole bonds too: the energy of all is known to first order in the stretch of exact bonds
             let mut force = vec![0.0; u.len()];
             self.tangent_into(u, &mut force);
-            let both = u.par_chunks(CHUNK).zip(force.par_chunks(CHUNK));
-            let products: Vec<f64> =
-                parallel::map_each(both, |(u, f)| u.iter().zip(f).map(|(u, f)| u * f).sum());
+            let products: Vec<f64> = parallel::map_chunks(u, CHUNK, |chunk, u| {
+                let force = &force[chunk * CHUNK..];
+                u.iter().zip(force).map(|(u, f)| u * f).sum()
+            });
             return 0.5 * products.iter().sum::<f64>();
         }
         let elements = self

@@ -202,12 +202,6 @@ impl<const D: usize> Model<D> {
     pub(super) fn holds_all_points(&self, counts: &[bool]) -> bool {
         (self.roles.iter().zip(counts)).all(|(&role, &counts)| counts || role != CellRole::Points)
     }
-
-    /// The number of points among the sites.
-    pub fn point_count(&self) -> usize {
-        let is_point = |s: &&super::Site<D>| matches!(s.kind, SiteKind::Point(_));
-        self.sites.iter().filter(is_point).count()
-    }
 }
 
 /// How far around the zone its lattice is continued, in spacings: farther than weights reach.

@@ -10,7 +10,7 @@ use super::{
     dilatation::{Carrier, Functional, LpsConstants, carried, divergence, stiffness_of_point},
     element_dilatation::ElementDilatations,
 };
-use crate::{parallel, peridynamics::bond_force::Kinematics, tensor::Vector};
+use crate::{parallel, peridynamics::bond_force::BondKinematics, tensor::Vector};
 
 /// The dilatations of the points at the seam and of the elements behind it.
 pub(super) struct States<const D: usize> {
@@ -171,7 +171,7 @@ impl<const D: usize> States<D> {
     pub fn own_parts(
         &self,
         u: &[f64],
-        kinematics: Kinematics,
+        kinematics: BondKinematics,
         wanted: impl Fn(usize) -> bool,
     ) -> OwnParts<'_, D> {
         let at = |site: u32| Vector::<D>::from_column_slice(&u[site as usize * D..][..D]);
@@ -180,7 +180,7 @@ impl<const D: usize> States<D> {
             false => 0.0,
         };
         let Some((elements, _)) =
-            (self.elements.as_ref()).filter(|_| kinematics == Kinematics::Exact)
+            (self.elements.as_ref()).filter(|_| kinematics == BondKinematics::Exact)
         else {
             return OwnParts {
                 values: (0..self.count()).map(linear).collect(),

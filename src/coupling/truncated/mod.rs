@@ -54,8 +54,8 @@ use self::{
 use crate::{
     assembly::Row,
     coupling::{
-        CellRole, Coupling, Definiteness, Interface, Model, ModelError, Operator, Reach, Rows,
-        Zone, held_families::depth_of_seam,
+        CellRole, Coupling, Definiteness, ExactStresses, Interface, MixedRows, Model, ModelError,
+        Operator, Reach, Rows, SeamBonds, Zone, held_families::depth_of_seam,
     },
     dimension,
     mesh::Mesh,
@@ -258,6 +258,60 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
             .is_some_and(|(_, i)| !self.pieces.listed[i])
     }
 
+    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
+        Some(self)
+    }
+
+    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
+        None
+    }
+
+    fn definiteness(&self) -> Definiteness {
+        let is_plain = self.pieces.strings.is_empty() && !self.pieces.has_two_dilatations;
+        match (self.pieces.squares, is_plain) {
+            (true, true) => Definiteness::SumOfSquares,
+            (true, false) => Definiteness::EdgeTerms,
+            (false, _) => Definiteness::NegativeTerms,
+        }
+    }
+
+    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
+        // what follows the motion has one dilatation
+        if self.cut_bonds == CutBonds::Linear || self.pieces.has_two_dilatations {
+            return None;
+        }
+        let states = self.states.as_ref();
+        let broken = match (&self.pieces.whole, states) {
+            (Some(whole), _) => &whole.broken,
+            (None, Some((segments, _))) => &segments.broken,
+            (None, None) => return None,
+        };
+        let bonds = NonlinearSeam::new(
+            self.model,
+            self.model.body()?,
+            &self.pieces.springs,
+            broken,
+            states.map(|(segments, common)| (segments, common)),
+        );
+        Some(SeamBonds {
+            bonds,
+            add_rest: Box::new(|site, row| {
+                if self.model.point_of(site).is_none() {
+                    self.model.add_element_rows(site, row);
+                    self.pieces.strings.add_row(site, row);
+                    // the elements behind the seam have other dilatations, with the bonds
+                    self.pieces.dilatations.take_back(site, row);
+                }
+            }),
+        })
+    }
+
+    fn beta(&self, site: usize) -> f64 {
+        f64::from(u8::from(self.model.point_of(site).is_some()))
+    }
+}
+
+impl<const D: usize> MixedRows<D> for TruncatedRows<'_, D> {
     fn has_body_bonds(&self, site: usize) -> bool {
         // the dilatations of an LPS differ from the body's
         let alone = self.pieces.whole.is_some();
@@ -273,47 +327,5 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         if self.has_body_bonds(site) {
             self.pieces.springs.add_row(site, row);
         }
-    }
-
-    fn definiteness(&self) -> Definiteness {
-        let is_plain = self.pieces.strings.is_empty() && !self.pieces.has_two_dilatations;
-        match (self.pieces.squares, is_plain) {
-            (true, true) => Definiteness::SumOfSquares,
-            (true, false) => Definiteness::EdgeTerms,
-            (false, _) => Definiteness::NegativeTerms,
-        }
-    }
-
-    fn seam_bonds(&self) -> Option<NonlinearSeam<D>> {
-        // what follows the motion has one dilatation
-        if self.cut_bonds == CutBonds::Linear || self.pieces.has_two_dilatations {
-            return None;
-        }
-        let states = self.states.as_ref();
-        let broken = match (&self.pieces.whole, states) {
-            (Some(whole), _) => &whole.broken,
-            (None, Some((segments, _))) => &segments.broken,
-            (None, None) => return None,
-        };
-        Some(NonlinearSeam::new(
-            self.model,
-            self.model.body()?,
-            &self.pieces.springs,
-            broken,
-            states.map(|(segments, common)| (segments, common)),
-        ))
-    }
-
-    fn add_row_without_bonds(&self, site: usize, row: &mut Row<D>) {
-        if self.model.point_of(site).is_none() {
-            self.model.add_element_rows(site, row);
-            self.pieces.strings.add_row(site, row);
-            // the elements behind the seam have other dilatations, with the bonds
-            self.pieces.dilatations.take_back(site, row);
-        }
-    }
-
-    fn beta(&self, site: usize) -> f64 {
-        f64::from(u8::from(self.model.point_of(site).is_some()))
     }
 }

@@ -28,7 +28,7 @@ use crate::{
     parallel,
     peridynamics::{
         Families, PdBody,
-        bond_force::{BondPass, Kinematics, pack, unpack},
+        bond_force::{BondKinematics, BondPass, pack, unpack},
     },
     system::FailureUpdate,
     tensor::{Tensor, Vector},
@@ -58,7 +58,7 @@ pub struct NonlinearSeam<const D: usize> {
     /// Bonds that the last pass broke.
     last: Vec<u32>,
     breaks: Option<Breaking<D>>,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     /// Sites at which parts end, and for each the parts with their weights.
     sites: Vec<u32>,
     offsets: Vec<usize>,
@@ -79,7 +79,7 @@ pub struct NonlinearSeam<const D: usize> {
 
 impl<const D: usize> NonlinearSeam<D> {
     /// How bonds follow the motion.
-    pub(in crate::coupling) fn follow_motion(&mut self, kinematics: Kinematics) {
+    pub(in crate::coupling) fn follow_motion(&mut self, kinematics: BondKinematics) {
         self.kinematics = kinematics;
     }
 
@@ -211,7 +211,7 @@ impl<const D: usize> NonlinearSeam<D> {
     }
 
     /// Elements' own parts of the dilatations, if there are any.
-    fn own_parts(&self, u: &[f64], kinematics: Kinematics) -> Option<OwnParts<'_, D>> {
+    fn own_parts(&self, u: &[f64], kinematics: BondKinematics) -> Option<OwnParts<'_, D>> {
         let states = self.states.as_ref();
         let is_known = |f| self.computed.knows_dilatation(f);
         states.map(|states| states.own_parts(u, kinematics, is_known))
@@ -234,8 +234,8 @@ impl<const D: usize> NonlinearSeam<D> {
             FailureUpdate::Frozen => 0,
         };
         match self.kinematics {
-            Kinematics::Exact => self.stretch::<true>(u, &mut pulls, &mut elongation),
-            Kinematics::Linear => self.stretch::<false>(u, &mut pulls, &mut elongation),
+            BondKinematics::Exact => self.stretch::<true>(u, &mut pulls, &mut elongation),
+            BondKinematics::Linear => self.stretch::<false>(u, &mut pulls, &mut elongation),
         }
         let own = self.own_parts(u, self.kinematics);
         let pressures = self.pull(own.as_ref(), &elongation, &mut pulls);
@@ -267,7 +267,7 @@ impl<const D: usize> NonlinearSeam<D> {
         let parts = self.parts.len();
         let (mut pulls, mut elongation) = (vec![[0.0; D]; parts], vec![0.0; parts]);
         self.stretch::<false>(x, &mut pulls, &mut elongation);
-        let own = self.own_parts(x, Kinematics::Linear);
+        let own = self.own_parts(x, BondKinematics::Linear);
         let pressures = self.pull(own.as_ref(), &elongation, &mut pulls);
         let parts = (own.as_ref(), &pressures[..]);
         self.add_forces(&pulls, parts, x, &mut Vec::new(), y);
@@ -362,8 +362,8 @@ impl<const D: usize> NonlinearSeam<D> {
         }
         let d: Vector<D> = self.difference.displacement(p, u);
         match self.kinematics {
-            Kinematics::Exact => part.strained::<true>(&d).elongation,
-            Kinematics::Linear => part.strained::<false>(&d).elongation,
+            BondKinematics::Exact => part.strained::<true>(&d).elongation,
+            BondKinematics::Linear => part.strained::<false>(&d).elongation,
         }
     }
 

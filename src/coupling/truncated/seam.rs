@@ -3,7 +3,7 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::{
-    coupling::Model,
+    coupling::{Model, bins::bin_of},
     fem::{self, Locator},
     tensor::Vector,
 };
@@ -160,16 +160,16 @@ impl<'a, const D: usize> Seam<'a, D> {
             let (low, high) = mesh.bounds_of(&n);
             let margin = Vector::repeat(size * 1e-3);
             for_box(
-                &bin(&(low - margin), size),
-                &bin(&(high + margin), size),
+                &bin_of(&(low - margin), size),
+                &bin_of(&(high + margin), size),
                 |key| {
                     bins.entry(key).or_default().push(faces.len() as u32);
                 },
             );
             let reach = Vector::repeat(longest * (1.0 + 1e-3));
             for_box(
-                &bin(&(low - reach), size),
-                &bin(&(high + reach), size),
+                &bin_of(&(low - reach), size),
+                &bin_of(&(high + reach), size),
                 |key| {
                     around.insert(key);
                 },
@@ -201,7 +201,7 @@ impl<'a, const D: usize> Seam<'a, D> {
         near.clear();
         let reach = self.longest * (1.0 + 1e-3);
         let (low, high) = (x.add_scalar(-reach), x.add_scalar(reach));
-        for_box(&bin(&low, self.size), &bin(&high, self.size), |key| {
+        for_box(&bin_of(&low, self.size), &bin_of(&high, self.size), |key| {
             near.extend(self.bins.get(&key).into_iter().flatten().copied());
         });
         near.sort_unstable();
@@ -364,15 +364,15 @@ impl<'a, const D: usize> Seam<'a, D> {
 
     /// Whether a bond of a point can meet a face at all.
     pub fn is_around(&self, x: &Vector<D>) -> bool {
-        self.around.contains(&bin(x, self.size))
+        self.around.contains(&bin_of(x, self.size))
     }
 
     /// Whether a bond can meet a face at all.
     pub fn near(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         let mut found = false;
         for_box(
-            &bin(&a.inf(b), self.size),
-            &bin(&a.sup(b), self.size),
+            &bin_of(&a.inf(b), self.size),
+            &bin_of(&a.sup(b), self.size),
             |key| found |= self.bins.contains_key(&key),
         );
         found
@@ -490,10 +490,6 @@ fn normal_of<const D: usize>(x: &[Vector<D>; D]) -> Option<Vector<D>> {
     }
     let size = n.norm();
     (size > 0.0).then(|| n / size)
-}
-
-fn bin<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {
-    std::array::from_fn(|i| (x[i] / size).floor() as i64)
 }
 
 fn for_box<const D: usize>(first: &[i64; D], last: &[i64; D], mut visit: impl FnMut([i64; D])) {

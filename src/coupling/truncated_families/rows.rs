@@ -2,7 +2,8 @@
 
 use crate::assembly::Row;
 use crate::coupling::{
-    CellRole, Coupling, Interface, Model, ModelError, Operator, Reach, Rows, Zone,
+    CellRole, Coupling, ExactStresses, Interface, MixedRows, Model, ModelError, Operator, Reach,
+    Rows, SeamBonds, Zone,
 };
 use crate::dimension;
 use crate::mesh::Mesh;
@@ -92,16 +93,34 @@ impl<const D: usize> Operator<D> for FamilyRows<'_, D> {
         self.model.point_of(site).is_some()
     }
 
-    fn has_body_bonds(&self, site: usize) -> bool {
-        !self.feet[site].is_empty()
+    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
+        Some(self)
     }
 
-    fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>) {
-        self.model.add_element_rows(site, row);
+    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
+        None
+    }
+
+    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
+        None
     }
 
     fn beta(&self, site: usize) -> f64 {
         f64::from(u8::from(self.is_body_row(site)))
+    }
+}
+
+impl<const D: usize> MixedRows<D> for FamilyRows<'_, D> {
+    fn has_body_bonds(&self, site: usize) -> bool {
+        !self.feet[site].is_empty()
+    }
+
+    fn is_body_bond(&self, _i: usize, _j: usize) -> bool {
+        true
+    }
+
+    fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>) {
+        self.model.add_element_rows(site, row);
     }
 }
 

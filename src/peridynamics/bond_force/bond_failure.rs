@@ -1,6 +1,6 @@
 //! What breaks bonds of the generic pass.
 
-use super::{BondSetup, CriticalStretch, Failure};
+use super::{BondCriterion, BondSetup, Failure};
 use crate::peridynamics::{PdBody, tearing_parameter::TearingParameter};
 
 /// What breaks bonds.
@@ -20,7 +20,7 @@ impl BondFailure {
             return Self::Never;
         };
         let points = setup.position.len();
-        if let CriticalStretch::TearingParameter(critical) = failure.critical {
+        if let BondCriterion::TearingParameter(critical) = failure.critical {
             // of whole families: those of the pass may lack bonds that a seam has of its own
             let whole = (0..points).map(|i| match body.is_foot(i) {
                 true => 0.0,

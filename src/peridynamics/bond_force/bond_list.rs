@@ -1,7 +1,7 @@
 //! Bonds as lists, with what their passes read.
 
 use super::{
-    Kinematics,
+    BondKinematics,
     compressed_list::{Neighbours, Weights},
 };
 
@@ -34,7 +34,7 @@ pub(super) struct List<const D: usize> {
     pub neighbours: Neighbours,
     pub weights: Weights,
     pub limit: Limit,
-    pub(super) kinematics: Kinematics,
+    pub(super) kinematics: BondKinematics,
     pub solid: Option<Solid>,
     /// Start of each point's bits, which fill whole bytes.
     pub bytes: Vec<usize>,

@@ -4,7 +4,7 @@
 //! Of a rigid or uniform motion over a step this is a field that is linear in the deformed positions, so that it is not resisted, however far it goes.
 
 use super::{
-    Kinematics,
+    BondKinematics,
     generic::Generic,
     point_loops::{Moments, RateMoments, give},
 };
@@ -60,7 +60,7 @@ impl<const D: usize> FamilyControl<D> {
     pub(super) fn drag(
         moments: &Moments<D>,
         bonds: &Vector<D>,
-        kinematics: Kinematics,
+        kinematics: BondKinematics,
         strength: f64,
     ) -> Self {
         let RateMoments {
@@ -79,8 +79,8 @@ impl<const D: usize> FamilyControl<D> {
         let gradient = rate * inverse;
         let of_bond = gradient * -strength;
         let (of_difference, deformed) = match kinematics {
-            Kinematics::Exact => (of_bond, bonds + moments.first),
-            Kinematics::Linear => (none, *bonds),
+            BondKinematics::Exact => (of_bond, bonds + moments.first),
+            BondKinematics::Linear => (none, *bonds),
         };
         Self {
             strength,

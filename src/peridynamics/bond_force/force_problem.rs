@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::kinematics::Kinematics;
+use super::kinematics::BondKinematics;
 use crate::{
     parallel,
     peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
@@ -45,7 +45,7 @@ pub enum BondForce<'a, const D: usize> {
         /// `p`, the pairwise coefficient of [`crate::peridynamics::linear_force_state`] \[N/m^(2D+2)\].
         coefficient: &'a BondFunction<'a, D>,
     },
-    /// Linear peridynamic solid, [SAND2015-7998] eq. (5.16)–(5.18), `T = [(D k − (D+2) μ)/m θ ω r + D(D+2) μ/m ω e] M`; the weighted volume `m` is that of the reference family and stays.
+    /// Linear peridynamic solid, [SAND2015-7998] eq. (5.16), (5.17), (5.18), `T = [(D k − (D+2) μ)/m θ ω r + D(D+2) μ/m ω e] M`; the weighted volume `m` is that of the reference family and stays.
     Solid {
         /// `ω`, lattice factors included.
         omega: &'a BondFunction<'a, D>,
@@ -65,7 +65,7 @@ pub enum BondForce<'a, const D: usize> {
 
 /// What breaks a bond: the stretch beyond which it does, or a tearing parameter.
 #[derive(Clone, Copy)]
-pub enum CriticalStretch<'a, const D: usize> {
+pub enum BondCriterion<'a, const D: usize> {
     /// The same for all bonds.
     Uniform(f64),
     /// A number per bond; the same from both ends.
@@ -78,7 +78,7 @@ pub enum CriticalStretch<'a, const D: usize> {
 #[derive(Clone, Copy)]
 pub struct Failure<'a, const D: usize> {
     /// Critical stretch \[1\]; infinite for bonds that only their law damages.
-    pub critical: CriticalStretch<'a, D>,
+    pub critical: BondCriterion<'a, D>,
     /// Points whose bonds never fail, one entry per point; empty for none.
     pub no_fail: &'a [bool],
 }
@@ -86,13 +86,13 @@ pub struct Failure<'a, const D: usize> {
 impl<const D: usize> Failure<'_, D> {
     /// Whether bonds break by their stretch: not at an infinite one, of bonds that their law damages.
     pub(super) fn has_limit(&self) -> bool {
-        !matches!(self.critical, CriticalStretch::Uniform(f64::INFINITY))
+        !matches!(self.critical, BondCriterion::Uniform(f64::INFINITY))
     }
 }
 
 /// Which families this process holds, and what all know of the others. Calls of passes that are made with it are collective.
 #[derive(Clone, Copy)]
-pub struct SharedRows<'a> {
+pub struct DistributedRows<'a> {
     /// The processes.
     pub ranks: &'a dyn Ranks,
     /// Points whose families no other process holds as its own, one mark per point.
@@ -117,7 +117,7 @@ pub struct BondSetup<'a, const D: usize> {
     /// The law.
     pub force: BondForce<'a, D>,
     /// How bonds follow the motion.
-    pub kinematics: Kinematics,
+    pub kinematics: BondKinematics,
     /// When bonds fail; `None` for never.
     pub failure: Option<Failure<'a, D>>,
     /// Bonds `(i, j)` of the reference families that are broken from the start and count as damage: pre-cracks. Symmetric in its arguments.
@@ -127,7 +127,7 @@ pub struct BondSetup<'a, const D: usize> {
     /// How lists store weights.
     pub storage: Storage,
     /// Who has which families, where they are spread over processes; none where all are here.
-    pub shared: Option<SharedRows<'a>>,
+    pub shared: Option<DistributedRows<'a>>,
 }
 
 /// Why no pass can be built.
@@ -236,9 +236,9 @@ impl<const D: usize> BondSetup<'_, D> {
             return f64::INFINITY;
         };
         let s = match failure.critical {
-            CriticalStretch::Uniform(s) => s,
-            CriticalStretch::PerBond(f) => f(i, k, xi),
-            CriticalStretch::TearingParameter(_) => return f64::INFINITY,
+            BondCriterion::Uniform(s) => s,
+            BondCriterion::PerBond(f) => f(i, k, xi),
+            BondCriterion::TearingParameter(_) => return f64::INFINITY,
         };
         self.kinematics.limit(s)
     }

@@ -1,4 +1,4 @@
-//! The pass that any law takes: the force state of every family, then the sum over the bonds of every point, [SAND2015-7998] eq. (2.3) and (2.5).
+//! The pass that any law takes: the force state of every family, then the sum over the bonds of every point, [SAND2015-7998] eq. (2.6) and (2.5).
 //!
 //! Nothing is assumed of the law but what [`ForceState`] says, so this is the place where a law is computed as it is written. The lattice and list passes are its accelerators.
 
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{
-    BondPass, BondSetup, ForceStates, Kinematics,
+    BondKinematics, BondPass, BondSetup, ForceStates,
     bond_failure::BondFailure,
     carried_deformation::CarriedDeformation,
     list::{extension, ratio, stretched},
@@ -60,7 +60,7 @@ pub(super) struct Generic<const D: usize> {
     pub(super) state: Vec<Option<StatePart<D>>>,
     pub(super) failure: BondFailure,
     pub(super) carried: Option<CarriedDeformation<D>>,
-    pub(super) kinematics: Kinematics,
+    pub(super) kinematics: BondKinematics,
     pub(super) intact: Vec<bool>,
     /// Bonds that were told to be broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
     pub(super) damaged_through: Vec<bool>,
@@ -84,7 +84,7 @@ pub(super) struct Generic<const D: usize> {
 pub(super) struct Scratch<const D: usize> {
     keeps_damage: bool,
     material: u16,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     bonds: Vec<Vector<D>>,
     volumes: Vec<f64>,
     pair: Vec<f64>,
@@ -241,8 +241,8 @@ impl<const D: usize> Generic<D> {
     ) -> super::list::Stretched<D> {
         let (xi, here) = (self.xi(i, j).into(), [0.0; D]);
         match self.kinematics {
-            Kinematics::Exact => stretched::<D, true>(&xi, &here, eta.as_slice()),
-            Kinematics::Linear => stretched::<D, false>(&xi, &here, eta.as_slice()),
+            BondKinematics::Exact => stretched::<D, true>(&xi, &here, eta.as_slice()),
+            BondKinematics::Linear => stretched::<D, false>(&xi, &here, eta.as_slice()),
         }
     }
 
@@ -275,8 +275,8 @@ impl<const D: usize> Generic<D> {
             let stretch = self.stretched(i, j, &eta);
             let (t, r) = (stretch.t(), stretch.length.sqrt());
             let (e, shrink) = match self.kinematics {
-                Kinematics::Exact => (extension::<true>(t), ratio::<true>(t)),
-                Kinematics::Linear => (extension::<false>(t), ratio::<false>(t)),
+                BondKinematics::Exact => (extension::<true>(t), ratio::<true>(t)),
+                BondKinematics::Linear => (extension::<false>(t), ratio::<false>(t)),
             };
             s.of.push(bond);
             s.bonds.push(self.xi(i, j));
@@ -359,7 +359,7 @@ impl<const D: usize> Generic<D> {
         self.outcome = outcome;
     }
 
-    /// `−V_i Σ V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)` of the points with rows; without a family at the far end a pairwise law has the same bond there, any other no energy.
+    /// `−V_i Σ V_j (T_i⟨ξ⟩ − T_j⟨−ξ⟩)` of the points with rows, [SAND2015-7998] eq. (2.5) as the sum (5.5); without a family at the far end a pairwise law has the same bond there, any other no energy.
     pub(super) fn gather(&self, states: &[Vector<D>], force: &mut [f64]) {
         parallel::for_each_chunk(force, D, 64, |i, force| {
             let mut sum = Vector::<D>::zeros();

@@ -85,7 +85,7 @@ impl<const D: usize> Generic<D> {
 #[cfg(test)]
 mod tests {
     use super::super::{
-        BondPass, FailureUpdate, ForceStates, Interval, Kinematics,
+        BondKinematics, BondPass, FailureUpdate, ForceStates, Interval,
         point_forces_tests::{CONSTANTS, pass, step},
         reference_force::{Case, H, case, noise},
     };
@@ -104,8 +104,8 @@ mod tests {
         let values = [yield_stress, 0.4, 0.0, 0.0, 0.7, strains, place];
         let law = Named::PlasticCorrespondence.build(CONSTANTS, &values);
         let kinematics = match strains > 0.0 {
-            true => Kinematics::Exact,
-            false => Kinematics::Linear,
+            true => BondKinematics::Exact,
+            false => BondKinematics::Linear,
         };
         let mut pass = pass(case, &law, kinematics, Some(0.15));
         step(&mut pass, u, 0.0);

@@ -15,7 +15,7 @@ const INTERVAL: f64 = 0.3;
 fn with_law<const D: usize, T>(
     case: &Case<D>,
     law: &Arc<dyn Law<D>>,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     failure: Option<Failure<'_, D>>,
     accelerated: bool,
     run: impl FnOnce(Box<dyn BondPass<D>>) -> T,
@@ -71,10 +71,10 @@ fn laws_with_states<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
     all.filter(|law| law.force_state().is_some()).collect()
 }
 
-fn ways<const D: usize>(law: &Arc<dyn Law<D>>) -> &'static [Kinematics] {
+fn ways<const D: usize>(law: &Arc<dyn Law<D>>) -> &'static [BondKinematics] {
     match law.force_state().is_some_and(|f| f.is_objective()) {
-        true => &[Kinematics::Exact, Kinematics::Linear],
-        false => &[Kinematics::Linear],
+        true => &[BondKinematics::Exact, BondKinematics::Linear],
+        false => &[BondKinematics::Linear],
     }
 }
 
@@ -100,7 +100,7 @@ fn against_accelerators<const D: usize>(counts: [usize; D], ghosts: bool) {
         for &kinematics in ways(law) {
             let run = |accelerated: bool| {
                 let failure = Failure {
-                    critical: CriticalStretch::Uniform(0.1),
+                    critical: BondCriterion::Uniform(0.1),
                     no_fail: &no_fail,
                 };
                 with_law(
@@ -230,7 +230,7 @@ fn consistent_when_broken<const D: usize>(counts: [usize; D]) {
         }
         for &kinematics in ways(&law) {
             let failure = Failure {
-                critical: CriticalStretch::Uniform(0.05),
+                critical: BondCriterion::Uniform(0.05),
                 no_fail: &[],
             };
             with_law(&case, &law, kinematics, Some(failure), false, |mut pass| {
@@ -321,7 +321,7 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
             false => 0.0,
         };
         let failure = Failure {
-            critical: CriticalStretch::TearingParameter(critical),
+            critical: BondCriterion::TearingParameter(critical),
             no_fail: &[],
         };
         let check = |mut pass: Box<dyn BondPass<3>>| {
@@ -369,7 +369,8 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
                 false => assert!(failed.is_none()),
             }
         };
-        with_law(&case, &law, Kinematics::Linear, Some(failure), false, check);
+        let linear = BondKinematics::Linear;
+        with_law(&case, &law, linear, Some(failure), false, check);
     }
 }
 
@@ -377,31 +378,38 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
 fn cycle<const D: usize>(case: &Case<D>, law: &Arc<dyn Law<D>>, steps: usize) -> [f64; 3] {
     let n = case.position.len() * D;
     let shape = noise(n, 0.02 * H, 8);
-    with_law(case, law, Kinematics::Linear, None, false, |mut pass| {
-        let mut force = vec![0.0; n];
-        let (mut before, mut last) = (vec![0.0; n], vec![0.0; n]);
-        let (mut work, mut dissipated) = (0.0, 0.0);
-        for k in 1..=steps {
-            let time = 1.5 * k as f64 / steps as f64;
-            let size = (std::f64::consts::PI * time).sin();
-            let u: Vec<f64> = shape.iter().map(|x| x * size).collect();
-            let interval = Interval {
-                end: time,
-                length: 1.5 / steps as f64,
-            };
-            // a trial leaves no trace
-            let trial: Vec<f64> = u.iter().map(|u| 3.0 * u).collect();
-            pass.force_into(&trial, &mut force, interval, FailureUpdate::Frozen);
-            pass.force_into(&u, &mut force, interval, FailureUpdate::Frozen);
-            dissipated += pass.commit();
-            for k in 0..n {
-                work += 0.5 * (force[k] + last[k]) * (u[k] - before[k]);
+    with_law(
+        case,
+        law,
+        BondKinematics::Linear,
+        None,
+        false,
+        |mut pass| {
+            let mut force = vec![0.0; n];
+            let (mut before, mut last) = (vec![0.0; n], vec![0.0; n]);
+            let (mut work, mut dissipated) = (0.0, 0.0);
+            for k in 1..=steps {
+                let time = 1.5 * k as f64 / steps as f64;
+                let size = (std::f64::consts::PI * time).sin();
+                let u: Vec<f64> = shape.iter().map(|x| x * size).collect();
+                let interval = Interval {
+                    end: time,
+                    length: 1.5 / steps as f64,
+                };
+                // a trial leaves no trace
+                let trial: Vec<f64> = u.iter().map(|u| 3.0 * u).collect();
+                pass.force_into(&trial, &mut force, interval, FailureUpdate::Frozen);
+                pass.force_into(&u, &mut force, interval, FailureUpdate::Frozen);
+                dissipated += pass.commit();
+                for k in 0..n {
+                    work += 0.5 * (force[k] + last[k]) * (u[k] - before[k]);
+                }
+                last.copy_from_slice(&force);
+                before = u;
             }
-            last.copy_from_slice(&force);
-            before = u;
-        }
-        [pass.stored_energy(&before), dissipated, work]
-    })
+            [pass.stored_energy(&before), dissipated, work]
+        },
+    )
 }
 
 #[test]
@@ -447,19 +455,26 @@ fn rotations_turn_the_forces_and_histories_go_on_from_a_checkpoint() {
             continue;
         }
         let begun = |state: Option<&[u64]>, u: &[f64]| {
-            with_law(&case, &law, Kinematics::Exact, None, false, |mut pass| {
-                let mut force = vec![0.0; n];
-                match state {
-                    Some(state) => assert!(pass.restore_damage(state), "{}", law.name()),
-                    None => {
-                        pass.force_into(&first, &mut force, LATER, FailureUpdate::Frozen);
-                        pass.commit();
+            with_law(
+                &case,
+                &law,
+                BondKinematics::Exact,
+                None,
+                false,
+                |mut pass| {
+                    let mut force = vec![0.0; n];
+                    match state {
+                        Some(state) => assert!(pass.restore_damage(state), "{}", law.name()),
+                        None => {
+                            pass.force_into(&first, &mut force, LATER, FailureUpdate::Frozen);
+                            pass.commit();
+                        }
                     }
-                }
-                let state = pass.damage_state();
-                pass.force_into(u, &mut force, LATER, FailureUpdate::Frozen);
-                (force, state)
-            })
+                    let state = pass.damage_state();
+                    pass.force_into(u, &mut force, LATER, FailureUpdate::Frozen);
+                    (force, state)
+                },
+            )
         };
         let (force, state) = begun(None, &u);
         let (other, _) = begun(None, &turned);
@@ -498,14 +513,14 @@ fn damaged(
 ) -> Told {
     let (points, n) = (case.position.len(), case.position.len() * 2);
     let failure = Failure {
-        critical: CriticalStretch::Uniform(f64::INFINITY),
+        critical: BondCriterion::Uniform(f64::INFINITY),
         no_fail,
     };
     let name = law.name();
     with_law(
         case,
         law,
-        Kinematics::Linear,
+        BondKinematics::Linear,
         Some(failure),
         false,
         |mut pass| {

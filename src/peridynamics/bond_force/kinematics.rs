@@ -2,7 +2,7 @@
 
 /// How bonds follow the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kinematics {
+pub enum BondKinematics {
     /// Bonds rotate and stretch: any displacement.
     #[default]
     Exact,
@@ -10,7 +10,7 @@ pub enum Kinematics {
     Linear,
 }
 
-impl Kinematics {
+impl BondKinematics {
     /// The value of `t` at the critical stretch `s`.
     pub(crate) fn limit(self, s: f64) -> f64 {
         match self {

@@ -1,9 +1,7 @@
 //! The pass over a lattice: families are one stencil, and all that a bond needs of its own is its bit.
 
-use rayon::prelude::*;
-
 use super::{
-    BondPass, Kinematics,
+    BondKinematics, BondPass,
     lattice_simd::{Broken, CARE, FOREIGN, FULL, IDLE, job},
     simd::LANES,
     stencil::{NONE, Stencil},
@@ -56,7 +54,7 @@ pub(super) struct Lattice<const D: usize> {
     pub(super) scale: Vec<f64>,
     /// Group times eight plus lane of each point, [`NONE`] for those without a family.
     pub(super) place: Vec<u32>,
-    pub(super) kinematics: Kinematics,
+    pub(super) kinematics: BondKinematics,
     pub(super) limit: f64,
     pub(super) solid: Option<Solid>,
     pub(super) u: [Vec<f64>; D],
@@ -143,8 +141,8 @@ impl<const D: usize> Lattice<D> {
 }
 
 pub(super) fn ones(bits: &[u8]) -> u64 {
-    let of_chunk = |c: &[u8]| c.iter().map(|b| u64::from(b.count_ones())).sum::<u64>();
-    let counts = parallel::map_each(bits.par_chunks(COPY), of_chunk);
+    let of_chunk = |_, c: &[u8]| c.iter().map(|b| u64::from(b.count_ones())).sum::<u64>();
+    let counts = parallel::map_chunks(bits, COPY, of_chunk);
     counts.iter().sum()
 }
 
@@ -169,8 +167,8 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         breakage: FailureUpdate,
     ) -> u64 {
         match self.kinematics {
-            Kinematics::Exact => self.pass::<true>(u, force, breakage, None),
-            Kinematics::Linear => self.pass::<false>(u, force, breakage, None),
+            BondKinematics::Exact => self.pass::<true>(u, force, breakage, None),
+            BondKinematics::Linear => self.pass::<false>(u, force, breakage, None),
         }
     }
 
@@ -276,8 +274,8 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
 
     fn stored_energy(&self, u: &[f64]) -> f64 {
         match self.kinematics {
-            Kinematics::Exact => self.energy::<true>(u),
-            Kinematics::Linear => self.energy::<false>(u),
+            BondKinematics::Exact => self.energy::<true>(u),
+            BondKinematics::Linear => self.energy::<false>(u),
         }
     }
 
@@ -335,8 +333,8 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
 
     fn add_lost_energy(&self, at: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum) {
         match self.kinematics {
-            Kinematics::Exact => self.lost::<true>(at, lost),
-            Kinematics::Linear => self.lost::<false>(at, lost),
+            BondKinematics::Exact => self.lost::<true>(at, lost),
+            BondKinematics::Linear => self.lost::<false>(at, lost),
         }
     }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::{
-    Kinematics, Told,
+    BondKinematics, Told,
     lattice::{COPY, Lattice, Solid, TASK},
     lattice_simd::{Bits, Broken, EARLY, FOREIGN, Field, IDLE, LATE, Task, job},
     simd::{LANES, Source, dispatch},
@@ -274,8 +274,8 @@ impl<const D: usize> Lattice<D> {
         told: Told<'_>,
     ) -> u64 {
         match self.kinematics {
-            Kinematics::Exact => self.pass::<true>(u, force, breakage, Some(told)),
-            Kinematics::Linear => self.pass::<false>(u, force, breakage, Some(told)),
+            BondKinematics::Exact => self.pass::<true>(u, force, breakage, Some(told)),
+            BondKinematics::Linear => self.pass::<false>(u, force, breakage, Some(told)),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Makes the lattice pass from a cloud or from a block.
 
 use super::{
-    BlockSetup, BondForce, BondSetup, Kinematics,
+    BlockSetup, BondForce, BondKinematics, BondSetup,
     lattice::{Lattice, Solid, TASK, ones},
     lattice_simd::EVEN,
     simd::LANES,
@@ -120,8 +120,8 @@ impl<const D: usize> Lattice<D> {
     pub(super) fn block(setup: &BlockSetup<'_, D>) -> Result<Self, String> {
         let unit: f64 = setup.spacing.iter().product();
         let setup_limit = |s: f64| match setup.kinematics {
-            Kinematics::Exact => s * (2.0 + s),
-            Kinematics::Linear => 2.0 * s,
+            BondKinematics::Exact => s * (2.0 + s),
+            BondKinematics::Linear => 2.0 * s,
         };
         let limit = setup.critical.map_or(f64::INFINITY, setup_limit);
         let stencil = setup.stencil(
@@ -155,7 +155,7 @@ impl<const D: usize> Lattice<D> {
         stencil: Stencil<D>,
         filled: Filled,
         points: usize,
-        kinematics: Kinematics,
+        kinematics: BondKinematics,
         force: &BondForce<'_, D>,
     ) -> Result<Self, String> {
         let Filled {

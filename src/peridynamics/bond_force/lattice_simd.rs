@@ -89,24 +89,19 @@ struct Sums<V, const D: usize> {
     low: V,
 }
 
+/// ψ or χ from its series and, if `CAREFUL`, beyond the range of that from `s = √(1 + t)`: the same bits within the range either way.
+/// With `ROOT` the function is ψ, `1/((1 + s) s)`, else χ, `1/(1 + s)`.
+// A closure for either would not be compiled for the instruction set unless the compiler puts it in its place.
 #[inline(always)]
-fn series<L: Lanes>(l: L, c: &[f64; 6], t: L::V) -> L::V {
+pub(super) fn series<L: Lanes, const CAREFUL: bool, const ROOT: bool>(
+    l: L,
+    c: &[f64; 6],
+    t: L::V,
+) -> L::V {
     let mut p = l.splat(c[5]);
     for k in (0..5).rev() {
         p = l.fma(p, t, l.splat(c[k]));
     }
-    p
-}
-
-/// ψ or χ from its series and, if `CAREFUL`, beyond the range of that from `√(1 + t)`: the same bits within the range either way.
-#[inline(always)]
-fn function<L: Lanes, const CAREFUL: bool>(
-    l: L,
-    c: &[f64; 6],
-    t: L::V,
-    root: impl Fn(L::V) -> L::V,
-) -> L::V {
-    let p = series(l, c, t);
     if !CAREFUL {
         return p;
     }
@@ -115,8 +110,31 @@ fn function<L: Lanes, const CAREFUL: bool>(
     if outside == 0 {
         return p;
     }
-    let s = l.sqrt(l.max(l.add(l.splat(1.0), t), l.splat(SHORTEST)));
-    l.select(outside, root(s), p)
+    let one = l.splat(1.0);
+    let s = l.sqrt(l.max(l.add(one, t), l.splat(SHORTEST)));
+    let mut below = l.add(one, s);
+    if ROOT {
+        below = l.mul(below, s);
+    }
+    l.select(outside, l.div(one, below), p)
+}
+
+/// The displacements of eight points.
+///
+/// # Safety
+/// `cell` is that of a group of the field.
+#[inline(always)]
+unsafe fn displaced<L: Lanes, const D: usize>(
+    l: L,
+    field: &Field<'_, D>,
+    cell: usize,
+) -> [L::V; D] {
+    let mut u = [l.splat(0.0); D];
+    for a in 0..D {
+        // SAFETY: group cells are what the sources were checked for
+        u[a] = unsafe { field.u[a].at(l, cell, 0) };
+    }
+    u
 }
 
 /// `t` of one bond of eight points, and η.
@@ -132,19 +150,24 @@ unsafe fn stretched<L: Lanes, const D: usize, const EXACT: bool>(
     here: &[L::V; D],
 ) -> (L::V, [L::V; D]) {
     // SAFETY: group cells and offsets are what the sources were checked for
-    let eta: [L::V; D] =
-        std::array::from_fn(|a| l.sub(unsafe { field.u[a].at(l, cell, o.delta) }, here[a]));
+    // by loops: `array::from_fn` calls a closure that is not compiled for the instruction set unless the compiler puts it in its place
+    let mut eta = *here;
+    for a in 0..D {
+        eta[a] = l.sub(unsafe { field.u[a].at(l, cell, o.delta) }, here[a]);
+    }
     // η (η + 2ξ): no difference of lengths, so nothing cancels that is not small itself
-    let factor = |a: usize| {
-        if EXACT {
+    let mut t = l.splat(0.0);
+    for a in 0..D {
+        let factor = if EXACT {
             l.add(eta[a], l.splat(o.twice[a]))
         } else {
             l.splat(o.slope[a])
-        }
-    };
-    let mut t = l.mul(eta[0], factor(0));
-    for a in 1..D {
-        t = l.fma(eta[a], factor(a), t);
+        };
+        t = if a == 0 {
+            l.mul(eta[a], factor)
+        } else {
+            l.fma(eta[a], factor, t)
+        };
     }
     if EXACT {
         t = l.mul(t, l.splat(o.inverse));
@@ -174,9 +197,8 @@ unsafe fn group<
 ) -> Sums<L::V, D> {
     let zero = l.splat(0.0);
     let one = l.splat(1.0);
-    let psi = |t| function::<L, CAREFUL>(l, &PSI, t, |s| l.div(one, l.mul(l.add(one, s), s)));
     // SAFETY (all loads below): group cells and offsets are what the sources were checked for
-    let here: [L::V; D] = std::array::from_fn(|a| unsafe { field.u[a].at(l, cell, 0) });
+    let here = unsafe { displaced(l, field, cell) };
     let (mut pull, mut deviatoric) = (zero, zero);
     if JOB == job::SOLID {
         pull = unsafe { field.pull.at(l, cell, 0) };
@@ -205,7 +227,7 @@ unsafe fn group<
         if JOB == job::MOMENTS {
             let half = l.splat(0.5);
             let chi = if EXACT {
-                function::<L, CAREFUL>(l, &CHI, t, |s| l.div(one, l.add(one, s)))
+                series::<L, CAREFUL, false>(l, &CHI, t)
             } else {
                 half
             };
@@ -221,7 +243,12 @@ unsafe fn group<
         let mut f = l.splat(o.weight);
         if JOB == job::PAIR {
             f = l.mul(f, t);
-            f = l.mul(f, if EXACT { psi(t) } else { l.splat(0.5) });
+            let psi = if EXACT {
+                series::<L, CAREFUL, true>(l, &PSI, t)
+            } else {
+                l.splat(0.5)
+            };
+            f = l.mul(f, psi);
         } else {
             let (mut there, mut stiffness) =
                 (unsafe { field.pull.at(l, cell, o.delta) }, deviatoric);
@@ -230,7 +257,7 @@ unsafe fn group<
                 stiffness = l.add(stiffness, unsafe { field.deviatoric.at(l, cell, o.delta) });
             }
             if EXACT {
-                let psi = psi(t);
+                let psi = series::<L, CAREFUL, true>(l, &PSI, t);
                 // e/r = t (1 − (1 + t) ψ), r/|ξ+η| = 1 − t ψ
                 let e = l.mul(t, l.fnma(t, psi, l.sub(one, psi)));
                 let ratio = l.fnma(t, psi, one);
@@ -269,7 +296,7 @@ unsafe fn break_bonds<L: Lanes, const D: usize, const EXACT: bool>(
     list: &mut Vec<Broken>,
 ) -> bool {
     // SAFETY: as above
-    let here: [L::V; D] = std::array::from_fn(|a| unsafe { field.u[a].at(l, cell, 0) });
+    let here = unsafe { displaced(l, field, cell) };
     let kept =
         |cell: usize| (0..LANES).fold(0u8, |m, k| m | u8::from(field.no_fail[cell + k]) << k);
     let kept_here = if field.no_fail.is_empty() {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::bond_list::{Limit, List, Solid};
 use super::{
-    BondForce, BondPass, BondSetup, Kinematics, Storage,
+    BondForce, BondKinematics, BondPass, BondSetup, Storage,
     compressed_list::{Neighbours, Weights},
     lattice_simd::Bits,
     list_simd::{self, Sum},
@@ -120,11 +120,11 @@ impl<const D: usize> List<D> {
         };
         let limit = match setup.failure.map(|f| f.critical) {
             // a list has no law that flows
-            None | Some(super::CriticalStretch::TearingParameter(_)) => Limit::Never,
-            Some(super::CriticalStretch::Uniform(_)) => {
+            None | Some(super::BondCriterion::TearingParameter(_)) => Limit::Never,
+            Some(super::BondCriterion::Uniform(_)) => {
                 Limit::Uniform(setup.limit(0, 0, &crate::tensor::Vector::zeros()))
             }
-            Some(super::CriticalStretch::PerBond(_)) => {
+            Some(super::BondCriterion::PerBond(_)) => {
                 Limit::PerBond(per_bond(&|i, k| setup.limit(i, k, &xi(i, k))))
             }
         };
@@ -359,8 +359,8 @@ impl<const D: usize> BondPass<D> for List<D> {
         breakage: FailureUpdate,
     ) -> u64 {
         match self.kinematics {
-            Kinematics::Exact => self.pass::<true>(u, force, breakage),
-            Kinematics::Linear => self.pass::<false>(u, force, breakage),
+            BondKinematics::Exact => self.pass::<true>(u, force, breakage),
+            BondKinematics::Linear => self.pass::<false>(u, force, breakage),
         }
     }
 
@@ -432,8 +432,8 @@ impl<const D: usize> BondPass<D> for List<D> {
 
     fn stored_energy(&self, u: &[f64]) -> f64 {
         match self.kinematics {
-            Kinematics::Exact => self.energy::<true>(u),
-            Kinematics::Linear => self.energy::<false>(u),
+            BondKinematics::Exact => self.energy::<true>(u),
+            BondKinematics::Linear => self.energy::<false>(u),
         }
     }
 
@@ -461,8 +461,8 @@ impl<const D: usize> BondPass<D> for List<D> {
     }
 
     fn broken(&self) -> u64 {
-        let of_chunk = |c: &[u8]| c.iter().map(|b| u64::from(b.count_ones())).sum();
-        let standing: Vec<u64> = parallel::map_each(self.intact.par_chunks(4096), of_chunk);
+        let of_chunk = |_, c: &[u8]| c.iter().map(|b| u64::from(b.count_ones())).sum();
+        let standing: Vec<u64> = parallel::map_chunks(&self.intact, 4096, of_chunk);
         self.reference - standing.iter().sum::<u64>()
     }
 
@@ -474,8 +474,8 @@ impl<const D: usize> BondPass<D> for List<D> {
 
     fn add_lost_energy(&self, at: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum) {
         match self.kinematics {
-            Kinematics::Exact => self.lost::<true>(at, lost),
-            Kinematics::Linear => self.lost::<false>(at, lost),
+            BondKinematics::Exact => self.lost::<true>(at, lost),
+            BondKinematics::Linear => self.lost::<false>(at, lost),
         }
     }
 

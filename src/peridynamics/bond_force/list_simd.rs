@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::lattice_simd::Bits;
+use super::lattice_simd::{Bits, series};
 use super::own_points::part;
 use super::simd::{LANES, Lanes, Work, dispatch};
-use super::stretch::{CHI, PSI, SERIES_RANGE, SHORTEST};
+use super::stretch::{CHI, PSI};
 use crate::peridynamics::bond_force::bond_list::{Limit, List};
 
 /// What the bonds of a point add up to.
@@ -81,32 +81,11 @@ impl<const D: usize> Gathered<D> {
     }
 }
 
-/// ψ or χ, whose root of `1 + t` is `1/((1 + s) s)` or `1/(1 + s)`.
-#[inline(always)]
-fn series<L: Lanes, const ROOT: bool>(l: L, c: &[f64; 6], t: L::V) -> L::V {
-    let mut p = l.splat(c[5]);
-    for k in (0..5).rev() {
-        p = l.fma(p, t, l.splat(c[k]));
-    }
-    let range = l.splat(SERIES_RANGE);
-    let outside = l.above(t, range) | l.above(l.splat(-SERIES_RANGE), t);
-    if outside == 0 {
-        return p;
-    }
-    let one = l.splat(1.0);
-    let s = l.sqrt(l.max(l.add(one, t), l.splat(SHORTEST)));
-    let mut below = l.add(one, s);
-    if ROOT {
-        below = l.mul(below, s);
-    }
-    l.select(outside, l.div(one, below), p)
-}
-
 /// `1 − r/|ξ+η|`, linear: `ξ·η/r²`.
 #[inline(always)]
 fn shortening<L: Lanes, const EXACT: bool>(l: L, t: L::V) -> L::V {
     if EXACT {
-        l.mul(t, series::<L, true>(l, &PSI, t))
+        l.mul(t, series::<L, true, true>(l, &PSI, t))
     } else {
         l.mul(t, l.splat(0.5))
     }
@@ -116,7 +95,7 @@ fn shortening<L: Lanes, const EXACT: bool>(l: L, t: L::V) -> L::V {
 #[inline(always)]
 fn extension<L: Lanes, const EXACT: bool>(l: L, t: L::V) -> L::V {
     if EXACT {
-        l.mul(t, series::<L, false>(l, &CHI, t))
+        l.mul(t, series::<L, true, false>(l, &CHI, t))
     } else {
         l.mul(t, l.splat(0.5))
     }

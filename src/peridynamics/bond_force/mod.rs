@@ -3,12 +3,14 @@
 //! | file | what |
 //! |---|---|
 //! | `force_problem.rs` | what a pass is made from, and the errors |
+//! | `kinematics.rs` | how bonds follow a motion: exactly, or to first order |
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
 //! | `point_forces.rs`, `point_state.rs`, `family_control.rs` | the same of correspondence, by a stress per point; what it keeps; its zero-energy control |
 //! | `point_loops.rs` | its loops over the bonds |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
+//! | `carried_deformation.rs`, `generic_carried.rs` | the deformation that a point which has flowed keeps where its bonds break |
 //! | `generic_states.rs` | what it tells of single points |
 //! | `generic_damage.rs` | damage that laws keep of their bonds |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
@@ -47,7 +49,7 @@ mod kinematics;
 mod lattice;
 mod lattice_pass;
 mod lattice_setup;
-// vector instructions: the other modules of the crate have no unsafe code
+// vector instructions: besides these two modules only `parallel.rs` has unsafe code
 #[allow(unsafe_code)]
 mod lattice_simd;
 mod list;
@@ -70,10 +72,10 @@ pub(super) mod stretch;
 mod tests;
 
 pub use force_problem::{
-    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, KernelError, Layout, SharedRows,
-    Storage,
+    BondCriterion, BondForce, BondFunction, BondSetup, DistributedRows, Failure, KernelError,
+    Layout, Storage,
 };
-pub use kinematics::Kinematics;
+pub use kinematics::BondKinematics;
 
 pub use stencil::BlockSetup;
 
@@ -256,7 +258,7 @@ fn pass<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>
     }
     lists?;
     let tears = (setup.failure.as_ref())
-        .is_some_and(|f| matches!(f.critical, CriticalStretch::TearingParameter(_)));
+        .is_some_and(|f| matches!(f.critical, BondCriterion::TearingParameter(_)));
     if tears && !setup.flows() {
         return Err(KernelError::NoFlow);
     }

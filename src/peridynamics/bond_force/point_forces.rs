@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::{
-    Kinematics,
+    BondKinematics,
     bond_failure::BondFailure,
     carried_deformation::{conjugate, felt},
     family_control::FamilyControl,
@@ -218,7 +218,7 @@ impl<const D: usize> Generic<D> {
 
     /// The sums over a family.
     fn moments(&self, i: usize, weights: &[f64], sites: &Sites) -> Moments<D> {
-        let is_small = self.kinematics == Kinematics::Linear;
+        let is_small = self.kinematics == BondKinematics::Linear;
         point_loops::moments(self.bonds_of(i, weights), sites, is_small)
     }
 
@@ -287,8 +287,8 @@ impl<const D: usize> Generic<D> {
                 strength * excess_length(&xi, &eta, &points.gradient[p], self.kinematics)
             };
             let along = match self.kinematics {
-                Kinematics::Exact => xi + eta,
-                Kinematics::Linear => xi,
+                BondKinematics::Exact => xi + eta,
+                BondKinematics::Linear => xi,
             };
             let size = (own * of(i) + back[bond] * of(j)) / along.norm();
             if size != 0.0 {

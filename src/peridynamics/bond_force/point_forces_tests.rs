@@ -45,7 +45,7 @@ fn laws(control: ZeroEnergyControl, strength: f64) -> [Arc<dyn Law<3>>; 2] {
 pub(super) fn pass(
     case: &Case<3>,
     law: &Arc<dyn Law<3>>,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     critical: Option<f64>,
 ) -> Generic<3> {
     pass_beside(case, law, kinematics, (critical, &[]))
@@ -55,7 +55,7 @@ pub(super) fn pass(
 fn pass_beside(
     case: &Case<3>,
     law: &Arc<dyn Law<3>>,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     (critical, no_fail): (Option<f64>, &[bool]),
 ) -> Generic<3> {
     let cloud = Cloud {
@@ -76,7 +76,7 @@ fn pass_beside(
         force: BondForce::Law { law, body: &body },
         kinematics,
         failure: critical.map(|s| Failure {
-            critical: CriticalStretch::Uniform(s),
+            critical: BondCriterion::Uniform(s),
             no_fail,
         }),
         precracked: None,
@@ -112,7 +112,7 @@ fn forces_are_those_of_the_force_states_bond_by_bond() {
         let n = case.position.len() * 3;
         for control in CONTROLS {
             for law in &laws(control, 0.7) {
-                for kinematics in [Kinematics::Exact, Kinematics::Linear] {
+                for kinematics in [BondKinematics::Exact, BondKinematics::Linear] {
                     let run = |by_bonds: bool| {
                         let mut pass = pass(&case, law, kinematics, Some(0.2));
                         if by_bonds {
@@ -167,7 +167,7 @@ fn points_that_soften_do_so_bond_by_bond_too_and_show_their_damage() {
         let law = law.calibrate().unwrap().to_lattice(&lattice).unwrap();
         let run = |by_bonds: bool| {
             let breaks = (Some(f64::INFINITY), held.as_slice());
-            let mut pass = pass_beside(&case, &law, Kinematics::Linear, breaks);
+            let mut pass = pass_beside(&case, &law, BondKinematics::Linear, breaks);
             if by_bonds {
                 pass.by_bonds();
             }
@@ -216,7 +216,7 @@ fn uniform_deformations_and_rotations_are_not_resisted() {
             for deformation in [quarter, stretch, quarter * stretch] {
                 let u = affine(&case, &(deformation - Tensor::identity()));
                 let run = |law| {
-                    let mut pass = pass(&case, law, Kinematics::Exact, None);
+                    let mut pass = pass(&case, law, BondKinematics::Exact, None);
                     step(&mut pass, &vec![0.0; u.len()], 0.0);
                     pass.commit();
                     step(&mut pass, &u, STEP)
@@ -240,7 +240,7 @@ fn controls_keep_momentum_and_a_drag_takes_energy() {
     for control in CONTROLS {
         for law in &laws(control, 0.7) {
             for seed in 1..6 {
-                let mut pass = pass(&case, law, Kinematics::Exact, Some(0.25));
+                let mut pass = pass(&case, law, BondKinematics::Exact, Some(0.25));
                 let before = noise(n, 0.1 * H, seed);
                 let mut force = vec![0.0; n];
                 pass.force_into(
@@ -282,7 +282,7 @@ fn controls_keep_momentum_and_a_drag_takes_energy() {
                 if none.name() != law.name() {
                     continue;
                 }
-                let mut without = self::pass(&case, &none, Kinematics::Exact, Some(0.25));
+                let mut without = self::pass(&case, &none, BondKinematics::Exact, Some(0.25));
                 let mut at_start = vec![0.0; n];
                 let at_once = Interval::AT_ONCE;
                 without.force_into(&before, &mut at_start, at_once, FailureUpdate::Update);
@@ -319,7 +319,7 @@ fn alternating(control: ZeroEnergyControl, wave: [u32; 3], direction: &Vector<3>
         .collect();
     let centre = case.position.len() / 2;
     let [law, _] = laws(control, 0.7);
-    let mut pass = pass(&case, &law, Kinematics::Exact, None);
+    let mut pass = pass(&case, &law, BondKinematics::Exact, None);
     step(&mut pass, &vec![0.0; u.len()], 0.0);
     pass.commit();
     let at = |force: &[f64]| {
@@ -408,7 +408,7 @@ fn the_tangent_at_rest_is_that_of_the_control() {
     let n = case.position.len() * 3;
     for control in CONTROLS {
         for law in &laws(control, 3.0) {
-            let mut pass = pass(&case, law, Kinematics::Exact, None);
+            let mut pass = pass(&case, law, BondKinematics::Exact, None);
             let direction = noise(n, H, 5);
             let scaled = |s: f64| -> Vec<f64> { direction.iter().map(|x| s * x).collect() };
             let (plus, minus) = (
@@ -441,12 +441,12 @@ fn a_resumed_drag_has_the_same_bits() {
     let case = case([9, 7, 8], 0.2, false);
     let n = case.position.len() * 3;
     let [law, _] = laws(ZeroEnergyControl::Drag, 0.7);
-    let mut first = pass(&case, &law, Kinematics::Exact, Some(0.25));
+    let mut first = pass(&case, &law, BondKinematics::Exact, Some(0.25));
     for seed in 1..4 {
         step(&mut first, &noise(n, 0.1 * H, seed), STEP);
         first.commit();
     }
-    let mut second = pass(&case, &law, Kinematics::Exact, Some(0.25));
+    let mut second = pass(&case, &law, BondKinematics::Exact, Some(0.25));
     assert!(second.restore_damage(&first.damage_state()));
     let here = noise(n, 0.1 * H, 3);
     // at once: the drag of the step before
@@ -465,7 +465,7 @@ fn a_resumed_drag_has_the_same_bits() {
 fn a_drag_is_that_of_its_definition_bond_by_bond() {
     let case = case([9, 7, 8], 0.2, false);
     let n = case.position.len() * 3;
-    for kinematics in [Kinematics::Exact, Kinematics::Linear] {
+    for kinematics in [BondKinematics::Exact, BondKinematics::Linear] {
         let forces = [0.7, 0.0].map(|strength| {
             let [_, law] = laws(ZeroEnergyControl::Drag, strength);
             let mut pass = pass(&case, &law, kinematics, Some(0.2));
@@ -489,8 +489,8 @@ fn a_drag_is_that_of_its_definition_bond_by_bond() {
             let j = pass.neighbour(bond);
             let [now, before] = [now, before].map(|u| of(u, j) - of(u, i));
             let y = match kinematics {
-                Kinematics::Exact => pass.xi(i, j) + now,
-                Kinematics::Linear => pass.xi(i, j),
+                BondKinematics::Exact => pass.xi(i, j) + now,
+                BondKinematics::Linear => pass.xi(i, j),
             };
             (y, (now - before) / STEP)
         };
@@ -532,7 +532,7 @@ fn a_torn_family_that_is_flattened_loses_its_bonds_and_their_energy_is_told() {
     let case = case([9, 7, 8], 0.2, false);
     let n = case.position.len() * 3;
     for law in &laws(ZeroEnergyControl::BondForce, 0.7) {
-        let mut pass = pass(&case, law, Kinematics::Exact, Some(0.2));
+        let mut pass = pass(&case, law, BondKinematics::Exact, Some(0.2));
         let tear = noise(n, 0.14 * H, 7);
         let mut force = vec![0.0; n];
         let mut step = |pass: &mut Generic<3>, u: &[f64]| {

@@ -94,7 +94,7 @@ pub(super) fn case<const D: usize>(counts: [usize; D], jitter: f64, ghosts: bool
 pub(super) fn with<const D: usize, T>(
     case: &Case<D>,
     law: Law,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     failure: Option<Failure<'_, D>>,
     layout: Layout,
     run: impl FnOnce(Box<dyn BondPass<D>>) -> T,
@@ -129,7 +129,7 @@ pub(super) fn with<const D: usize, T>(
 pub(super) fn naive<const D: usize>(
     case: &Case<D>,
     law: Law,
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     u: &[f64],
     intact: &dyn Fn(usize, usize) -> bool,
 ) -> (Vec<f64>, f64) {
@@ -140,11 +140,11 @@ pub(super) fn naive<const D: usize>(
         let xi = case.position[j] - case.position[i];
         let eta = at(j) - at(i);
         match kinematics {
-            Kinematics::Exact => {
+            BondKinematics::Exact => {
                 let y = xi + eta;
                 (xi, y.norm() - xi.norm(), y / y.norm())
             }
-            Kinematics::Linear => (xi, xi.dot(&eta) / xi.norm(), xi / xi.norm()),
+            BondKinematics::Linear => (xi, xi.dot(&eta) / xi.norm(), xi / xi.norm()),
         }
     };
     let (mut m, mut theta) = (vec![0.0; points], vec![0.0; points]);
@@ -215,7 +215,7 @@ pub(super) fn balances<const D: usize>(
     case: &Case<D>,
     u: &[f64],
     force: &[f64],
-    kinematics: Kinematics,
+    kinematics: BondKinematics,
     name: &str,
 ) {
     let n = force.len();
@@ -223,7 +223,7 @@ pub(super) fn balances<const D: usize>(
     for a in 0..D {
         let total: f64 = force.iter().skip(a).step_by(D).sum();
         assert!(total.abs() < 1e-15 * scale, "{name}: momentum {total:e}");
-        for b in (0..a).filter(|_| kinematics == Kinematics::Exact) {
+        for b in (0..a).filter(|_| kinematics == BondKinematics::Exact) {
             let y = |i: usize, a: usize| case.position[i][a] + u[i * D + a];
             let moment: f64 = (0..n / D)
                 .map(|i| y(i, a) * force[i * D + b] - y(i, b) * force[i * D + a])

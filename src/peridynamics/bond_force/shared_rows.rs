@@ -3,7 +3,7 @@
 //! A lattice asks for numbers of its offsets and for the bits of all bonds, a quarter of a byte for each. Lists hold the bonds of all points.
 
 use super::force_problem::{
-    BondForce, BondFunction, BondSetup, CriticalStretch, Failure, SharedRows,
+    BondCriterion, BondForce, BondFunction, BondSetup, DistributedRows, Failure,
 };
 use crate::peridynamics::{Families, offset_table::OffsetTable};
 use crate::system::all_say;
@@ -47,7 +47,7 @@ impl<const D: usize> BondSetup<'_, D> {
     }
 }
 
-impl SharedRows<'_> {
+impl DistributedRows<'_> {
     /// What all processes know of the bonds of each offset; none where one of them has found no lattice. Of several bonds that of the first point counts, as in one process.
     pub(super) fn merged<const D: usize>(
         &self,
@@ -144,7 +144,7 @@ struct Whole {
 
 impl Whole {
     /// Collective.
-    fn of<const D: usize>(setup: &BondSetup<'_, D>, shared: &SharedRows<'_>) -> Self {
+    fn of<const D: usize>(setup: &BondSetup<'_, D>, shared: &DistributedRows<'_>) -> Self {
         let mut offsets = vec![0];
         offsets.extend(shared.sizes.iter().scan(0, |end, &n| {
             *end += n as usize;
@@ -167,7 +167,7 @@ impl Whole {
             BondForce::Law { .. } => Vec::new(),
         };
         let stretch = match setup.failure.map(|f| f.critical) {
-            Some(CriticalStretch::PerBond(f)) => numbers(f),
+            Some(BondCriterion::PerBond(f)) => numbers(f),
             _ => Vec::new(),
         };
         let mut neighbours = vec![0; all];
@@ -212,7 +212,7 @@ pub(super) fn with_all_families<const D: usize, T>(
     };
     let failure = setup.failure.map(|failure| Failure {
         critical: match failure.critical {
-            CriticalStretch::PerBond(_) => CriticalStretch::PerBond(&stretch),
+            BondCriterion::PerBond(_) => BondCriterion::PerBond(&stretch),
             other => other,
         },
         ..failure

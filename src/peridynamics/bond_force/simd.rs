@@ -1,7 +1,7 @@
 //! Eight numbers at a time: AVX-512, twice AVX2, or plain code, chosen at run time.
 //!
 //! All three do the same operations lane by lane, with fused multiplication and addition everywhere, so results do not depend on which one runs.
-//! With `lattice_simd.rs` the only file of the library with `unsafe` code: intrinsics, and loads that [`Source`] has checked.
+//! With `lattice_simd.rs` and `src/parallel.rs` the only file of the library with `unsafe` code: intrinsics, and loads that [`Source`] has checked.
 
 /// Numbers per vector.
 pub(super) const LANES: usize = 8;
@@ -113,7 +113,11 @@ pub(super) struct Plain;
 
 #[inline(always)]
 fn each(f: impl Fn(usize) -> f64) -> [f64; LANES] {
-    std::array::from_fn(f)
+    let mut all = [0.0; LANES];
+    for k in 0..LANES {
+        all[k] = f(k);
+    }
+    all
 }
 
 impl Lanes for Plain {

@@ -438,7 +438,7 @@ pub struct BlockSetup<'a, const D: usize> {
     /// The law; its function is asked for point 0 and bond 0 only.
     pub force: super::BondForce<'a, D>,
     /// How bonds follow the motion.
-    pub kinematics: super::Kinematics,
+    pub kinematics: super::BondKinematics,
     /// Critical stretch \[1\]; `None` for never.
     pub critical: Option<f64>,
 }

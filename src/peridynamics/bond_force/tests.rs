@@ -4,7 +4,7 @@ use super::{reference_force::*, *};
 use crate::tensor::{Tensor, Vector};
 
 const LAWS: [Law; 2] = [Law::Pmb, Law::Solid];
-const BOTH: [Kinematics; 2] = [Kinematics::Exact, Kinematics::Linear];
+const BOTH: [BondKinematics; 2] = [BondKinematics::Exact, BondKinematics::Linear];
 
 /// Layouts that a case has a pass for.
 fn layouts(jitter: f64) -> &'static [Layout] {
@@ -34,7 +34,7 @@ fn against_naive<const D: usize>(counts: [usize; D], jitter: f64, ghosts: bool) 
                     );
                     // the textbook's difference of lengths loses what the amplitude has less than the length
                     let error = difference(&force, &expected) / largest(&expected);
-                    let tolerance = if amplitude < 1e-3 && kinematics == Kinematics::Exact {
+                    let tolerance = if amplitude < 1e-3 && kinematics == BondKinematics::Exact {
                         1e-9
                     } else {
                         1e-13
@@ -72,48 +72,58 @@ fn derivatives<const D: usize>(counts: [usize; D], jitter: f64) {
     let n = case.position.len() * D;
     for law in LAWS {
         for &layout in layouts(jitter) {
-            with(&case, law, Kinematics::Exact, None, layout, |mut pass| {
-                let name = format!("{D}D {law:?} {}", pass.name());
-                let direction = noise(n, H, 5);
-                let (mut plus, mut minus, mut tangent) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-                let scaled = |s: f64| -> Vec<f64> { direction.iter().map(|x| s * x).collect() };
-                pass.force_into(
-                    &scaled(1e-5),
-                    &mut plus,
-                    Interval::AT_ONCE,
-                    FailureUpdate::Frozen,
-                );
-                pass.force_into(
-                    &scaled(-1e-5),
-                    &mut minus,
-                    Interval::AT_ONCE,
-                    FailureUpdate::Frozen,
-                );
-                pass.tangent_into(&direction, &mut tangent);
-                let numeric: Vec<f64> = plus
-                    .iter()
-                    .zip(&minus)
-                    .map(|(p, m)| (p - m) / 2e-5)
-                    .collect();
-                let error = difference(&numeric, &tangent) / largest(&tangent);
-                assert!(error < 1e-8, "{name}: tangent {error:e}");
+            with(
+                &case,
+                law,
+                BondKinematics::Exact,
+                None,
+                layout,
+                |mut pass| {
+                    let name = format!("{D}D {law:?} {}", pass.name());
+                    let direction = noise(n, H, 5);
+                    let (mut plus, mut minus, mut tangent) =
+                        (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+                    let scaled = |s: f64| -> Vec<f64> { direction.iter().map(|x| s * x).collect() };
+                    pass.force_into(
+                        &scaled(1e-5),
+                        &mut plus,
+                        Interval::AT_ONCE,
+                        FailureUpdate::Frozen,
+                    );
+                    pass.force_into(
+                        &scaled(-1e-5),
+                        &mut minus,
+                        Interval::AT_ONCE,
+                        FailureUpdate::Frozen,
+                    );
+                    pass.tangent_into(&direction, &mut tangent);
+                    let numeric: Vec<f64> = plus
+                        .iter()
+                        .zip(&minus)
+                        .map(|(p, m)| (p - m) / 2e-5)
+                        .collect();
+                    let error = difference(&numeric, &tangent) / largest(&tangent);
+                    assert!(error < 1e-8, "{name}: tangent {error:e}");
 
-                // force = dE/du about a strained state
-                let u = noise(n, 0.1 * H, 8);
-                let at = |s: f64| -> Vec<f64> {
-                    u.iter().zip(&direction).map(|(u, d)| u + s * d).collect()
-                };
-                let slope = (pass.stored_energy(&at(1e-5)) - pass.stored_energy(&at(-1e-5))) / 2e-5;
-                pass.force_into(&u, &mut plus, Interval::AT_ONCE, FailureUpdate::Frozen);
-                let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
-                assert!(
-                    (slope - work).abs() < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
-                    "{name}: {slope} {work}"
-                );
+                    // force = dE/du about a strained state
+                    let u = noise(n, 0.1 * H, 8);
+                    let at = |s: f64| -> Vec<f64> {
+                        u.iter().zip(&direction).map(|(u, d)| u + s * d).collect()
+                    };
+                    let slope =
+                        (pass.stored_energy(&at(1e-5)) - pass.stored_energy(&at(-1e-5))) / 2e-5;
+                    pass.force_into(&u, &mut plus, Interval::AT_ONCE, FailureUpdate::Frozen);
+                    let work: f64 = plus.iter().zip(&direction).map(|(f, d)| f * d).sum();
+                    assert!(
+                        (slope - work).abs()
+                            < 1e-7 * largest(&plus) * largest(&direction) * n as f64,
+                        "{name}: {slope} {work}"
+                    );
 
-                balances(&case, &u, &plus, Kinematics::Exact, &name);
-                row_sums_bound_rows(pass.as_ref(), n, &name);
-            });
+                    balances(&case, &u, &plus, BondKinematics::Exact, &name);
+                    row_sums_bound_rows(pass.as_ref(), n, &name);
+                },
+            );
         }
     }
 }
@@ -144,25 +154,32 @@ fn a_large_rotation_turns_the_forces() {
     }
     for law in LAWS {
         for &layout in layouts(0.0) {
-            with(&case, law, Kinematics::Exact, None, layout, |mut pass| {
-                let (mut force, mut other) = (vec![0.0; n], vec![0.0; n]);
-                pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
-                pass.force_into(
-                    &turned,
-                    &mut other,
-                    Interval::AT_ONCE,
-                    FailureUpdate::Frozen,
-                );
-                let expected: Vec<f64> = force
-                    .chunks(3)
-                    .flat_map(|f| {
-                        let f = rotation * Vector::<3>::from_column_slice(f);
-                        [f.x, f.y, f.z]
-                    })
-                    .collect();
-                let error = difference(&other, &expected) / largest(&expected);
-                assert!(error < 1e-13, "{law:?} {}: {error:e}", pass.name());
-            });
+            with(
+                &case,
+                law,
+                BondKinematics::Exact,
+                None,
+                layout,
+                |mut pass| {
+                    let (mut force, mut other) = (vec![0.0; n], vec![0.0; n]);
+                    pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
+                    pass.force_into(
+                        &turned,
+                        &mut other,
+                        Interval::AT_ONCE,
+                        FailureUpdate::Frozen,
+                    );
+                    let expected: Vec<f64> = force
+                        .chunks(3)
+                        .flat_map(|f| {
+                            let f = rotation * Vector::<3>::from_column_slice(f);
+                            [f.x, f.y, f.z]
+                        })
+                        .collect();
+                    let error = difference(&other, &expected) / largest(&expected);
+                    assert!(error < 1e-13, "{law:?} {}: {error:e}", pass.name());
+                },
+            );
         }
     }
 }
@@ -179,9 +196,9 @@ fn check_lost_energy<const D: usize>(
     stands: Standing<'_>,
     name: &str,
 ) {
-    let energy = naive(case, law, Kinematics::Exact, states[0], stands).1;
+    let energy = naive(case, law, BondKinematics::Exact, states[0], stands).1;
     for u in states {
-        let of = |stands: Standing<'_>| naive(case, law, Kinematics::Exact, u, stands).1;
+        let of = |stands: Standing<'_>| naive(case, law, BondKinematics::Exact, u, stands).1;
         let taken = of(&|_, _| true) - of(stands);
         let found = pass.lost_energy(&|i| std::array::from_fn(|a| u[i * D + a]));
         assert!((found - taken).abs() < 1e-11 * energy, "{name}");
@@ -254,7 +271,7 @@ fn break_twice<const D: usize>(
     );
     let whole = force.clone();
     let mut lost = pass.force_into(first, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
-    let (expected, energy) = naive(case, law, Kinematics::Exact, first, &|i, j| {
+    let (expected, energy) = naive(case, law, BondKinematics::Exact, first, &|i, j| {
         !breaks(first, i, j)
     });
     assert!(
@@ -285,7 +302,7 @@ fn break_twice<const D: usize>(
     let state = pass.damage_state();
     lost += pass.force_into(second, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
     let stands = |i: usize, j: usize| !breaks(first, i, j) && !breaks(second, i, j);
-    let (expected, _) = naive(case, law, Kinematics::Exact, second, &stands);
+    let (expected, _) = naive(case, law, BondKinematics::Exact, second, &stands);
     assert!(
         difference(&force, &expected) < 1e-13 * largest(&expected),
         "{name}"
@@ -321,13 +338,13 @@ fn breaking<const D: usize>(counts: [usize; D], jitter: f64) {
     for law in LAWS {
         for &layout in layouts(jitter) {
             let failure = Failure {
-                critical: CriticalStretch::Uniform(critical),
+                critical: BondCriterion::Uniform(critical),
                 no_fail: &no_fail,
             };
             with(
                 &case,
                 law,
-                Kinematics::Exact,
+                BondKinematics::Exact,
                 Some(failure),
                 layout,
                 |mut pass| {
@@ -353,7 +370,7 @@ fn threads_do_not_change_a_bit() {
     let n = case.position.len() * 3;
     let u = noise(n, 0.05 * H, 31);
     let failure = Failure {
-        critical: CriticalStretch::Uniform(0.08),
+        critical: BondCriterion::Uniform(0.08),
         no_fail: &[],
     };
     for law in LAWS {
@@ -367,7 +384,7 @@ fn threads_do_not_change_a_bit() {
                     with(
                         &case,
                         law,
-                        Kinematics::Exact,
+                        BondKinematics::Exact,
                         Some(failure),
                         layout,
                         |mut pass| {
@@ -416,7 +433,7 @@ fn precracks_count_as_damage_and_single_weights_err_by_little() {
             bulk: BULK,
             shear: SHEAR,
         },
-        kinematics: Kinematics::Exact,
+        kinematics: BondKinematics::Exact,
         failure: None,
         precracked: Some(&cut),
         layout: Layout::List,
@@ -426,7 +443,9 @@ fn precracks_count_as_damage_and_single_weights_err_by_little() {
     let (mut force, mut single) = (vec![0.0; n], vec![0.0; n]);
     let mut pass = bond_pass(&setup).unwrap();
     pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Frozen);
-    let (expected, _) = naive(&case, Law::Solid, Kinematics::Exact, &u, &|i, j| !cut(i, j));
+    let (expected, _) = naive(&case, Law::Solid, BondKinematics::Exact, &u, &|i, j| {
+        !cut(i, j)
+    });
     assert!(difference(&force, &expected) < 1e-13 * largest(&expected));
     assert!(pass.broken() > 0);
 
@@ -451,7 +470,7 @@ fn what_cannot_be_is_refused() {
             rows: &[],
             without_energy: &[],
             force: BondForce::Pairwise { coefficient: f },
-            kinematics: Kinematics::Exact,
+            kinematics: BondKinematics::Exact,
             failure: None,
             precracked: None,
             layout: Layout::Automatic,

@@ -2,8 +2,8 @@
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Micromodulus, Past, PdError, Present,
+        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
+        Influence, Law, LinearForceState, Micromodulus, MomentConditions, Past, PdError, Present,
         ShellTarget, StatePart,
         influence::{Alpha, Degree},
     },
@@ -105,12 +105,12 @@ impl<const D: usize> LinearForceState<D> for BondBased<D> {
         &self,
         bonds: &[(Vector<D>, f64)],
         horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)> {
+    ) -> Option<(Vec<f64>, MomentConditions<D>)> {
         let lambda = bonds
             .iter()
             .map(|(xi, _)| self.kernel(xi.norm(), horizon))
             .collect();
-        Some((lambda, Conditions::bond_based(&self.tensor)))
+        Some((lambda, MomentConditions::bond_based(&self.tensor)))
     }
 
     fn coefficients(

@@ -17,7 +17,7 @@ const HISTORY: [&str; 2] = ["damage", "micropotential"];
 
 /// Bond-based material whose bonds lose their stiffness by a damage φ of each, from 0 to 1.
 ///
-/// Source: [SAND2015-7998] section 6.2, eq. (6.20)–(6.26), with the micropotential `w = ½ p |ξ|² e²` of an undamaged bond:
+/// Source: [SAND2015-7998] section 6.2: energy (6.20), force (6.21), failure surface S (6.23), growth (6.26), with the micropotential `w = ½ p |ξ|² e²` of an undamaged bond:
 ///
 /// ```text
 /// T⟨ξ⟩ = (1 − φ) p |ξ|² e M ,     W = Σ (1 − φ) w V
@@ -152,7 +152,7 @@ fn micropotential<const D: usize>(family: &DeformedFamily<'_, D>, k: usize) -> f
 }
 
 impl<const D: usize> ContinuumDamage<D> {
-    /// The damage D at which a family whose `V₀ μ•w` is `drive` lies on the failure surface; below 0 inside of it, 1 at most.
+    /// [SAND2015-7998] eq. (6.23) with S = 0: the damage D at which a family whose `V₀ μ•w` is `drive` lies on the failure surface; below 0 inside of it, 1 at most.
     fn surface(&self, drive: f64) -> f64 {
         ((drive / self.onset - 1.0) / self.hardening).min(1.0)
     }
@@ -162,7 +162,7 @@ impl<const D: usize> ContinuumDamage<D> {
         self.onset * (1.0 + self.hardening * damage)
     }
 
-    /// The damage of bonds that all count alike; returns what it dissipates.
+    /// The damage of bonds that all count alike, `μ = τ = 1/V₀` of [SAND2015-7998] eq. (6.24); returns what it dissipates.
     fn grow_alike(&self, family: &DeformedFamily<'_, D>, present: &mut [f64]) -> f64 {
         let drive = (0..family.len()).map(|k| micropotential(family, k) * family.volumes[k]);
         let damage = self.surface(drive.sum());
@@ -174,7 +174,7 @@ impl<const D: usize> ContinuumDamage<D> {
         (damage - before) * self.threshold(0.5 * (before + damage))
     }
 
-    /// The same with weak planes: `present` are φ and w of each bond, with w of the end of the step and φ of its beginning.
+    /// The same with weak planes, by [SAND2015-7998] eq. (6.26) over the step: `present` are φ and w of each bond, with w of the end of the step and φ of its beginning.
     fn grow_by_direction(
         &self,
         family: &DeformedFamily<'_, D>,

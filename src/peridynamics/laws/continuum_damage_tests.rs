@@ -110,7 +110,7 @@ impl Point {
             damage: 0.0,
             carried: None,
             material: 0,
-            kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
+            kinematics: crate::peridynamics::bond_force::BondKinematics::Exact,
         };
         let mut present = vec![f64::NAN; self.history.len()];
         let mut force = vec![Vector::zeros(); self.bonds.len()];

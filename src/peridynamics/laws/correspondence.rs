@@ -2,8 +2,8 @@
 
 use crate::{
     peridynamics::{
-        BondEnergy, Conditions, Family, ForceState, Influence, Law, LinearForceState, PdError,
-        ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
+        BondEnergy, Family, ForceState, Influence, Law, LinearForceState, MomentConditions,
+        PdError, ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -105,7 +105,7 @@ impl<const D: usize> LinearForceState<D> for Correspondence<D> {
         &self,
         _bonds: &[(Vector<D>, f64)],
         _horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)> {
+    ) -> Option<(Vec<f64>, MomentConditions<D>)> {
         None
     }
 

@@ -178,7 +178,7 @@ mod tests {
                 carried: None,
                 keeps_damage: false,
                 material: 0,
-                kinematics: bond_force::Kinematics::Linear,
+                kinematics: bond_force::BondKinematics::Linear,
             };
             let past = Past {
                 point: past,

@@ -2,8 +2,8 @@
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Past, PdError, Present, ShellTarget,
+        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
+        Influence, Law, LinearForceState, MomentConditions, Past, PdError, Present, ShellTarget,
         StatePart, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -11,7 +11,7 @@ use crate::{
 
 /// Linearised ordinary state-based linear peridynamic solid.
 ///
-/// Source: [SAND2015-7998] eq. (5.16)–(5.18), for `D` dimensions with `k` the bulk modulus of `D` dimensions (`λ + 2μ/D`):
+/// Source: [SAND2015-7998] eq. (5.16), with the dilatation θ of (5.17) and the weighted volume m of (5.18), for `D` dimensions with `k` the bulk modulus of `D` dimensions (`λ + 2μ/D`):
 ///
 /// ```text
 /// T⟨ξ⟩ = (D k − (D+2) μ)/m  ω θ ξ  +  D(D+2) μ/m  ω  ξ (ξ·η)/|ξ|² ,     θ = D/m Σ ω ξ·η V ,   m = Σ ω |ξ|² V
@@ -105,13 +105,13 @@ impl<const D: usize> LinearForceState<D> for LinearPeridynamicSolid<D> {
         &self,
         bonds: &[(Vector<D>, f64)],
         horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)> {
+    ) -> Option<(Vec<f64>, MomentConditions<D>)> {
         let omega: Vec<f64> = bonds
             .iter()
             .map(|(xi, _)| self.influence.value(xi.norm(), horizon))
             .collect();
         let m = moment_fitted_weights::weighted_volume(bonds, &omega);
-        Some((omega, Conditions::lps(m)))
+        Some((omega, MomentConditions::lps(m)))
     }
 
     fn coefficients(

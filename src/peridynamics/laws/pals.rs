@@ -6,8 +6,8 @@ use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        BondEnergy, CalibrationFields, Conditions, DeformedFamily, EnergyDensity, Family,
-        ForceState, HistoryLayout, Influence, Law, LinearForceState, Past, PdError, Present,
+        BondEnergy, CalibrationFields, DeformedFamily, EnergyDensity, Family, ForceState,
+        HistoryLayout, Influence, Law, LinearForceState, MomentConditions, Past, PdError, Present,
         ShellTarget, StatePart, StressFit,
         position_aware_influence::{self, PositionAware},
     },
@@ -16,7 +16,7 @@ use crate::{
 
 /// Ordinary state-based solid whose two influence functions are fitted to every family, so that surfaces do not soften it.
 ///
-/// Source: [SAND2015-7998] eq. (4.9)–(4.11), for `D` dimensions with κ the bulk modulus of `D` dimensions (`λ + 2μ/D`):
+/// Source: [SAND2015-7998] eq. (4.9), with ε of (4.5), θ of (4.10) and the force state (4.11), for `D` dimensions with κ the bulk modulus of `D` dimensions (`λ + 2μ/D`):
 ///
 /// ```text
 /// W = ½ κ θ² + μ Σ σ ε² V ,     θ = Σ ω |ξ| e V ,     ε = e − θ |ξ|/D
@@ -101,7 +101,7 @@ impl<const D: usize> PositionAwareSolid<D> {
         }
     }
 
-    /// θ of a family.
+    /// θ of a family, [SAND2015-7998] eq. (4.10).
     pub(super) fn dilatation(family: &DeformedFamily<'_, D>) -> f64 {
         let extensions = family.extension.iter().enumerate();
         extensions.fold(0.0, |theta, (k, e)| {
@@ -199,7 +199,7 @@ impl<const D: usize> LinearForceState<D> for PositionAwareSolid<D> {
         &self,
         _bonds: &[(Vector<D>, f64)],
         _horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)> {
+    ) -> Option<(Vec<f64>, MomentConditions<D>)> {
         None
     }
 
@@ -253,7 +253,7 @@ impl<const D: usize> LinearForceState<D> for FittedStress<'_, D> {
         &self,
         bonds: &[(Vector<D>, f64)],
         horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)> {
+    ) -> Option<(Vec<f64>, MomentConditions<D>)> {
         self.law.moment_conditions(bonds, horizon)
     }
 

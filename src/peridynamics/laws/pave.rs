@@ -37,7 +37,8 @@ const fn parameters(first: Parameter) -> [Parameter; 1 + relaxing::NUMBERS] {
 
 /// [`PositionAwareSolid`] whose deviatoric response relaxes, by Maxwell arms beside a spring.
 ///
-/// Source: [SAND2015-7998] eq. (4.12)–(4.15), with `q_i = ε − ε^i` the extension of the spring in arm `i` and `μ_i = λ_i μ`:
+/// Source: [SAND2015-7998] eq. (4.12), (4.13), (4.14), (4.15), with `q_i = ε − ε^i` the extension of the spring in arm `i` and `μ_i = λ_i μ`.
+/// As printed, the right-hand side of (4.13) lacks the factor `1/τ_i`:
 ///
 /// ```text
 /// T⟨ξ⟩ = [ (κ θ − 1/D Σ t |ξ| V) ω |ξ| + t ] M ,     t = 2 μ σ [(1 − Σ λ_i) ε + Σ λ_i q_i] ,     q̇_i = ε̇ − q_i/τ_i
@@ -207,7 +208,7 @@ mod tests {
             carried: None,
             keeps_damage: false,
             material: 0,
-            kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
+            kinematics: crate::peridynamics::bond_force::BondKinematics::Exact,
         };
         let respond = |law: &dyn ForceState<3>, numbers: usize| {
             let past = vec![0.0; numbers];

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, Conditions, DeformedFamily, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Mixture, Past, PdError, PointStress,
+        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
+        Influence, Law, LinearForceState, Mixture, MomentConditions, Past, PdError, PointStress,
         Present, ShellTarget, StatePart,
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -251,7 +251,7 @@ impl<const D: usize> LinearForceState<D> for Several<D> {
         &self,
         bonds: &[(Vector<D>, f64)],
         horizon: f64,
-    ) -> Option<(Vec<f64>, Conditions<D>)> {
+    ) -> Option<(Vec<f64>, MomentConditions<D>)> {
         self.first().linearised().moment_conditions(bonds, horizon)
     }
 

@@ -106,7 +106,7 @@ impl<const D: usize> Point<D> {
             carried: None,
             keeps_damage: false,
             material: 0,
-            kinematics: crate::peridynamics::bond_force::Kinematics::Exact,
+            kinematics: crate::peridynamics::bond_force::BondKinematics::Exact,
         };
         let mut force = vec![Vector::zeros(); self.bonds.len()];
         let mut after = past.to_vec();

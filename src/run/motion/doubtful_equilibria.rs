@@ -17,7 +17,7 @@ use crate::tensor::Vector;
 pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     model: &'a Model<D>,
     rest: &'a RunSettings<D>,
-    joining: CouplingTraits,
+    traits: CouplingTraits,
     springs: Arc<Springs>,
     /// The stress error of a uniform field at surfaces of points.
     uniform: f64,
@@ -38,7 +38,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
         Self {
             model,
             rest: setup.rest,
-            joining: setup.joining,
+            traits: setup.traits,
             springs: Arc::clone(&setup.springs),
             uniform: setup.proof.largest("stress error"),
             force: Vector::zeros(),
@@ -89,7 +89,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
         let round_off = round_off(self.model, self.furthest);
         let relative = Balance { force, scale }.relative();
         let is_loaded = scale > round_off;
-        let balance = out_of_balance(force.as_slice(), relative, self.joining);
+        let balance = out_of_balance(force.as_slice(), relative, self.traits);
         let balance = balance.filter(|_| is_loaded);
         balance.into_iter().chain(self.peak)
     }

@@ -1,12 +1,12 @@
 //! The moving system of a scene: what moves, with what mass, from where.
 
 use crate::coupling::semidiscrete::behaviour::{
-    BondBehaviour, ContactBehaviour, Critical, SystemError,
+    BondBehaviour, ContactBehaviour, FailureCriterion, SystemError,
 };
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
 use crate::coupling::{BrokenBonds, Coupling, Definiteness, Interface, Model, Operator};
 use crate::observe::summary::Decision;
-use crate::peridynamics::bond_force::{Kinematics, Storage};
+use crate::peridynamics::bond_force::{BondKinematics, Storage};
 use crate::peridynamics::critical_stretch as failure_stretch;
 use crate::progress::Progress;
 use crate::run::definiteness;
@@ -59,17 +59,17 @@ pub(crate) fn dynamic<'a, const D: usize>(
     progress: &dyn Progress,
 ) -> Result<DynamicSystem<'a>, RunError> {
     let breaking = &rest.breaking;
-    let critical_stretch = critical_stretch(model, rest)?;
+    let failure = failure_criterion(model, rest)?;
     let kinematics = rest.kinematics();
     let bonds = match kinematics {
-        Kinematics::Exact => "geometrically exact bonds",
-        Kinematics::Linear => "bonds linear in the displacement",
+        BondKinematics::Exact => "geometrically exact bonds",
+        BondKinematics::Linear => "bonds linear in the displacement",
     };
     let storage = storage(breaking.precision);
-    let breaks = failure_text(model, critical_stretch.as_ref(), breaking);
+    let breaks = failure_text(model, failure.as_ref(), breaking);
     let density = |material: u16| rest.density[material as usize];
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
-    let is_linear = critical_stretch.is_none()
+    let is_linear = failure.is_none()
         && breaking.contact.is_none()
         && breaking.bonds == BondsSpec::Linear
         && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
@@ -83,7 +83,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         density,
         &BondBehaviour {
             kinematics,
-            critical_stretch: critical_stretch.clone(),
+            failure: failure.clone(),
             no_fail: &can_fail_nowhere,
             contact: breaking.contact.map(|c| ContactBehaviour {
                 approach: c.radius_factor,
@@ -98,7 +98,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         Ok(motion) => {
             let motion = motion.with_local_laws(&model.local_laws(&rest.local_laws))?;
             let motion = sharing_steps(motion.with_ranks(start.ranks), start.sharing);
-            if critical_stretch.is_some()
+            if failure.is_some()
                 && motion.has_seam_bonds()
                 && operator.definiteness() == Definiteness::NegativeTerms
             {
@@ -152,7 +152,7 @@ fn storage(precision: PrecisionSpec) -> Storage {
 /// In words: at which stretch bonds break, and what fracture energy that is; or what a law was calibrated to.
 fn failure_text<const D: usize>(
     model: &Model<D>,
-    critical: Option<&Critical>,
+    critical: Option<&FailureCriterion>,
     breaking: &Breaking<D>,
 ) -> String {
     let law = model.peridynamics.as_ref().map(|p| &p.law);
@@ -160,8 +160,8 @@ fn failure_text<const D: usize>(
         return found;
     }
     let stretches = critical.map(|critical| match critical {
-        Critical::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
-        Critical::PerLattice(list) => {
+        FailureCriterion::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
+        FailureCriterion::PerLattice(list) => {
             let horizons = model.body().map_or(&[][..], |b| b.cloud.horizon.values());
             let each = list
                 .iter()
@@ -170,8 +170,8 @@ fn failure_text<const D: usize>(
             let each: Vec<String> = each.collect();
             format!("bonds break at the stretch {}", each.join(", "))
         }
-        Critical::ByMaterials(stretch) => stretches_of_materials(stretch, breaking),
-        Critical::Tearing(p) => format!("bonds break at the tearing parameter {p}"),
+        FailureCriterion::ByMaterials(stretch) => stretches_of_materials(stretch, breaking),
+        FailureCriterion::Tearing(p) => format!("bonds break at the tearing parameter {p}"),
     });
     if let (Some(s), Some(_)) = (&stretches, &breaking.several) {
         return s.clone();
@@ -292,7 +292,7 @@ pub(crate) fn still<'a, const D: usize>(
     }
     let behaviour = BondBehaviour {
         kinematics,
-        critical_stretch: None,
+        failure: None,
         no_fail: &|_| false,
         contact: None,
         storage: Storage::Double,
@@ -313,11 +313,11 @@ fn reason(error: &SystemError) -> String {
     text[..end].to_owned()
 }
 
-/// The stretch at which bonds break, if any do.
-pub(crate) fn critical_stretch<const D: usize>(
+/// What breaks bonds, if anything does.
+pub(crate) fn failure_criterion<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
-) -> Result<Option<Critical>, RunError> {
+) -> Result<Option<FailureCriterion>, RunError> {
     let (Some(fracture), Some(_), Some(p)) =
         (rest.breaking.fracture, model.body(), &model.peridynamics)
     else {
@@ -327,8 +327,8 @@ pub(crate) fn critical_stretch<const D: usize>(
         return material_stretches::of(model, several, &rest.breaking).map(Some);
     }
     let energy = match fracture {
-        Fracture::Stretch(s) => return Ok(Some(Critical::Uniform(s))),
-        Fracture::Tearing(p) => return Ok(Some(Critical::Tearing(p))),
+        Fracture::Stretch(s) => return Ok(Some(FailureCriterion::Uniform(s))),
+        Fracture::Tearing(p) => return Ok(Some(FailureCriterion::Tearing(p))),
         Fracture::Energy(energy) => energy,
     };
     let mut list = Vec::new();
@@ -345,8 +345,8 @@ pub(crate) fn critical_stretch<const D: usize>(
         })?);
     }
     Ok(Some(match list[..] {
-        [s] => Critical::Uniform(s),
-        _ => Critical::PerLattice(list),
+        [s] => FailureCriterion::Uniform(s),
+        _ => FailureCriterion::PerLattice(list),
     }))
 }
 
@@ -360,11 +360,11 @@ pub(crate) fn failing_stretch<const D: usize>(
         return Ok(Some(limit));
     }
     Ok(
-        critical_stretch(model, rest)?.and_then(|critical| match critical {
-            Critical::Uniform(s) => Some(s),
-            Critical::ByMaterials(of) => Some(of.smallest()).filter(|s| s.is_finite()),
-            Critical::PerLattice(list) => list.iter().copied().reduce(f64::min),
-            Critical::Tearing(_) => None,
+        failure_criterion(model, rest)?.and_then(|critical| match critical {
+            FailureCriterion::Uniform(s) => Some(s),
+            FailureCriterion::ByMaterials(of) => Some(of.smallest()).filter(|s| s.is_finite()),
+            FailureCriterion::PerLattice(list) => list.iter().copied().reduce(f64::min),
+            FailureCriterion::Tearing(_) => None,
         }),
     )
 }
@@ -374,12 +374,15 @@ pub(crate) fn plane_energy<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
 ) -> Result<Option<PlaneEnergy>, RunError> {
-    let Some(critical) = critical_stretch(model, rest)? else {
+    let Some(critical) = failure_criterion(model, rest)? else {
         return Ok(None);
     };
     let knows_energy =
         (model.peridynamics.as_ref()).is_some_and(|p| p.law.bond_energy(1.0).is_some());
-    let has_one = !matches!(critical, Critical::Tearing(_) | Critical::ByMaterials(_));
+    let has_one = !matches!(
+        critical,
+        FailureCriterion::Tearing(_) | FailureCriterion::ByMaterials(_)
+    );
     if !has_one || !knows_energy {
         return Ok(None);
     }

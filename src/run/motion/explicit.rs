@@ -7,7 +7,7 @@ use super::guard::Balance;
 use super::impact_record::ImpactRecord;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
-use super::saved::{Saved, Zone as FollowedZone};
+use super::saved::{Saved, SavedZone};
 use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
 use super::sharing::sharing;
 use super::step_observer::{Segment, StepObserver, Stop, Watched, moment};
@@ -74,7 +74,7 @@ pub(crate) fn run<const D: usize>(
     let (file, saved) = opened(&rest, options, &mut begun.choices)?;
     if let Some(saved) = &saved {
         let cells = problem.mesh.cell_count();
-        let fits = |zone: &FollowedZone| zone.nonlocal.len() == cells && zone.wanted.len() == cells;
+        let fits = |zone: &SavedZone| zone.nonlocal.len() == cells && zone.wanted.len() == cells;
         if saved.zone.is_some() != rest.follow.is_some()
             || saved.zone.as_ref().is_some_and(|z| !fits(z))
         {
@@ -130,14 +130,16 @@ pub(crate) fn run<const D: usize>(
 
 /// Zones of cells that are nonlocal or local.
 fn zones_of(nonlocal: &[bool]) -> Vec<Zone> {
-    let zone = |n: &bool| if *n { Zone::Nonlocal } else { Zone::Local };
+    let zone = |n: &bool| {
+        if *n { Zone::Nonlocal } else { Zone::Local }
+    };
     nonlocal.iter().map(zone).collect()
 }
 
 /// What the run tells of itself at the end of a segment, whatever follows.
 struct SegmentRecord {
     title: String,
-    joining: CouplingTraits,
+    traits: CouplingTraits,
     remedy: &'static str,
     choices: Vec<Decision>,
     proof: Proof,
@@ -188,7 +190,7 @@ fn take_segment<'r, const D: usize>(
     let mut watch = laid_out.watch;
     let mut record = SegmentRecord {
         title: laid_out.title,
-        joining: laid_out.joining,
+        traits: laid_out.traits,
         remedy: laid_out.remedy,
         choices: laid_out.choices,
         proof: laid_out.proof,
@@ -269,7 +271,7 @@ impl SegmentRecord {
         let Segment { model, pace, .. } = *observer.segment;
         let next = RunSetup {
             title: self.title,
-            joining: self.joining,
+            traits: self.traits,
             remedy: self.remedy,
             choices: self.choices,
             timings: Timings::default(),
@@ -315,7 +317,7 @@ impl SegmentRecord {
         let energy_gain = observer.guard.energy_gain();
         let rotation = observer.guard.rotation();
         self.proof.parts.extend(self.growth.take());
-        let mut told = warnings(model, self.joining, &self.proof);
+        let mut told = warnings(model, self.traits, &self.proof);
         told.extend(of_elements(model, &model.local_laws(&rest.local_laws)));
         told.extend(unusual_stretch(model, rest)?);
         told.extend(without_response(motion.system(), &motion.state().u));
@@ -338,7 +340,7 @@ impl SegmentRecord {
         Ok(RunSummary {
             scene: self.title,
             dimension: D,
-            coupling: self.joining.name.to_owned(),
+            coupling: self.traits.name.to_owned(),
             sizes: sizes(model, operator),
             choices: self.choices,
             total_seconds: self.timings.total(),

@@ -9,7 +9,7 @@
 //! Energies are those of the rows of the history, and of every hundredth step where rows are farther apart, so that watching costs less than one per cent.
 
 use super::seen::{Rotated, Seen};
-use super::writer::{Moment, Row};
+use super::writer::{EnergyRow, Moment};
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::rotation::Rotations;
 use crate::scene::solve::Explicit as Spec;
@@ -74,7 +74,7 @@ impl<'m, const D: usize> Guard<'m, D> {
     }
 
     /// Looks at the energies of a state; returns why the run has to end.
-    pub fn look_at_energies(&mut self, moment: &Moment<'_>, row: &Row) -> Option<Ended> {
+    pub fn look_at_energies(&mut self, moment: &Moment<'_>, row: &EnergyRow) -> Option<Ended> {
         let energy = (row.kinetic + row.stored).abs().max(row.work.abs());
         let seen = &mut self.seen;
         seen.largest = seen.largest.max(energy);

@@ -9,7 +9,7 @@ use super::dynamic_system::{DynamicSystem, start};
 use super::impact::impacted;
 use super::impact_record::ImpactRecord;
 use super::rezoning::Leaving;
-use super::saved::{EdgeReached, Saved, StepChoice, Zone};
+use super::saved::{EdgeReached, Saved, SavedZone, StepChoice};
 use super::setup::restore;
 use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
@@ -45,7 +45,7 @@ pub(crate) struct RezoneState<'a, const D: usize> {
     pub due: bool,
     pub pace: StepChoice,
     pub edge: Option<EdgeReached>,
-    pub zone: Option<Zone>,
+    pub zone: Option<SavedZone>,
     pub seen: Seen,
     pub growth: Option<Part>,
     /// Steps taken by this program, and their seconds.
@@ -60,7 +60,7 @@ pub(crate) struct StepState<'r, 'm, const D: usize> {
     pub pace: StepChoice,
     pub drive: SceneDrive<'m, D>,
     pub edge: Option<EdgeReached>,
-    pub zone: Option<Zone>,
+    pub zone: Option<SavedZone>,
     pub seen: Seen,
     /// What is known of modes that grow; none of a run that goes on from a checkpoint.
     pub growth: Option<Part>,
@@ -160,7 +160,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             pace,
             drive,
             edge,
-            zone: zone.or_else(|| rest.follow.as_ref().map(|_| Zone::first(model))),
+            zone: zone.or_else(|| rest.follow.as_ref().map(|_| SavedZone::first(model))),
             seen,
             growth,
             told: self.choices.len(),

@@ -1,7 +1,7 @@
 //! The stretch at which bonds of each material break, and those between two.
 
 use crate::coupling::Model;
-use crate::coupling::semidiscrete::behaviour::{Critical, StretchOfMaterials, SystemError};
+use crate::coupling::semidiscrete::behaviour::{FailureCriterion, StretchOfMaterials, SystemError};
 use crate::peridynamics::Mixture;
 use crate::peridynamics::critical_stretch as failure_stretch;
 use crate::run::error::RunError;
@@ -86,7 +86,7 @@ pub(super) fn of<const D: usize>(
     model: &Model<D>,
     law: &dyn Mixture<D>,
     breaking: &Breaking<D>,
-) -> Result<Critical, RunError> {
+) -> Result<FailureCriterion, RunError> {
     let Some(fracture) = &breaking.several else {
         let law = law.law(law.used()[0]).name();
         return Err(SystemError::Law { law }.into());
@@ -104,7 +104,7 @@ pub(super) fn of<const D: usize>(
             table[usize::from(a) * count + usize::from(b)] = stretches.between(a, b)?;
         }
     }
-    Ok(Critical::ByMaterials(StretchOfMaterials::new(
+    Ok(FailureCriterion::ByMaterials(StretchOfMaterials::new(
         count,
         |a, b| table[usize::from(a) * count + usize::from(b)],
     )))

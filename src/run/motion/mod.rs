@@ -20,6 +20,9 @@
 //! | `rezoning.rs` | what a change of the zone carries over, and what it costs |
 //! | `supports.rs` | what holds the body: forces and displacements of conditions |
 //! | `probe_rows.rs`, `section_rows.rs` | what the history tells of probes, and of sections through the body |
+//! | `material_stretches.rs` | the stretch at which bonds of each material break |
+//! | `crack_growth.rs` | how far cracks grow within a load step |
+//! | `tables.rs` | tables beside the history: tips of cracks, states along lines |
 //! | `tips.rs` | where the tip of a crack is |
 //! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
 //! | `saved.rs` | what a checkpoint keeps |

@@ -125,11 +125,11 @@ fn load_steps<const D: usize>(
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
     choices.push(observer.spent());
     let summary = observer.summary(system.as_ref(), first, taken?)?;
-    let of_model = warnings(model, laid_out.joining, &laid_out.proof).into_iter();
+    let of_model = warnings(model, laid_out.traits, &laid_out.proof).into_iter();
     let of_model = of_model.chain(of_elements(model, &model.local_laws(&rest.local_laws)));
     Ok(RunSummary {
         scene: laid_out.title,
-        coupling: laid_out.joining.name.to_owned(),
+        coupling: laid_out.traits.name.to_owned(),
         sizes: sizes(model, operator),
         choices,
         total_seconds: timings.total(),

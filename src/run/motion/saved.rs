@@ -24,14 +24,14 @@ pub(crate) struct Saved {
     /// When damage reached the edge of the nonlocal zone, if it did.
     pub edge: Option<EdgeReached>,
     /// Where a zone that follows the crack stands; none of one that does not.
-    pub zone: Option<Zone>,
+    pub zone: Option<SavedZone>,
     /// What was seen of energy and rotation.
     pub seen: Seen,
 }
 
 /// Where a zone that follows the crack stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Zone {
+pub struct SavedZone {
     /// Whether each cell is nonlocal.
     pub nonlocal: Vec<bool>,
     /// When each was wanted last \[s\], or became nonlocal; minus infinity if never.
@@ -44,7 +44,7 @@ pub struct Zone {
     pub shares: [f64; 2],
 }
 
-impl Zone {
+impl SavedZone {
     /// Of the layout that a run begins with.
     pub fn first<const D: usize>(model: &Model<D>) -> Self {
         let share = share(model);

@@ -24,7 +24,7 @@ pub struct ModelSetup<'a, const D: usize> {
     /// The title of the scene.
     pub title: String,
     /// How its bodies are coupled.
-    pub joining: CouplingTraits,
+    pub traits: CouplingTraits,
     /// What to change in the scene where a mode may grow.
     pub remedy: &'static str,
     /// What shows that no mode grows, if anything does.
@@ -54,7 +54,7 @@ pub struct ModelSetup<'a, const D: usize> {
 /// A run before its zones are laid out: what stays when they change.
 pub(crate) struct RunSetup {
     pub title: String,
-    pub joining: CouplingTraits,
+    pub traits: CouplingTraits,
     pub remedy: &'static str,
     pub choices: Vec<Decision>,
     pub timings: Timings,
@@ -65,7 +65,7 @@ pub(crate) struct RunSetup {
 pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, RunSettings<D>) {
     let watch = Stopwatch::start();
     let title = scene.title.clone();
-    let joining = scene.coupling.joining();
+    let traits = scene.coupling.traits();
     let remedy = growth::remedy(&scene.coupling);
     let mut timings = Timings::default();
     if let Some(placement) = &scene.placement {
@@ -74,7 +74,7 @@ pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, R
     let (problem, rest) = setup::problem(scene);
     let begun = RunSetup {
         title,
-        joining,
+        traits,
         remedy,
         choices: rest.made().cloned().collect(),
         timings,
@@ -94,7 +94,7 @@ pub(crate) fn lay_out<const D: usize, T>(
 ) -> Result<(T, Problem<D>), RunError> {
     let RunSetup {
         title,
-        joining,
+        traits,
         remedy,
         mut choices,
         mut timings,
@@ -140,7 +140,7 @@ pub(crate) fn lay_out<const D: usize, T>(
     }
     let done = then(ModelSetup {
         title,
-        joining,
+        traits,
         remedy,
         proved,
         model: &model,

@@ -2,7 +2,7 @@
 
 use super::RunOptions;
 use crate::coupling::Problem;
-use crate::peridynamics::bond_force::Kinematics;
+use crate::peridynamics::bond_force::BondKinematics;
 use crate::run::setup::RunSettings;
 use crate::scene::conditions::Prescribed;
 use crate::scene::solve::Explicit;
@@ -45,7 +45,7 @@ pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings
 /// Whether each process of a static scene may, beside those at a seam. Forces then have to be linear: of others each process has the rows of all sites.
 pub(crate) fn may_share_rows<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
     let law = problem.peridynamics.as_ref().map(|p| &p.law);
-    rest.kinematics() == Kinematics::Linear
+    rest.kinematics() == BondKinematics::Linear
         && law.is_some_and(|law| law.is_linear())
         && rest.elements == ElementsSpec::Linear
         && families_of_all(problem, rest).is_some()

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use super::RunOptions;
 use super::breaks::Breaks;
-use super::dynamic_system::{critical_stretch, failing_stretch};
+use super::dynamic_system::{failing_stretch, failure_criterion};
 use super::guard::{Balance, Guard};
-use super::saved::{EdgeReached, StepChoice, Zone};
+use super::saved::{EdgeReached, SavedZone, StepChoice};
 use super::seen::Seen;
-use super::writer::{Moment, Recorder, Row};
+use super::writer::{EnergyRow, Moment, Recorder};
 use super::zone_monitor::{ZoneMonitor, fastest_crack};
 use crate::coupling::{Model, Operator};
 use crate::observe::ObserveError;
@@ -136,7 +136,7 @@ pub(super) struct Watched {
     pub balance: Balance,
     pub seen: Seen,
     pub edge: Option<EdgeReached>,
-    pub zone: Option<Zone>,
+    pub zone: Option<SavedZone>,
 }
 
 /// Watches and writes the steps of a segment.
@@ -148,7 +148,7 @@ pub(super) struct StepObserver<'a, 'r, const D: usize> {
     pub guard: Guard<'a, D>,
     pub recorder: Recorder<'r, D>,
     pub edge: Option<EdgeReached>,
-    pub zone: Option<Zone>,
+    pub zone: Option<SavedZone>,
     /// Why the steps were left early.
     pub stop: Option<Stop>,
     /// Whether a checkpoint was due with the change of the zone: of the state in the next layout.
@@ -186,7 +186,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         let guard = Guard::new(rotations, balance, segment.spec, pace.steps, seen);
         let monitor = match &rest.follow {
             Some(follow) => {
-                let critical = critical_stretch(model, rest)?.filter(|_| model.body().is_some());
+                let critical = failure_criterion(model, rest)?.filter(|_| model.body().is_some());
                 critical.map(|critical| {
                     let speed = fastest_crack(model, |m| rest.density[m as usize]);
                     ZoneMonitor::new(follow, model, critical.at(0), speed, pace.step)
@@ -421,7 +421,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     fn reason_to_end(
         &mut self,
         moment: &Moment<'_>,
-        energies: Option<&Row>,
+        energies: Option<&EnergyRow>,
         last: bool,
     ) -> Option<Ended> {
         let Segment { rest, options, .. } = *self.segment;
@@ -442,7 +442,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     fn write(
         &mut self,
         moment: &Moment<'_>,
-        energies: Option<Row>,
+        energies: Option<EnergyRow>,
         due: DueOutput,
     ) -> Result<(), ObserveError> {
         if due.row {
@@ -463,7 +463,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     }
 
     /// Writes a row of the history and of the tables of tips.
-    fn write_row(&mut self, moment: &Moment<'_>, energies: Row) -> Result<(), ObserveError> {
+    fn write_row(&mut self, moment: &Moment<'_>, energies: EnergyRow) -> Result<(), ObserveError> {
         let sites = &self.segment.model.sites;
         let probed = self.fields.probed(moment);
         self.recorder

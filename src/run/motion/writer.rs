@@ -9,7 +9,7 @@ use super::breaks::Breaks;
 use super::crack_growth::CrackGrowth;
 use super::impact_record::ImpactRecord;
 use super::probe_rows::ProbeRows;
-use super::saved::{EdgeReached, Saved, StepChoice, Written, Zone};
+use super::saved::{EdgeReached, Saved, SavedZone, StepChoice, Written};
 use super::section_rows::SectionRows;
 use super::supports::Supports;
 use super::tables::Tables;
@@ -83,7 +83,7 @@ impl Moment<'_> {
 
 /// The energies of a row of the history.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Row {
+pub struct EnergyRow {
     /// `½ vᵀ M v`.
     pub kinetic: f64,
     /// Of all bodies.
@@ -114,7 +114,7 @@ pub struct Recorder<'a, const D: usize> {
     /// Kinetic and stored energy at the start.
     pub energy_at_start: f64,
     /// Energies of the last row.
-    pub last: Row,
+    pub last: EnergyRow,
     /// How far cracks grew between rows.
     pub growth: CrackGrowth,
     /// Seconds that writing took.
@@ -162,7 +162,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             options,
             last_checkpoint: Instant::now(),
             energy_at_start: written.map_or(0.0, |w| w.energy_at_start),
-            last: Row::default(),
+            last: EnergyRow::default(),
             growth: written.map_or_else(CrackGrowth::default, |w| w.growth),
             seconds: 0.0,
         })
@@ -226,10 +226,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
     }
 
     /// The energies of a state.
-    pub fn energies(&self, moment: &Moment<'_>) -> Row {
+    pub fn energies(&self, moment: &Moment<'_>) -> EnergyRow {
         let Moment { state, system, .. } = moment;
         let stored = system.stored_energy(&state.u);
-        Row {
+        EnergyRow {
             kinetic: moment.kinetic,
             stored,
             work: state.work,
@@ -245,7 +245,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     pub fn row(
         &mut self,
         moment: &Moment<'_>,
-        energies: Row,
+        energies: EnergyRow,
         probed: &[f64],
         positions: impl Fn(usize) -> Vector<D>,
     ) -> Result<(), ObserveError> {
@@ -394,7 +394,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         system: &dyn SemiDiscrete,
         pace: StepChoice,
         edge: Option<EdgeReached>,
-        zone: Option<Zone>,
+        zone: Option<SavedZone>,
         seen: &Seen,
     ) -> Result<(), ObserveError> {
         if !self.options.writes() {

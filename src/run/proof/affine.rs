@@ -2,6 +2,7 @@
 
 use super::classes::{Layout, RowClass, Skin, Unbalanced, limits, told};
 use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress};
+use super::loads::centre;
 use super::patch::{Around, PatchField, StressError, stress_errors};
 use super::surface::{self, Boundary, FacetKind};
 use crate::coupling::{Model, Operator, Site, SiteKind, Zone};
@@ -49,11 +50,6 @@ fn reference<const D: usize>(model: &Model<D>) -> Tensor4<D> {
     let own = model.peridynamic_material();
     let cell = (0..model.mesh.cell_count()).find(|&c| model.material_of_cell(c) == own);
     *model.tensor_of_cell(cell.unwrap_or(0))
-}
-
-fn centre<const D: usize>(model: &Model<D>) -> Vector<D> {
-    let (low, high) = model.mesh.bounds();
-    (low + high) * 0.5
 }
 
 fn affine<const D: usize>(model: &Model<D>, g: &Tensor<D>, centre: &Vector<D>) -> Vec<f64> {

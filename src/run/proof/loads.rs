@@ -79,9 +79,9 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
 }
 
 /// The middle of the mesh, about which moments are taken.
-fn centre<const D: usize>(model: &Model<D>) -> Vector<D> {
+pub(super) fn centre<const D: usize>(model: &Model<D>) -> Vector<D> {
     let (low, high) = model.mesh.bounds();
-    (low + high) / 2.0
+    (low + high) * 0.5
 }
 
 /// A condition as it is at time zero; components that depend on time alone are one, for the force of a unit field is what loads are made of.

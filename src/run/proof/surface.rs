@@ -3,7 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use super::classes::Skin;
-use crate::coupling::Model;
+use crate::coupling::{Model, bin_of};
 use crate::mesh::boundary::BoundaryFacet;
 use crate::scene::conditions::{Bedding, Condition, Prescribed, Support};
 use crate::shape::{Barrier, Barriers};
@@ -81,8 +81,8 @@ impl<'a, const D: usize> Boundary<'a, D> {
         let mut bins: FxHashMap<[i64; D], Vec<u32>> = FxHashMap::default();
         let bounds: Vec<_> = facets.iter().map(|f| mesh.bounds_of(&f.nodes)).collect();
         for (number, (low, high)) in bounds.iter().enumerate() {
-            let from = bin(&(low - Vector::repeat(reach)), reach);
-            let to = bin(&(high + Vector::repeat(reach)), reach);
+            let from = bin_of(&(low - Vector::repeat(reach)), reach);
+            let to = bin_of(&(high + Vector::repeat(reach)), reach);
             let counts: [usize; D] = std::array::from_fn(|i| (to[i] - from[i] + 1) as usize);
             for index in 0..counts.iter().product::<usize>() {
                 let mut rest = index;
@@ -124,7 +124,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
         limit: f64,
         wanted: impl Fn(usize) -> bool + 's,
     ) -> impl Iterator<Item = (usize, f64)> + 's {
-        let list = self.bins.get(&bin(x, self.reach));
+        let list = self.bins.get(&bin_of(x, self.reach));
         list.into_iter().flatten().filter_map(move |&f| {
             let f = f as usize;
             let (low, high) = &self.bounds[f];
@@ -151,10 +151,6 @@ impl<'a, const D: usize> Boundary<'a, D> {
     pub fn is_near_crack(&self, x: &Vector<D>, limit: f64) -> bool {
         self.barriers.near(x, limit)
     }
-}
-
-fn bin<const D: usize>(x: &Vector<D>, size: f64) -> [i64; D] {
-    std::array::from_fn(|i| (x[i] / size).floor() as i64)
 }
 
 /// The boxes around facets between materials, of points that have several, near a box.

@@ -1,7 +1,7 @@
 //! `zones = "auto"`: the nonlocal zone that follows from a scene's shapes, and from its displacement in elements.
 //!
 //! 1. Cells at cracks, at voids and at notches are marked, the last for good only where bonds break. What is marked is padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled.
-//! 2. A static scene is solved with that zone, with elements alone where it is empty. Elements in which [`Criteria`](crate::coupling::need::Criteria) finds the local model wrong or a bond near its end are marked too.
+//! 2. A static scene is solved with that zone, with elements alone where it is empty. Elements in which [`Criteria`](crate::coupling::error_indicator::Criteria) finds the local model wrong or a bond near its end are marked too.
 //! 3. Where they lie outside, the zone is theirs and the scene is solved again; one around notches only where it leaves clearly more of the error than the tolerance, or is much larger than theirs. Else the solution is that of the scene, and is kept: the run writes it without solving again. A look costs its search only.
 //!
 //! A load that grows is looked at once, at its end, with elements alone in which cells at cracks and voids carry next to nothing; a motion at its start.
@@ -82,7 +82,7 @@ pub(crate) fn placed<const D: usize>(scene: &Draft<'_, D>) -> Result<Option<Foun
     };
     let span = auto.span();
     if let Some(c) = &spec.coupling
-        && matches!(c.get_ref().joining().zones, ZonesNeeded::Everywhere(_))
+        && matches!(c.get_ref().traits().zones, ZonesNeeded::Everywhere(_))
     {
         return Ok(None);
     }

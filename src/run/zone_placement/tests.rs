@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::coupling::semidiscrete::behaviour::{BondBehaviour, Critical};
+use crate::coupling::semidiscrete::behaviour::{BondBehaviour, FailureCriterion};
 use crate::coupling::{CoupledSystem, Model, Zone};
-use crate::peridynamics::bond_force::Kinematics;
+use crate::peridynamics::bond_force::BondKinematics;
 use crate::progress::Silent;
 use crate::run::{AnyScene, PlacedScene, setup, solve_with};
 use crate::scene::validated::Scene;
@@ -102,7 +102,7 @@ fn nonlocal(scene: &Scene<2>) -> Vec<[f64; 2]> {
 #[test]
 fn a_smooth_scene_is_finite_elements_bit_for_bit() {
     let scene = bar(&[]);
-    assert_eq!(scene.coupling.joining().name, "local");
+    assert_eq!(scene.coupling.traits().name, "local");
     let placement = scene.placement.clone().expect("a placement");
     assert!(scene.kept.is_some(), "{placement:?}");
     assert!(placement.choice.choice.contains("no peridynamics"));
@@ -135,7 +135,7 @@ fn a_crack_is_padded_by_two_horizons() {
             .as_ref()
             .is_some_and(|p| { scene.kept.is_some() && p.choice.why.contains("cracks mark") })
     );
-    assert_eq!(scene.coupling.joining().name, "truncated");
+    assert_eq!(scene.coupling.traits().name, "truncated");
     let (u, _) = solved(scene);
     assert!(u.iter().all(|u| u.is_finite()));
     // a method that needs a transition zone gets one; this body has no room for it beyond the zone
@@ -218,6 +218,21 @@ fn a_corner_is_marked_until_the_rest_is_within_the_tolerance() {
     }
 }
 
+/// What elements miss of a field grows with the length over which bonds weigh it: the micromodulus of the scene's law decides, no other.
+#[test]
+fn bonds_that_weigh_their_far_ends_more_mark_more_cells() {
+    let marked = |micromodulus: &str| {
+        let cutout = "mesh.rectangle.cutouts.slit={min=[0.8,0.45],max=[1.2,0.55]}";
+        let law = format!("materials.plate.bond-based.micromodulus={micromodulus}");
+        nonlocal(&plate(&[cutout, "zones.auto.tolerance=0.03", &law])).len()
+    };
+    let counts = ["triangular", "inverse-distance", "uniform"].map(marked);
+    assert!(
+        counts[0] <= counts[1] && counts[1] < counts[2],
+        "{counts:?}"
+    );
+}
+
 #[test]
 fn wrong_zones_are_refused_with_the_key_and_the_remedy() {
     let error = |text: &str, overrides: &[&str]| load(text, overrides).expect_err("wrong");
@@ -270,8 +285,8 @@ fn a_scene_allocates_what_it_needs() {
     let operator = coupling.operator(&model).expect("rows");
     let bits = |critical_stretch: Option<f64>| {
         let behaviour = BondBehaviour {
-            kinematics: Kinematics::Linear,
-            critical_stretch: critical_stretch.map(Critical::Uniform),
+            kinematics: BondKinematics::Linear,
+            failure: critical_stretch.map(FailureCriterion::Uniform),
             no_fail: &|_| false,
             contact: None,
             storage: crate::peridynamics::bond_force::Storage::Double,

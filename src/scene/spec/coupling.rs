@@ -19,13 +19,13 @@ use crate::peridynamics::{Influence, LinearForceState};
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CouplingSpec {
-    /// Each site takes the whole force of its own model (SAND2015-7998 eq. 2.30).
+    /// Each site takes the whole force of its own model (SAND2015-7998 eq. (2.30)).
     Splice(NoOptionsSpec),
-    /// Forces blended by β over the transition zone (eq. 3.9 to 3.14).
+    /// Forces blended by β over the transition zone (SAND2015-7998 eq. (3.14)).
     Blending(BlendingSpec),
     /// Half of a splice's forces and half of a blending's: what both leave out of balance cancels.
     Balanced(BalancedSpec),
-    /// Partial stress in the transition zone (eq. 2.19 to 2.29).
+    /// Partial stress in the transition zone (SAND2015-7998 eq. (2.19), (2.29)).
     PartialStress(PartialStressSpec),
     /// Bonds that end on the faces of elements: symmetric, in exact equilibrium.
     Truncated(TruncatedSpec),
@@ -75,7 +75,7 @@ pub struct CouplingTraits {
 
 impl CouplingSpec {
     /// Name, description and needs of the coupling.
-    pub fn joining(&self) -> CouplingTraits {
+    pub fn traits(&self) -> CouplingTraits {
         match self {
             Self::Splice(_) => CouplingTraits {
                 name: "splice",
@@ -203,7 +203,7 @@ impl CouplingSpec {
 pub(super) fn coupling_schema(generator: &mut SchemaGenerator) -> Schema {
     let table = generator.subschema_for::<CouplingSpec>();
     json_schema!({
-        "description": "How the two models are joined: a table, [coupling.blending], or a name where no option is set, \"splice\".",
+        "description": "How the two models are selected: a table, [coupling.blending], or a name where no option is set, \"splice\".",
         "anyOf": [table, { "enum": CouplingSpec::names() }]
     })
 }
@@ -329,7 +329,7 @@ mod tests {
             let typed = format!("[coupling.{name}]");
             let table: std::collections::BTreeMap<String, CouplingSpec> =
                 toml::from_str(&typed).expect("no option is compulsory");
-            assert_eq!(table["coupling"].joining().name, *name);
+            assert_eq!(table["coupling"].traits().name, *name);
         }
     }
 }

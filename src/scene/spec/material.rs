@@ -173,9 +173,9 @@ impl MaterialSpec {
         Some(FractureSpec {
             law,
             typed: [
-                ("fracture-energy", energy.as_ref()),
-                ("critical-stretch", stretch.as_ref()),
-                ("tearing-parameter", tearing),
+                (FractureKey::Energy, energy.as_ref()),
+                (FractureKey::Stretch, stretch.as_ref()),
+                (FractureKey::Tearing, tearing),
             ],
         })
     }
@@ -186,7 +186,29 @@ pub struct FractureSpec<'a> {
     /// The key of the material's law.
     pub law: &'static str,
     /// Keys, and what is typed.
-    pub typed: [(&'static str, Option<&'a Number>); 3],
+    pub typed: [(FractureKey, Option<&'a Number>); 3],
+}
+
+/// A key that says when bonds of a material break.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FractureKey {
+    /// By the energy per area of a new crack.
+    Energy,
+    /// By the stretch of the bond.
+    Stretch,
+    /// By the tearing parameter of its ends.
+    Tearing,
+}
+
+impl FractureKey {
+    /// As a scene types it.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Energy => "fracture-energy",
+            Self::Stretch => "critical-stretch",
+            Self::Tearing => "tearing-parameter",
+        }
+    }
 }
 
 /// The constants of a bond-based material.
@@ -272,14 +294,14 @@ pub enum MicromodulusSpec {
     Uniform,
     /// `λ = c (1 - |ξ|/δ) / |ξ|³`.
     Triangular,
-    /// `λ = c ω(|ξ|) / |ξ|²` with an influence function (SAND2015-7998 eq. 5.13a).
+    /// `λ = c ω(|ξ|) / |ξ|²` with an influence function (SAND2015-7998 eq. (5.13a)).
     Influence(InfluenceSpec),
 }
 
 /// An influence function: `{ degree = 3, alpha = 0 }`, or "gaussian".
 #[derive(Clone, Debug)]
 pub enum InfluenceSpec {
-    /// `P_n / |ξ|^α` (SAND2015-7998 eq. 5.8).
+    /// `P_n / |ξ|^α` (SAND2015-7998 eq. (5.8)).
     Polynomial(PolynomialSpec),
     /// `exp(-|ξ|²/δ²)`.
     Gaussian,

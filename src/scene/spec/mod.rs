@@ -1,6 +1,18 @@
 //! What a scene file holds, as typed. The JSON Schema is made from these types and their comments.
 //!
 //! Every choice is a table of one key (`[coupling.splice]`), so that an error is underlined at its own token.
+//!
+//! | file | what is typed |
+//! |---|---|
+//! | `mesh.rs` | the mesh |
+//! | `material.rs`, `named_law.rs`, `user_material.rs` | materials and peridynamics; laws known by their key; compiled routines |
+//! | `material_interface.rs` | bonds between two materials |
+//! | `region.rs` | shapes and zones |
+//! | `coupling.rs` | the coupling |
+//! | `condition.rs`, `impactor.rs` | conditions and voids, rigid impactors |
+//! | `motion.rs` | time and load steps, initial fields, what may break |
+//! | `control.rs` | solver and output |
+//! | `table.rs` | tables of numbers |
 
 mod condition;
 mod control;
@@ -29,9 +41,9 @@ pub use coupling::{
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use material::{
-    BondBasedSpec, CorrespondenceSpec, InfluenceSpec, LatticeSpec, MaterialSpec, MicromodulusSpec,
-    PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec, VolumesSpec,
-    WeightsSpec,
+    BondBasedSpec, CorrespondenceSpec, FractureKey, InfluenceSpec, LatticeSpec, MaterialSpec,
+    MicromodulusSpec, PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec,
+    VolumesSpec, WeightsSpec,
 };
 pub use material_interface::{MaterialInterfaceSpec, StiffnessSpec};
 pub use mesh::{

@@ -112,12 +112,12 @@ impl<'de> Visitor<'de> for Seed {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<NamedSpec, A::Error> {
         let law = self.0;
         let parameters = law.parameters();
-        let mut common: [Option<Number>; 6] = Default::default();
+        let mut common: [Option<Number>; COMMON.len()] = Default::default();
         let mut own: Vec<Option<Given>> = vec![None; parameters.len()];
         let mut cells: Option<CellsSpec> = None;
         while let Some(key) = map.next_key_seed(Key(law))? {
             match key {
-                Field::Common(6) => cells = Some(map.next_value()?),
+                Field::Common(k) if COMMON[k].0 == "cells" => cells = Some(map.next_value()?),
                 Field::Common(k) => common[k] = Some(map.next_value()?),
                 Field::Own(k) if parameters[k].words.is_empty() => {
                     own[k] = Some(Given::Number(map.next_value()?));
@@ -125,14 +125,11 @@ impl<'de> Visitor<'de> for Seed {
                 Field::Own(k) => own[k] = Some(Given::Word(map.next_value()?)),
             }
         }
-        let [
-            modulus,
-            poisson_ratio,
-            density,
-            fracture_energy,
-            critical_stretch,
-            tearing_parameter,
-        ] = common;
+        let mut taken = |key: &str| {
+            let place = COMMON.iter().position(|c| c.0 == key);
+            place.and_then(|k| common[k].take())
+        };
+        let poisson_ratio = taken("poisson-ratio");
         let missing = |key| <A::Error as de::Error>::missing_field(key);
         if law.ratio() == Ratio::Any && poisson_ratio.is_none() {
             return Err(missing("poisson-ratio"));
@@ -144,12 +141,12 @@ impl<'de> Visitor<'de> for Seed {
         }
         Ok(NamedSpec {
             law,
-            youngs_modulus: modulus.ok_or_else(|| missing("youngs-modulus"))?,
+            youngs_modulus: taken("youngs-modulus").ok_or_else(|| missing("youngs-modulus"))?,
             poisson_ratio,
-            density,
-            fracture_energy,
-            critical_stretch,
-            tearing_parameter,
+            density: taken("density"),
+            fracture_energy: taken("fracture-energy"),
+            critical_stretch: taken("critical-stretch"),
+            tearing_parameter: taken("tearing-parameter"),
             cells,
             parameters: own,
         })

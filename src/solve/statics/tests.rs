@@ -1,6 +1,6 @@
 use super::*;
 use crate::progress::Silent;
-use crate::solve::stencils::{Lattice, splice};
+use crate::solve::stencils::{StencilGrid, splice};
 use nalgebra::{DMatrix, DVector};
 
 struct Case {
@@ -12,7 +12,7 @@ struct Case {
 }
 
 impl Case {
-    fn new(lattice: &Lattice, matrix: BlockCsr, symmetry: Symmetry) -> Case {
+    fn new(lattice: &StencilGrid, matrix: BlockCsr, symmetry: Symmetry) -> Case {
         let n = matrix.dofs();
         Case {
             matrix,
@@ -87,8 +87,8 @@ impl Case {
 }
 
 fn cases() -> Vec<(&'static str, Case)> {
-    let plane = Lattice::rectangle(14, 9);
-    let solid = Lattice::block(6, 5, 4);
+    let plane = StencilGrid::rectangle(14, 9);
+    let solid = StencilGrid::block(6, 5, 4);
     let inner = |x: [f64; 3]| x[0] > 3.0 && x[0] < 9.0;
     let (p, s) = (plane.positions(), solid.positions());
     use Symmetry::{Symmetric, Unsymmetric};
@@ -165,7 +165,10 @@ fn direct_agrees_with_dense_lu_for_every_ordering() {
 
 #[test]
 fn krylov_agrees_with_direct() {
-    let (plane, solid) = (Lattice::rectangle(70, 60), Lattice::block(16, 14, 12));
+    let (plane, solid) = (
+        StencilGrid::rectangle(70, 60),
+        StencilGrid::block(16, 14, 12),
+    );
     let x = plane.positions();
     let y = solid.positions();
     use Symmetry::{Symmetric, Unsymmetric};
@@ -250,7 +253,7 @@ fn prescribed_values_are_kept_component_by_component() {
 
 #[test]
 fn results_have_the_same_bits_on_any_number_of_threads() {
-    let lattice = Lattice::rectangle(70, 60);
+    let lattice = StencilGrid::rectangle(70, 60);
     let x = lattice.positions();
     let spliced = splice(&lattice.bonds(3), &lattice.elements(), |i| x[i][0] > 30.0);
     for (matrix, symmetry) in [
@@ -301,19 +304,19 @@ fn singular(case: &Case) -> (Vec<usize>, Vec<String>, String) {
 
 #[test]
 fn a_free_body_is_named_with_all_its_motions() {
-    let plane = Lattice::rectangle(8, 5);
+    let plane = StencilGrid::rectangle(8, 5);
     let (sites, modes, message) = singular(&Case::new(&plane, plane.bonds(2), Symmetry::Symmetric));
     assert_eq!(sites.len(), 40);
     assert_eq!(modes.len(), 3, "{modes:?}");
     assert!(message.contains("prescribe displacements"), "{message}");
-    let solid = Lattice::block(3, 4, 3);
+    let solid = StencilGrid::block(3, 4, 3);
     let (_, modes, _) = singular(&Case::new(&solid, solid.elements(), Symmetry::Symmetric));
     assert_eq!(modes.len(), 6, "{modes:?}");
 }
 
 #[test]
 fn one_pinned_point_leaves_a_rotation() {
-    let plane = Lattice::rectangle(8, 5);
+    let plane = StencilGrid::rectangle(8, 5);
     let mut case = Case::new(&plane, plane.elements(), Symmetry::Symmetric);
     case.prescribed[0] = Some(0.0);
     case.prescribed[1] = Some(0.0);
@@ -358,7 +361,7 @@ fn cut(case: &mut Case, group: impl Fn(usize) -> bool) {
 
 #[test]
 fn a_detached_fragment_and_an_isolated_site_are_named() {
-    let plane = Lattice::rectangle(12, 7);
+    let plane = StencilGrid::rectangle(12, 7);
     let mut case = Case::new(&plane, plane.bonds(2), Symmetry::Symmetric).held();
     let x = plane.positions();
     let inside = |i: usize| (4.0..=6.0).contains(&x[i][0]) && (2.0..=4.0).contains(&x[i][1]);
@@ -381,7 +384,7 @@ fn a_detached_fragment_and_an_isolated_site_are_named() {
 #[test]
 fn a_hinge_is_found_by_its_pivot() {
     // two blocks of elements share one site: the second turns about it
-    let plane = Lattice::rectangle(5, 5);
+    let plane = StencilGrid::rectangle(5, 5);
     let k = plane.elements();
     let n = plane.len();
     let hinge = 24;
@@ -445,7 +448,7 @@ fn a_hinge_is_found_by_its_pivot() {
 
 #[test]
 fn a_symmetric_indefinite_system_falls_back_to_lu() {
-    let plane = Lattice::rectangle(6, 5);
+    let plane = StencilGrid::rectangle(6, 5);
     let mut case = Case::new(&plane, plane.elements(), Symmetry::Symmetric).held();
     let e = case.matrix.row_offsets[9] + case.matrix.row(9).0.binary_search(&9).expect("diagonal");
     case.matrix.values[4 * e] -= 20.0;
@@ -456,7 +459,7 @@ fn a_symmetric_indefinite_system_falls_back_to_lu() {
 
 #[test]
 fn wrong_shapes_and_numbers_are_refused() {
-    let plane = Lattice::rectangle(4, 3);
+    let plane = StencilGrid::rectangle(4, 3);
     let mut case = Case::new(&plane, plane.elements(), Symmetry::Symmetric).held();
     case.load[5] = f64::NAN;
     let message = case
@@ -480,11 +483,11 @@ fn wrong_shapes_and_numbers_are_refused() {
 
 #[test]
 fn auto_factorises_narrow_stencils_and_iterates_on_wide_ones_in_three_dimensions() {
-    let plane = Lattice::rectangle(60, 60);
+    let plane = StencilGrid::rectangle(60, 60);
     let case = Case::new(&plane, plane.elements(), Symmetry::Symmetric).held();
     let info = case.solve(&StaticParams::default()).expect("solved").info;
     assert_eq!(info.method, MethodUsed::Cholesky);
-    let solid = Lattice::block(17, 17, 17);
+    let solid = StencilGrid::block(17, 17, 17);
     let case = Case::new(&solid, solid.bonds(3), Symmetry::Symmetric).held();
     let info = case.solve(&StaticParams::default()).expect("solved").info;
     assert_eq!(info.method, MethodUsed::ConjugateGradients);

@@ -4,7 +4,7 @@ use super::sample_run::Pilot;
 use crate::variants::Quantity;
 
 /// Orders below are those of a singularity, orders above do not last: linear elements and the nonlocal operator have two
-/// (\[SAND2015-7998\] (2.23) to (2.28): the difference from the local operator is δ² times fourth derivatives).
+/// (\[SAND2015-7998\] eq. (2.28) bounds the difference from the local operator by δ; of smooth fields it is δ² times fourth derivatives).
 const ORDERS: (f64, f64) = (0.8, 2.0);
 
 /// The order where two runs leave it open: that of the scenes of the calibration half, and in motion that of the dispersion of elements, lattices and steps.

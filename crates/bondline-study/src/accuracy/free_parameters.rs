@@ -131,7 +131,7 @@ impl AccuracyRequest {
             shapes.filter_map(toml::Value::as_table).cloned().collect()
         });
         let coupling = spec.coupling.is_none();
-        let typed = spec.coupling.as_ref().map(|c| c.get_ref().joining().name);
+        let typed = spec.coupling.as_ref().map(|c| c.get_ref().traits().name);
         let asked = Self {
             accuracy,
             breaks: base.breaks,

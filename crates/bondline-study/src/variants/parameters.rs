@@ -59,7 +59,7 @@ const VERSIONS: [f64; 8] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 8.0];
 /// The numbers of a scene that knobs change.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Base {
-    joining: CouplingTraits,
+    traits: CouplingTraits,
     /// δ, where it is one number.
     horizon: Option<f64>,
     /// Spacing and origin of a typed lattice.
@@ -115,9 +115,9 @@ impl Base {
         let moves = !matches!(solve, None | Some(SolveSpec::Static(_)));
         let transition = spec.zones.transition.as_ref().map(|t| t.get_ref());
         Self {
-            joining: spec.coupling.as_ref().map_or(
-                CouplingSpec::Truncated(TruncatedSpec::default()).joining(),
-                |c| c.get_ref().joining(),
+            traits: spec.coupling.as_ref().map_or(
+                CouplingSpec::Truncated(TruncatedSpec::default()).traits(),
+                |c| c.get_ref().traits(),
             ),
             horizon,
             lattice,
@@ -188,7 +188,7 @@ impl Base {
         match knob {
             "coupling" => CouplingSpec::names()
                 .iter()
-                .filter(|name| **name != self.joining.name)
+                .filter(|name| **name != self.traits.name)
                 // elements alone see no crack and break no bond
                 .filter(|name| !(**name == "local" && self.breaks))
                 .map(|name| setting((*name).to_owned(), Change::Coupling((*name).to_owned())))
@@ -277,7 +277,7 @@ impl Base {
 
     /// The scene with all spacings `factor` times as large, and peridynamics everywhere; `None` where it is already, or where nothing cuts bonds.
     pub(crate) fn everywhere(&self, factor: f64) -> Option<Vec<Change>> {
-        let is_all = matches!(self.joining.zones, ZonesNeeded::Everywhere(_));
+        let is_all = matches!(self.traits.zones, ZonesNeeded::Everywhere(_));
         (self.breaks && !is_all).then(|| {
             let all = Change::Coupling("nonlocal".to_owned());
             self.scaled(factor).into_iter().chain([all]).collect()
@@ -322,11 +322,11 @@ impl Base {
                 Change::Keys(keys) => list.extend(keys.iter().cloned()),
             }
         }
-        let mut joining = self.joining;
+        let mut traits = self.traits;
         if let Some(name) = coupling {
             list.push(format!("coupling={name}"));
             if let Some(other) = named(name) {
-                joining = other.joining();
+                traits = other.traits();
             }
         }
         let (Some(horizon), Some(spacing)) = (self.horizon, self.spacing()) else {
@@ -346,7 +346,7 @@ impl Base {
         if delta != 1.0 {
             list.push(format!("peridynamics.horizon={:e}", horizon * delta));
         }
-        self.lattice_overrides(spacing * finer, coupling.map(|_| joining), &mut list);
+        self.lattice_overrides(spacing * finer, coupling.map(|_| traits), &mut list);
         // where points lie in the cells, the two are one
         let cells = if self.lattice.is_some() {
             elements
@@ -366,7 +366,7 @@ impl Base {
         if let Some(width) = self.around.filter(|_| delta != 1.0) {
             list.push(format!("{key}.around={:e}", width * delta));
         }
-        if let ZonesNeeded::Transition { width, .. } = joining.zones
+        if let ZonesNeeded::Transition { width, .. } = traits.zones
             && !self.has_transition
         {
             // half a cell more, so that the cells make up the width

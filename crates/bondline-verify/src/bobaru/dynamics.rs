@@ -9,7 +9,7 @@ use crate::{
     },
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
 };
 
@@ -83,15 +83,15 @@ pub fn table_three() -> Table {
             let found = peak(&line, 150.0, 230.0, 270.0);
             shares[k] = 100.0 * found.amplitude / 0.01;
             let name = format!("{case} {kernel}");
-            table.push(Row::within(
+            table.push(TableRow::within(
                 &name,
                 "time at the middle",
                 found.time,
                 printed[k].0,
                 0.002,
             ));
-            let row =
-                Row::info(&name, "reflected amplitude [%]", shares[k]).with_reference(printed[k].1);
+            let row = TableRow::info(&name, "reflected amplitude [%]", shares[k])
+                .with_reference(printed[k].1);
             let near = (shares[k] / printed[k].1 - 1.0).abs() < 0.02;
             table.push(if near {
                 row
@@ -99,7 +99,7 @@ pub fn table_three() -> Table {
                 row.differs("the cells at the two changes of spacing are not stated; here each cell ends half-way to its neighbour, and there is one node more (2001, 3001)")
             });
         }
-        table.push(Row::at_least(
+        table.push(TableRow::at_least(
             case,
             "reflection constant / triangular",
             shares[0] / shares[1],
@@ -107,25 +107,25 @@ pub fn table_three() -> Table {
         ));
     }
     table.push(
-        Row::within("a 2:1", "stiffness of the coarse part, constant", modulus(Micromodulus::InverseDistance, 0.2), 0.96, 1e-12)
+        TableRow::within("a 2:1", "stiffness of the coarse part, constant", modulus(Micromodulus::InverseDistance, 0.2), 0.96, 1e-12)
             .because("the reflection is that of a change of stiffness: a midpoint rule with m = 2.5 has 0.96 of it for either micromodulus, m = 5 has 1 (constant) \
                 or 0.96 (triangular), so that in case a the triangular one meets no change, by chance and not by its continuity"),
     );
-    table.push(Row::within(
+    table.push(TableRow::within(
         "a 2:1",
         "stiffness of the fine part, constant",
         modulus(Micromodulus::InverseDistance, 0.1),
         1.0,
         1e-12,
     ));
-    table.push(Row::within(
+    table.push(TableRow::within(
         "a 2:1",
         "stiffness of the coarse part, triangular",
         modulus(Micromodulus::Triangular, 0.2),
         0.96,
         1e-12,
     ));
-    table.push(Row::within(
+    table.push(TableRow::within(
         "a 2:1",
         "stiffness of the fine part, triangular",
         modulus(Micromodulus::Triangular, 0.1),
@@ -158,9 +158,9 @@ fn push_raw(
     found: &Peak,
     (n, horizon, inside, time, amplitude): (i32, f64, i32, f64, f64),
 ) {
-    table.push(Row::within(case, "arrival", found.time, time, 1e-9));
+    table.push(TableRow::within(case, "arrival", found.time, time, 1e-9));
     // the table cuts its digits
-    table.push(Row::within(
+    table.push(TableRow::within(
         case,
         "amplitude",
         found.amplitude,
@@ -169,13 +169,14 @@ fn push_raw(
     ));
     let m = horizon * f64::from(n - 1) / 450.0;
     let family = 2.0 * (m + 1e-9).floor() + 1.0;
-    let row = Row::info(case, "nodes in the horizon", family).with_reference(f64::from(inside));
+    let row =
+        TableRow::info(case, "nodes in the horizon", family).with_reference(f64::from(inside));
     table.push(if family == f64::from(inside) {
                     row
                 } else {
                     row.differs("the printed horizon and number of nodes give another m than the printed count; the arrival times are those of the horizon")
                 });
-    table.push(Row::info(
+    table.push(TableRow::info(
         case,
         "arrival by stiffness alone, 400/sqrt(1 - 1/m^2)",
         400.0 / (1.0 - 1.0 / (m * m)).sqrt(),
@@ -185,8 +186,14 @@ fn push_raw(
 /// Rates of convergence of the arrival and the amplitude.
 fn push_rates(table: &mut Table, weights: Weights, effort: Effort, late: f64, low: f64) {
     if weights == Weights::Raw && effort == Effort::Full {
-        table.push(Row::within("raw", "rate of the arrival", late, 1.245, 0.05));
-        table.push(Row::within(
+        table.push(TableRow::within(
+            "raw",
+            "rate of the arrival",
+            late,
+            1.245,
+            0.05,
+        ));
+        table.push(TableRow::within(
             "raw",
             "rate of the amplitude",
             low,
@@ -194,8 +201,8 @@ fn push_rates(table: &mut Table, weights: Weights, effort: Effort, late: f64, lo
             0.05,
         ));
     } else if effort == Effort::Full {
-        table.push(Row::info("normalised", "rate of the arrival", late));
-        table.push(Row::info("normalised", "rate of the amplitude", low));
+        table.push(TableRow::info("normalised", "rate of the arrival", late));
+        table.push(TableRow::info("normalised", "rate of the amplitude", low));
     }
 }
 
@@ -247,9 +254,10 @@ pub fn table_four(effort: Effort) -> Table {
                     (n, horizon, inside, time, amplitude),
                 );
             } else {
-                table.push(Row::info(&case, "arrival", found.time).with_reference(time));
-                table
-                    .push(Row::info(&case, "amplitude", found.amplitude).with_reference(amplitude));
+                table.push(TableRow::info(&case, "arrival", found.time).with_reference(time));
+                table.push(
+                    TableRow::info(&case, "amplitude", found.amplitude).with_reference(amplitude),
+                );
             }
         }
         push_rates(
@@ -260,7 +268,7 @@ pub fn table_four(effort: Effort) -> Table {
             -slope(&nodes, &low),
         );
     }
-    table.push(Row::within(
+    table.push(TableRow::within(
         "initial",
         "elastic energy over E a^2/2, with omega = 1/4",
         gaussian_energy(0.25),

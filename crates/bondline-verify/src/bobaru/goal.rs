@@ -2,7 +2,7 @@
 
 use crate::bobaru::line::{Line, Rule, Sharing, Weights};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
 };
 
@@ -163,8 +163,8 @@ pub fn statics() -> Table {
         let stages = refine(&goal(watch), rule);
         for (k, s) in stages.iter().enumerate() {
             let case = format!("{name}, grid {}", k + 1);
-            table.push(Row::info(&case, "nodes", s.nodes as f64));
-            table.push(Row::info(
+            table.push(TableRow::info(&case, "nodes", s.nodes as f64));
+            table.push(TableRow::info(
                 &case,
                 "error [%]",
                 100.0 * (s.value / 0.5 - 1.0).abs(),
@@ -175,19 +175,19 @@ pub fn statics() -> Table {
         }
     }
     if let [seen, blind, uniform, ..] = last[..] {
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             "visibility of target and loads",
             "error [%]",
             100.0 * seen.1,
             0.2,
         ));
-        table.push(Row::at_least(
+        table.push(TableRow::at_least(
             "visibility of target and loads",
             "nodes of the uniform grid over these",
             uniform.0 / seen.0,
             2.0,
         ));
-        table.push(Row::at_least(
+        table.push(TableRow::at_least(
             "visibility of the target",
             "error over that with the loads in view",
             blind.1 / seen.1,

@@ -5,7 +5,7 @@ use crate::bobaru::{
     line::{Line, Rule},
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
 };
 
@@ -44,7 +44,7 @@ pub fn matrix() -> Table {
             largest = largest.max((ours[(i, j)] - PRINTED[i][j]).abs());
         }
     }
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "constant",
         "largest difference of 49 entries",
         largest,
@@ -57,11 +57,11 @@ pub fn matrix() -> Table {
     ] {
         let a = seven(kernel).dense();
         let rows = a.column_sum().amax();
-        table.push(Row::at_most(name, "largest sum of a row", rows, 1e-14));
+        table.push(TableRow::at_most(name, "largest sum of a row", rows, 1e-14));
         let mut s: Vec<f64> = a.clone().singular_values().iter().copied().collect();
         s.sort_by(f64::total_cmp);
         let condition = s[6] / s[1];
-        let row = Row::info(name, "condition number without the rigid motion", condition);
+        let row = TableRow::info(name, "condition number without the rigid motion", condition);
         table.push(match printed {
             Some(printed) => row.with_reference(printed).differs(SINGULAR),
             None => row.with_reference(1e18).differs(
@@ -70,7 +70,7 @@ pub fn matrix() -> Table {
         });
         let fixed = a.remove_row(3).remove_column(3);
         let s = fixed.singular_values();
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             "condition number with the middle node fixed",
             s.max() / s.min(),
@@ -132,12 +132,12 @@ pub fn jumps() -> Table {
             let expected = [impulse, step, -step][k];
             let value = values[k] * expected;
             table.push(if last {
-                Row::within(&case, what, value, expected, 0.03)
+                TableRow::within(&case, what, value, expected, 0.03)
             } else {
-                Row::info(&case, what, value).with_reference(expected)
+                TableRow::info(&case, what, value).with_reference(expected)
             });
         }
-        table.push(Row::within(
+        table.push(TableRow::within(
             &case,
             "peak of u at a over delta m, (34)",
             peak / (delta * m as f64),
@@ -147,7 +147,7 @@ pub fn jumps() -> Table {
     }
     for (k, what) in ["(29)", "(32)", "(33)"].iter().enumerate() {
         table.push(
-            Row::at_least(
+            TableRow::at_least(
                 *what,
                 "order in 1/m between m = 16 and 64",
                 (errors[0][k] / errors[2][k]).ln() / 4f64.ln(),

@@ -6,7 +6,7 @@ use crate::bobaru::{
     slope,
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
 };
 
@@ -210,20 +210,21 @@ pub fn table_one() -> Table {
             let norms: Vec<f64> = found.iter().map(|e| e.norm).collect();
             for i in 0..4 {
                 table.push(
-                    Row::info(&case, format!("error, {} nodes", NODES[i]), errors[i])
+                    TableRow::info(&case, format!("error, {} nodes", NODES[i]), errors[i])
                         .with_reference(p.printed[k][i])
                         .differs(GEOMETRY),
                 );
             }
             worst[k] = norms.iter().copied().fold(0.0, f64::max);
-            table.push(Row::info(&case, "2-norm of the error, 801 nodes", norms[3]));
-            table.push(Row::info(&case, "rate of the 2-norm", rate(&NODES, &norms)));
+            let told = |what: &str, value: f64| TableRow::info(&case, what, value);
+            table.push(told("2-norm of the error, 801 nodes", norms[3]));
+            table.push(told("rate of the 2-norm", rate(&NODES, &norms)));
             table.push(
-                Row::info(&case, "rate in the number of nodes", rate(&NODES, &errors))
+                TableRow::info(&case, "rate in the number of nodes", rate(&NODES, &errors))
                     .with_reference(p.rates[k])
                     .differs(GEOMETRY),
             );
-            table.push(Row::within(
+            table.push(TableRow::within(
                 &case,
                 "rate of the printed errors",
                 rate(&NODES, &p.printed[k]),
@@ -239,7 +240,7 @@ pub fn table_one() -> Table {
             ..PLAIN
         };
         table.push(
-            Row::info(
+            TableRow::info(
                 format!("{} triangular", p.name),
                 "2-norm with forces in pairs, 801 nodes",
                 error(grid.x, &grid.horizon, pairs, p.at).norm,
@@ -247,7 +248,7 @@ pub fn table_one() -> Table {
             .because(PAIRS),
         );
         table.push(
-            Row::at_least(
+            TableRow::at_least(
                 p.name,
                 "largest 2-norm of the four grids, constant / triangular",
                 worst[0] / worst[1],
@@ -314,7 +315,7 @@ pub fn table_two() -> Table {
             };
             for i in 0..4 {
                 all[g][k][i] = errors_of(g, i, ratio, rule);
-                let row = Row::info(
+                let row = TableRow::info(
                     &case,
                     format!("error, {} nodes", NODES[i]),
                     all[g][k][i].point,
@@ -329,10 +330,11 @@ pub fn table_two() -> Table {
             }
             let reason = if g == 0 { UNIFORM } else { REFINED };
             let norms = all[g][k].map(|e| e.norm);
-            table.push(Row::info(&case, "2-norm of the error, 801 nodes", norms[3]));
-            table.push(Row::info(&case, "rate of the 2-norm", rate(&NODES, &norms)));
+            let told = |what: &str, value: f64| TableRow::info(&case, what, value);
+            table.push(told("2-norm of the error, 801 nodes", norms[3]));
+            table.push(told("rate of the 2-norm", rate(&NODES, &norms)));
             table.push(
-                Row::info(
+                TableRow::info(
                     &case,
                     "rate in the number of nodes",
                     rate(&NODES, &all[g][k].map(|e| e.point)),
@@ -340,7 +342,7 @@ pub fn table_two() -> Table {
                 .with_reference(rates[g][k])
                 .differs(reason),
             );
-            table.push(Row::within(
+            table.push(TableRow::within(
                 &case,
                 "rate of the printed errors",
                 rate(&NODES, &printed[g][k]),
@@ -353,7 +355,7 @@ pub fn table_two() -> Table {
         for (g, name) in [(1, "double"), (2, "quadruple")] {
             let gain = |i: usize| all[0][k][i].norm / all[g][k][i].norm;
             let mean = (0..4).map(|i| gain(i).ln()).sum::<f64>() / 4.0;
-            table.push(Row::at_least(
+            table.push(TableRow::at_least(
                 format!("{name} {kernel}"),
                 "2-norm uniform / graded, geometric mean of the four",
                 mean.exp(),

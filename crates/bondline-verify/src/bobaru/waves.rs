@@ -12,7 +12,7 @@ use crate::{
     },
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
 };
 
@@ -196,19 +196,19 @@ pub fn table_five(effort: Effort) -> Table {
             ];
             for (what, value, reference, limit) in rows {
                 table.push(match name {
-                    "as stated" => Row::info(&case, what, value)
+                    "as stated" => TableRow::info(&case, what, value)
                         .with_reference(reference)
                         .differs(READING),
-                    "25 %, new nodes" => Row::within(&case, what, value, reference, limit),
-                    _ => Row::info(&case, what, value).with_reference(reference),
+                    "25 %, new nodes" => TableRow::within(&case, what, value, reference, limit),
+                    _ => TableRow::info(&case, what, value).with_reference(reference),
                 });
             }
-            table.push(Row::info(
+            table.push(TableRow::info(
                 &case,
                 "largest jump of the energy at a change",
                 r.jump,
             ));
-            table.push(Row::info(
+            table.push(TableRow::info(
                 &case,
                 "change of the energy over the run",
                 r.drift,
@@ -220,7 +220,7 @@ pub fn table_five(effort: Effort) -> Table {
                 .map(|p| 0.5 * (p.range.0 + p.range.1) as f64)
                 .collect();
             let late: Vec<f64> = runs.iter().map(|r| r.peak.time - 400.0).collect();
-            table.push(Row::within(
+            table.push(TableRow::within(
                 name,
                 "rate of the arrival",
                 -slope(&nodes, &late),
@@ -302,14 +302,14 @@ fn push_refined(table: &mut Table, name: &str, k: usize, base: &Outcome, r: &Out
     let ratio = base.point_steps as f64 / r.point_steps as f64;
     let error = r.error / base.error;
     if k == 1 {
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             name,
             "largest jump of the energy at a change",
             r.jump,
             1e-4,
         ));
         table.push(
-            Row::at_most(
+            TableRow::at_most(
                 name,
                 "largest jump of the momentum at a change",
                 r.momentum,
@@ -317,25 +317,25 @@ fn push_refined(table: &mut Table, name: &str, k: usize, base: &Outcome, r: &Out
             )
             .because("over 0.01, the amplitude of the wave times its speed"),
         );
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             name,
             "error over that of the uniform grid",
             error,
             1.05,
         ));
-        table.push(Row::at_least(
+        table.push(TableRow::at_least(
             name,
             "node steps of the uniform grid over these",
             ratio,
             2.0,
         ));
     } else {
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             "largest jump of the energy at a change",
             r.jump,
         ));
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             "error over that of the uniform grid",
             error,
@@ -358,15 +358,15 @@ pub fn refinement() -> Table {
         "25 %, every 64 steps, source rule",
     ];
     for (k, (name, r)) in names.into_iter().zip(&runs).enumerate() {
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             "error of u against d'Alembert, L2",
             r.error,
         ));
-        table.push(Row::info(name, "node steps", r.point_steps as f64));
-        let drift = Row::info(name, "largest change of the energy over the run", r.drift);
+        table.push(TableRow::info(name, "node steps", r.point_steps as f64));
+        let drift = TableRow::info(name, "largest change of the energy over the run", r.drift);
         if k < 2 {
-            table.push(Row::at_most(
+            table.push(TableRow::at_most(
                 name,
                 "largest change of the energy over the run",
                 r.drift,
@@ -382,7 +382,11 @@ pub fn refinement() -> Table {
         if k == 0 {
             continue;
         }
-        table.push(Row::info(name, "changes of the grid", r.changes as f64));
+        table.push(TableRow::info(
+            name,
+            "changes of the grid",
+            r.changes as f64,
+        ));
         push_refined(&mut table, name, k, base, r);
     }
     table

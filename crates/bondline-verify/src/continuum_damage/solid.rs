@@ -3,7 +3,7 @@
 use super::{SHOWN, THROUGH, extent, reaches};
 use crate::observed::{Seen, run_scene_with};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 
@@ -65,37 +65,49 @@ fn growth(seen: &Seen) -> [f64; 2] {
 fn phases(damaged: &Seen, table: &mut Table) {
     let case = "continuum damage";
     let at = |level: usize, strain: f64| extent(damaged, LEVELS[level], strain);
-    table.push(Row::at_least(
+    table.push(TableRow::at_least(
         case,
         "damaged at 0.0057",
         at(0, SHOWN[0]),
         1.0,
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         case,
         "cracked at 0.0057",
         at(1, SHOWN[0]),
         5.0,
     ));
     let [begun, ended] = growth(damaged);
-    table.push(Row::info(case, "strain of the first damage", begun));
-    table.push(Row::at_most(
+    table.push(TableRow::info(case, "strain of the first damage", begun));
+    table.push(TableRow::at_most(
         case,
         "strain when cracked through",
         ended,
         SHOWN[1],
     ));
-    table.push(Row::at_least(case, "strain between", ended - begun, 0.002));
-    table.push(Row::info(case, "seconds", damaged.seconds));
+    table.push(TableRow::at_least(
+        case,
+        "strain between",
+        ended - begun,
+        0.002,
+    ));
+    table.push(TableRow::info(case, "seconds", damaged.seconds));
     let case = "critical stretch";
     match alone(Some(BRITTLE)) {
         Ok(seen) => {
             let [begun, ended] = growth(&seen);
-            table.push(Row::info(case, "strain of the first damage", begun));
-            table.push(Row::info(case, "strain when cracked through", ended));
-            table.push(Row::at_most(case, "strain between", ended - begun, 0.0012));
+            table.push(TableRow::info(case, "strain of the first damage", begun));
+            table.push(TableRow::info(case, "strain when cracked through", ended));
+            table.push(TableRow::at_most(
+                case,
+                "strain between",
+                ended - begun,
+                0.0012,
+            ));
         }
-        Err(why) => table.push(Row::at_most(case, "strain between", f64::NAN, 0.0).because(why)),
+        Err(why) => {
+            table.push(TableRow::at_most(case, "strain between", f64::NAN, 0.0).because(why))
+        }
     }
 }
 
@@ -104,7 +116,9 @@ fn coupled(damaged: &Seen, table: &mut Table) {
     let case = "elements in the ends";
     let seen = match plate(SCENE, &[]) {
         Ok(seen) => seen,
-        Err(why) => return table.push(Row::at_most(case, "extent", f64::NAN, 0.0).because(why)),
+        Err(why) => {
+            return table.push(TableRow::at_most(case, "extent", f64::NAN, 0.0).because(why));
+        }
     };
     let [_, alone] = growth(damaged);
     let [_, ended] = growth(&seen);
@@ -117,21 +131,36 @@ fn coupled(damaged: &Seen, table: &mut Table) {
             each.fold(0.0, f64::max)
         };
         let quantity = format!("{what}, most beside points alone up to 0.0065 [mm]");
-        table.push(Row::at_most(case, &quantity, off(0.0065), EXTENT_LIMIT));
+        table.push(TableRow::at_most(
+            case,
+            &quantity,
+            off(0.0065),
+            EXTENT_LIMIT,
+        ));
         let quantity = format!("{what}, most beside points alone until cracked through [mm]");
-        table.push(Row::info(case, &quantity, off(alone)));
+        table.push(TableRow::info(case, &quantity, off(alone)));
     }
     let quantity = "strain when cracked through";
-    table.push(Row::within(case, quantity, ended, alone, FRACTURE_LIMIT));
+    table.push(TableRow::within(
+        case,
+        quantity,
+        ended,
+        alone,
+        FRACTURE_LIMIT,
+    ));
     let ratio = seen.seconds / damaged.seconds;
-    table.push(Row::info(case, "time over that of points alone", ratio));
+    table.push(TableRow::info(
+        case,
+        "time over that of points alone",
+        ratio,
+    ));
     // the modulus of a continuous body, which five layers do not have
     let whole = "materials.ends.bond-based.youngs-modulus=140e3";
     if let Ok(stiff) = plate(SCENE, &[whole]) {
         let [_, ended] = growth(&stiff);
         let quantity = "strain when cracked through, with E in the elements";
-        table.push(Row::info(case, quantity, ended));
-        table.push(Row::info(
+        table.push(TableRow::info(case, quantity, ended));
+        table.push(TableRow::info(
             case,
             "its shift, of that of points alone",
             ended / alone - 1.0,
@@ -151,7 +180,7 @@ pub fn plates(progress: &dyn Progress) -> Table {
             phases(&damaged, &mut table);
             coupled(&damaged, &mut table);
         }
-        Err(why) => table.push(Row::at_most("plate", "extent", f64::NAN, 0.0).because(why)),
+        Err(why) => table.push(TableRow::at_most("plate", "extent", f64::NAN, 0.0).because(why)),
     }
     table
 }

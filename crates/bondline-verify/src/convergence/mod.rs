@@ -21,7 +21,7 @@ pub mod transform;
 
 use crate::Effort;
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 use study::{KERNELS, Study, grid_sizes};
@@ -83,11 +83,11 @@ fn figures<const D: usize>(study: &Study) -> Table {
     for curve in &study.curves {
         let case = format!("{D}D {}", curve.name::<D>());
         if let Some(why) = &curve.failure {
-            table.push(Row::refused(case, "median, nodal L2", why.clone()));
+            table.push(TableRow::refused(case, "median, nodal L2", why.clone()));
             continue;
         }
         for norm in study::Norm::ALL {
-            table.push(Row::info(
+            table.push(TableRow::info(
                 &case,
                 format!("median, {}", norm.name()),
                 curve.median(norm),
@@ -107,11 +107,11 @@ fn figures<const D: usize>(study: &Study) -> Table {
 }
 
 /// An order; a kernel that is exact at some N (1D, α = 1, exact lengths at whole δ/h) has none.
-fn order_row(case: &str, quantity: String, order: f64) -> Row {
+fn order_row(case: &str, quantity: String, order: f64) -> TableRow {
     if order.is_finite() {
-        Row::info(case, quantity, order)
+        TableRow::info(case, quantity, order)
     } else {
-        Row::refused(
+        TableRow::refused(
             case,
             quantity,
             "the error is zero at some N, so that there is no order",

@@ -7,7 +7,7 @@ use super::{
     study::{FIT_FROM, KERNELS, Kernel, Norm, Study, grid_sizes},
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::{
         PartialVolume::{Exact, Full, Hhb, PdLammps},
         influence::{Alpha, Degree},
@@ -55,12 +55,12 @@ pub(super) fn residuals<const D: usize>() -> Table {
                 .map(|n| residual::<D>(&kernel.discretisation(n, alpha)).map(f64::abs))
                 .collect();
             match all {
-                Err(why) => table.push(Row::refused(name, "median", why.to_string())),
+                Err(why) => table.push(TableRow::refused(name, "median", why.to_string())),
                 Ok(all) => {
                     let middle = median(all.iter().copied());
                     let largest = all.iter().copied().fold(0.0, f64::max);
-                    table.push(Row::info(&name, "median", middle));
-                    table.push(Row::info(&name, "largest", largest));
+                    table.push(TableRow::info(&name, "median", middle));
+                    table.push(TableRow::info(&name, "largest", largest));
                     medians.push((kernel, middle));
                 }
             }
@@ -75,13 +75,13 @@ pub(super) fn residuals<const D: usize>() -> Table {
         let (hhb, exact) = (of(Hhb, Degree::P0), of(Exact, Degree::P0));
         let case = format!("{D}D alpha = {}, P0", alpha.exponent());
         let rough = full.min(ramp);
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             &case,
             "HHB over the better of full and PDLAMMPS",
             hhb / rough,
             1.0,
         ));
-        table.push(Row::at_most(&case, "exact over HHB", exact / hhb, 1.0));
+        table.push(TableRow::at_most(&case, "exact over HHB", exact / hhb, 1.0));
     }
     table
 }
@@ -125,7 +125,7 @@ fn accuracy<const D: usize>(study: &Study, table: &mut Table) {
                 .map(|(a, b)| (a.1 - b.1).abs())
                 .fold(0.0, f64::max);
             table.push(
-                Row::at_most(
+                TableRow::at_most(
                     format!("{} against {}", h.name::<D>(), e.name::<D>()),
                     "largest difference of errors, nodal L2",
                     largest,
@@ -136,7 +136,7 @@ fn accuracy<const D: usize>(study: &Study, table: &mut Table) {
         }
         if let (Some(p), Some(f)) = (of(PdLammps, Degree::P0), of(Full, Degree::P0)) {
             table.push(
-                Row::info(
+                TableRow::info(
                     format!("{} against {}", p.name::<D>(), f.name::<D>()),
                     "ratio of median errors, nodal L2",
                     p.median(norm) / f.median(norm),
@@ -163,10 +163,10 @@ fn accuracy<const D: usize>(study: &Study, table: &mut Table) {
     }
 }
 
-fn ratio_row(case: String, quantity: &str, ratio: f64, limit: Option<f64>) -> Row {
+fn ratio_row(case: String, quantity: &str, ratio: f64, limit: Option<f64>) -> TableRow {
     match limit {
-        Some(limit) => Row::at_most(case, quantity, ratio, limit),
-        None => Row::info(case, quantity, ratio),
+        Some(limit) => TableRow::at_most(case, quantity, ratio, limit),
+        None => TableRow::info(case, quantity, ratio),
     }
 }
 
@@ -186,20 +186,20 @@ fn orders<const D: usize>(study: &Study, table: &mut Table) {
             let quantity = format!("order, {}, N >= {FIT_FROM}", norm.name());
             let order = curve.order(norm);
             table.push(match (D, alpha) {
-                (1, Alpha::Zero) => Row::within(&name, quantity, order, 1.0, FIRST_ORDER),
-                (1, Alpha::One) => Row::at_least(&name, quantity, order, 1.0),
-                _ => Row::within(&name, quantity, order, 1.0, FIRST_ORDER_ROUGH),
+                (1, Alpha::Zero) => TableRow::within(&name, quantity, order, 1.0, FIRST_ORDER),
+                (1, Alpha::One) => TableRow::at_least(&name, quantity, order, 1.0),
+                _ => TableRow::within(&name, quantity, order, 1.0, FIRST_ORDER_ROUGH),
             });
             if D == 1 {
                 let rises = if curve.is_monotone(norm) { 0.0 } else { 1.0 };
-                table.push(Row::at_most(
+                table.push(TableRow::at_most(
                     &name,
                     format!("error rises somewhere, {}, N >= {FIT_FROM}", norm.name()),
                     rises,
                     0.0,
                 ));
             }
-            table.push(Row::info(
+            table.push(TableRow::info(
                 &name,
                 format!("order, nodal L2, N >= {FIT_FROM}"),
                 curve.order(Norm::Nodal),
@@ -219,18 +219,22 @@ fn times<const D: usize>(study: &Study, table: &mut Table) {
     let most = |f: &dyn Fn(&super::problem::Outcome) -> f64| {
         at.iter().map(|o| f(&o.1)).fold(0.0, f64::max)
     };
-    table.push(Row::info(&case, "inner points", most(&|o| o.points as f64)));
-    table.push(Row::info(
+    table.push(TableRow::info(
+        &case,
+        "inner points",
+        most(&|o| o.points as f64),
+    ));
+    table.push(TableRow::info(
         &case,
         "directed bonds, most",
         most(&|o| o.bonds as f64),
     ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         &case,
         "iterations, median",
         median(at.iter().map(|o| o.1.iterations as f64)),
     ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         &case,
         "seconds a solve, most",
         most(&|o| o.time.as_secs_f64()),

@@ -48,7 +48,7 @@ fn hermite(n: usize, x: f64) -> (f64, f64) {
 /// How the bar is discretised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Gauss–Hermite quadrature, eq. (2.2).
+    /// Gauss–Hermite quadrature, \[EmmrichWeckner2007\] eq. (2.2).
     GaussHermite,
     /// Composite midpoint rule.
     Midpoint,
@@ -149,7 +149,7 @@ impl Bar {
         (&self.modes * u, &self.modes * v)
     }
 
-    /// Kinetic and elastic energy, eq. (2.3).
+    /// Kinetic and elastic energy, \[EmmrichWeckner2007\] eq. (2.3).
     pub fn energies(&self, tau: f64) -> (f64, f64) {
         let (u, v) = self.at(tau);
         (

@@ -24,7 +24,7 @@ pub(super) fn integrand(omega: f64, zeta: f64, tau: f64, lambda: f64) -> f64 {
         * (2.0 * tau / lambda * root).cos()
 }
 
-/// The exact displacement, eq. (3.1).
+/// The exact displacement, \[EmmrichWeckner2007\] eq. (3.1).
 ///
 /// The integrand is an even entire function of ω below `exp(−ω²)`, so that the trapezoidal rule converges faster than any power of its step.
 pub fn exact(zeta: f64, tau: f64, lambda: f64) -> f64 {

@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 use crate::Effort;
 use bar::{Bar, Method};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 use closed_form::{LAMBDA, energy_ratio, exact, exact_adaptive, initial, micromodulus};
@@ -33,14 +33,14 @@ fn solution() -> Table {
             largest = largest.max(difference.abs());
         }
     }
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "lambda = 0.75",
         "(3.1) against adaptive quadrature, 49 places and times",
         largest,
         1e-10,
     ));
     let start = [0.0, 0.4, 1.3, 3.0].map(|z| (exact(z, 0.0, LAMBDA) - initial(z)).abs());
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "lambda = 0.75",
         "(3.1) at tau = 0 against the initial displacement",
         start.into_iter().fold(0.0, f64::max),
@@ -50,7 +50,7 @@ fn solution() -> Table {
         let wave = 0.5 * (initial(z - 2.0) + initial(z + 2.0));
         (exact(z, 2.0, 1e-4) - wave).abs()
     });
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "lambda = 1e-4",
         "(3.1) at tau = 2 against d'Alembert",
         dalembert.into_iter().fold(0.0, f64::max),
@@ -68,7 +68,7 @@ fn solution() -> Table {
             })
             .sum();
         let classical = PI.sqrt() / (2.0 * 2f64.sqrt());
-        table.push(Row::within(
+        table.push(TableRow::within(
             format!("lambda = {lambda}"),
             "f(lambda), closed form against the energy by Fourier",
             energy_ratio(lambda),
@@ -76,14 +76,14 @@ fn solution() -> Table {
             1e-10,
         ));
     }
-    table.push(Row::within(
+    table.push(TableRow::within(
         "lambda -> 0",
         "f",
         energy_ratio(1e-4),
         1.0,
         1e-7,
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "lambda -> infinity",
         "f",
         energy_ratio(1e4),
@@ -97,7 +97,7 @@ fn compare(table: &mut Table, between: &[[f64; 2]]) {
     if let [hermite, midpoint, elements, half_hats] = *between {
         for (k, time) in ["tau = 2", "tau = 8"].into_iter().enumerate() {
             table.push(
-                Row::info(
+                TableRow::info(
                     time,
                     "error midpoint / Gauss-Hermite",
                     midpoint[k] / hermite[k],
@@ -105,7 +105,7 @@ fn compare(table: &mut Table, between: &[[f64; 2]]) {
                 .because("the text: almost the same accuracy, Gauss-Hermite somewhat better"),
             );
             let ratio = elements[k] / hermite[k];
-            let row = Row::info(time, "error elements / Gauss-Hermite", ratio);
+            let row = TableRow::info(time, "error elements / Gauss-Hermite", ratio);
             table.push(if ratio < 1.0 {
                 row.because("the text: elements are best")
             } else {
@@ -114,7 +114,7 @@ fn compare(table: &mut Table, between: &[[f64; 2]]) {
                     the ends do not add up to 0 and hold the bar there; half hats do not",
                 )
             });
-            table.push(Row::info(
+            table.push(TableRow::info(
                 time,
                 "error half hats / whole hats",
                 half_hats[k] / elements[k],
@@ -135,15 +135,15 @@ fn discretisations(n: usize) -> Table {
     let mut between = Vec::new();
     for method in Method::ALL {
         let Some(bar) = Bar::new(method, n) else {
-            table.push(Row::info(method.name(), "mass matrix", f64::NAN));
+            table.push(TableRow::info(method.name(), "mass matrix", f64::NAN));
             continue;
         };
         let name = method.name();
         let row_sum = bar.largest_row_sum();
         table.push(match method {
-            Method::Elements => Row::info(name, "largest sum of a row of K", row_sum)
+            Method::Elements => TableRow::info(name, "largest sum of a row of K", row_sum)
                 .because("remark 1: approximately zero; the rows at the ends are not"),
-            _ => Row::at_most(name, "largest sum of a row of K", row_sum, 1e-12),
+            _ => TableRow::at_most(name, "largest sum of a row of K", row_sum, 1e-12),
         });
         let (kinetic, elastic) = bar.energies(0.0);
         let first = kinetic + elastic;
@@ -153,25 +153,25 @@ fn discretisations(n: usize) -> Table {
                 ((kinetic + elastic) / first - 1.0).abs()
             })
             .fold(0.0, f64::max);
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             name,
             "change of the energy, tau <= 20",
             drift,
             1e-10,
         ));
-        table.push(Row::info(name, "energy at tau = 0", first).with_reference(total));
+        table.push(TableRow::info(name, "energy at tau = 0", first).with_reference(total));
         for tau in [1.0, 2.0, 4.0, 8.0, 16.0] {
             let value = bar.error(tau);
             let quantity = format!("error at the nodes, tau = {tau}");
             let sharp = method == Method::GaussHermite && n == 99 && tau == 4.0;
             table.push(if sharp {
-                Row::at_most(name, quantity, value, 1e-9)
+                TableRow::at_most(name, quantity, value, 1e-9)
             } else {
-                Row::info(name, quantity, value)
+                TableRow::info(name, quantity, value)
             });
         }
         if method == Method::GaussHermite && n == 99 {
-            table.push(Row::at_most(
+            table.push(TableRow::at_most(
                 name,
                 "largest error at a node, tau = 4",
                 bar.largest_error(4.0),
@@ -179,7 +179,7 @@ fn discretisations(n: usize) -> Table {
             ));
         }
         let e = bar.error_between(2.0);
-        table.push(Row::info(
+        table.push(TableRow::info(
             name,
             "error of the function linear between nodes, tau = 2",
             e,
@@ -206,10 +206,10 @@ fn misprint() -> Table {
             h * h * all - all
         };
         let largest = (0..n).map(|i| row(i).abs()).fold(0.0, f64::max);
-        table.push(Row::info("as printed", "largest sum of a row of K", largest).differs(
+        table.push(TableRow::info("as printed", "largest sum of a row of K", largest).differs(
             "printed: h^2 sum_k C_ik delta_ij - C_ij; meant: h^2 (sum_k C_ik delta_ij - C_ij), whose rows add up to 0 as remark 1 says",
         ));
-        table.push(Row::at_most(
+        table.push(TableRow::at_most(
             "with the parenthesis",
             "largest sum of a row of K",
             bar.largest_row_sum(),

@@ -15,7 +15,7 @@ use crate::{
     variable_horizon::{BarLaw, BarModel, linear_scale, profile},
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::Progress,
 };
@@ -49,11 +49,11 @@ fn push_ramp(table: &mut Table, rule: &[(f64, f64)]) {
     }
     let spread =
         gaps.iter().copied().fold(0.0, f64::max) - gaps.iter().copied().fold(1.0, f64::min);
-    table.push(Row::info("slope 0.3 kept, u = x", "stress, pd - ps", gaps[2]).differs(
+    table.push(TableRow::info("slope 0.3 kept, u = x", "stress, pd - ps", gaps[2]).differs(
         "(2.23) bounds it by delta |grad T1|, which is 0 under a uniform strain; a linear ramp leaves a constant stress difference of the order of the squared slope, \
          whatever the horizon. No ghost force follows (its divergence is 0), but pd and ps stresses do not meet",
     ));
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "slope 0.3 kept, u = x",
         "its spread over three horizons",
         spread,
@@ -106,16 +106,20 @@ fn orders() -> Table {
             }
         }
         table.push(
-            Row::at_most(case, "div of (2.8) against (2.5), largest", balance, 1e-9)
+            TableRow::at_most(case, "div of (2.8) against (2.5), largest", balance, 1e-9)
                 .because("independent: the stress counts crossing bonds, the force those that end at the point"),
         );
         for (name, d) in names.into_iter().zip(&differences) {
             table.push(
-                Row::at_least(case, format!("{name}: order"), slope(&eps, d), 0.95)
+                TableRow::at_least(case, format!("{name}: order"), slope(&eps, d), 0.95)
                     .with_reference(1.0)
                     .because("stated: O(delta) at least; in one dimension odd moments vanish or come with the slope of the horizon, which is of order eps too"),
             );
-            table.push(Row::info(case, format!("{name}: at eps = 0.025"), d[3]));
+            table.push(TableRow::info(
+                case,
+                format!("{name}: at eps = 0.025"),
+                d[3],
+            ));
         }
     }
     push_ramp(&mut table, &rule);
@@ -143,11 +147,11 @@ fn push_models(table: &mut Table, progress: &dyn Progress) {
                 let largest = bar.linear.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
                 let value = largest / linear_scale();
                 match model {
-                    BarModel::PartialStress => Row::at_most(case, what, value, 1e-8),
-                    BarModel::Standard => Row::info(case, what, value),
+                    BarModel::PartialStress => TableRow::at_most(case, what, value, 1e-8),
+                    BarModel::Standard => TableRow::info(case, what, value),
                 }
             }
-            Err(e) => Row::refused(case, what, e.to_string()),
+            Err(e) => TableRow::refused(case, what, e.to_string()),
         });
     }
 }
@@ -171,7 +175,7 @@ fn ghost_force(progress: &dyn Progress) -> Table {
     for ramp in [0.0, 0.1, 0.3, -0.3, 0.6] {
         largest = largest.max(force(&|x| 0.2 + ramp * x, 0.05).abs());
     }
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "linear ramps of slope up to 0.6",
         "largest ghost force",
         largest,
@@ -182,20 +186,20 @@ fn ghost_force(progress: &dyn Progress) -> Table {
         .iter()
         .map(|k| force(&|x| 0.2 + 0.3 * x + 0.5 * k * x * x, 0.0))
         .collect();
-    table.push(Row::within(
+    table.push(TableRow::within(
         "slope 0.3, delta'' from 0.1 to 0.00625",
         "order in delta''",
         slope(&curvatures, &forces),
         1.0,
         0.02,
     ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         "slope 0.3",
         "ghost force over delta''",
         forces[4] / curvatures[4],
     ));
     table.push(
-        Row::at_most(
+        TableRow::at_most(
             "slope 0, delta'' = 0.4",
             "ghost force",
             force(&|x| 0.2 + 0.2 * x * x, 0.0).abs(),
@@ -209,7 +213,7 @@ fn ghost_force(progress: &dyn Progress) -> Table {
         .map(|e| force(&|x| e * (1.0 + 0.3 * (1.7 * x).sin()), 0.4))
         .collect();
     table.push(
-        Row::within(
+        TableRow::within(
             "delta = eps d(x)",
             "order in eps",
             slope(&eps, &shrinking),
@@ -223,7 +227,7 @@ fn ghost_force(progress: &dyn Progress) -> Table {
         horizon: &|x| 0.2 + 0.3 * x + 0.2 * x * x,
         rule: &rule,
     };
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "slope 0.3, delta'' = 0.4",
         "partial stress: its force",
         bar.partial_force(0.0).abs(),
@@ -292,12 +296,16 @@ fn figure() -> Table {
                 ghost_strain(spacing, Sharing::Mean, |x| figure_horizon(x, smooth));
             strains[k][l] = strain;
             let case = format!("{name}, dx = {spacing}");
-            table.push(Row::info(&case, "largest ghost strain", strain));
-            table.push(Row::info(&case, "largest ghost force under u = x", force));
+            table.push(TableRow::info(&case, "largest ghost strain", strain));
+            table.push(TableRow::info(
+                &case,
+                "largest ghost force under u = x",
+                force,
+            ));
         }
     }
     table.push(
-        Row::at_least(
+        TableRow::at_least(
             "dx = 0.02",
             "ghost strain, piecewise linear / cubic",
             strains[0][1] / strains[1][1],
@@ -308,17 +316,17 @@ fn figure() -> Table {
     let step = |x: f64| if x < 0.0 { 1.0 } else { 0.4 };
     let (strain, force) = ghost_strain(0.04, Sharing::Source, step);
     table.push(
-        Row::at_most("splice of 1 and 0.4, dx = 0.04", "largest ghost strain", strain, 1e-11)
+        TableRow::at_most("splice of 1 and 0.4, dx = 0.04", "largest ghost strain", strain, 1e-11)
             .because("section 2.5: each point with its own horizon for both ends of a bond; the source-node rule of Bobaru 2009 is this splice"),
     );
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         "splice of 1 and 0.4, dx = 0.04",
         "largest ghost force under u = x",
         force,
         1e-11,
     ));
     let (strain, _) = ghost_strain(0.04, Sharing::Mean, step);
-    table.push(Row::info(
+    table.push(TableRow::info(
         "step from 1 to 0.4, dx = 0.04",
         "largest ghost strain of standard peridynamics",
         strain,
@@ -366,11 +374,11 @@ fn blending_bound() -> Table {
             }
             let case = format!("beta {name}, delta = {delta}");
             table.push(
-                Row::at_most(&case, "largest remainder / bound", largest, 1.0).because(
+                TableRow::at_most(&case, "largest remainder / bound", largest, 1.0).because(
                     "read as d^6 (d+2)/12 Lambda/3 {...}: printed with Lambda twice, which has the wrong unit; sup of u'''' over the family",
                 ),
             );
-            table.push(Row::info(
+            table.push(TableRow::info(
                 &case,
                 "mean remainder / mean bound",
                 mean.0 / mean.1,

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::Effort;
 use crate::meshes::gmsh;
-use bondline::observe::report::Row;
+use bondline::observe::report::TableRow;
 
 /// Relative residual that every solution must reach.
 const RESIDUAL_LIMIT: f64 = 1e-10;
@@ -91,7 +91,7 @@ fn series(samples: &[f64], modulus: f64) -> f64 {
     most / 0.01
 }
 
-pub(super) fn rows(_: Effort) -> Vec<Row> {
+pub(super) fn rows(_: Effort) -> Vec<TableRow> {
     let folder = std::env::temp_dir().join(format!("bondline-contrast-{}", std::process::id()));
     let written = std::fs::create_dir_all(&folder)
         .and_then(|()| std::fs::write(folder.join("contrast.msh"), mesh()));
@@ -104,7 +104,7 @@ pub(super) fn rows(_: Effort) -> Vec<Row> {
     rows
 }
 
-fn measured(folder: &Path) -> Vec<Row> {
+fn measured(folder: &Path) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for coupling in METHODS {
         for modulus in [1e-8, 1e-4, 1e4, 1e8] {
@@ -124,7 +124,7 @@ fn measured(folder: &Path) -> Vec<Row> {
                         RESIDUAL_LIMIT,
                     ));
                     let quantity = "largest distance from two springs in series";
-                    rows.push(Row::at_most(&case, quantity, off, EXACT_LIMIT));
+                    rows.push(TableRow::at_most(&case, quantity, off, EXACT_LIMIT));
                 }
             }
         }

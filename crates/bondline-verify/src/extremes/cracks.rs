@@ -6,7 +6,7 @@ use super::{
 };
 use crate::Effort;
 use bondline::coupling::Sampler;
-use bondline::observe::report::Row;
+use bondline::observe::report::TableRow;
 use bondline::observe::summary::MotionSummary;
 use bondline::run::warnings;
 use bondline::scene::Source;
@@ -57,7 +57,7 @@ fn change((a, b): (MotionSummary, MotionSummary)) -> f64 {
 }
 
 /// A piece within the zone that cracks cut off on all sides, under a load: the rest is as if it were not there.
-pub(super) fn pieces(_: Effort) -> Vec<Row> {
+pub(super) fn pieces(_: Effort) -> Vec<TableRow> {
     let void = "[voids.piece.inside.box]\nmin = [0.4, 0.4]\nmax = [0.6, 0.6]\n";
     let mut rows = Vec::new();
     for coupling in METHODS.iter().chain(&["nonlocal"]) {
@@ -122,7 +122,7 @@ fn parted(coupling: &'static str, method: &str, bonds: &str) -> Result<MotionSum
 }
 
 /// Bodies torn apart: no energy is left.
-pub(super) fn torn(effort: Effort) -> Vec<Row> {
+pub(super) fn torn(effort: Effort) -> Vec<TableRow> {
     let mut cases = vec![("nonlocal", "relaxation", "exact")];
     for coupling in [
         "nonlocal",
@@ -174,7 +174,7 @@ fn slit(coupling: &str, cells: usize, ratio: usize, horizons: f64) -> String {
 }
 
 /// How far a slit opens where the seam comes near, against a seam three horizons off.
-pub(super) fn beside_seam(effort: Effort) -> Vec<Row> {
+pub(super) fn beside_seam(effort: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     let finenesses: &[(usize, usize)] = match effort {
         Effort::Quick => &[(60, 2)],
@@ -212,7 +212,7 @@ pub(super) fn beside_seam(effort: Effort) -> Vec<Row> {
                 let quantity = "opening: change";
                 rows.push(match change {
                     Ok(change) if horizons <= warned => {
-                        Row::info(case, quantity, change).because("a warning tells")
+                        TableRow::info(case, quantity, change).because("a warning tells")
                     }
                     change => kept(&case, quantity, change, SEAM_LIMIT),
                 });

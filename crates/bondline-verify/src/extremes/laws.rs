@@ -5,7 +5,7 @@ use super::{
     kept, refused,
 };
 use crate::Effort;
-use bondline::observe::report::Row;
+use bondline::observe::report::TableRow;
 
 /// Relative residual that every solution must reach.
 pub const RESIDUAL_LIMIT: f64 = 1e-10;
@@ -16,7 +16,7 @@ pub const CONTINUITY_LIMIT: f64 = 1e-6;
 /// The same where cells change their role at a whole m.
 pub const ROLES_LIMIT: f64 = 1e-3;
 
-pub(super) fn poisson(effort: Effort) -> Vec<Row> {
+pub(super) fn poisson(effort: Effort) -> Vec<TableRow> {
     let ratios: &[f64] = match effort {
         Effort::Quick => &[-0.9, 0.0, 0.4999],
         Effort::Full => &[-0.9, -0.5, 0.0, 0.25, 0.4, 0.49, 0.4999],
@@ -56,7 +56,7 @@ pub(super) fn poisson(effort: Effort) -> Vec<Row> {
     rows
 }
 
-pub(super) fn ratio(effort: Effort) -> Vec<Row> {
+pub(super) fn ratio(effort: Effort) -> Vec<TableRow> {
     let ratios: &[f64] = match effort {
         Effort::Quick => &[1.01, 1.5, 3.015, 6.0],
         Effort::Full => &[

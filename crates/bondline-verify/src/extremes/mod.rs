@@ -22,12 +22,12 @@ mod steps;
 
 use crate::Effort;
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 
 /// Measures one kind of extreme.
-type Part = fn(Effort) -> Vec<Row>;
+type Part = fn(Effort) -> Vec<TableRow>;
 
 /// Runs the suite. Quick: without the million steps, three dimensions only where nothing else tells.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
@@ -60,20 +60,22 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
 }
 
 /// A result that must keep a limit; a refusal is short, because nothing forbids the case.
-fn kept(case: &str, quantity: &str, result: Result<f64, String>, limit: f64) -> Row {
+fn kept(case: &str, quantity: &str, result: Result<f64, String>, limit: f64) -> TableRow {
     match result {
-        Ok(value) => Row::at_most(case, quantity, value, limit),
-        Err(why) => Row::at_most(case, quantity, f64::NAN, limit).because(why),
+        Ok(value) => TableRow::at_most(case, quantity, value, limit),
+        Err(why) => TableRow::at_most(case, quantity, f64::NAN, limit).because(why),
     }
 }
 
 /// A case that must be refused, with all of these words; a result is short.
-fn refused(case: &str, result: Result<f64, String>, words: &[&str]) -> Row {
+fn refused(case: &str, result: Result<f64, String>, words: &[&str]) -> TableRow {
     match result {
-        Err(why) if words.iter().all(|w| why.contains(w)) => Row::refused(case, "refused", why),
-        Err(why) => {
-            Row::at_most(case, "refused otherwise than expected", f64::NAN, 0.0).because(why)
+        Err(why) if words.iter().all(|w| why.contains(w)) => {
+            TableRow::refused(case, "refused", why)
         }
-        Ok(value) => Row::at_most(case, "not refused; gives", value, f64::NEG_INFINITY),
+        Err(why) => {
+            TableRow::at_most(case, "refused otherwise than expected", f64::NAN, 0.0).because(why)
+        }
+        Ok(value) => TableRow::at_most(case, "not refused; gives", value, f64::NEG_INFINITY),
     }
 }

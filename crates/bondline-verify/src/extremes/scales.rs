@@ -6,7 +6,7 @@ use super::{
 };
 use crate::Effort;
 use bondline::{
-    observe::{report::Row, summary::MotionSummary},
+    observe::{report::TableRow, summary::MotionSummary},
     scene::Source,
 };
 
@@ -16,7 +16,7 @@ pub const UNITS_LIMIT: f64 = 1e-10;
 /// Relative change a million lengths from the origin: coordinates there have 1e-10 of the length left.
 pub const FAR_LIMIT: f64 = 1e-6;
 
-pub(super) fn rows(effort: Effort) -> Vec<Row> {
+pub(super) fn rows(effort: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     let dimensions: &[usize] = match effort {
         Effort::Quick => &[1, 2],
@@ -39,7 +39,7 @@ pub(super) fn rows(effort: Effort) -> Vec<Row> {
     rows
 }
 
-fn of(case: &str, base: &Body, solved: &Solved, rows: &mut Vec<Row>) {
+fn of(case: &str, base: &Body, solved: &Solved, rows: &mut Vec<TableRow>) {
     let against = |body: Body, scale: f64| -> Result<f64, String> {
         let mut other = body.solve()?;
         other.samples.iter_mut().for_each(|u| *u *= scale);
@@ -135,7 +135,7 @@ fn pulse(height: f64) -> String {
 }
 
 /// Geometrically exact bonds: small and large displacements, flights and turns.
-pub(super) fn exact(_: Effort) -> Vec<Row> {
+pub(super) fn exact(_: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     let stored = |m: Result<MotionSummary, String>| m.map(|m| m.stored_energy);
     for coupling in METHODS.iter().chain(&["nonlocal"]) {

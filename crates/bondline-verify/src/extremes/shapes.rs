@@ -5,7 +5,7 @@ use super::{
     kept, refused,
 };
 use crate::Effort;
-use bondline::{mesh::quality::LARGEST_EDGE_RATIO, observe::report::Row};
+use bondline::{mesh::quality::LARGEST_EDGE_RATIO, observe::report::TableRow};
 
 /// Relative residual that every solution must reach.
 const RESIDUAL_LIMIT: f64 = 1e-10;
@@ -42,7 +42,7 @@ fn families(dimension: usize, ratio: f64, more: &str) -> String {
     .scene()
 }
 
-pub(super) fn cells_and_families(_: Effort) -> Vec<Row> {
+pub(super) fn cells_and_families(_: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for cell in ["quad4", "tri3"] {
         for aspect in [1e2, 1e4, 1e6] {
@@ -96,7 +96,7 @@ pub(super) fn cells_and_families(_: Effort) -> Vec<Row> {
     ] {
         let result = residual(&text);
         rows.push(match (&result, words.is_empty()) {
-            (Err(why), true) => Row::refused(case, "refused", why.clone()),
+            (Err(why), true) => TableRow::refused(case, "refused", why.clone()),
             (Ok(_), true) => kept(case, "relative residual", result, RESIDUAL_LIMIT),
             _ => refused(case, result, words),
         });
@@ -113,7 +113,7 @@ fn zoned(coupling: &'static str, zone: &str) -> Result<f64, String> {
     residual(&format!("{head}[zones.nonlocal]\n{zone}\n{tail}"))
 }
 
-pub(super) fn zones(_: Effort) -> Vec<Row> {
+pub(super) fn zones(_: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for coupling in METHODS {
         for (case, zone) in [
@@ -148,14 +148,14 @@ pub(super) fn zones(_: Effort) -> Vec<Row> {
                     RESIDUAL_LIMIT,
                 ),
                 // a message that names place and remedy is an answer; nothing else is
-                Err(why) => Row::refused(format!("{coupling}, {case}"), "refused", why),
+                Err(why) => TableRow::refused(format!("{coupling}, {case}"), "refused", why),
             });
         }
     }
     rows
 }
 
-pub(super) fn fragments(_: Effort) -> Vec<Row> {
+pub(super) fn fragments(_: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     let ring: String = [
         ("low", [0.4, 0.4], [0.6, 0.4]),
@@ -184,7 +184,7 @@ pub(super) fn fragments(_: Effort) -> Vec<Row> {
         let result = residual(&through.scene());
         rows.push(match result {
             Ok(r) => kept(&case, "relative residual", Ok(r), RESIDUAL_LIMIT),
-            Err(why) => Row::refused(case, "refused", why),
+            Err(why) => TableRow::refused(case, "refused", why),
         });
     }
     rows

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::Effort;
 use bondline::{
-    observe::{report::Row, summary::MotionSummary},
+    observe::{report::TableRow, summary::MotionSummary},
     scene::Source,
 };
 
@@ -35,7 +35,7 @@ fn pulse(coupling: &'static str, time: &str) -> Source {
     Source::new("extreme.toml", format!("{head}{tail}"))
 }
 
-pub(super) fn rows(effort: Effort) -> Vec<Row> {
+pub(super) fn rows(effort: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for coupling in ["local", "nonlocal", "truncated", "splice"] {
         let stable = match moved(&pulse(coupling, "duration = 0.01\n")) {
@@ -90,7 +90,7 @@ const BRANCHING: &str = include_str!("../../../../examples/branching.toml");
 const PRECISION_LIMIT: f64 = 1e-6;
 
 /// Weights of bonds in four bytes: the same crack.
-fn precision() -> [Row; 2] {
+fn precision() -> [TableRow; 2] {
     let run = |precision: &str| {
         let mut source = Source::new("branching.toml", BRANCHING);
         for set in ["solve.explicit.outputs=1", precision] {

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use crate::Effort;
 use bar::{Bar, CHANGES, FINE, LENGTH, Wave, pulse};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 use lattices::{Families, Meeting, Solid};
@@ -228,14 +228,14 @@ fn forces(ratio: usize, found: &[(Variant, Option<Found>)]) -> Table {
         let case = format!("{ratio}:1 {}", variant.name());
         let Some(f) = found else {
             let why = "no bonds of that sign balance every node";
-            table.push(Row::refused(case, "ghost force", why));
+            table.push(TableRow::refused(case, "ghost force", why));
             continue;
         };
         let judged = |quantity: &str, value: f64, zero: bool| {
             if zero {
-                Row::at_most(&case, quantity, value, ROUND_OFF)
+                TableRow::at_most(&case, quantity, value, ROUND_OFF)
             } else {
-                Row::info(&case, quantity, value)
+                TableRow::info(&case, quantity, value)
             }
         };
         table.push(judged("ghost force", f.ghost, variant.is_patch_exact()));
@@ -246,9 +246,9 @@ fn forces(ratio: usize, found: &[(Variant, Option<Found>)]) -> Table {
                 let quantity = format!("{pulse}, {way}");
                 // what forces without a potential make grow is measured, not judged
                 table.push(if value.is_finite() {
-                    Row::info(&case, quantity, value)
+                    TableRow::info(&case, quantity, value)
                 } else {
-                    Row::refused(&case, quantity, "the motion grows without bound")
+                    TableRow::refused(&case, quantity, "the motion grows without bound")
                 });
             }
         }
@@ -271,9 +271,9 @@ fn passes(ratio: usize, found: &[Found], pure: &Pure) -> Table {
             for (against, value) in [("the exact wave", exact), ("the fine bar", fine)] {
                 let quantity = format!("pass {}, {against}", p + 1);
                 table.push(if *value < 1e3 {
-                    Row::info(case, quantity, *value)
+                    TableRow::info(case, quantity, *value)
                 } else {
-                    Row::refused(case, quantity, "the motion grows without bound")
+                    TableRow::refused(case, quantity, "the motion grows without bound")
                 });
             }
         }
@@ -307,13 +307,18 @@ fn statements(ratio: usize, found: &[Found]) -> Table {
             if let Some(best) = best {
                 let quantity = format!("{pulse}, {way}: reflected, of the paper's construction");
                 let ratio_of = height(best) / height(paper);
-                table.push(Row::at_most(best.variant.name(), quantity, ratio_of, 0.5));
+                table.push(TableRow::at_most(
+                    best.variant.name(),
+                    quantity,
+                    ratio_of,
+                    0.5,
+                ));
             }
         }
     }
     let last = |f: &Found| f.passes[PASSES - 1][1];
     table.push(
-        Row::info(
+        TableRow::info(
             format!("{ratio}:1 {}", paper.variant.name()),
             "eighth pass: largest velocity error against the bar that is all fine",
             last(paper),
@@ -325,7 +330,7 @@ fn statements(ratio: usize, found: &[Found]) -> Table {
         if let Some(f) = of(v) {
             let case = format!("{ratio}:1 {}", f.variant.name());
             let quantity = "eighth pass: largest velocity error against the bar that is all fine";
-            table.push(Row::info(case, quantity, last(f)).with_reference(PRINTED_ERROR));
+            table.push(TableRow::info(case, quantity, last(f)).with_reference(PRINTED_ERROR));
         }
     }
     table
@@ -362,20 +367,20 @@ fn half_the_spacing(effort: Effort, found: &[Found]) -> Table {
         let found = found.iter().find(|f| f.variant == variant)?;
         found.passes.last().copied()
     };
-    let rows: Vec<Vec<Row>> = variants
+    let rows: Vec<Vec<TableRow>> = variants
         .par_iter()
         .map(|&variant| {
             let (Some(half), Some(whole)) = (half(variant), whole(variant)) else {
                 let why = "no bonds of that sign balance every node";
-                return vec![Row::refused(variant.name(), "error", why)];
+                return vec![TableRow::refused(variant.name(), "error", why)];
             };
             ["the exact wave", "the fine bar"]
                 .iter()
                 .zip(half.iter().zip(whole))
                 .flat_map(|(against, (half, whole))| {
                     [
-                        Row::info(variant.name(), format!("against {against}"), *half),
-                        Row::info(
+                        TableRow::info(variant.name(), format!("against {against}"), *half),
+                        TableRow::info(
                             variant.name(),
                             format!("figure 5 over it, {against}"),
                             whole / half,
@@ -423,7 +428,7 @@ fn state_based(effort: Effort) -> Table {
             }
         }
     }
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<TableRow>> = cases
         .par_iter()
         .map(|&(dimension, meeting)| match dimension {
             1 => meeting_rows::<1>(meeting),
@@ -435,7 +440,7 @@ fn state_based(effort: Effort) -> Table {
     table
 }
 
-fn meeting_rows<const D: usize>(meeting: Meeting) -> Vec<Row> {
+fn meeting_rows<const D: usize>(meeting: Meeting) -> Vec<TableRow> {
     let law = match meeting.solid {
         Solid::StateBased => "LPS",
         Solid::BondBased => "bond-based",
@@ -450,15 +455,15 @@ fn meeting_rows<const D: usize>(meeting: Meeting) -> Vec<Row> {
     );
     // a pulse two horizons wide, and 14 of its widths beyond and before it
     let mut strip = lattices::Strip::<D>::new(meeting, 36 * meeting.m);
-    let mut rows = vec![Row::info(&case, "ghost force", strip.ghost_force())];
+    let mut rows = vec![TableRow::info(&case, "ghost force", strip.ghost_force())];
     let measured = |case: &str, strip: &lattices::Strip<D>| {
         let [pressure, shear] = strip.reflected();
         let mut rows = vec![
-            Row::at_most(case, "asymmetry", strip.asymmetry(), ROUND_OFF),
-            Row::info(case, "pressure reflected", pressure),
+            TableRow::at_most(case, "asymmetry", strip.asymmetry(), ROUND_OFF),
+            TableRow::info(case, "pressure reflected", pressure),
         ];
         if D > 1 {
-            rows.push(Row::info(case, "shear reflected", shear));
+            rows.push(TableRow::info(case, "shear reflected", shear));
         }
         rows
     };
@@ -466,17 +471,17 @@ fn meeting_rows<const D: usize>(meeting: Meeting) -> Vec<Row> {
     let balanced = format!("{case}, balanced");
     match strip.balance(LEAST) {
         Some([least, most]) => {
-            rows.push(Row::at_most(
+            rows.push(TableRow::at_most(
                 &balanced,
                 "ghost force",
                 strip.ghost_force(),
                 ROUND_OFF,
             ));
             rows.extend(measured(&balanced, &strip));
-            rows.push(Row::info(&balanced, "smallest factor", least));
-            rows.push(Row::info(&balanced, "largest factor", most));
+            rows.push(TableRow::info(&balanced, "smallest factor", least));
+            rows.push(TableRow::info(&balanced, "largest factor", most));
         }
-        None => rows.push(Row::refused(
+        None => rows.push(TableRow::refused(
             &balanced,
             "ghost force",
             "no positive factors balance every node",
@@ -496,7 +501,7 @@ fn plates(effort: Effort) -> Table {
         Effort::Quick => &[(2, 2), (2, 3)],
         Effort::Full => &[(2, 2), (2, 3), (4, 2), (4, 3)],
     };
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<TableRow>> = cases
         .par_iter()
         .map(|&(ratio, m)| plate(ratio, m))
         .collect();
@@ -504,7 +509,7 @@ fn plates(effort: Effort) -> Table {
     table
 }
 
-fn plate(ratio: usize, m: usize) -> Vec<Row> {
+fn plate(ratio: usize, m: usize) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for (name, between) in [
         ("dual horizon", Between::DualHorizon),
@@ -512,23 +517,28 @@ fn plate(ratio: usize, m: usize) -> Vec<Row> {
     ] {
         let case = format!("{ratio}:1, m = {m}, {name}");
         let strip = Strip::new(ratio, m, between);
-        rows.push(Row::info(&case, "ghost force", strip.ghost_force()));
-        rows.push(Row::info(&case, "bonds", strip.bonds() as f64));
+        rows.push(TableRow::info(&case, "ghost force", strip.ghost_force()));
+        rows.push(TableRow::info(&case, "bonds", strip.bonds() as f64));
         match strip.balanced(LEAST) {
             Some(b) => {
-                rows.push(Row::info(&case, "conditions", b.conditions as f64));
-                rows.push(Row::at_most(&case, "ghost force then", b.left, ROUND_OFF));
-                rows.push(Row::at_least(
+                rows.push(TableRow::info(&case, "conditions", b.conditions as f64));
+                rows.push(TableRow::at_most(
+                    &case,
+                    "ghost force then",
+                    b.left,
+                    ROUND_OFF,
+                ));
+                rows.push(TableRow::at_least(
                     &case,
                     "smallest factor",
                     b.factors[0],
                     0.999 * LEAST,
                 ));
-                rows.push(Row::info(&case, "largest factor", b.factors[1]));
+                rows.push(TableRow::info(&case, "largest factor", b.factors[1]));
             }
             None => {
                 let why = "no positive factors balance every node: bonds between the lattices are too few";
-                rows.push(Row::refused(&case, "ghost force then", why));
+                rows.push(TableRow::refused(&case, "ghost force then", why));
             }
         }
     }

@@ -29,7 +29,7 @@ pub enum Variant {
     DualHorizon,
     /// The same for an ordinary state-based law.
     DualHorizonState,
-    /// The multi-horizon paper, bond-based: eq. (7), bonds between the two lattices by the horizon of the coarse node.
+    /// The multi-horizon paper, bond-based: \[Jenabidehkordi2019\] eq. (7), bonds between the two lattices by the horizon of the coarse node.
     MultiHorizon,
     /// The same for an ordinary state-based law, α a ratio of volumes.
     MultiHorizonState,

@@ -8,7 +8,7 @@ use super::{gmsh, scene};
 use crate::Effort;
 use bondline::{
     mesh::CellShape,
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 
@@ -258,7 +258,12 @@ fn text(
 }
 
 /// One case: its error, or why it is refused.
-fn row(family: &Family, law: (&str, &str), coupling: (&str, &str, bool), per_element: f64) -> Row {
+fn row(
+    family: &Family,
+    law: (&str, &str),
+    coupling: (&str, &str, bool),
+    per_element: f64,
+) -> TableRow {
     let name = format!(
         "{}, {}, {}, {per_element} h",
         family.name, coupling.0, law.0
@@ -288,11 +293,11 @@ fn row(family: &Family, law: (&str, &str), coupling: (&str, &str, bool), per_ele
                 .iter()
                 .find(|w| w.contains("uniform stress"));
             match warned {
-                Some(why) if error > LIMIT => Row::warned(&name, "error", error, why),
-                _ => Row::at_most(&name, "error", error, LIMIT),
+                Some(why) if error > LIMIT => TableRow::warned(&name, "error", error, why),
+                _ => TableRow::at_most(&name, "error", error, LIMIT),
             }
         }
-        Err(why) => Row::refused(&name, "error", why),
+        Err(why) => TableRow::refused(&name, "error", why),
     }
 }
 
@@ -318,7 +323,7 @@ pub fn of_second_order(effort: Effort, progress: &dyn Progress) -> Table {
         family.name = name;
         match raised {
             Ok(mesh) => family.mesh = mesh,
-            Err(why) => table.push(Row::refused(name, "mesh", why)),
+            Err(why) => table.push(TableRow::refused(name, "mesh", why)),
         }
         let laws = if effort == Effort::Full { 3 } else { 1 };
         for coupling in COUPLINGS {
@@ -328,7 +333,7 @@ pub fn of_second_order(effort: Effort, progress: &dyn Progress) -> Table {
         }
     }
     progress.stage("affine fields", Some(cases.len() as u64));
-    let rows: Vec<Row> = cases
+    let rows: Vec<TableRow> = cases
         .into_par_iter()
         .map(|(family, law, coupling)| {
             let row = row(&family, law, coupling, 2.0);
@@ -365,7 +370,7 @@ pub fn tables(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         }
     }
     progress.stage("affine fields", Some(cases.len() as u64));
-    let rows: Vec<Row> = cases
+    let rows: Vec<TableRow> = cases
         .into_par_iter()
         .map(|(family, law, coupling, per_element)| {
             let row = row(family, law, coupling, per_element);

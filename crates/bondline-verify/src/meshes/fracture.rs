@@ -10,7 +10,7 @@ use crate::Effort;
 use bondline::{
     observe::{
         cracks::CrackSummary,
-        report::{Columns, Row, Table},
+        report::{Columns, Table, TableRow},
         summary::MotionSummary,
     },
     progress::Progress,
@@ -160,22 +160,22 @@ pub fn planes(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             }
         }
     }
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<TableRow>> = cases
         .into_par_iter()
         .map(|(d, m, (law, material))| {
             let name = format!("{d}D {law}, m = {m}");
             match plane(d, m, material) {
                 Ok([energy, area]) => vec![
-                    Row::within(
+                    TableRow::within(
                         &name,
                         "energy over fracture energy",
                         energy / ENERGY,
                         1.0,
                         PLANE_LIMIT,
                     ),
-                    Row::within(&name, "crack area over section", area, 1.0, 1e-9),
+                    TableRow::within(&name, "crack area over section", area, 1.0, 1e-9),
                 ],
-                Err(why) => vec![Row::refused(&name, "energy over fracture energy", why)],
+                Err(why) => vec![TableRow::refused(&name, "energy over fracture energy", why)],
             }
         })
         .collect();
@@ -194,13 +194,13 @@ pub fn planes(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         .flat_map(|&m| LAWS.map(|law| [30.0, 45.0].map(|angle| (m, law, angle))))
         .flatten()
         .collect();
-    let found: Vec<Row> = angles
+    let found: Vec<TableRow> = angles
         .into_par_iter()
         .map(|(m, (law, material), angle)| {
             let name = format!("2D {law}, m = {m}, at {angle} degrees");
             match inclined(m, material, angle) {
-                Ok(energy) => Row::info(&name, "energy over fracture energy", energy / ENERGY),
-                Err(why) => Row::refused(&name, "energy over fracture energy", why),
+                Ok(energy) => TableRow::info(&name, "energy over fracture energy", energy / ENERGY),
+                Err(why) => TableRow::refused(&name, "energy over fracture energy", why),
             }
         })
         .collect();
@@ -292,18 +292,22 @@ pub fn balance(
 const FRACTIONS: [f64; 3] = [0.4, 0.2, 0.1];
 
 /// Rows of the balance of one body at falling steps; at the smallest one it has to close.
-fn closing(name: &str, closes: bool, run: impl Fn(f64) -> Result<(f64, u64), String>) -> Vec<Row> {
+fn closing(
+    name: &str,
+    closes: bool,
+    run: impl Fn(f64) -> Result<(f64, u64), String>,
+) -> Vec<TableRow> {
     let row = |fraction: f64| {
         let quantity = format!("unaccounted over work, {fraction} of the stable step");
         match run(fraction) {
             Ok((_, 0)) => {
-                Row::at_most(name, quantity, f64::NAN, BALANCE_LIMIT).because("no bond broke")
+                TableRow::at_most(name, quantity, f64::NAN, BALANCE_LIMIT).because("no bond broke")
             }
             Ok((gap, _)) if closes && fraction == FRACTIONS[2] => {
-                Row::at_most(name, quantity, gap.abs(), BALANCE_LIMIT)
+                TableRow::at_most(name, quantity, gap.abs(), BALANCE_LIMIT)
             }
-            Ok((gap, _)) => Row::info(name, quantity, gap),
-            Err(why) => Row::refused(name, quantity, why),
+            Ok((gap, _)) => TableRow::info(name, quantity, gap),
+            Err(why) => TableRow::refused(name, quantity, why),
         }
     };
     FRACTIONS.into_iter().map(row).collect()
@@ -324,7 +328,7 @@ pub fn balances(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             }
         }
     }
-    let mut rows: Vec<Vec<Row>> = cases
+    let mut rows: Vec<Vec<TableRow>> = cases
         .into_par_iter()
         .map(|((law, material), coupling)| {
             let closes = matches!(coupling, "nonlocal" | "truncated");
@@ -339,7 +343,7 @@ pub fn balances(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
             let count = if body.1 == TRIANGLES { 2 } else { 1 };
             laws[..count].par_iter().map(move |law| (body, law))
         });
-        let found: Vec<Vec<Row>> = bodies
+        let found: Vec<Vec<TableRow>> = bodies
             .map(|((name, text, mesh), (law, material))| {
                 closing(&format!("{name}, {law}"), true, |fraction| {
                     let text = format!("{text}[materials.m.{material}\nyoungs-modulus = 1\ndensity = 1\nfracture-energy = 1e-4\n");

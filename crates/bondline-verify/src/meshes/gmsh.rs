@@ -22,19 +22,7 @@ fn element(shape: CellShape, nodes: &[u32]) -> (usize, Vec<usize>) {
     const HEX: [usize; 20] = [
         0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 16, 9, 17, 10, 18, 19, 12, 15, 13, 14,
     ];
-    let kind = match shape {
-        CellShape::Line2 => LINE,
-        CellShape::Tri3 => TRIANGLE,
-        CellShape::Quad4 => QUADRILATERAL,
-        CellShape::Tet4 => TETRAHEDRON,
-        CellShape::Hex8 => HEXAHEDRON,
-        CellShape::Vertex => 15,
-        CellShape::Line3 => 8,
-        CellShape::Tri6 => 9,
-        CellShape::Quad8 => 16,
-        CellShape::Tet10 => 11,
-        CellShape::Hex20 => 17,
-    };
+    let kind = shape.gmsh_type() as usize;
     let order: Vec<usize> = match shape {
         CellShape::Tet10 => TET.to_vec(),
         CellShape::Hex20 => HEX.to_vec(),

@@ -5,7 +5,7 @@ use crate::Effort;
 use bondline::{
     observe::{
         proof::Part,
-        report::{Columns, Row, Table},
+        report::{Columns, Table, TableRow},
     },
     progress::Progress,
 };
@@ -161,8 +161,8 @@ fn rows<const D: usize>(effort: Effort, table: &mut Table, progress: &dyn Progre
                 refused.len()
             );
             table.push(match (ran, refused.first()) {
-                (0, Some(why)) => Row::refused(case, quantity, why.clone()),
-                _ => Row::at_most(case, quantity, value, LOAD_LIMIT),
+                (0, Some(why)) => TableRow::refused(case, quantity, why.clone()),
+                _ => TableRow::at_most(case, quantity, value, LOAD_LIMIT),
             });
         }
     }

@@ -4,7 +4,7 @@ use super::scene::{history, run};
 use crate::Effort;
 use bondline::{
     observe::{
-        report::{Columns, Row, Table},
+        report::{Columns, Table, TableRow},
         summary::RunSummary,
     },
     progress::Progress,
@@ -129,7 +129,7 @@ fn rows(case: &Case, table: &mut Table) {
     .concat();
     let summary = match run(case.text, &let_go, &[]) {
         Ok(summary) => summary,
-        Err(reason) => return table.push(Row::refused(case.name, "let go", reason)),
+        Err(reason) => return table.push(TableRow::refused(case.name, "let go", reason)),
     };
     let Some(motion) = &summary.motion else {
         return;
@@ -138,12 +138,12 @@ fn rows(case: &Case, table: &mut Table) {
         2.0 * figure(&summary, "exponent"),
         2.0 * figure(&summary, "exponent that would not show"),
     );
-    table.push(Row::info(
+    table.push(TableRow::info(
         case.name,
         "proof: ln of the energy's growth",
         found,
     ));
-    table.push(Row::info(
+    table.push(TableRow::info(
         case.name,
         "proof: ln of what would not show",
         unseen,
@@ -152,17 +152,17 @@ fn rows(case: &Case, table: &mut Table) {
     let start = now + motion.missing_energy - motion.external_work;
     // what the seam exchanges with a wave, and what velocity Verlet makes of the energy, is no growth
     let margin = 0.1;
-    table.push(Row::at_most(
+    table.push(TableRow::at_most(
         case.name,
         "run: ln of the energy's growth",
         (now / start).ln(),
         found.max(unseen) + margin,
     ));
     match run(case.text, case.overrides, &[]) {
-        Err(reason) => table.push(Row::refused(case.name, "at the defaults", reason)),
+        Err(reason) => table.push(TableRow::refused(case.name, "at the defaults", reason)),
         Ok(summary) => {
             let gain = summary.motion.and_then(|m| m.energy_gain);
-            table.push(Row::at_most(
+            table.push(TableRow::at_most(
                 case.name,
                 "at the defaults: energy gained, of the largest",
                 gain.map_or(0.0, |g| g.largest),
@@ -295,11 +295,11 @@ fn discrete_energy(swing: &Swing, steps: u64, table: &mut Table) {
         .collect();
     let quantity = "change of the discrete energy, relative";
     match history(swing.text, &all, swing.mesh, "discrete_energy") {
-        Err(reason) => table.push(Row::refused(name, quantity, reason)),
+        Err(reason) => table.push(TableRow::refused(name, quantity, reason)),
         Ok(values) => {
             let first = values.first().copied().unwrap_or(f64::NAN);
             let change = values.iter().fold(0.0_f64, |m, v| m.max((v - first).abs()));
-            table.push(Row::at_most(name, quantity, change / first, 1e-9));
+            table.push(TableRow::at_most(name, quantity, change / first, 1e-9));
         }
     }
 }

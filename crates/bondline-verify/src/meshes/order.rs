@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::{gmsh, scene};
 use crate::Effort;
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
 
@@ -459,7 +459,7 @@ pub fn order(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         let mut table = Table::new(title, Columns::Full);
         match measured(problem, effort) {
             Ok(rows) => table.rows.extend(rows),
-            Err(why) => table.push(Row::info(problem.name, "error", f64::NAN).because(why)),
+            Err(why) => table.push(TableRow::info(problem.name, "error", f64::NAN).because(why)),
         }
         super::tell(&table, effort, progress);
         table
@@ -475,7 +475,7 @@ pub fn order(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
 /// A mesh of some elements per length: its table in the scene, and the text of the file that it names.
 type Typed = (usize, String, Option<String>);
 
-fn measured(problem: &Problem, effort: Effort) -> Result<Vec<Row>, String> {
+fn measured(problem: &Problem, effort: Effort) -> Result<Vec<TableRow>, String> {
     let is_solid = problem.kinematics == "solid";
     let meshes = match (effort, is_solid) {
         (Effort::Quick, _) => 2,
@@ -497,13 +497,13 @@ fn measured(problem: &Problem, effort: Effort) -> Result<Vec<Row>, String> {
         typed.iter().map(run).collect()
     };
     let of_elements: Vec<f64> = error_of(None).into_iter().collect::<Result<_, _>>()?;
-    let rows: Vec<Vec<Row>> = METHODS
+    let rows: Vec<Vec<TableRow>> = METHODS
         .par_iter()
         .map(|method| {
             let case = format!("{}, {}", problem.name, method.name);
             match method.dear {
                 Some(why) if is_solid => {
-                    vec![Row::refused(case, "order", why)]
+                    vec![TableRow::refused(case, "order", why)]
                 }
                 _ => judged(
                     &case,
@@ -525,16 +525,16 @@ fn judged(
     of_elements: &[f64],
     effort: Effort,
     is_solid: bool,
-) -> Vec<Row> {
+) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for (k, (error, alone)) in errors.iter().zip(of_elements).enumerate() {
         let quantity = format!("error, mesh {}", k + 1);
         rows.push(match error {
-            Err(why) => Row::refused(case, quantity, why.as_str()),
+            Err(why) => TableRow::refused(case, quantity, why.as_str()),
             Ok(e) if k == 1 => {
-                Row::at_most(case, quantity, *e, alone + BEYOND_LIMIT).with_reference(*alone)
+                TableRow::at_most(case, quantity, *e, alone + BEYOND_LIMIT).with_reference(*alone)
             }
-            Ok(e) => Row::info(case, quantity, *e).with_reference(*alone),
+            Ok(e) => TableRow::info(case, quantity, *e).with_reference(*alone),
         });
     }
     // a coarser mesh may be refused: the order is that of the last two
@@ -544,11 +544,11 @@ fn judged(
     let observed = (before / last).log2();
     let alone = of_elements[errors.len() - 1];
     rows.push(match (effort, is_solid) {
-        (Effort::Quick, _) => Row::info(case, "order", observed),
-        (Effort::Full, true) if *last <= alone => Row::info(case, "order", observed)
+        (Effort::Quick, _) => TableRow::info(case, "order", observed),
+        (Effort::Full, true) if *last <= alone => TableRow::info(case, "order", observed)
             .because("the error is at most that of elements alone"),
-        (Effort::Full, true) => Row::at_least(case, "order", observed, ORDER_LIMIT_3D),
-        (Effort::Full, false) => Row::at_least(case, "order", observed, ORDER_LIMIT),
+        (Effort::Full, true) => TableRow::at_least(case, "order", observed, ORDER_LIMIT_3D),
+        (Effort::Full, false) => TableRow::at_least(case, "order", observed, ORDER_LIMIT),
     });
     rows
 }

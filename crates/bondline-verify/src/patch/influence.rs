@@ -9,7 +9,7 @@ use crate::{
 };
 use bondline::{
     coupling::FitDegree,
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::{
         Influence, Micromodulus,
         influence::{Alpha, Degree},
@@ -83,7 +83,7 @@ pub fn table(progress: &dyn Progress) -> Table {
         }
     }
     progress.stage("influence functions", Some(cases.len() as u64));
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<TableRow>> = cases
         .into_par_iter()
         .map(|(name, law, method)| {
             let case = Case {
@@ -97,17 +97,17 @@ pub fn table(progress: &dyn Progress) -> Table {
             progress.advance(1);
             let bar = match Enclosed::<1>::new(&case) {
                 Ok(bar) => bar,
-                Err(e) => return vec![Row::refused(name, "solution error", e.to_string())],
+                Err(e) => return vec![TableRow::refused(name, "solution error", e.to_string())],
             };
             let s = spectrum(&bar);
             let mut rows = vec![
-                Row::info(&name, "smallest real", s.smallest),
-                Row::info(&name, "largest imaginary", s.imaginary),
-                Row::info(&name, "largest real", s.largest),
+                TableRow::info(&name, "smallest real", s.smallest),
+                TableRow::info(&name, "largest imaginary", s.imaginary),
+                TableRow::info(&name, "largest real", s.largest),
             ];
             rows.push(match solution_error(&bar) {
-                Ok(error) => Row::info(&name, "solution error", error),
-                Err(why) => Row::refused(&name, "solution error", why),
+                Ok(error) => TableRow::info(&name, "solution error", error),
+                Err(why) => TableRow::refused(&name, "solution error", why),
             });
             rows
         })
@@ -126,7 +126,7 @@ pub fn table(progress: &dyn Progress) -> Table {
 /// Meshfree partial stress in 2D, where the solution loses digits: which ω of the law, and with it of the divergence, loses how many.
 ///
 /// A scene has no key for an ω of the divergence alone; a bond-based law has its own for each kind of micromodulus.
-fn meshfree(progress: &dyn Progress) -> Vec<Row> {
+fn meshfree(progress: &dyn Progress) -> Vec<TableRow> {
     let kernels = [
         ("inverse distance", Micromodulus::InverseDistance),
         ("triangular", Micromodulus::Triangular),
@@ -153,8 +153,8 @@ fn meshfree(progress: &dyn Progress) -> Vec<Row> {
                 .map_err(|e| e.to_string())
                 .and_then(|block| solution_error(&block));
             match solved {
-                Ok(error) => Row::info(name, "solution error", error),
-                Err(why) => Row::refused(name, "solution error", why),
+                Ok(error) => TableRow::info(name, "solution error", error),
+                Err(why) => TableRow::refused(name, "solution error", why),
             }
         })
         .collect()

@@ -8,7 +8,7 @@
 //! Beside points the horizon shrinks with the cells. The solution is that of the local theory, which points meet to second order in the horizon, and cells at the seam are linear: order 2.
 
 use bondline::fem::{Rule, for_each_point};
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::progress::Progress;
 use bondline::tensor::Vector;
 
@@ -173,7 +173,7 @@ fn rows(table: &mut Table, name: &str, counts: &[usize], errors: &[Result<f64, S
         match found {
             Ok(error) => {
                 if *n == counts[counts.len() - 1] {
-                    table.push(Row::at_most(
+                    table.push(TableRow::at_most(
                         &case,
                         "relative L2 error of u",
                         *error,
@@ -181,14 +181,14 @@ fn rows(table: &mut Table, name: &str, counts: &[usize], errors: &[Result<f64, S
                     ));
                     if let Some(before) = last {
                         let order = (before / error).log2();
-                        table.push(Row::at_least(&case, "order", order, limit_of_order));
+                        table.push(TableRow::at_least(&case, "order", order, limit_of_order));
                     }
                 } else {
-                    table.push(Row::info(&case, "relative L2 error of u", *error));
+                    table.push(TableRow::info(&case, "relative L2 error of u", *error));
                 }
                 last = Some(*error);
             }
-            Err(why) => table.push(Row::refused(&case, "relative L2 error of u", why)),
+            Err(why) => table.push(TableRow::refused(&case, "relative L2 error of u", why)),
         }
     }
 }
@@ -211,16 +211,16 @@ pub fn beside_points(effort: Effort, progress: &dyn Progress) -> Table {
                 let case = format!("{cell}, {coupling}, {n} cells a side");
                 match error_of_sites(&coupled(cell, coupling, *n)) {
                     Ok(error) => {
-                        table.push(Row::info(&case, "relative L2 error of u", error));
+                        table.push(TableRow::info(&case, "relative L2 error of u", error));
                         if let Some(before) = last {
                             let order = (before / error).log2();
                             let is_slow = coupling == "splice" && cell.starts_with("tri");
                             let limit = if is_slow { 0.8 } else { 1.8 };
-                            table.push(Row::at_least(&case, "order", order, limit));
+                            table.push(TableRow::at_least(&case, "order", order, limit));
                         }
                         last = Some(error);
                     }
-                    Err(why) => table.push(Row::refused(&case, "relative L2 error of u", why)),
+                    Err(why) => table.push(TableRow::refused(&case, "relative L2 error of u", why)),
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Problems with known solutions: a hole under tension, a cantilever, a tapered panel.
 
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::progress::Progress;
 use bondline::tensor::Vector;
 
@@ -94,8 +94,8 @@ pub fn table(effort: Effort, progress: &dyn Progress) -> Table {
     let mut within =
         |case: &str, quantity: &str, found: Result<f64, String>, exact: f64, limit: f64| {
             table.push(match found {
-                Ok(value) => Row::within(case, quantity, value, exact, limit),
-                Err(why) => Row::refused(case, quantity, why),
+                Ok(value) => TableRow::within(case, quantity, value, exact, limit),
+                Err(why) => TableRow::refused(case, quantity, why),
             });
         };
     let name = "stress at the hole, over 3";

@@ -11,12 +11,12 @@ use super::Material;
 use crate::Effort;
 use crate::enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNGS_MODULUS};
 use crate::typed;
-use bondline::coupling::semidiscrete::{BondBehaviour, Critical};
+use bondline::coupling::semidiscrete::{BondBehaviour, FailureCriterion};
 use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
 use bondline::coupling::{BlendingFunction, FitDegree};
-use bondline::observe::report::{Columns, Row, Table};
+use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::peridynamics::Micromodulus;
-use bondline::peridynamics::bond_force::Kinematics;
+use bondline::peridynamics::bond_force::BondKinematics;
 use bondline::progress::{Progress, Silent};
 use bondline::solve::statics::{self, StaticParams, StaticProblem};
 use bondline::system::{FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry};
@@ -214,8 +214,8 @@ fn run_crack(
     let never =
         |x: &Vector<2>| is_band(&e, x, 1) || (breaks == Breaks::WithinZone && x.amax() > outside);
     let behaviour = BondBehaviour {
-        kinematics: Kinematics::Exact,
-        critical_stretch: Some(Critical::Uniform(CRITICAL)),
+        kinematics: BondKinematics::Exact,
+        failure: Some(FailureCriterion::Uniform(CRITICAL)),
         no_fail: &never,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,
@@ -289,7 +289,7 @@ fn running(table: &mut Table) {
             }
         }
     }
-    let found: Vec<Vec<Row>> = cases
+    let found: Vec<Vec<TableRow>> = cases
         .par_iter()
         .map(|&(place, rows, method, breaks)| {
             let case = case(method, widths(method));
@@ -305,8 +305,8 @@ fn running(table: &mut Table) {
                 run_crack(&case, None, y, breaks, steps).map(|run| (whole, run))
             });
             match measured {
-                Err(why) => vec![Row::refused(&name, "energy taken", why)],
-                Ok((_, run)) if run.missing.abs() > 1.0 => vec![Row::refused(
+                Err(why) => vec![TableRow::refused(&name, "energy taken", why)],
+                Ok((_, run)) if run.missing.abs() > 1.0 => vec![TableRow::refused(
                     &name,
                     "energy taken",
                     format!(
@@ -315,17 +315,17 @@ fn running(table: &mut Table) {
                     ),
                 )],
                 Ok((whole, run)) => vec![
-                    Row::info(&name, "energy taken", run.taken / whole.taken - 1.0),
-                    Row::info(&name, "longer above", run.longer[0] - whole.longer[0]),
-                    Row::info(&name, "longer below", run.longer[1] - whole.longer[1]),
-                    Row::info(&name, "tip at 50 %", run.tip[0] - whole.tip[0]),
-                    Row::info(&name, "tip at 85 %", run.tip[1] - whole.tip[1]),
-                    Row::info(&name, "alone: longer above", whole.longer[0]),
-                    Row::info(&name, "alone: below", whole.longer[1]),
-                    Row::info(&name, "alone: tip", whole.tip[0]),
-                    Row::info(&name, "steps", whole.steps as f64),
-                    Row::info(&name, "energy missing", run.missing),
-                    Row::info(&name, "alone: missing", whole.missing),
+                    TableRow::info(&name, "energy taken", run.taken / whole.taken - 1.0),
+                    TableRow::info(&name, "longer above", run.longer[0] - whole.longer[0]),
+                    TableRow::info(&name, "longer below", run.longer[1] - whole.longer[1]),
+                    TableRow::info(&name, "tip at 50 %", run.tip[0] - whole.tip[0]),
+                    TableRow::info(&name, "tip at 85 %", run.tip[1] - whole.tip[1]),
+                    TableRow::info(&name, "alone: longer above", whole.longer[0]),
+                    TableRow::info(&name, "alone: below", whole.longer[1]),
+                    TableRow::info(&name, "alone: tip", whole.tip[0]),
+                    TableRow::info(&name, "steps", whole.steps as f64),
+                    TableRow::info(&name, "energy missing", run.missing),
+                    TableRow::info(&name, "alone: missing", whole.missing),
                 ],
             }
         })
@@ -470,10 +470,10 @@ pub(super) fn cracks(progress: &dyn Progress) -> Vec<Table> {
         let name = format!("{}, {}", method.name(), material.name());
         match found {
             Ok([field, opening]) => {
-                rest.push(Row::info(&name, "field", field));
-                rest.push(Row::info(&name, "opening", opening));
+                rest.push(TableRow::info(&name, "field", field));
+                rest.push(TableRow::info(&name, "opening", opening));
             }
-            Err(why) => rest.push(Row::refused(&name, "field", why)),
+            Err(why) => rest.push(TableRow::refused(&name, "field", why)),
         }
     }
     let mut moving = Table::new(
@@ -516,8 +516,8 @@ pub(super) fn waves(effort: Effort, progress: &dyn Progress) -> Table {
         };
         let quantity = format!("w = {w} delta");
         table.push(match found {
-            Ok(v) => Row::info(&name, quantity, v),
-            Err(why) => Row::refused(&name, quantity, why),
+            Ok(v) => TableRow::info(&name, quantity, v),
+            Err(why) => TableRow::refused(&name, quantity, why),
         });
     }
     table

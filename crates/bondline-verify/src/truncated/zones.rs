@@ -12,7 +12,7 @@ use crate::{
 };
 use bondline::{
     coupling::{ModelError, truncated::seam_conditions},
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::Progress,
 };
@@ -176,7 +176,7 @@ fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
 }
 
 /// What stands in the way of a seam that does not follow the lattice, and whether it could be fitted.
-fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<Row> {
+fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<TableRow> {
     let case = Case {
         form: Form::Block,
         grain,
@@ -188,25 +188,27 @@ fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<Row> {
         .and_then(|(text, file, _)| Ok(scene::model::<D>(&text, &files(&file))?));
     let laid = match laid {
         Ok(laid) => laid,
-        Err(e) => return vec![Row::refused(name, "conditions", e.to_string())],
+        Err(e) => return vec![TableRow::refused(name, "conditions", e.to_string())],
     };
     let mut rows = Vec::new();
     if let Some(found) = seam_conditions(&laid.model) {
-        rows.push(Row::info(&name, "conditions", found.conditions as f64));
-        rows.push(Row::info(&name, "rank", found.rank as f64));
-        rows.push(Row::info(&name, "unknowns", found.unknowns as f64));
-        rows.push(Row::info(&name, "unreachable", found.unreachable));
-        rows.push(Row::info(
+        rows.push(TableRow::info(&name, "conditions", found.conditions as f64));
+        rows.push(TableRow::info(&name, "rank", found.rank as f64));
+        rows.push(TableRow::info(&name, "unknowns", found.unknowns as f64));
+        rows.push(TableRow::info(&name, "unreachable", found.unreachable));
+        rows.push(TableRow::info(
             &name,
             "unreachable by factors of 0.1 to 1000, at least",
             found.out_of_reach,
         ));
     }
     rows.push(match laid.coupling.operator(&laid.model) {
-        Ok(_) => Row::info(&name, "left after the fit", 0.0),
-        Err(ModelError::Seam { residual, .. }) => Row::info(&name, "left after the fit", residual)
-            .because("refused when the model is made"),
-        Err(e) => Row::refused(&name, "left after the fit", e.to_string()),
+        Ok(_) => TableRow::info(&name, "left after the fit", 0.0),
+        Err(ModelError::Seam { residual, .. }) => {
+            TableRow::info(&name, "left after the fit", residual)
+                .because("refused when the model is made")
+        }
+        Err(e) => TableRow::refused(&name, "left after the fit", e.to_string()),
     });
     rows
 }
@@ -220,7 +222,7 @@ pub(super) fn obstructions(effort: Effort, progress: &dyn Progress) -> Table {
         Columns::ByQuantity,
     );
     let grains = [Grain::Jittered, Grain::Simplices];
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<TableRow> = Vec::new();
     for grain in grains {
         for ratio in [2, 3] {
             rows.extend(obstruction::<2>(grain, ratio));
@@ -260,7 +262,7 @@ fn crack<const D: usize>(end: f64) -> String {
     format!("[cracks.c]\n{shape}\n")
 }
 
-fn rows<const D: usize>(case: &Case) -> Vec<Row> {
+fn rows<const D: usize>(case: &Case) -> Vec<TableRow> {
     let name = format!(
         "{D}D {}, m = {}, {}, {}",
         case.material.name(),
@@ -271,11 +273,11 @@ fn rows<const D: usize>(case: &Case) -> Vec<Row> {
     let e = match build::<D>(case) {
         Ok(e) => e,
         Err(EnclosedError::Scene(e)) if e.is_seam() => {
-            return vec![Row::refused(name, "residual", e.to_string())];
+            return vec![TableRow::refused(name, "residual", e.to_string())];
         }
         Err(e) => {
             return vec![
-                Row::at_most(name, "residual", f64::NAN, AFFINE_LIMIT).because(e.to_string()),
+                TableRow::at_most(name, "residual", f64::NAN, AFFINE_LIMIT).because(e.to_string()),
             ];
         }
     };
@@ -358,7 +360,7 @@ pub(super) fn table(effort: Effort, progress: &dyn Progress) -> Table {
     let one = cases::<1>(effort);
     let two = cases::<2>(effort);
     let three = cases::<3>(effort);
-    let mut all: Vec<Vec<Row>> = one.par_iter().map(rows::<1>).collect();
+    let mut all: Vec<Vec<TableRow>> = one.par_iter().map(rows::<1>).collect();
     all.extend(two.par_iter().map(rows::<2>).collect::<Vec<_>>());
     all.extend(three.par_iter().map(rows::<3>).collect::<Vec<_>>());
     all.into_iter().flatten().for_each(|row| table.push(row));
@@ -372,7 +374,7 @@ mod tests {
 
     #[test]
     fn zones_of_any_shape_pass() {
-        let mut all: Vec<Row> = cases::<1>(Effort::Quick)
+        let mut all: Vec<TableRow> = cases::<1>(Effort::Quick)
             .iter()
             .flat_map(rows::<1>)
             .collect();

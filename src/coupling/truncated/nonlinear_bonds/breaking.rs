@@ -8,7 +8,7 @@ use crate::{
     coupling::{Model, SiteKind},
     fem::Locator,
     parallel,
-    peridynamics::{PdBody, bond_force::Kinematics},
+    peridynamics::{PdBody, bond_force::BondKinematics},
     tensor::Vector,
 };
 
@@ -70,15 +70,15 @@ impl<const D: usize> Breaking<D> {
     /// The bonds that still stand and are over the limit.
     pub fn over(
         &self,
-        kinematics: Kinematics,
+        kinematics: BondKinematics,
         stands: impl Fn(usize) -> bool + Sync,
         u: &[f64],
     ) -> Vec<usize> {
         let is_over = |bond: usize| {
             let difference = self.difference.displacement(bond, u);
             let strained = match kinematics {
-                Kinematics::Exact => self.part[bond].strained::<true>(&difference),
-                Kinematics::Linear => self.part[bond].strained::<false>(&difference),
+                BondKinematics::Exact => self.part[bond].strained::<true>(&difference),
+                BondKinematics::Linear => self.part[bond].strained::<false>(&difference),
             };
             strained.excess > self.limit[bond] * strained.square
         };

@@ -14,7 +14,7 @@ use crate::{
             dilatation_state::States,
         },
     },
-    peridynamics::{PdBody, bond_force::Kinematics},
+    peridynamics::{PdBody, bond_force::BondKinematics},
 };
 
 /// Site, part and weight of an end of a part.
@@ -75,7 +75,7 @@ impl<const D: usize> NonlinearSeam<D> {
             intact: Vec::new(),
             last: Vec::new(),
             breaks: None,
-            kinematics: Kinematics::Linear,
+            kinematics: BondKinematics::Linear,
             sites: Vec::new(),
             offsets: vec![0],
             ends: Vec::new(),

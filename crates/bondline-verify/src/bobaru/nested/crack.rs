@@ -5,7 +5,7 @@
 
 use crate::bobaru::nested::{plate::Plate, transfer::Scattered};
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     progress::Silent,
     solve::statics::{StaticParams, StaticProblem, solve},
     tensor::Vector,
@@ -114,12 +114,12 @@ pub fn opening() -> Table {
             let stage = match stage(&plate, &levels) {
                 Ok(stage) => stage,
                 Err(why) => {
-                    table.push(Row::at_most(case, "opening", f64::NAN, 0.0).because(why));
+                    table.push(TableRow::at_most(case, "opening", f64::NAN, 0.0).because(why));
                     break;
                 }
             };
-            table.push(Row::info(&case, "sites", stage.sites as f64));
-            table.push(Row::info(
+            table.push(TableRow::info(&case, "sites", stage.sites as f64));
+            table.push(TableRow::info(
                 &case,
                 "opening over h, strain",
                 stage.opening / STRAIN,
@@ -127,7 +127,7 @@ pub fn opening() -> Table {
             last.push((name, finest, stage));
             let change = before.map_or(f64::INFINITY, |b| (stage.opening / b.opening - 1.0).abs());
             if change.is_finite() {
-                table.push(Row::info(&case, "change", change));
+                table.push(TableRow::info(&case, "change", change));
             }
             if change < SETTLED && padding.is_some() {
                 break;
@@ -149,10 +149,10 @@ pub fn opening() -> Table {
             let saved = uniform.sites as f64 / nested.sites as f64;
             let quantity = "opening off that of the uniform lattice h/4";
             table.push(match name {
-                "visibility of the crack" => Row::at_most(&case, quantity, off, SETTLED),
-                _ => Row::info(&case, quantity, off),
+                "visibility of the crack" => TableRow::at_most(&case, quantity, off, SETTLED),
+                _ => TableRow::info(&case, quantity, off),
             });
-            table.push(Row::at_least(
+            table.push(TableRow::at_least(
                 &case,
                 "sites of the uniform lattice over these",
                 saved,

@@ -21,7 +21,7 @@ use crate::{
     },
 };
 use bondline::{
-    observe::report::{Columns, Row, Table},
+    observe::report::{Columns, Table, TableRow},
     solve::explicit::{Explicit, ExplicitParams, State, Undriven},
     tensor::Vector,
 };
@@ -356,7 +356,7 @@ pub fn ring(effort: Effort) -> Table {
         .map(|case| outcome(&plan(case), &exact))
         .collect();
     let Some(Ok(base)) = outcomes.first() else {
-        table.push(Row::at_most(UNIFORM.name, "error", f64::NAN, 0.0));
+        table.push(TableRow::at_most(UNIFORM.name, "error", f64::NAN, 0.0));
         return table;
     };
     for (k, (case, outcome)) in std::iter::once(&UNIFORM)
@@ -366,21 +366,23 @@ pub fn ring(effort: Effort) -> Table {
     {
         match outcome {
             Ok(o) => table.rows.extend(rows(case.name, o, base, k)),
-            Err(why) => table.push(Row::at_most(case.name, "error", f64::NAN, 0.0).because(why)),
+            Err(why) => {
+                table.push(TableRow::at_most(case.name, "error", f64::NAN, 0.0).because(why))
+            }
         }
     }
     table
 }
 
 /// The rows of a case: judged for the uniform one and ours, the others for comparison.
-fn rows(name: &str, o: &Outcome, base: &Outcome, number: usize) -> Vec<Row> {
+fn rows(name: &str, o: &Outcome, base: &Outcome, number: usize) -> Vec<TableRow> {
     let at_most = |quantity: &str, value: f64, limit: f64| match number {
-        0 | 1 => Row::at_most(name, quantity, value, limit),
-        _ => Row::info(name, quantity, value),
+        0 | 1 => TableRow::at_most(name, quantity, value, limit),
+        _ => TableRow::info(name, quantity, value),
     };
     let mut rows = vec![
-        Row::info(name, "error of u against the classical wave, L2", o.error),
-        Row::info(name, "site steps", o.site_steps as f64),
+        TableRow::info(name, "error of u against the classical wave, L2", o.error),
+        TableRow::info(name, "site steps", o.site_steps as f64),
         at_most("largest change of the energy over the run", o.drift, 0.01),
     ];
     if number == 0 {
@@ -394,11 +396,15 @@ fn rows(name: &str, o: &Outcome, base: &Outcome, number: usize) -> Vec<Row> {
         1.05,
     ));
     rows.push(match number {
-        1 => Row::at_least(name, quantity, saved, 2.0),
-        _ => Row::info(name, quantity, saved),
+        1 => TableRow::at_least(name, quantity, saved, 2.0),
+        _ => TableRow::info(name, quantity, saved),
     });
     if o.changes > 0 {
-        rows.push(Row::info(name, "changes of the grid", o.changes as f64));
+        rows.push(TableRow::info(
+            name,
+            "changes of the grid",
+            o.changes as f64,
+        ));
         rows.push(at_most(
             "largest jump of the energy at a change",
             o.jump,
