@@ -82,7 +82,7 @@ fn equal_bodies_exchange_their_velocities() {
     }
 }
 
-/// Points of bodies with horizons of their own: whichever comes first, contact is as stiff.
+/// Points of bodies with horizons of their own: whichever comes first, contact is as stiff. It was that of the last lattice over the horizon of the first: stable steps of 0.29 and 0.17.
 #[test]
 fn contact_does_not_depend_on_the_order_of_bodies() {
     let strip = |fine: &str, coarse: &str| {
@@ -106,12 +106,12 @@ points.lattice = {{ spacing = 0.5 }}
 nonlocal = {{ any = [{{ box = {{ min = [2, -1], max = [10, 5] }} }}, {{ box = {{ min = [13, -1], max = [21, 5] }} }}, {{ box = {{ min = [24, -1], max = [30, 5] }} }}] }}
 [zones.bodies.{fine}]
 inside = {{ box = {{ min = [2, -1], max = [10, 5] }} }}
-spacing = 0.5
-horizon = 1.5
+spacing = 0.25
+horizon = 0.75
 [zones.bodies.{coarse}]
 inside = {{ box = {{ min = [13, -1], max = [21, 5] }} }}
-spacing = 1
-horizon = 3
+spacing = 0.5
+horizon = 1.5
 [cracks.gap]
 segment = {{ from = [6, -1], to = [6, 5] }}
 [contact]
