@@ -133,7 +133,7 @@ impl Ranks for ThreadRank {
         _: RankSolverKind,
     ) -> Result<Box<dyn RankSolver + 'a>, String> {
         self.board.solvers.fetch_add(1, Ordering::Relaxed);
-        // every thread has all rows, and factorises them as one matrix
+        // the first thread has all rows, and factorises them as one matrix
         let (d, partition) = (rows.matrix.block, rows.partition);
         let mut own = Vec::new();
         for (r, &site) in partition.of(self.rank).iter().enumerate() {
@@ -149,18 +149,22 @@ impl Ranks for ThreadRank {
                 }
             }
         }
-        let size = partition.sites() * d;
-        let mut matrix = DMatrix::<f64>::zeros(size, size);
-        for entry in self.gather_words(&own).concat().chunks_exact(3) {
-            matrix[(entry[0] as usize, entry[1] as usize)] += f64::from_bits(entry[2]);
-        }
-        for k in 0..size {
-            if matrix.row(k).iter().all(|x| *x == 0.0) {
-                matrix[(k, k)] = 1.0;
+        let entries = self.gather_words(&own).concat();
+        let factors = (self.rank == 0).then(|| {
+            let size = partition.sites() * d;
+            let mut matrix = DMatrix::<f64>::zeros(size, size);
+            for entry in entries.chunks_exact(3) {
+                matrix[(entry[0] as usize, entry[1] as usize)] += f64::from_bits(entry[2]);
             }
-        }
+            for k in 0..size {
+                if matrix.row(k).iter().all(|x| *x == 0.0) {
+                    matrix[(k, k)] = 1.0;
+                }
+            }
+            matrix.lu()
+        });
         Ok(Box::new(Dense {
-            matrix: matrix.lu(),
+            factors,
             rank: self.another(),
             lengths: partition.lengths(d),
         }))
@@ -217,9 +221,9 @@ impl Exchange for Told {
     }
 }
 
-/// All rows, factorised.
+/// All rows, factorised by the first thread.
 struct Dense {
-    matrix: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
+    factors: Option<nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>>,
     rank: ThreadRank,
     lengths: Vec<usize>,
 }
@@ -228,12 +232,16 @@ impl RankSolver for Dense {
     fn solve_into(&mut self, b: &[f64], x: &mut [f64], _: f64, _: usize) -> RankSolve {
         let mut all = vec![0.0; self.lengths.iter().sum()];
         self.rank.gather_into(b, &self.lengths, &mut all);
-        let found = self
-            .matrix
-            .solve(&DVector::from_vec(all))
-            .expect("a regular matrix");
+        let found = self.factors.as_ref().map_or_else(Vec::new, |factors| {
+            let found = factors.solve(&DVector::from_vec(all));
+            let found = found.expect("a regular matrix");
+            found.iter().map(|x| x.to_bits()).collect()
+        });
+        let found = self.rank.told_to_all(&found).concat();
         let first: usize = self.lengths[..self.rank.rank].iter().sum();
-        x.copy_from_slice(&found.as_slice()[first..first + x.len()]);
+        for (x, word) in x.iter_mut().zip(&found[first..]) {
+            *x = f64::from_bits(*word);
+        }
         RankSolve {
             iterations: 1,
             failure: None,
