@@ -221,12 +221,15 @@ pub trait MixedRows<const D: usize>: Sync {
     fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>);
 }
 
+/// Adds to the row of a site.
+pub type AddRow<'a, const D: usize> = dyn Fn(usize, &mut Row<D>) + Sync + 'a;
+
 /// Bonds of a seam that a nonlinear system takes over.
 pub struct SeamBonds<'a, const D: usize> {
     /// The bonds, which may be geometrically exact, and break.
     pub bonds: NonlinearSeam<D>,
     /// Adds what is left of the row of a site without them.
-    pub add_rest: Box<dyn Fn(usize, &mut Row<D>) + Sync + 'a>,
+    pub add_rest: Box<AddRow<'a, D>>,
 }
 
 /// The rows of a coupled model.
