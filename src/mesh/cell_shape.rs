@@ -52,11 +52,14 @@ struct Geometry {
     gmsh_order: &'static [usize],
     /// For each corner, its neighbours along edges, ordered so that their determinant is positive in a good cell.
     corners: &'static [(usize, &'static [usize])],
-    /// Signed length, area or volume of the cell with these corners.
-    volume: fn(&dyn Fn(usize) -> Vector<3>) -> f64,
+    /// Signed length, area or volume of the cell with these corners, of which there are at most [`MOST_CORNERS`].
+    volume: fn(&[Vector<3>]) -> f64,
     /// Cells of the shape that together are a line, a quadrilateral or a hexahedron, by its corners; of a shape of second order its linear one.
     in_box: &'static [&'static [usize]],
 }
+
+/// Of a hexahedron.
+pub(super) const MOST_CORNERS: usize = 8;
 
 /// By the number of the shape.
 static GEOMETRY: [&Geometry; 11] = [
@@ -146,8 +149,8 @@ impl CellShape {
     }
 
     /// Signed length, area or volume of a cell with these corners.
-    pub(super) fn volume_of_corners(self, corner: &dyn Fn(usize) -> Vector<3>) -> f64 {
-        (self.linear().geometry().volume)(corner)
+    pub(super) fn volume_of_corners(self, corners: &[Vector<3>]) -> f64 {
+        (self.linear().geometry().volume)(corners)
     }
 
     /// Cells of the linear shape that together are a line, a quadrilateral or a hexahedron, by the corners of that.
@@ -173,7 +176,7 @@ fn det2(a: &Vector<3>, b: &Vector<3>) -> f64 {
 }
 
 /// The determinant of the Jacobian is quadratic in each coordinate, hence two Gauss points along each are exact.
-fn volume_of_hexahedron(x: &dyn Fn(usize) -> Vector<3>) -> f64 {
+fn volume_of_hexahedron(x: &[Vector<3>]) -> f64 {
     let g = 0.5 / 3.0f64.sqrt();
     let mut volume = 0.0;
     for point in 0..8 {
@@ -189,7 +192,7 @@ fn volume_of_hexahedron(x: &dyn Fn(usize) -> Vector<3>) -> f64 {
             for (k, side) in bit.iter().enumerate() {
                 let sign = if *side == 0 { -1.0 } else { 1.0 };
                 let slope = sign * factor((k + 1) % 3) * factor((k + 2) % 3);
-                jacobian[k] += x(i) * slope;
+                jacobian[k] += x[i] * slope;
             }
         }
         volume += det3(&jacobian[0], &jacobian[1], &jacobian[2]) / 8.0;
@@ -221,7 +224,7 @@ const LINE2: Geometry = Geometry {
     mid_sides: &[],
     gmsh_order: &[],
     corners: &[(0, &[1])],
-    volume: |x| (x(1) - x(0))[0],
+    volume: |x| (x[1] - x[0])[0],
     in_box: &[&[0, 1]],
 };
 
@@ -243,7 +246,7 @@ const TRI3: Geometry = Geometry {
     mid_sides: &[],
     gmsh_order: &[],
     corners: &[(0, &[1, 2]), (1, &[2, 0]), (2, &[0, 1])],
-    volume: |x| det2(&(x(1) - x(0)), &(x(2) - x(0))) / 2.0,
+    volume: |x| det2(&(x[1] - x[0]), &(x[2] - x[0])) / 2.0,
     in_box: &[&[0, 1, 2], &[0, 2, 3]],
 };
 
@@ -266,7 +269,7 @@ const QUAD4: Geometry = Geometry {
     mid_sides: &[],
     gmsh_order: &[],
     corners: &[(0, &[1, 3]), (1, &[2, 0]), (2, &[3, 1]), (3, &[0, 2])],
-    volume: |x| det2(&(x(2) - x(0)), &(x(3) - x(1))) / 2.0,
+    volume: |x| det2(&(x[2] - x[0]), &(x[3] - x[1])) / 2.0,
     in_box: &[&[0, 1, 2, 3]],
 };
 
@@ -294,7 +297,7 @@ const TET4: Geometry = Geometry {
         (2, &[0, 1, 3]),
         (3, &[0, 2, 1]),
     ],
-    volume: |x| det3(&(x(1) - x(0)), &(x(2) - x(0)), &(x(3) - x(0))) / 6.0,
+    volume: |x| det3(&(x[1] - x[0]), &(x[2] - x[0]), &(x[3] - x[0])) / 6.0,
     // around the diagonal from corner 0 to corner 6
     in_box: &[
         &[0, 1, 2, 6],
@@ -417,7 +420,8 @@ mod tests {
             for cell in shape.in_box() {
                 assert_eq!(cell.len(), shape.linear().node_count());
                 let x = |i: usize| corner(cell[i]);
-                volume += shape.volume_of_corners(&x);
+                let corners: Vec<Vector<3>> = (0..cell.len()).map(x).collect();
+                volume += shape.volume_of_corners(&corners);
                 let centre = (0..cell.len()).map(x).sum::<Vector<3>>() / cell.len() as f64;
                 for facet in shape.linear().facets() {
                     let (a, b) = (x(facet[0]), x(facet[facet.len() - 1]));

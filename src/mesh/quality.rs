@@ -1,7 +1,7 @@
 //! Sizes and shapes of cells, and the checks that refuse a mesh no element can live on.
 
 use super::error::position;
-use super::{Mesh, MeshError, conformity};
+use super::{Mesh, MeshError, cell_shape::MOST_CORNERS, conformity};
 use crate::tensor::{Tensor, Vector, determinant, padded};
 
 /// A corner whose scaled Jacobian is at or below this counts as degenerate.
@@ -39,7 +39,11 @@ impl<const D: usize> Mesh<D> {
             return 0.0;
         }
         let nodes = self.corners(c);
-        shape.volume_of_corners(&|i| padded(&self.nodes[nodes[i] as usize]).into())
+        let mut x = [Vector::<3>::zeros(); MOST_CORNERS];
+        for (x, &n) in x.iter_mut().zip(nodes) {
+            *x = padded(&self.nodes[n as usize]).into();
+        }
+        shape.volume_of_corners(&x[..nodes.len()])
     }
 
     /// Smallest determinant of the edges at any corner of cell `c`, divided by their lengths; 0 if an edge has no length.
