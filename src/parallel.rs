@@ -95,7 +95,7 @@ mod places {
         }
     }
 
-    /// See [`super::map_with`]. Values that are there when a task panics are not dropped.
+    /// `of` each number below `count`, in their order, with what `new` makes for each task. Values that are there when a task panics are not dropped.
     #[inline]
     pub(crate) fn map_with<S, T: Send>(
         count: usize,
@@ -118,7 +118,10 @@ mod places {
         all
     }
 
-    /// See [`super::for_each_chunk`].
+    /// Calls `body` with the number of each chunk of `size` values, the last of which may be shorter, and the chunk.
+    ///
+    /// # Panics
+    /// For chunks without a value.
     #[inline]
     pub(crate) fn for_each_chunk<A: Send>(
         values: &mut [A],
@@ -139,7 +142,7 @@ mod places {
         });
     }
 
-    /// See [`super::for_each_task`]. Tasks that are left when one panics are not dropped.
+    /// Calls `body` with the number of each task and the task. Tasks that are left when one panics are not dropped.
     #[inline]
     pub(crate) fn for_each_task<T: Send>(
         mut tasks: Vec<T>,
@@ -159,19 +162,7 @@ mod places {
     }
 }
 
-/// Calls `body` with the number of each chunk of `size` values, the last of which may be shorter, and the chunk.
-///
-/// # Panics
-/// For chunks without a value.
-#[inline]
-pub(crate) fn for_each_chunk<A: Send>(
-    values: &mut [A],
-    size: usize,
-    at_least: usize,
-    body: impl Fn(usize, &mut [A]) + Sync,
-) {
-    places::for_each_chunk(values, size, at_least, body);
-}
+pub(crate) use places::{for_each_chunk, for_each_task, map_with};
 
 /// Calls `body` with the number of each value and the value.
 #[inline]
@@ -180,17 +171,7 @@ pub(crate) fn for_each_mut<A: Send>(
     at_least: usize,
     body: impl Fn(usize, &mut A) + Sync,
 ) {
-    places::for_each_chunk(values, 1, at_least, |k, value| body(k, &mut value[0]));
-}
-
-/// Calls `body` with the number of each task and the task.
-#[inline]
-pub(crate) fn for_each_task<T: Send>(
-    tasks: Vec<T>,
-    at_least: usize,
-    body: impl Fn(usize, T) + Sync,
-) {
-    places::for_each_task(tasks, at_least, body);
+    for_each_chunk(values, 1, at_least, |k, value| body(k, &mut value[0]));
 }
 
 /// `of` each number below `count`, in their order.
@@ -200,7 +181,7 @@ pub(crate) fn map<T: Send>(
     at_least: usize,
     of: impl Fn(usize) -> T + Sync,
 ) -> Vec<T> {
-    places::map_with(count, at_least, || (), |(), k| of(k))
+    map_with(count, at_least, || (), |(), k| of(k))
 }
 
 /// `of` each value, in their order.
@@ -223,17 +204,6 @@ pub(crate) fn map_chunks<'a, A: Sync, T: Send>(
     map(count.div_ceil(size), 1, |k| {
         of(k, &values[k * size..count.min((k + 1) * size)])
     })
-}
-
-/// `of` each number below `count`, in their order, with what `new` makes for each task.
-#[inline]
-pub(crate) fn map_with<S, T: Send>(
-    count: usize,
-    at_least: usize,
-    new: impl Fn() -> S + Sync,
-    of: impl Fn(&mut S, usize) -> T + Sync,
-) -> Vec<T> {
-    places::map_with(count, at_least, new, of)
 }
 
 /// `of` each number below `count`, in their order.
