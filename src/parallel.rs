@@ -59,11 +59,12 @@ fn gathered<T: Send>(
         // a list without an entry takes no memory
         if !list.is_empty() {
             let mut lists = lists.lock().unwrap_or_else(PoisonError::into_inner);
-            lists.push((first, list));
+            // in its place, for a sort is compiled for each type of item
+            let at = lists.partition_point(|(other, _)| *other < first);
+            lists.insert(at, (first, list));
         }
     });
-    let mut lists = lists.into_inner().unwrap_or_else(PoisonError::into_inner);
-    lists.sort_unstable_by_key(|(first, _)| *first);
+    let lists = lists.into_inner().unwrap_or_else(PoisonError::into_inner);
     let total: usize = lists.iter().map(|(_, list)| list.len()).sum();
     let mut lists = lists.into_iter().map(|(_, list)| list);
     let mut all = lists.next().unwrap_or_default();

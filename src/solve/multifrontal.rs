@@ -171,13 +171,7 @@ impl<'a> Assembly<'a> {
         let node = &self.symbolic.nodes[s as usize];
         let (p, r) = (node.pivot_dofs, node.row_dofs);
         let symmetric = self.params.symmetry == Symmetry::Symmetric;
-        let mut front = Front {
-            p,
-            r,
-            panel: vec![0.0; (p + r) * p],
-            upper: vec![0.0; if symmetric { 0 } else { p * r }],
-            schur: vec![0.0; r * r],
-        };
+        let mut front = Front::new(p, r, symmetric);
         let maps: Vec<Vec<u32>> = LOCAL.with_borrow_mut(|local| {
             self.number_front(s, local);
             self.add_entries(s, local, &mut front);
@@ -356,13 +350,7 @@ impl<'a> Assembly<'a> {
 /// does it; to tell how long that takes.
 pub(crate) fn trial_front(p: usize, r: usize, rows: &[usize], symmetry: Symmetry) {
     let symmetric = symmetry == Symmetry::Symmetric;
-    let mut front = Front {
-        p,
-        r,
-        panel: vec![0.0; (p + r) * p],
-        upper: vec![0.0; if symmetric { 0 } else { p * r }],
-        schur: vec![0.0; r * r],
-    };
+    let mut front = Front::new(p, r, symmetric);
     for &n in rows {
         let map: Vec<u32> = (0..n).map(|i| (i * (p + r) / n) as u32).collect();
         front.add_update(&vec![1e-9; n * n], &map, symmetric);
@@ -386,6 +374,14 @@ pub(crate) fn trial_front(p: usize, r: usize, rows: &[usize], symmetry: Symmetry
     std::hint::black_box(&front.panel);
 }
 
+/// Writes zeros to columns of so many `rows`, from row `first(column)` on.
+fn write_columns(values: &mut [f64], rows: usize, first: impl Fn(usize) -> usize) {
+    for (j, column) in values.chunks_exact_mut(rows.max(1)).enumerate() {
+        // or the compiler leaves it out, for it knows that the memory is zero
+        std::hint::black_box(&mut column[first(j)..]).fill(0.0);
+    }
+}
+
 /// One front under assembly; see [`front`] for the layout.
 struct Front {
     p: usize,
@@ -396,6 +392,24 @@ struct Front {
 }
 
 impl Front {
+    /// A front of zeros.
+    fn new(p: usize, r: usize, symmetric: bool) -> Self {
+        let mut front = Self {
+            p,
+            r,
+            panel: vec![0.0; (p + r) * p],
+            upper: vec![0.0; if symmetric { 0 } else { p * r }],
+            schur: vec![0.0; r * r],
+        };
+        // A page of fresh memory that is read before it is written, as `+=` does, interrupts the thread twice and the others of
+        // the process once: what is assembled is written first, and no more, for the upper triangles are never touched.
+        let first = |column: usize| if symmetric { column } else { 0 };
+        write_columns(&mut front.panel, p + r, first);
+        write_columns(&mut front.upper, p, first);
+        write_columns(&mut front.schur, r, first);
+        front
+    }
+
     /// Adds to an entry that lies in a pivot row or column.
     fn add(&mut self, i: usize, j: usize, value: f64) {
         if j < self.p {

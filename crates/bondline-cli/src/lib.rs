@@ -345,9 +345,10 @@ fn run(
         ranks,
     };
     let is_first = ranks.is_none_or(|ranks| ranks.rank() == 0);
-    let summary = match is_first {
-        true => scene.run_with(&options, &TerminalProgress::on_stderr()),
-        false => scene.run_with(&options, &Silent),
+    let summary = match ranks {
+        None => threads::on_one(|| scene.run_with(&options, &TerminalProgress::on_stderr())),
+        Some(_) if is_first => scene.run_with(&options, &TerminalProgress::on_stderr()),
+        Some(_) => scene.run_with(&options, &Silent),
     };
     let summary = summary.map_err(|e| miette::miette!("{e}"))?;
     let code = match summary.motion.as_ref().map(|m| m.ended) {
@@ -363,7 +364,6 @@ fn run(
     Ok(code)
 }
 
-/// Runs a scene with finer and finer meshes, and prints, writes and plots the differences.
 /// Predicts a run, and what each of several processes would have of it.
 fn check(
     scene: &SceneArguments,
@@ -375,7 +375,9 @@ fn check(
         CheckError::Run(e) => miette::miette!("{e}"),
     };
     let progress = TerminalProgress::on_stderr();
-    let found = bondline_study::check(&scene.scene, &scene.overrides, pilots, &progress);
+    let found = threads::on_one(|| {
+        bondline_study::check(&scene.scene, &scene.overrides, pilots, &progress)
+    });
     let mut prediction = found.map_err(told)?;
     if let Some(count) = processes {
         // lays the model out even where a check alone would count it from volumes
@@ -390,6 +392,7 @@ fn check(
     Ok(prediction)
 }
 
+/// Runs a scene with finer and finer meshes, and prints, writes and plots the differences.
 fn converge(
     scene: &SceneArguments,
     refinement: Refinement,
@@ -403,11 +406,13 @@ fn converge(
         factor,
     };
     let progress = TerminalProgress::on_stderr();
-    let found = bondline_study::converge(&scene.scene, &scene.overrides, &params, &progress)
-        .map_err(|e| match e {
-            ConvergeError::Scene(e) => report(*e),
-            other => miette::miette!("{other}"),
-        })?;
+    let found = threads::on_one(|| {
+        bondline_study::converge(&scene.scene, &scene.overrides, &params, &progress)
+    });
+    let found = found.map_err(|e| match e {
+        ConvergeError::Scene(e) => report(*e),
+        other => miette::miette!("{other}"),
+    })?;
     let format = if json {
         tables::Format::Json
     } else {

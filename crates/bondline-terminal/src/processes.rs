@@ -62,12 +62,12 @@ mod petsc {
             }
             let ranks = PetscRanks::start();
             let ranks = ranks.map_err(|e| miette::miette!("cannot start MPI and PETSc: {e}"))?;
-            if std::env::var_os("RAYON_NUM_THREADS").is_none() {
-                // else the threads of every process would take all cores
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
-                pool.build_global()
-                    .map_err(|e| miette::miette!("cannot start a thread: {e}"))?;
-            }
+            // else the threads of every process would take all cores
+            let one = std::env::var_os("RAYON_NUM_THREADS").is_none();
+            // as many as the variable says, for 0; this thread, which alone may send messages, is one of them
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(one));
+            let started = pool.use_current_thread().build_global();
+            started.map_err(|e| miette::miette!("cannot start a thread: {e}"))?;
             Ok(Self(Some(ranks)))
         }
 

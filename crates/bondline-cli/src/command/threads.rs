@@ -41,3 +41,8 @@ pub fn start(typed: Option<usize>, oversubscribe: Oversubscribe) -> miette::Resu
         .build_global()
         .map_err(|e| miette::miette!("cannot start {wanted} threads: {e}; ask for fewer"))
 }
+
+/// Does `work` on one of the threads that compute. Begun from any other thread, each of its loops would put that to sleep and wake it again.
+pub fn on_one<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    rayon::scope(|_| work())
+}

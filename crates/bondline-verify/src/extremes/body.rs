@@ -1,6 +1,7 @@
 //! A scene made to measure, and what its run gives.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bondline::coupling::Sampler;
 use bondline::observe::summary::MotionSummary;
@@ -215,7 +216,11 @@ fn of<const D: usize>(scene: Scene<D>) -> Result<Solved, RunError> {
 pub fn moved(source: &Source) -> Result<MotionSummary, String> {
     let mut scene = bondline_study::from_source(source, Path::new(""), "extreme")
         .map_err(|e| e.message().to_owned())?;
-    let folder = std::env::temp_dir().join(format!("bondline-extremes-{}", std::process::id()));
+    // several run at a time
+    static BEGUN: AtomicUsize = AtomicUsize::new(0);
+    let number = BEGUN.fetch_add(1, Ordering::Relaxed);
+    let name = format!("bondline-extremes-{}-{number}", std::process::id());
+    let folder = std::env::temp_dir().join(name);
     scene.set_output_directory(folder.clone());
     let summary = scene.run(&Silent).map_err(|e| e.to_string());
     // what lies there is of no further use

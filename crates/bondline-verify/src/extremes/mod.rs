@@ -25,6 +25,7 @@ use bondline::{
     observe::report::{Columns, Table, TableRow},
     progress::Progress,
 };
+use rayon::prelude::*;
 
 /// Measures one kind of extreme.
 type Part = fn(Effort) -> Vec<TableRow>;
@@ -47,7 +48,7 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     ];
     progress.stage("extremes", Some(parts.len() as u64));
     let tables = parts
-        .iter()
+        .par_iter()
         .map(|(title, rows)| {
             let mut table = Table::new(*title, Columns::Full);
             table.rows = rows(effort);
