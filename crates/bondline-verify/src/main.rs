@@ -113,8 +113,13 @@ fn chosen<'a>(name: Option<&str>, ranks: Option<&'a dyn Ranks>) -> miette::Resul
             None => SUITES.iter().collect(),
             Some(suite) => vec![suite],
         };
-        let alone = suites.into_iter().map(|s| (s, Box::new(s.run) as _));
-        return Ok(alone.collect());
+        // on one of the threads that compute: begun from another, each loop would put that to sleep and wake it again
+        let on_one = |suite: &'static Suite| -> Chosen<'a> {
+            let run =
+                |effort, progress: &dyn Progress| rayon::scope(|_| (suite.run)(effort, progress));
+            (suite, Box::new(run))
+        };
+        return Ok(suites.into_iter().map(on_one).collect());
     }
     let run = ON_PROCESSES.iter().find(|(n, _)| Some(*n) == name);
     match (named, run) {
