@@ -168,6 +168,9 @@ impl AnyScene {
 
     /// Runs the scene and writes its outputs.
     ///
+    /// Parallel loops run on rayon's threads. A loop that is begun on another thread puts that to sleep and wakes it again, which counts where loops are short:
+    /// begin the run on one of rayon's, by `rayon::scope(|_| scene.run_with(&options, progress))`, as the program does.
+    ///
     /// # Errors
     /// [`RunError`], each with place and remedy.
     pub fn run_with(
