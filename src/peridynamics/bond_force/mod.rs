@@ -69,6 +69,8 @@ mod stencil;
 mod stencil_numbers;
 pub(super) mod stretch;
 #[cfg(test)]
+mod tearing_tests;
+#[cfg(test)]
 mod tests;
 
 pub use force_problem::{
