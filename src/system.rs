@@ -8,6 +8,7 @@
 //! | `shared_blocks.rs`, `spmv.rs`, `exact_sum.rs`, `segments.rs` | rows that share blocks; products, exact sums, ranges of sites |
 //! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | what elements and springs add to the tangent |
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
+//! | `place_stress.rs` | the stress of a place |
 //! | `wrapped.rs` | a system around another one |
 
 use crate::parallel;
@@ -17,6 +18,7 @@ mod exact_sum;
 mod ghosts;
 mod neighbour_springs;
 mod partition;
+mod place_stress;
 pub mod ranks;
 mod segments;
 mod shared_blocks;
@@ -30,6 +32,7 @@ pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
 pub(crate) use neighbour_springs::share_long_rows;
 pub use partition::{NeighbourGraph, Partition};
+pub use place_stress::PlaceStress;
 pub use ranks::{Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
 pub(crate) use ranks::{all_say, first_text};
 pub use segments::Segments;
@@ -246,9 +249,9 @@ pub trait SemiDiscrete: Send + Sync {
         self.dissipation().map(|d| d.total())
     }
 
-    /// Stress \[Pa\] of the sites whose force states are not linear, as tensors padded with zeros.
-    fn stresses(&self, _u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        Vec::new()
+    /// Cauchy stress of a site by its force state; none where that is linear, or has no memory and follows from the displacement alone.
+    fn stress_of_site(&self, _site: usize, _u: &[f64]) -> Option<PlaceStress> {
+        None
     }
 
     /// The energy density \[J/m^D\] of each site, zero but at points; none if it follows from the displacements by the linear force states.
@@ -266,9 +269,9 @@ pub trait SemiDiscrete: Send + Sync {
         Vec::new()
     }
 
-    /// Stress \[Pa\] of the cells whose law is not linear, as tensors padded with zeros.
-    fn cell_stresses(&self, _u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        Vec::new()
+    /// Mean Cauchy stress of a cell whose law is not linear; none of any other.
+    fn stress_of_cell(&self, _cell: usize, _u: &[f64]) -> Option<PlaceStress> {
+        None
     }
 
     /// What the local laws of finite elements remember, by name and cell.

@@ -83,6 +83,12 @@ impl<const D: usize> Model<D> {
         !self.cauchy_born.is_empty()
     }
 
+    /// Whether elements of a material, by its number, do.
+    pub fn follows_bonds_in(&self, material: u16) -> bool {
+        let law = self.cauchy_born.get(usize::from(material));
+        law.is_some_and(Option::is_some)
+    }
+
     /// The local law of elements of a material by its number: that of the bonds, where [`Model::follow_bonds`] gave one, and otherwise that of those `typed`.
     pub fn local_law<'a>(
         &'a self,

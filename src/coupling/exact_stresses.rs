@@ -21,7 +21,7 @@ use std::sync::Arc;
 use super::model::Model;
 use crate::{
     parallel,
-    peridynamics::{Law, PdBody, WholeFamily, bond_force::BondKinematics},
+    peridynamics::{Law, PdBody, MemorylessFamily, bond_force::BondKinematics},
     tensor::{Tensor, Vector},
 };
 
@@ -150,13 +150,14 @@ impl<const D: usize> ExactStresses<D> {
         let bonds: Vec<Vector<D>> = neighbours.iter().map(of).collect();
         let volume = |l: &u32| body.cloud.volume[*l as usize];
         let volumes: Vec<f64> = neighbours.iter().map(volume).collect();
-        let family = WholeFamily {
+        let family = MemorylessFamily {
             bonds: &bonds,
             volumes: &volumes,
             pair,
             omega,
             state: body.state(j),
             material: body.cloud.material.get(j).copied().unwrap_or(0),
+            damage: 0.0,
         };
         let exact = |difference: &[Vector<D>]| {
             let (stress, _) = family.stress(states, BondKinematics::Exact, difference);

@@ -26,8 +26,8 @@ use crate::{
     material::LocalLaw,
     peridynamics::bond_force::{BondKinematics, BondPass},
     system::{
-        BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, Ranks,
-        SemiDiscrete, SharedSteps, Symmetry,
+        BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, PlaceStress,
+        Ranks, SemiDiscrete, SharedSteps, Symmetry,
     },
 };
 use behaviour::NONE;
@@ -479,8 +479,8 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.count_without_response(u)
     }
 
-    fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        self.stresses_of_points(u)
+    fn stress_of_site(&self, site: usize, u: &[f64]) -> Option<PlaceStress> {
+        self.stress_of_point(site, u)
     }
 
     fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
@@ -491,9 +491,8 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.remembered_by_points()
     }
 
-    fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        let elements = self.elements.as_ref();
-        elements.map_or(Vec::new(), |e| e.stresses(self.model, u))
+    fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<PlaceStress> {
+        self.elements.as_ref()?.stress(self.model, cell, u)
     }
 
     fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {

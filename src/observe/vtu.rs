@@ -95,15 +95,14 @@ impl Field {
 
     /// One tensor per entry by rows, filled up with zeros to 3 × 3.
     pub fn tensor<const D: usize>(name: &str, entries: &[Tensor<D>]) -> Self {
-        let mut values = vec![0.0; 9 * entries.len()];
-        for (row, t) in values.chunks_exact_mut(9).zip(entries) {
-            for i in 0..D {
-                for j in 0..D {
-                    row[3 * i + j] = t[(i, j)];
-                }
-            }
-        }
-        Self::reals(name, 9, values)
+        let entry = |t: &Tensor<D>, i, j| if i < D && j < D { t[(i, j)] } else { 0.0 };
+        let rows = |t| std::array::from_fn(|i| std::array::from_fn(|j| entry(t, i, j)));
+        Self::rows(name, entries.iter().map(rows))
+    }
+
+    /// One tensor of three dimensions per entry, by rows.
+    pub fn rows(name: &str, entries: impl Iterator<Item = [[f64; 3]; 3]>) -> Self {
+        Self::reals(name, 9, entries.flatten().flatten().collect())
     }
 
     fn is_vector(&self) -> bool {

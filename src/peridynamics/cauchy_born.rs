@@ -12,7 +12,7 @@ use std::sync::Arc;
 use super::bond_force::{BondKinematics, stretch::psi};
 use crate::{
     material::{LocalLaw, LocalResponse, central_differences},
-    peridynamics::{Accelerator, EnergyDensity, Law, StatePart, WholeFamily},
+    peridynamics::{Accelerator, EnergyDensity, Law, StatePart, MemorylessFamily},
     tensor::{Tensor, Tensor4, Vector, determinant},
 };
 
@@ -195,13 +195,14 @@ impl<const D: usize> CauchyBorn<D> {
             return (Tensor::zeros(), EnergyDensity::default());
         };
         let difference: Vec<Vector<D>> = half.bonds.iter().map(|xi| gradient * xi).collect();
-        let family = WholeFamily {
+        let family = MemorylessFamily {
             bonds: &half.bonds,
             volumes: &half.volumes,
             pair: &half.pair,
             omega: &half.omega,
             state: half.state.as_ref(),
             material: self.material,
+            damage: 0.0,
         };
         family.stress(states, self.kinematics, &difference)
     }

@@ -5,8 +5,10 @@
 
 use crate::{
     material::LocalLaw,
-    peridynamics::{StatePart, ZeroEnergyControl, bond_force::BondKinematics},
-    tensor::{Tensor, Vector},
+    peridynamics::{
+        StatePart, ZeroEnergyControl, bond_force::BondKinematics, invert_shape_tensor,
+    },
+    tensor::{Tensor, Vector, determinant},
 };
 
 /// The numbers that a law keeps from step to step, by their names.
@@ -90,6 +92,57 @@ impl<const D: usize> DeformedFamily<'_, D> {
     pub fn is_empty(&self) -> bool {
         self.bonds.is_empty()
     }
+
+    /// The virial `σ = J⁻¹ Σ T⟨ξ⟩ ⊗ Y⟨ξ⟩ V` of the deformed bonds with the force state `T` \[Pa\], which is symmetric for an ordinary law: under a uniform deformation `J⁻¹ P Fᵀ` with P of
+    /// [SAND2015-7998] eq. (2.19). Linear bonds have no other than the linear stress `Σ T⟨ξ⟩ ⊗ ξ V`, which a rotation turns to first order only.
+    pub fn virial_stress(&self, force: &[Vector<D>]) -> Tensor<D> {
+        let mut virial = Tensor::zeros();
+        for (k, force) in force.iter().enumerate() {
+            let arm = match self.kinematics {
+                BondKinematics::Exact => self.bonds[k] + self.difference[k],
+                BondKinematics::Linear => self.bonds[k],
+            };
+            virial += force * arm.transpose() * self.volumes[k];
+        }
+        virial / self.volume_ratio()
+    }
+
+    /// Volume over undeformed volume, `J = det F̄` with `F̄ = (Σ Y⟨ξ⟩ ⊗ ξ V/|ξ|²) (Σ ξ ⊗ ξ V/|ξ|²)⁻¹` of the intact bonds; 1 of linear bonds, and of those that do not span the space or are turned inside out.
+    pub fn volume_ratio(&self) -> f64 {
+        if self.kinematics == BondKinematics::Linear {
+            return 1.0;
+        }
+        let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
+        for ((xi, eta), volume) in self.bonds.iter().zip(self.difference).zip(self.volumes) {
+            let weighed = xi.transpose() * (volume / xi.norm_squared());
+            shape += xi * weighed;
+            moment += eta * weighed;
+        }
+        let ratio = match invert_shape_tensor(&shape, self.len()) {
+            Ok(inverse) => determinant(&(Tensor::identity() + moment * inverse)),
+            Err(_) => 1.0,
+        };
+        if ratio > 0.0 { ratio } else { 1.0 }
+    }
+}
+
+/// Cauchy stress of a point \[Pa\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CauchyStress<const D: usize> {
+    /// Its components within the body.
+    pub tensor: Tensor<D>,
+    /// The normal stress out of the plane of a long body; none where it is `ν tr σ` of an isotropic elastic one.
+    pub across: Option<f64>,
+}
+
+impl<const D: usize> CauchyStress<D> {
+    /// That of a point that carries none.
+    pub fn zero() -> Self {
+        Self {
+            tensor: Tensor::zeros(),
+            across: Some(0.0),
+        }
+    }
 }
 
 /// What a point and its intact bonds remember, by [`HistoryLayout`]: the numbers of a bond follow one another, bond after bond.
@@ -152,18 +205,17 @@ pub trait ForceState<const D: usize>: Send + Sync {
         force: &mut [Vector<D>],
     ) -> EnergyDensity;
 
-    /// The stress of a point whose force state is `force` \[Pa\], as results show it: the partial stress `Σ T⟨ξ⟩ ⊗ ξ V`, [SAND2015-7998] eq. (2.19), and of laws for strains of any size
-    /// the Cauchy stress.
+    /// The Cauchy stress of a point whose force state is `force`, as results show it: [`DeformedFamily::virial_stress`], and of correspondence `J⁻¹ P Fᵀ`.
     fn stress(
         &self,
         family: &DeformedFamily<'_, D>,
         _past: Past<'_>,
         force: &[Vector<D>],
-    ) -> Tensor<D> {
-        let bonds = force.iter().zip(family.bonds).zip(family.volumes);
-        bonds.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
-            sum + force * xi.transpose() * *volume
-        })
+    ) -> CauchyStress<D> {
+        CauchyStress {
+            tensor: family.virial_stress(force),
+            across: None,
+        }
     }
 
     /// The stress of a point, of a law whose [`ForceState::respond`] is that and nothing else: the pass then asks for it once per point instead of for a force per bond. `material` is that of the point; none asks whether all of them have one control.

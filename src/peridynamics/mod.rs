@@ -26,7 +26,7 @@
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs`, `body/` | the body: rows of the internal force, and partial stress | eq. (2.5), (2.19) |
 //! | `cauchy_born.rs` | a law of elements with the stress of whole families | eq. (2.10) |
-//! | `whole_family.rs` | the stress of a family without memory | eq. (2.19) |
+//! | `memoryless_family.rs` | the stress of a family without memory | eq. (2.19) |
 //! | `contact.rs` | short-range contact between points without a bond | Parks et al. 2008 |
 //! | `bond_force/` | bond passes: threaded internal force with damage, for motion | eq. (2.5) |
 
@@ -55,7 +55,7 @@ pub mod shape_tensor;
 pub mod shell_weights;
 pub mod softening;
 mod tearing_parameter;
-mod whole_family;
+mod memoryless_family;
 pub mod zero_energy;
 
 pub(crate) use body::FamilyEnds;
@@ -65,7 +65,7 @@ pub use crack_area::CrackArea;
 pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{
-    DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past, PointStress,
+    CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past, PointStress,
     Present,
 };
 pub use horizon::Horizon;
@@ -84,7 +84,7 @@ pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use position_aware_influence::{CalibrationFields, NotPositionAware};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shell_weights::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
-pub use whole_family::WholeFamily;
+pub use memoryless_family::MemorylessFamily;
 pub use zero_energy::ZeroEnergyControl;
 
 use crate::tensor::Vector;

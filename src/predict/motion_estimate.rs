@@ -233,7 +233,7 @@ impl OutputCost {
                 system: None,
                 broken: &[],
                 sections: &[],
-                stresses: None,
+                stresses: (&rest.stresses, 0.0),
             };
             let mut series = Series::new(folder.path(), "trial");
             let more = [OverSites::Vector("velocity", &u)];

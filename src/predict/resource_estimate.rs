@@ -263,7 +263,7 @@ fn seconds_of_output<const D: usize>(
         system: None,
         broken: &[],
         sections: &[],
-        stresses: rest.stresses.at(0.0),
+        stresses: (&rest.stresses, 0.0),
     };
     Ok(output_seconds(&rest.output, &made_up)?)
 }

@@ -23,8 +23,8 @@ pub struct Solved<'a, const D: usize> {
     pub broken: &'a [(u32, u32)],
     /// Forces in the sections that the scene asks for.
     pub sections: &'a [SectionForce],
-    /// What of the stress is thermal and what is made of it, at a time; none where neither is.
-    pub stresses: Option<(&'a StressSettings<D>, f64)>,
+    /// What of the stress is thermal and what is made of it, and the time.
+    pub stresses: (&'a StressSettings<D>, f64),
 }
 
 /// The zone that each site lies in; of a node the most nonlocal one of the elements around it.

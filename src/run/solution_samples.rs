@@ -3,9 +3,9 @@
 use rustc_hash::FxHashSet;
 
 use super::solution::Solved;
-use super::stresses::{KnownStresses, Place, names};
+use super::stresses::{Expansions, Stress, names};
 use crate::fem::{self, Locator};
-use crate::scene::spec::StressSpec;
+use crate::scene::validated::StressOutput;
 use crate::shape::Shape;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, strain};
@@ -16,15 +16,15 @@ use crate::{
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The columns of a table along positions: place, displacement, strain, the stress where it is `asked` for, and the model.
-pub(super) fn table_header<const D: usize>(asked: &[StressSpec]) -> Vec<String> {
+/// The columns of a table along positions: place, displacement, strain, the stress where numbers made of it are asked for, and the model.
+pub(super) fn table_header<const D: usize>(output: &StressOutput) -> Vec<String> {
     let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
     header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
     for (i, first) in AXES[..D].iter().enumerate() {
         header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
     }
-    if !asked.is_empty() {
-        header.extend(names::<D>(asked));
+    if !output.numbers.is_empty() {
+        header.extend(names::<D>(output));
     }
     header.push("model".to_owned());
     header
@@ -36,15 +36,15 @@ struct Sample<const D: usize> {
     gradient: Option<Tensor<D>>,
     carrier: Carrier,
     zone: Zone,
-    /// The stress and the numbers made of it, if they are asked for.
-    stress: Option<(Tensor<D>, Vec<f64>)>,
+    /// The stress, if numbers made of it are asked for.
+    stress: Option<Stress<D>>,
 }
 
 /// The solution at sites and between them.
 pub(super) struct SampledSolution<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
     intact: Intact,
-    known: KnownStresses,
+    expansions: Expansions,
     sampler: Sampler<'a, D>,
     body: Locator<D>,
     tolerance: f64,
@@ -59,9 +59,9 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         Self {
             solved,
             intact: Intact::of(solved),
-            known: match solved.has_derived() {
-                true => KnownStresses::of(solved),
-                false => KnownStresses::default(),
+            expansions: match solved.has_derived() {
+                true => Expansions::of(solved),
+                false => Expansions::default(),
             },
             sampler: Sampler::new(model),
             body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
@@ -90,7 +90,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         let carrier = self.sampler.carrier(x)?;
         let stress = solved
             .has_derived()
-            .then(|| solved.carried_stress(carrier, &self.known, &self.intact));
+            .then(|| solved.carried_stress(carrier, &self.expansions, &self.intact));
         let (gradient, zone) = match carrier {
             Carrier::Element(c, xi) => (Some(solved.gradient_in(c, &xi)), solved.model.zones[c]),
             Carrier::Point(site) => (None, solved.zone_of_site[site]),
@@ -143,11 +143,10 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             for i in 0..D {
                 row.extend((i..D).map(|j| e[(i, j)]));
             }
-            if let Some((stress, derived)) = &sample.stress {
-                for i in 0..D {
-                    row.extend((i..D).map(|j| stress[(i, j)]));
-                }
-                row.extend(derived);
+            if let Some(stress) = &sample.stress {
+                let output = self.solved.stress_output();
+                row.extend(stress.components(output));
+                row.extend(stress.derived(output));
             }
             row.push(f64::from(label(sample.zone)));
             Some(row)
@@ -207,22 +206,29 @@ impl<const D: usize> Solved<'_, D> {
         fem::superconvergent_gradient(&self.model.mesh, c, xi, |n| self.node(n))
     }
 
-    /// Stress of what carries a position, and the numbers made of it.
+    /// What is written of stresses.
+    pub(super) fn stress_output(&self) -> &StressOutput {
+        &self.stresses.0.output
+    }
+
+    /// Whether numbers made of the stress are asked for.
+    pub(super) fn has_derived(&self) -> bool {
+        !self.stress_output().numbers.is_empty()
+    }
+
+    /// Stress of what carries a position.
     pub(super) fn carried_stress(
         &self,
         carrier: Carrier,
-        known: &KnownStresses,
+        expansions: &Expansions,
         intact: &Intact,
-    ) -> (Tensor<D>, Vec<f64>) {
-        let (stress, place) = match carrier {
-            Carrier::Element(c, xi) => (self.stress_in(c, &xi, known), Place::Within(c, xi)),
+    ) -> Stress<D> {
+        match carrier {
+            Carrier::Element(c, xi) => self.stress_in(c, &xi, expansions),
             Carrier::Point(site) => {
-                let stands = |p, j| intact.is_intact(p, j);
-                let stress = self.point_stress(site, stands, known);
-                (stress, Place::Point(site))
+                self.point_stress(site, |p, j| intact.is_intact(p, j), expansions)
             }
-        };
-        (stress, self.derived(&stress, place))
+        }
     }
 
     /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.

@@ -161,7 +161,7 @@ fn solve_chosen<const D: usize>(
         system: system.as_ref().map(|s| s as &dyn SemiDiscrete),
         broken: &[],
         sections: &sections,
-        stresses: rest.stresses.at(0.0),
+        stresses: (&rest.stresses, 0.0),
     };
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");

@@ -2,11 +2,9 @@
 
 use super::solution::Solved;
 use super::solution_samples::Intact;
-use super::stress_settings::StressSettings;
-use super::stresses::{KnownStresses, names};
+use super::stresses::{Expansions, Stress, names};
 use crate::coupling::{Carrier, Model, Sampler};
 use crate::scene::validated::Output;
-use crate::tensor::Vector;
 
 /// What carries each probe; nothing where no stress is asked for.
 pub(super) struct StressProbes {
@@ -15,7 +13,7 @@ pub(super) struct StressProbes {
 
 /// The columns of a scene's probes: the stress, then the numbers made of it; none where no stress is asked for.
 pub(super) fn header<const D: usize>(output: &Output<D>) -> Vec<String> {
-    let probes = output.probes.iter().filter(|_| !output.stresses.is_empty());
+    let probes = output.probes.iter().filter(|_| !output.stresses.numbers.is_empty());
     probes
         .flat_map(|(name, _)| {
             let columns = names::<D>(&output.stresses).into_iter();
@@ -26,18 +24,14 @@ pub(super) fn header<const D: usize>(output: &Output<D>) -> Vec<String> {
 
 impl StressProbes {
     /// In a model.
-    pub fn new<const D: usize>(
-        model: &Model<D>,
-        settings: &StressSettings<D>,
-        probes: &[(String, Vector<D>)],
-    ) -> Self {
-        if settings.asked.is_empty() || probes.is_empty() {
+    pub fn new<const D: usize>(model: &Model<D>, output: &Output<D>) -> Self {
+        if output.stresses.numbers.is_empty() || output.probes.is_empty() {
             return Self {
                 carriers: Vec::new(),
             };
         }
         let sampler = Sampler::new(model);
-        let carriers = probes.iter().map(|(_, x)| sampler.carrier(x));
+        let carriers = output.probes.iter().map(|(_, x)| sampler.carrier(x));
         Self {
             carriers: carriers.collect(),
         }
@@ -50,19 +44,14 @@ impl StressProbes {
 
     /// Stress at each probe, and the numbers made of it; zero where nothing carries it.
     pub fn row<const D: usize>(&self, solved: &Solved<'_, D>) -> Vec<f64> {
-        let (known, intact) = (KnownStresses::of(solved), Intact::of(solved));
-        let columns = names::<D>(solved.asked()).len();
-        let of_probe = |carrier: &Option<Carrier>| match carrier {
-            Some(carrier) => {
-                let (stress, derived) = solved.carried_stress(*carrier, &known, &intact);
-                let mut row = Vec::with_capacity(columns);
-                for i in 0..D {
-                    row.extend((i..D).map(|j| stress[(i, j)]));
-                }
-                row.extend(derived);
-                row
-            }
-            None => vec![0.0; columns],
+        let (expansions, intact) = (Expansions::of(solved), Intact::of(solved));
+        let output = solved.stress_output();
+        let of_probe = |carrier: &Option<Carrier>| {
+            let stress = carrier.map_or_else(Stress::zero, |carrier| {
+                solved.carried_stress(carrier, &expansions, &intact)
+            });
+            let derived = stress.derived(output);
+            stress.components(output).chain(derived)
         };
         self.carriers.iter().flat_map(of_probe).collect()
     }

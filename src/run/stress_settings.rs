@@ -2,19 +2,22 @@
 
 use super::thermal::Thermal;
 use crate::material::Kinematics;
+use crate::peridynamics::bond_force::BondKinematics;
 use crate::scene::materials::{Material, Ratio};
-use crate::scene::spec::StressSpec;
-use crate::scene::validated::Scene;
+use crate::scene::spec::BondsSpec;
+use crate::scene::validated::{Scene, StressOutput};
 
 /// What of a scene's stresses is thermal, and what is made of them.
 #[derive(Clone, Debug)]
 pub struct StressSettings<const D: usize> {
-    /// What is asked for.
-    pub asked: Vec<StressSpec>,
+    /// What is written.
+    pub output: StressOutput,
     /// What expands, if anything does.
     pub thermal: Option<Thermal<D>>,
     /// How the body stands for a solid.
     pub kinematics: Kinematics,
+    /// How bonds follow the motion.
+    pub bonds: BondKinematics,
     /// Poisson's ratio and `E α` of each material.
     pub constants: Vec<(f64, f64)>,
 }
@@ -28,7 +31,7 @@ impl<const D: usize> StressSettings<D> {
         let alpha = |m: &Material<D>| m.expansion.unwrap_or(0.0);
         let within = |m| match kinematics {
             Kinematics::PlaneStrain => (1.0 + ratio(m)) * alpha(m),
-            _ => alpha(m),
+            Kinematics::Bar | Kinematics::PlaneStress | Kinematics::Solid => alpha(m),
         };
         let cells = scene.mesh.cell_count().max(1);
         let (low, high) = scene.mesh.bounds();
@@ -39,17 +42,21 @@ impl<const D: usize> StressSettings<D> {
             reach: 0.25 * size,
         });
         Self {
-            asked: scene.output.stresses.clone(),
+            output: scene.output.stresses.clone(),
             thermal,
             kinematics,
+            bonds: match scene.breaking.bonds {
+                BondsSpec::Exact => BondKinematics::Exact,
+                BondsSpec::Linear => BondKinematics::Linear,
+            },
             constants: (scene.materials.iter())
                 .map(|m| (ratio(m), stiffness(m) * alpha(m)))
                 .collect(),
         }
     }
 
-    /// What outputs at time `t` need; none where nothing is asked for and nothing expands.
-    pub fn at(&self, t: f64) -> Option<(&Self, f64)> {
-        (self.thermal.is_some() || !self.asked.is_empty()).then_some((self, t))
+    /// Whether stresses of points are more than the bonds that a process has of its own: numbers are made of them, or a temperature has a part in them.
+    pub fn asks_for_more(&self) -> bool {
+        self.thermal.is_some() || !self.output.numbers.is_empty()
     }
 }

@@ -1,29 +1,29 @@
 //! Stress of elements and points as outputs show it: less its thermal part, and the numbers made of it.
 
-use rustc_hash::FxHashMap;
-
 use super::solution::Solved;
-use super::stress_settings::StressSettings;
 use super::thermal::Thermal;
 use crate::fem;
-use crate::material::Kinematics;
+use crate::peridynamics::{ForceState, bond_force::BondKinematics};
 use crate::scene::spec::StressSpec;
+use crate::scene::validated::StressOutput;
+use crate::system::PlaceStress;
 use crate::tensor::{Tensor, Vector};
 
-/// The names of the columns of a stress: its components, then the numbers that are `asked` for.
-pub(super) fn names<const D: usize>(asked: &[StressSpec]) -> Vec<String> {
+/// The names of the columns of a stress: its components, then the numbers that are asked for.
+pub(super) fn names<const D: usize>(output: &StressOutput) -> Vec<String> {
     let mut names = Vec::new();
     for (i, first) in AXES[..D].iter().enumerate() {
         names.extend(AXES[i..D].iter().map(|second| format!("s{first}{second}")));
     }
-    names.extend(asked.iter().map(|s| name(s).replace('-', "_")));
+    names.extend(output.across.then(|| "szz".to_owned()));
+    names.extend((output.numbers.iter()).map(|s| name(s).replace('-', "_")));
     names
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The name of a number made of a stress.
-fn name(asked: &StressSpec) -> &'static str {
+pub(super) fn name(asked: &StressSpec) -> &'static str {
     match asked {
         StressSpec::VonMises => "von-mises",
         StressSpec::MaxPrincipal => "max-principal",
@@ -31,196 +31,191 @@ fn name(asked: &StressSpec) -> &'static str {
     }
 }
 
-/// What a stress belongs to.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Place {
-    Cell(usize),
-    /// A cell, and reference coordinates in it.
-    Within(usize, [f64; 3]),
-    Point(usize),
-}
-
-/// Stresses that laws which are not linear tell of themselves, by cell and by site.
+/// The displacements of all sites by which a body expands freely, of a scene with a temperature: by a unit rise, and by a unit gradient of it along each axis.
 #[derive(Default)]
-pub(super) struct KnownStresses {
-    cells: FxHashMap<u32, [[f64; 3]; 3]>,
-    points: FxHashMap<u32, [[f64; 3]; 3]>,
-    /// Of a scene with a temperature, the displacements of all sites by which a body expands freely: by a unit rise, and by a unit gradient of it along each axis.
-    expansions: Vec<Vec<f64>>,
-}
+pub(super) struct Expansions(Vec<Vec<f64>>);
 
-impl KnownStresses {
+impl Expansions {
     pub fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
-        let u = solved.displacement;
-        let system = solved.system;
-        let cells = system.map(|s| s.cell_stresses(u)).unwrap_or_default();
-        let points = system.map(|s| s.stresses(u)).unwrap_or_default();
-        Self {
-            cells: cells.into_iter().collect(),
-            points: points.into_iter().collect(),
-            expansions: match solved.thermal() {
-                Some(_) => super::thermal::unit_expansions(solved.model),
-                None => Vec::new(),
-            },
-        }
+        Self(match solved.thermal() {
+            Some(_) => super::thermal::unit_expansions(solved.model),
+            None => Vec::new(),
+        })
     }
-}
 
-impl KnownStresses {
     /// The stress `of` the displacement of free expansion in `parts`.
-    fn expanded<const D: usize>(
-        &self,
-        parts: &[f64],
-        of: impl Fn(&[f64]) -> Tensor<D>,
-    ) -> Tensor<D> {
-        let each = parts.iter().zip(&self.expansions);
+    fn stress<const D: usize>(&self, parts: &[f64], of: impl Fn(&[f64]) -> Tensor<D>) -> Tensor<D> {
+        let each = parts.iter().zip(&self.0);
         each.filter(|(part, _)| **part != 0.0)
             .map(|(part, u)| of(u) * *part)
             .sum()
     }
 }
 
-impl<const D: usize> Solved<'_, D> {
-    fn thermal(&self) -> Option<(&Thermal<D>, f64)> {
-        let (settings, t) = self.stresses?;
-        settings.thermal.as_ref().map(|thermal| (thermal, t))
-    }
+/// The stress of a place \[Pa\]: its components within the body, and the normal one out of the plane, zero but in plane strain.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stress<const D: usize> {
+    pub tensor: Tensor<D>,
+    pub across: f64,
+}
 
-    /// The numbers made of the stress that are asked for.
-    pub(super) fn asked(&self) -> &[StressSpec] {
-        self.stresses.map_or(&[][..], |(s, _)| &s.asked)
-    }
-
-    /// Whether numbers made of the stress are asked for.
-    pub(super) fn has_derived(&self) -> bool {
-        !self.asked().is_empty()
-    }
-
-    /// The names of their fields.
-    pub(super) fn derived_names(&self) -> Vec<&'static str> {
-        self.asked().iter().map(name).collect()
-    }
-
-    /// Stress of an element at its centre, where the displacement has the gradient `gradient`.
-    pub(super) fn cell_stress(
-        &self,
-        c: usize,
-        gradient: &Tensor<D>,
-        known: &KnownStresses,
-    ) -> Tensor<D> {
-        if let Some(own) = self.own_cell_stress(c, known) {
-            return own;
-        }
-        let model = self.model;
-        match self.thermal() {
-            Some((thermal, t)) => {
-                let mechanical = gradient - thermal.cell_gradient(model, c, t);
-                model.tensor_of_cell(c).contract(&mechanical)
-            }
-            None => model.tensor_of_cell(c).contract(gradient),
+impl<const D: usize> Stress<D> {
+    /// No stress, where nothing carries one.
+    pub fn zero() -> Self {
+        Self {
+            tensor: Tensor::zeros(),
+            across: 0.0,
         }
     }
 
-    /// Stress of an element at reference coordinates `xi`; the mean of the cell where its law is not linear, or its stress the partial stress of bonds.
-    pub(super) fn stress_in(&self, c: usize, xi: &[f64; 3], known: &KnownStresses) -> Tensor<D> {
-        if let Some(own) = self.own_cell_stress(c, known) {
-            return own;
-        }
-        let model = self.model;
-        let mut gradient = self.gradient_in(c, xi);
-        if let Some((thermal, t)) = self.thermal() {
-            gradient -= thermal.gradient_in(model, c, xi, t);
-        }
-        model.tensor_of_cell(c).contract(&gradient)
+    /// The components in the order of [`names`].
+    pub fn components(&self, output: &StressOutput) -> impl Iterator<Item = f64> + use<D> {
+        let upper = (0..D).flat_map(|i| (i..D).map(move |j| (i, j)));
+        let across = output.across.then_some(self.across);
+        let tensor = self.tensor;
+        upper.map(move |(i, j)| tensor[(i, j)]).chain(across)
     }
 
-    /// The mean stress of an element that is no product of a tensor with the displacement gradient; none of other elements.
-    fn own_cell_stress(&self, c: usize, known: &KnownStresses) -> Option<Tensor<D>> {
-        if let Some(rows) = known.cells.get(&(c as u32)) {
-            return Some(Tensor::from_fn(|i, j| rows[i][j]));
+    /// Three rows of three.
+    pub fn rows(&self) -> [[f64; 3]; 3] {
+        let mut rows = PlaceStress::new(&self.tensor, None).rows;
+        if D == 2 {
+            rows[2][2] = self.across;
         }
-        let (model, operator) = (self.model, self.operator);
-        let own = operator.cell_stress(c, self.displacement)?;
-        let Some((thermal, t)) = self.thermal() else {
-            return Some(own);
-        };
-        let of = |u: &[f64]| operator.cell_stress(c, u).unwrap_or_else(Tensor::zeros);
-        let parts = thermal.parts(model.material_of_cell(c), &model.mesh.centroid(c), t);
-        Some(own - known.expanded(&parts, of))
+        rows
     }
 
-    /// Stress of a point over the bonds of its family that stand.
-    pub(super) fn point_stress(
-        &self,
-        site: usize,
-        stands: impl Fn(usize, usize) -> bool,
-        known: &KnownStresses,
-    ) -> Tensor<D> {
-        if let Some(rows) = known.points.get(&(site as u32)) {
-            return Tensor::from_fn(|i, j| rows[i][j]);
-        }
-        let Some((body, p)) = self.model.point_of(site) else {
-            return Tensor::zeros();
-        };
-        let stress = body.partial_stress_of(p, self.displacement, |j| stands(p, j));
-        match self.thermal() {
-            Some((thermal, t)) => {
-                let of = |u: &[f64]| body.partial_stress_of(p, u, |j| stands(p, j));
-                let material = self.model.peridynamic_material();
-                let parts = thermal.parts(material, &self.model.sites[site].position, t);
-                stress - known.expanded(&parts, of)
-            }
-            None => stress,
-        }
-    }
-
-    /// The numbers made of a stress, in the order of their names.
-    pub(super) fn derived(&self, stress: &Tensor<D>, place: Place) -> Vec<f64> {
-        let Some((settings, t)) = self.stresses else {
-            return Vec::new();
-        };
-        let across = self.stress_out_of_plane(settings, t, stress, place);
-        let principal = principal(stress, across);
+    /// The numbers made of it that are asked for, in the order of their names.
+    pub fn derived(&self, output: &StressOutput) -> Vec<f64> {
+        let principal = principal(&self.tensor, self.across);
         let of = |s: &StressSpec| match s {
             StressSpec::VonMises => von_mises(&principal),
             StressSpec::MaxPrincipal => principal.into_iter().fold(f64::NEG_INFINITY, f64::max),
             StressSpec::MinPrincipal => principal.into_iter().fold(f64::INFINITY, f64::min),
         };
-        settings.asked.iter().map(of).collect()
+        output.numbers.iter().map(of).collect()
+    }
+}
+
+impl<const D: usize> Solved<'_, D> {
+    fn thermal(&self) -> Option<(&Thermal<D>, f64)> {
+        let (settings, t) = self.stresses;
+        settings.thermal.as_ref().map(|thermal| (thermal, t))
     }
 
-    /// Stress out of the plane: zero but in plane strain, where it is `ν (σ_xx + σ_yy) − E α ΔT`.
-    fn stress_out_of_plane(
+    /// Stress of an element at its centre, where the displacement has the gradient `gradient`: the mean Cauchy stress where its law is not linear, the linear stress of another.
+    pub(super) fn cell_stress(
         &self,
-        settings: &StressSettings<D>,
-        t: f64,
-        stress: &Tensor<D>,
-        place: Place,
-    ) -> f64 {
-        if settings.kinematics != Kinematics::PlaneStrain {
-            return 0.0;
-        }
+        c: usize,
+        gradient: &Tensor<D>,
+        expansions: &Expansions,
+    ) -> Stress<D> {
+        let thermal = |(thermal, t): (&Thermal<D>, f64)| thermal.cell_gradient(self.model, c, t);
+        self.stress_of_element(c, self.model.mesh.centroid(c), expansions, || {
+            self.thermal().map_or(*gradient, |at| gradient - thermal(at))
+        })
+    }
+
+    /// Stress of an element at reference coordinates `xi`; the mean of the cell where its law is not linear, or its stress the partial stress of bonds.
+    pub(super) fn stress_in(&self, c: usize, xi: &[f64; 3], expansions: &Expansions) -> Stress<D> {
         let model = self.model;
-        let (material, x): (u16, Vector<D>) = match place {
-            Place::Cell(c) => (model.material_of_cell(c), model.mesh.centroid(c)),
-            Place::Within(c, xi) => (
-                model.material_of_cell(c),
-                fem::position_in(&model.mesh, c, &xi),
-            ),
-            Place::Point(site) => {
-                let material = model
-                    .point_of(site)
-                    .and_then(|(body, p)| body.cloud.material.get(p));
-                let own = material.copied().unwrap_or(model.peridynamic_material());
-                (own, model.sites[site].position)
+        let x = fem::position_in(&model.mesh, c, xi);
+        self.stress_of_element(c, x, expansions, || {
+            let gradient = self.gradient_in(c, xi);
+            let thermal = |(thermal, t): (&Thermal<D>, f64)| thermal.gradient_in(model, c, xi, t);
+            self.thermal().map_or(gradient, |at| gradient - thermal(at))
+        })
+    }
+
+    /// Stress of an element at `x`, where the mechanical part of the displacement gradient is `gradient`.
+    fn stress_of_element(
+        &self,
+        c: usize,
+        x: Vector<D>,
+        expansions: &Expansions,
+        gradient: impl FnOnce() -> Tensor<D>,
+    ) -> Stress<D> {
+        let model = self.model;
+        let material = model.material_of_cell(c);
+        let told = (self.system).and_then(|system| system.stress_of_cell(c, self.displacement));
+        if let Some(told) = told {
+            return self.complete(told.tensor(), told.across, material, &x);
+        }
+        let own = |u: &[f64]| self.operator.cell_stress(c, u);
+        let tensor = match own(self.displacement) {
+            Some(stress) => {
+                let of = |u: &[f64]| own(u).unwrap_or_else(Tensor::zeros);
+                let thermal = self.thermal().map(|(thermal, t)| {
+                    let parts = thermal.parts(material, &model.mesh.centroid(c), t);
+                    expansions.stress(&parts, of)
+                });
+                stress - thermal.unwrap_or_else(Tensor::zeros)
             }
+            None => model.tensor_of_cell(c).contract(&gradient()),
         };
-        let (ratio, per_degree) = settings.constants[usize::from(material)];
-        let rise = settings
-            .thermal
-            .as_ref()
-            .map_or(0.0, |th| th.rise_at(&x, t));
-        ratio * stress.trace() - per_degree * rise
+        self.complete(tensor, None, material, &x)
+    }
+
+    /// Stress of a point over the bonds of its family that stand: the Cauchy stress of exact bonds, of a nonlinear law and of one with memory, the linear stress of others.
+    pub(super) fn point_stress(
+        &self,
+        site: usize,
+        stands: impl Fn(usize, usize) -> bool,
+        expansions: &Expansions,
+    ) -> Stress<D> {
+        let model = self.model;
+        let Some((body, p)) = model.point_of(site) else {
+            return Stress::zero();
+        };
+        let x = model.sites[site].position;
+        let material = body.cloud.material.get(p).copied();
+        let material = material.unwrap_or(model.peridynamic_material());
+        let u = self.displacement;
+        if let Some(told) = self.system.and_then(|system| system.stress_of_site(site, u)) {
+            return self.complete(told.tensor(), told.across, material, &x);
+        }
+        if let Some(law) = self.exact_law() {
+            let told = body.exact_stress(p, law, u, |j| stands(p, j));
+            return self.complete(told.tensor, told.across, material, &x);
+        }
+        let of = |u: &[f64]| body.partial_stress_of(p, u, |j| stands(p, j));
+        let thermal = self.thermal().map(|(thermal, t)| {
+            let parts = thermal.parts(material, &x, t);
+            expansions.stress(&parts, of)
+        });
+        let tensor = of(u) - thermal.unwrap_or_else(Tensor::zeros);
+        self.complete(tensor, None, material, &x)
+    }
+
+    /// The force states of exact bonds whose stress follows from the displacement alone.
+    fn exact_law(&self) -> Option<&dyn ForceState<D>> {
+        let law = &self.model.peridynamics.as_ref()?.law;
+        let states = law.force_state()?;
+        let is_exact = self.stresses.0.bonds == BondKinematics::Exact && states.is_objective();
+        (is_exact && states.history().is_empty()).then_some(states)
+    }
+
+    /// A stress with the one out of the plane: in plane strain, where the law does not tell it, that of an isotropic elastic body, `ν (σ_xx + σ_yy) − E α ΔT`.
+    fn complete(
+        &self,
+        tensor: Tensor<D>,
+        told: Option<f64>,
+        material: u16,
+        x: &Vector<D>,
+    ) -> Stress<D> {
+        let (settings, t) = self.stresses;
+        let elastic = || {
+            let (ratio, per_degree) = settings.constants[usize::from(material)];
+            let rise = settings.thermal.as_ref().map_or(0.0, |th| th.rise_at(x, t));
+            ratio * tensor.trace() - per_degree * rise
+        };
+        Stress {
+            tensor,
+            across: match settings.output.across {
+                true => told.unwrap_or_else(elastic),
+                false => 0.0,
+            },
+        }
     }
 }
 

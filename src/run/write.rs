@@ -12,7 +12,7 @@ use super::point_cells::PointCells;
 use super::sections;
 use super::solution::Solved;
 use super::solution_samples::{Intact, SampledSolution, label, table_header};
-use super::stresses::{KnownStresses, Place};
+use super::stresses::{self, Expansions, Stress};
 use crate::fem;
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
@@ -83,7 +83,7 @@ pub(super) fn write_for<const D: usize>(
         tables.push((PROBES, positions));
     }
     let sampled = tables.into_iter().map(|(name, positions)| {
-        let header = table_header::<D>(solved.asked());
+        let header = table_header::<D>(solved.stress_output());
         (name, header, solution.rows(&positions))
     });
     // by all processes before one writes, which may fail
@@ -237,10 +237,9 @@ struct SnapshotRows<'a, const D: usize> {
     /// The material of each cell, where there are several.
     materials: Vec<i32>,
     strains: Vec<Tensor<D>>,
-    stresses: Vec<Tensor<D>>,
+    stresses: Vec<Stress<D>>,
     shown_cells: Vec<u32>,
-    known: KnownStresses,
-    places: Vec<Place>,
+    expansions: Expansions,
     /// Numbers of points and of cells among those of all processes; empty where one shows all.
     identifiers: [Vec<i64>; 2],
 }
@@ -260,8 +259,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             strains: Vec::new(),
             stresses: Vec::new(),
             shown_cells: Vec::new(),
-            known: KnownStresses::of(solved),
-            places: Vec::new(),
+            expansions: Expansions::of(solved),
             identifiers: [const { Vec::new() }; 2],
         }
     }
@@ -302,9 +300,8 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             }
             let gradient = solved.element_gradient(c);
             self.strains.push(strain(&gradient));
-            let stress = solved.cell_stress(c, &gradient, &self.known);
+            let stress = solved.cell_stress(c, &gradient, &self.expansions);
             self.stresses.push(stress);
-            self.places.push(Place::Cell(c));
             self.shown_cells.push(c as u32);
             if let Shown::Piece(piece) = shown {
                 self.identifiers[1].extend(piece.cell(c).map(i64::from));
@@ -318,14 +315,14 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         let model = solved.model;
         let cells = PointCells::of(model);
         let intact = Intact::of(solved);
-        let known = &self.known;
-        let on_points: Vec<(usize, Tensor<D>, Tensor<D>)> =
+        let expansions = &self.expansions;
+        let on_points: Vec<(usize, Tensor<D>, Stress<D>)> =
             parallel::filter_map(model.sites.len(), 1, |site| {
                 let (_, p) = model.point_of(site)?;
                 if !shown.includes_site(site) {
                     return None;
                 }
-                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), known);
+                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), expansions);
                 Some((site, strain(&solved.point_gradient(p, &intact)), stress))
             });
         for (site, e, stress) in on_points {
@@ -361,7 +358,6 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             self.materials.extend(material.map(|&m| i32::from(m)));
             self.strains.push(e);
             self.stresses.push(stress);
-            self.places.push(Place::Point(site));
         }
     }
 
@@ -421,17 +417,16 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             Field::labels("model", self.zones.clone()),
             Field::scalar("volume", self.volumes.clone()),
             Field::tensor("strain", &self.strains),
-            Field::tensor("stress", &self.stresses),
+            Field::rows("stress", self.stresses.iter().map(Stress::rows)),
         ];
+        let output = self.solved.stress_output();
         let derived: Vec<Vec<f64>> = match self.solved.has_derived() {
-            true => parallel::map(shown, 1, |k| {
-                self.solved.derived(&self.stresses[k], self.places[k])
-            }),
+            true => parallel::map(shown, 1, |k| self.stresses[k].derived(output)),
             false => Vec::new(),
         };
-        for (k, name) in self.solved.derived_names().into_iter().enumerate() {
+        for (k, number) in output.numbers.iter().enumerate() {
             let values = derived.iter().map(|d| d[k]).collect();
-            fields.push(Field::scalar(name, values));
+            fields.push(Field::scalar(stresses::name(number), values));
         }
         let model = self.solved.model;
         let by_points = model.body().is_some_and(|b| !b.cloud.material.is_empty());

@@ -223,7 +223,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         elements::elements(self.spec, coupling, (&self.materials, used), law, bonds)
     }
 
-    /// Refuses a temperature whose strain is not known, and numbers made of stresses that are not.
+    /// Refuses a temperature whose strain is not known.
     fn check_heat(
         &self,
         breaking: &Breaking<D>,
@@ -232,8 +232,7 @@ impl<'a, const D: usize> Draft<'a, D> {
     ) -> Result<(), SceneError> {
         let (spec, materials) = (self.spec, &self.materials);
         let has_points = may_have_points && zones.iter().any(|z| *z != Zone::Local);
-        temperature::agrees(spec, materials, breaking, &self.solve, has_points)?;
-        output::stresses_agree(spec, materials, self.kinematics)
+        temperature::agrees(spec, materials, breaking, &self.solve, has_points)
     }
 
     /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
@@ -282,7 +281,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             mesh,
             |c| self.cell_material[c] == peridynamic,
         )?;
-        let output = output::output(spec, mesh, &voids, self.name)?;
+        let output = output::output(spec, (mesh, self.kinematics), &voids, self.name)?;
         let scene = Scene {
             title: spec.title.clone().unwrap_or_else(|| self.name.to_owned()),
             kinematics: self.kinematics,

@@ -5,11 +5,10 @@ use toml::Spanned;
 use super::bounds_checks;
 use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::Material;
 use super::region::{self, Region};
 use super::section;
 use super::spec::{OutputSpec, SceneSpec, SolveSpec, TipSpec};
-use super::validated::{Output, Tip};
+use super::validated::{Output, StressOutput, Tip};
 use super::value::Text;
 use crate::fem::Locator;
 use crate::material::Kinematics;
@@ -27,7 +26,7 @@ pub(crate) const SECTIONS: &str = "sections";
 /// The outputs of a scene whose files are named `name` by default.
 pub(crate) fn output<const D: usize>(
     spec: &SceneSpec,
-    mesh: &Mesh<D>,
+    (mesh, kinematics): (&Mesh<D>, Kinematics),
     voids: &[Shape<D>],
     name: &str,
 ) -> Result<Output<D>, SceneError> {
@@ -96,37 +95,15 @@ pub(crate) fn output<const D: usize>(
         vtu: o.vtu.unwrap_or(true),
         points: o.points,
         energy_density: o.energy_density.unwrap_or(false),
-        stresses: o.stresses.iter().map(|s| *s.get_ref()).collect(),
+        stresses: StressOutput {
+            numbers: o.stresses.iter().map(|s| *s.get_ref()).collect(),
+            across: kinematics == Kinematics::PlaneStrain,
+        },
         lines,
         probes,
         sections,
         tips,
     })
-}
-
-/// Refuses numbers made of a stress whose part out of the plane is not known.
-pub(super) fn stresses_agree<const D: usize>(
-    spec: &SceneSpec,
-    materials: &[Material<D>],
-    kinematics: Kinematics,
-) -> Result<(), SceneError> {
-    let Some(asked) = spec.output.stresses.first() else {
-        return Ok(());
-    };
-    let unknown = materials.iter().find(|m| !m.law.is_linear());
-    let Some(unknown) = unknown.filter(|_| kinematics == Kinematics::PlaneStrain) else {
-        return Ok(());
-    };
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`output.stresses` in plane strain, and the material `{}` is a {} law",
-            unknown.name,
-            unknown.law.name()
-        ),
-    )
-    .label(asked.span(), "its stress out of the plane is not written")
-    .help("use kinematics = \"solid\" with one layer of cells, or leave out `stresses`"))
 }
 
 impl<const D: usize> Output<D> {

@@ -109,6 +109,15 @@ pub struct Solver {
     pub max_iterations: usize,
 }
 
+/// What is written of the stress at probes, along lines and in fields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StressOutput {
+    /// Numbers made of it.
+    pub numbers: Vec<super::spec::StressSpec>,
+    /// Whether there is a normal stress out of the plane: in plane strain.
+    pub across: bool,
+}
+
 /// The outputs of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output<const D: usize> {
@@ -122,8 +131,8 @@ pub struct Output<const D: usize> {
     pub points: super::spec::PointOutputSpec,
     /// Whether it holds the energy density of points.
     pub energy_density: bool,
-    /// Numbers made of the stress that it holds too.
-    pub stresses: Vec<super::spec::StressSpec>,
+    /// What is written of the stress beside its components.
+    pub stresses: StressOutput,
     /// Lines of samples: name and positions.
     pub lines: Vec<(String, Vec<Vector<D>>)>,
     /// Probes: name and position.

@@ -75,8 +75,8 @@ macro_rules! fields_of {
             self.$system.element_tangent(u, interval)
         }
 
-        fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-            self.$system.stresses(u)
+        fn stress_of_site(&self, site: usize, u: &[f64]) -> Option<$crate::system::PlaceStress> {
+            self.$system.stress_of_site(site, u)
         }
 
         fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
@@ -87,8 +87,8 @@ macro_rules! fields_of {
             self.$system.points_without_response(u)
         }
 
-        fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-            self.$system.cell_stresses(u)
+        fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<$crate::system::PlaceStress> {
+            self.$system.stress_of_cell(cell, u)
         }
     };
 }

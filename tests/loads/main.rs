@@ -9,6 +9,7 @@ mod pressure;
 mod rotation;
 mod sections;
 mod springs;
+mod stress_measures;
 mod stresses;
 mod tables;
 mod thermal;

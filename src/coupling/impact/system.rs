@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::Impact;
 use crate::system::wrapped::state_of;
-use crate::system::{BlockCsr, ElementTangent, FailureUpdate, Halfway, Interval, SemiDiscrete};
+use crate::system::{
+    BlockCsr, ElementTangent, FailureUpdate, Halfway, Interval, PlaceStress, SemiDiscrete,
+};
 
 /// A system whose sites rigid impactors push: the sites of the body first, one for each impactor after them.
 ///
@@ -130,8 +132,8 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         });
     }
 
-    fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        self.body.stresses(self.own(u))
+    fn stress_of_site(&self, site: usize, u: &[f64]) -> Option<PlaceStress> {
+        self.body.stress_of_site(site, self.own(u))
     }
 
     fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
@@ -142,7 +144,7 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         self.body.points_without_response(self.own(u))
     }
 
-    fn cell_stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        self.body.cell_stresses(self.own(u))
+    fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<PlaceStress> {
+        self.body.stress_of_cell(cell, self.own(u))
     }
 }

@@ -13,7 +13,7 @@ use crate::{
     peridynamics::{
         Accelerator, Families, Law, PdBody,
         bond_force::{
-            BondCriterion, BondForce, BondPass, BondSetup, DistributedRows, Failure, Layout,
+            BondCriterion, BondForce, BondKinematics, BondPass, BondSetup, DistributedRows, Failure, Layout,
             Storage, bond_pass,
         },
         contact::{Contact, ContactSetup, contact_stiffness},
@@ -25,6 +25,7 @@ use crate::{
 /// The points and their bonds.
 pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
+    pub kinematics: BondKinematics,
     pub failure: Option<FailureCriterion>,
     /// Whether the law damages bonds.
     pub damages: bool,
@@ -341,6 +342,7 @@ impl<const D: usize> MovingBody<D> {
         let shift = shift_of(&site_of_point);
         Ok(Some(Self {
             pass,
+            kinematics: behaviour.kinematics,
             failure: behaviour.failure.clone(),
             damages: p.law.damages(),
             contact,

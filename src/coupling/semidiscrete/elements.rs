@@ -9,8 +9,8 @@ use crate::{
     fem::{CellBandError, NonlinearElements},
     material::LocalLaw,
     parallel,
-    system::{ElementTangent, Symmetry},
-    tensor::{Tensor, Vector},
+    system::{ElementTangent, PlaceStress, Symmetry},
+    tensor::Vector,
 };
 
 /// The elements around the nodes that are sites, as their rows have them.
@@ -114,15 +114,12 @@ impl<const D: usize> LocalElements<D> {
         self.elements.stored(&model.mesh, nodes)
     }
 
-    /// The mean stress \[Pa\] of each cell, padded with zeros.
-    pub fn stresses(&self, model: &Model<D>, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
+    /// The mean Cauchy stress of a cell, if it is among them; bonds of a plane, which it may follow, know nothing of the stress out of it.
+    pub fn stress(&self, model: &Model<D>, cell: usize, u: &[f64]) -> Option<PlaceStress> {
         let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
-        let padded = |s: Tensor<D>| {
-            let entry = |i: usize, j: usize| if i < D && j < D { s[(i, j)] } else { 0.0 };
-            std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
-        };
-        let found = self.elements.stresses(&model.mesh, nodes).into_iter();
-        found.map(|(cell, s)| (cell, padded(s))).collect()
+        let (stress, across) = self.elements.stress(&model.mesh, cell, nodes)?;
+        let is_known = !model.follows_bonds_in(model.material_of_cell(cell));
+        Some(PlaceStress::new(&stress, is_known.then_some(across)))
     }
 
     /// See [`NonlinearElements::remembered`].

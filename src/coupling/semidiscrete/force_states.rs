@@ -2,30 +2,23 @@
 
 use super::CoupledSystem;
 use super::behaviour::NONE;
+use crate::{peridynamics::bond_force::BondKinematics, system::PlaceStress};
 
 impl<const D: usize> CoupledSystem<'_, D> {
-    /// See [`crate::system::SemiDiscrete::stresses`].
-    pub(super) fn stresses_of_points(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
-        let (Some(moving), Some(body)) = (&self.body, self.model.body()) else {
-            return Vec::new();
-        };
-        let Some(states) = moving.pass.force_states() else {
-            return Vec::new();
-        };
-        let mut points = vec![0.0; moving.displacement.len()];
-        moving.spread(u, &mut points);
-        let sites = moving.site_of_point.iter().enumerate();
+    /// See [`crate::system::SemiDiscrete::stress_of_site`].
+    pub(super) fn stress_of_point(&self, site: usize, u: &[f64]) -> Option<PlaceStress> {
+        let moving = self.body.as_ref()?;
+        let states = moving.pass.force_states()?;
+        let (body, p) = self.model.point_of(site)?;
+        let law = &self.model.peridynamics.as_ref()?.law;
+        let is_linear = law.is_linear() && moving.kinematics == BondKinematics::Linear;
         // a family of which a seam has cut a part is not all of what is strained
-        let whole = |p: usize| states.family_size(p) == body.families.of(p).len();
-        sites
-            .filter(|&(p, &site)| site != NONE && whole(p))
-            .map(|(p, &site)| {
-                let stress = states.partial_stress(p, &points);
-                let entry = |i: usize, j: usize| if i < D && j < D { stress[(i, j)] } else { 0.0 };
-                let rows = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
-                (site, rows)
-            })
-            .collect()
+        let is_whole = states.family_size(p) == body.families.of(p).len();
+        (is_whole && !is_linear).then(|| {
+            let transfer = &body.cloud.transfer;
+            let stress = states.stress(p, &|j| transfer.displacement(j, u));
+            PlaceStress::new(&stress.tensor, stress.across)
+        })
     }
 
     /// See [`crate::system::SemiDiscrete::energy_densities`].

@@ -1,6 +1,7 @@
 //! What the bonds of a point give at a displacement: its partial stress and its energy density.
 
 use super::PdBody;
+use crate::peridynamics::{CauchyStress, ForceState, MemorylessFamily};
 use crate::tensor::{Tensor, Vector};
 
 impl<const D: usize> PdBody<D> {
@@ -54,6 +55,41 @@ impl<const D: usize> PdBody<D> {
             })
         });
         self.stress_of(j, self.differences(j, u), is_intact, shape)
+    }
+
+    /// The Cauchy stress of point `j` by its exact bonds to neighbours that `stands` names, of a law without memory \[Pa\].
+    pub fn exact_stress(
+        &self,
+        j: usize,
+        law: &dyn ForceState<D>,
+        u: &[f64],
+        stands: impl Fn(usize) -> bool,
+    ) -> CauchyStress<D> {
+        let (pair, omega) = self.kernel(j);
+        let family = self.families.of(j).iter().map(|&l| l as usize);
+        let volume = |l: usize| self.cloud.volume[l];
+        let (standing, lost): (Vec<_>, Vec<_>) =
+            family.enumerate().partition(|&(_, l)| stands(l));
+        let of = |list: &[f64]| -> Vec<f64> {
+            let kept = standing.iter().filter_map(|&(k, _)| list.get(k).copied());
+            kept.collect()
+        };
+        let differ = self.differences(j, u);
+        let bonds: Vec<Vector<D>> = standing.iter().map(|&(_, l)| self.bond(j, l)).collect();
+        let volumes: Vec<f64> = standing.iter().map(|&(_, l)| volume(l)).collect();
+        let difference: Vec<Vector<D>> = standing.iter().map(|&(_, l)| differ(l)).collect();
+        let lost: f64 = lost.iter().map(|&(_, l)| volume(l)).sum();
+        let kept: f64 = volumes.iter().sum();
+        let family = MemorylessFamily {
+            bonds: &bonds,
+            volumes: &volumes,
+            pair: &of(pair),
+            omega: &of(omega),
+            state: self.state(j),
+            material: self.cloud.material.get(j).copied().unwrap_or(0),
+            damage: if lost > 0.0 { lost / (lost + kept) } else { 0.0 },
+        };
+        family.cauchy_stress(law, &difference)
     }
 
     /// The energy density of point `j` under displacements `u` of the sites, by the bonds to neighbours that `stands` names: that whose derivative the linear force state is \[J/m^D\].

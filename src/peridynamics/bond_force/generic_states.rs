@@ -5,20 +5,17 @@ use super::{
     bond_failure::BondFailure,
     generic::{Generic, Scratch, at},
 };
-use crate::{peridynamics::Past, tensor::Tensor};
+use crate::{
+    peridynamics::{CauchyStress, Past},
+    tensor::Vector,
+};
 
 impl<const D: usize> ForceStates<D> for Generic<D> {
-    fn partial_stress(&self, i: usize, u: &[f64]) -> Tensor<D> {
+    fn stress(&self, i: usize, displaced: &dyn Fn(usize) -> Vector<D>) -> CauchyStress<D> {
         let mut s = Scratch::default();
         s.carried = self.carried_of(i).copied();
-        self.respond(
-            i,
-            &|j| at(u, j),
-            |bond| self.intact[bond],
-            0.0,
-            &self.past,
-            &mut s,
-        );
+        let intact = |bond: usize| self.intact[bond];
+        self.respond(i, displaced, intact, 0.0, &self.past, &mut s);
         let own = i * self.layout.point.len()..(i + 1) * self.layout.point.len();
         let parts = s.split(self.state[i].as_ref(), false);
         let past = Past {
@@ -26,7 +23,7 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
             bonds: parts.past,
         };
         let law = self.law.force_state();
-        law.map_or_else(Tensor::zeros, |law| {
+        law.map_or_else(CauchyStress::zero, |law| {
             law.stress(&parts.family, past, parts.force)
         })
     }

@@ -86,7 +86,8 @@ pub(crate) use list::{extension, ratio, stretched};
 
 use crate::dimension;
 use crate::system::{ExactSum, FailureUpdate, Interval};
-use crate::tensor::Tensor;
+use crate::peridynamics::CauchyStress;
+use crate::tensor::Vector;
 
 /// One sweep over the bonds of a cloud.
 ///
@@ -219,8 +220,8 @@ pub struct Reach<'a> {
 
 /// What force states tell of a body.
 pub trait ForceStates<const D: usize> {
-    /// The partial stress `Σ T⟨ξ⟩ ⊗ ξ V` of a point at the displacements `u` \[Pa\], [SAND2015-7998] eq. (2.19), by its intact bonds; `u` has `D` numbers per point.
-    fn partial_stress(&self, point: usize, u: &[f64]) -> Tensor<D>;
+    /// The stress of a point by its intact bonds and its history, [`crate::peridynamics::ForceState::stress`], where the points are displaced by `displaced` \[m\].
+    fn stress(&self, point: usize, displaced: &dyn Fn(usize) -> Vector<D>) -> CauchyStress<D>;
 
     /// The energy density that a point stores at the displacements `u`, by its intact bonds \[J/m^D\].
     fn energy_density(&self, point: usize, u: &[f64]) -> f64;

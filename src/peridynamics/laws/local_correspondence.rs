@@ -6,7 +6,7 @@ use super::{Correspondence, Parameter};
 use crate::{
     material::LocalLaw,
     peridynamics::{
-        BondEnergy, Calibrate, DeformedFamily, EnergyDensity, ForceState, HistoryLayout,
+        BondEnergy, Calibrate, CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout,
         KeptDamage, Law, LinearForceState, Past, PointStress, Present, ZeroEnergyControl,
         bond_force::{conjugate, felt},
         shape_tensor::spanned_inverse,
@@ -245,21 +245,25 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         energy
     }
 
+    /// `(1 − D) J⁻¹ P(F̄) F̄ᵀ`: the zero-energy control has no part in it.
     fn stress(
         &self,
         family: &DeformedFamily<'_, D>,
         past: Past<'_>,
         _force: &[Vector<D>],
-    ) -> Tensor<D> {
-        // the stabilising term has no part in it
+    ) -> CauchyStress<D> {
         let Some((gradient, _)) = displacement_gradient(family) else {
-            return Tensor::zeros();
+            return CauchyStress::zero();
         };
         let mut present = past.point.to_vec();
         let objective = self.local.is_objective();
         let felt = felt(&gradient, family.carried, objective);
         let found = (self.law()).respond(&felt, 0.0, past.point, &mut present);
-        found.cauchy(&felt, objective) * (1.0 - family.damage)
+        let left = 1.0 - family.damage;
+        CauchyStress {
+            tensor: found.cauchy(&felt, objective) * left,
+            across: Some(found.across * left),
+        }
     }
 
     fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {

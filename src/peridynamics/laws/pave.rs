@@ -7,7 +7,7 @@ use super::{Constants, NamedLaw, Parameter, PositionAwareSolid, Ratio, relaxing}
 use crate::{
     material::{Kinematics, LocalLaw, PronySeries},
     peridynamics::{
-        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
+        BondEnergy, CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Past, Present,
     },
     tensor::Vector,
@@ -158,6 +158,22 @@ impl<const D: usize> ForceState<D> for PositionAwareViscoelasticSolid<D> {
             *force += family.direction[k] * through;
         }
         energy
+    }
+
+    /// The virial, and across a long body what its elastic volume leaves of the trace.
+    fn stress(
+        &self,
+        family: &DeformedFamily<'_, D>,
+        _past: Past<'_>,
+        force: &[Vector<D>],
+    ) -> CauchyStress<D> {
+        let tensor = family.virial_stress(force);
+        let theta = PositionAwareSolid::dilatation(family);
+        let trace = self.dilatation.stress_trace(theta);
+        CauchyStress {
+            tensor,
+            across: trace.map(|trace| trace / family.volume_ratio() - tensor.trace()),
+        }
     }
 
     fn is_objective(&self) -> bool {

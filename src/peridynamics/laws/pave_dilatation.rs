@@ -62,6 +62,18 @@ impl Dilatation {
         }
     }
 
+    /// `σ_m + σ_m + σ_z = 3 K θ` of a long body at the dilatation θ \[Pa\], by which its volume resists whatever has relaxed; none of another body.
+    pub fn stress_trace(&self, theta: f64) -> Option<f64> {
+        match self {
+            Self::Plane {
+                bulk,
+                is_free: false,
+                ..
+            } => Some(3.0 * bulk * theta),
+            Self::Plane { is_free: true, .. } | Self::Solid { .. } => None,
+        }
+    }
+
     /// `σ_m` \[Pa\] and the energies at the end of a step; overwrites `present`.
     pub fn respond(
         &self,

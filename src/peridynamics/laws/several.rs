@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
+        Accelerator, BondEnergy, CauchyStress, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
         Influence, Law, LinearForceState, Mixture, MomentConditions, Past, PdError, PointStress,
         Present, ShellTarget, StatePart,
     },
-    tensor::{Tensor, Tensor4, Vector},
+    tensor::{Tensor4, Vector},
 };
 
 /// The stiffness of a bond between two materials of a law that acts bond by bond.
@@ -298,9 +298,11 @@ impl<const D: usize> ForceState<D> for Several<D> {
         family: &DeformedFamily<'_, D>,
         past: Past<'_>,
         force: &[Vector<D>],
-    ) -> Tensor<D> {
+    ) -> CauchyStress<D> {
         let states = self.states(family.material);
-        states.map_or_else(Tensor::zeros, |states| states.stress(family, past, force))
+        states.map_or_else(CauchyStress::zero, |states| {
+            states.stress(family, past, force)
+        })
     }
 
     fn correspondence(&self, material: Option<u16>) -> Option<PointStress<'_, D>> {

@@ -82,7 +82,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
         let (output, stresses) = (&rest.output, &rest.stresses);
         let writers = options.writers().filter(|_| output.vtu);
         Self {
-            probes: StressProbes::new(model, stresses, &output.probes),
+            probes: StressProbes::new(model, output),
             model,
             operator,
             zone_of_site: solution::zone_of_site(model),
@@ -116,7 +116,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
             system: Some(moment.system),
             broken,
             sections: &[],
-            stresses: self.stresses.at(moment.state.time),
+            stresses: (self.stresses, moment.state.time),
         }
     }
 

@@ -1,16 +1,18 @@
-//! The force state of one whole family of a law without memory.
+//! The force state of one family of a law without memory.
 
 use super::bond_force::{BondKinematics, stretch::psi};
 use crate::{
-    peridynamics::{DeformedFamily, EnergyDensity, ForceState, Past, Present, StatePart},
+    peridynamics::{
+        CauchyStress, DeformedFamily, EnergyDensity, ForceState, Past, Present, StatePart,
+    },
     tensor::{Tensor, Vector},
 };
 
-/// A family of which no bond is broken, with the coefficients of its linearised law.
+/// The intact bonds of a family, with the coefficients of its linearised law.
 ///
 /// Shapes: one entry per bond; `omega` is not read by a pairwise law. Units: ξ \[m\], V \[m^D\].
 #[derive(Clone, Copy, Debug)]
-pub struct WholeFamily<'a, const D: usize> {
+pub struct MemorylessFamily<'a, const D: usize> {
     /// Bond vectors ξ.
     pub bonds: &'a [Vector<D>],
     /// Volumes V of their far points.
@@ -23,9 +25,11 @@ pub struct WholeFamily<'a, const D: usize> {
     pub state: Option<&'a StatePart<D>>,
     /// The material of the point, 0 in a body of one.
     pub material: u16,
+    /// Share of the family's volume whose bonds are broken, 0 of a whole family.
+    pub damage: f64,
 }
 
-impl<const D: usize> WholeFamily<'_, D> {
+impl<const D: usize> MemorylessFamily<'_, D> {
     /// The partial stress `Σ T⟨ξ⟩ ⊗ ξ V` \[Pa\], [SAND2015-7998] eq. (2.19), and the energies, where the displacements of the far points differ from that of the point by `difference` \[m\].
     pub fn stress(
         &self,
@@ -33,6 +37,34 @@ impl<const D: usize> WholeFamily<'_, D> {
         kinematics: BondKinematics,
         difference: &[Vector<D>],
     ) -> (Tensor<D>, EnergyDensity) {
+        self.deformed(law, kinematics, difference, |family, force, energy| {
+            let forces = force.iter().zip(family.bonds).zip(family.volumes);
+            let stress = forces.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
+                sum + force * xi.transpose() * *volume
+            });
+            (stress, energy)
+        })
+    }
+
+    /// The Cauchy stress of exact bonds, [`ForceState::stress`], likewise.
+    pub fn cauchy_stress(
+        &self,
+        law: &dyn ForceState<D>,
+        difference: &[Vector<D>],
+    ) -> CauchyStress<D> {
+        let exact = BondKinematics::Exact;
+        self.deformed(law, exact, difference, |family, force, _| {
+            law.stress(family, NO_PAST, force)
+        })
+    }
+
+    fn deformed<T>(
+        &self,
+        law: &dyn ForceState<D>,
+        kinematics: BondKinematics,
+        difference: &[Vector<D>],
+        told: impl FnOnce(&DeformedFamily<'_, D>, &[Vector<D>], EnergyDensity) -> T,
+    ) -> T {
         let bonds = self.bonds.len();
         let (mut extension, mut direction) = (vec![0.0; bonds], self.bonds.to_vec());
         for (k, eta) in difference.iter().enumerate() {
@@ -62,27 +94,24 @@ impl<const D: usize> WholeFamily<'_, D> {
             difference,
             extension: &extension,
             direction: &direction,
-            is_whole: true,
-            damage: 0.0,
+            is_whole: self.damage == 0.0,
+            damage: self.damage,
             carried: None,
             keeps_damage: false,
             material: self.material,
             kinematics,
-        };
-        let past = Past {
-            point: &[],
-            bonds: &[],
         };
         let present = Present {
             point: &mut [],
             bonds: &mut [],
             principal_stress: None,
         };
-        let energy = law.respond(&family, 0.0, past, present, &mut force);
-        let forces = force.iter().zip(self.bonds).zip(self.volumes);
-        let stress = forces.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
-            sum + force * xi.transpose() * *volume
-        });
-        (stress, energy)
+        let energy = law.respond(&family, 0.0, NO_PAST, present, &mut force);
+        told(&family, &force, energy)
     }
 }
+
+const NO_PAST: Past<'_> = Past {
+    point: &[],
+    bonds: &[],
+};
