@@ -21,7 +21,7 @@ use std::sync::Arc;
 use super::model::Model;
 use crate::{
     parallel,
-    peridynamics::{Law, PdBody, MemorylessFamily, bond_force::BondKinematics},
+    peridynamics::{Law, MemorylessFamily, PdBody, bond_force::BondKinematics},
     tensor::{Tensor, Vector},
 };
 

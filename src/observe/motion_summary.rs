@@ -107,7 +107,7 @@ impl Rotation {
             None => String::new(),
         };
         format!(
-            "the body at ({}) has rotated by {:.1} degrees{when}: what is for small rotations there, elements or points, is {} % too large{failure}{energy}; where that matters use {}",
+            "the body at ({}) has rotated by {:.1} degrees{when}: what is for small rotations there, elements or points, is {} % too large, and its stress, linear, has turned to first order only, off by that part of its stiffness{failure}{energy}; where that matters use {}",
             components(&self.place),
             self.degrees,
             number(100.0 * self.length_error),

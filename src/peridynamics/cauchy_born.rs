@@ -12,7 +12,7 @@ use std::sync::Arc;
 use super::bond_force::{BondKinematics, stretch::psi};
 use crate::{
     material::{LocalLaw, LocalResponse, central_differences},
-    peridynamics::{Accelerator, EnergyDensity, Law, StatePart, MemorylessFamily},
+    peridynamics::{Accelerator, EnergyDensity, Law, MemorylessFamily, StatePart},
     tensor::{Tensor, Tensor4, Vector, determinant},
 };
 

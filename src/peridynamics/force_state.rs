@@ -5,9 +5,7 @@
 
 use crate::{
     material::LocalLaw,
-    peridynamics::{
-        StatePart, ZeroEnergyControl, bond_force::BondKinematics, invert_shape_tensor,
-    },
+    peridynamics::{StatePart, ZeroEnergyControl, bond_force::BondKinematics, invert_shape_tensor},
     tensor::{Tensor, Vector, determinant},
 };
 

@@ -47,6 +47,7 @@ mod lattice_families;
 pub mod law;
 pub mod laws;
 pub mod linear_force_state;
+mod memoryless_family;
 pub mod moment_fitted_weights;
 pub(crate) mod offset_table;
 pub mod partial_volume;
@@ -55,7 +56,6 @@ pub mod shape_tensor;
 pub mod shell_weights;
 pub mod softening;
 mod tearing_parameter;
-mod memoryless_family;
 pub mod zero_energy;
 
 pub(crate) use body::FamilyEnds;
@@ -65,8 +65,8 @@ pub use crack_area::CrackArea;
 pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_energy};
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{
-    CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past, PointStress,
-    Present,
+    CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past,
+    PointStress, Present,
 };
 pub use horizon::Horizon;
 pub use influence::{Influence, Micromodulus};
@@ -79,12 +79,12 @@ pub use laws::{
 pub use linear_force_state::{
     Family, FamilyMaterials, LinearForceState, StatePart, StressFit, collapsed_tensor,
 };
+pub use memoryless_family::MemorylessFamily;
 pub use moment_fitted_weights::{Bound, FitError, MomentConditions};
 pub use partial_volume::{BoxCell, PartialVolume, PartialVolumeError};
 pub use position_aware_influence::{CalibrationFields, NotPositionAware};
 pub use shape_tensor::{ShapeError, invert_shape_tensor};
 pub use shell_weights::{LatticeFamily, ShellError, ShellTarget, isotropic_shell_factors};
-pub use memoryless_family::MemorylessFamily;
 pub use zero_energy::ZeroEnergyControl;
 
 use crate::tensor::Vector;

@@ -13,7 +13,10 @@ pub(super) struct StressProbes {
 
 /// The columns of a scene's probes: the stress, then the numbers made of it; none where no stress is asked for.
 pub(super) fn header<const D: usize>(output: &Output<D>) -> Vec<String> {
-    let probes = output.probes.iter().filter(|_| !output.stresses.numbers.is_empty());
+    let probes = output
+        .probes
+        .iter()
+        .filter(|_| !output.stresses.numbers.is_empty());
     probes
         .flat_map(|(name, _)| {
             let columns = names::<D>(&output.stresses).into_iter();

@@ -1,7 +1,9 @@
 //! What of a scene's stresses is thermal, and which numbers made of them are written.
 
+use std::sync::Arc;
+
 use super::thermal::Thermal;
-use crate::material::Kinematics;
+use crate::material::{Kinematics, LocalLaw};
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::scene::materials::{Material, Ratio};
 use crate::scene::spec::BondsSpec;
@@ -18,6 +20,8 @@ pub struct StressSettings<const D: usize> {
     pub kinematics: Kinematics,
     /// How bonds follow the motion.
     pub bonds: BondKinematics,
+    /// The local law of each material's elements, of those whose elements are not linear by their material.
+    pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
     /// Poisson's ratio and `E α` of each material.
     pub constants: Vec<(f64, f64)>,
 }
@@ -49,6 +53,9 @@ impl<const D: usize> StressSettings<D> {
                 BondsSpec::Exact => BondKinematics::Exact,
                 BondsSpec::Linear => BondKinematics::Linear,
             },
+            local_laws: (scene.materials.iter())
+                .map(|m| m.law.local_law().filter(|law| !law.is_linear()))
+                .collect(),
             constants: (scene.materials.iter())
                 .map(|m| (ratio(m), stiffness(m) * alpha(m)))
                 .collect(),

@@ -112,7 +112,8 @@ impl<const D: usize> Solved<'_, D> {
     ) -> Stress<D> {
         let thermal = |(thermal, t): (&Thermal<D>, f64)| thermal.cell_gradient(self.model, c, t);
         self.stress_of_element(c, self.model.mesh.centroid(c), expansions, || {
-            self.thermal().map_or(*gradient, |at| gradient - thermal(at))
+            self.thermal()
+                .map_or(*gradient, |at| gradient - thermal(at))
         })
     }
 
@@ -171,7 +172,10 @@ impl<const D: usize> Solved<'_, D> {
         let material = body.cloud.material.get(p).copied();
         let material = material.unwrap_or(model.peridynamic_material());
         let u = self.displacement;
-        if let Some(told) = self.system.and_then(|system| system.stress_of_site(site, u)) {
+        if let Some(told) = self
+            .system
+            .and_then(|system| system.stress_of_site(site, u))
+        {
             return self.complete(told.tensor(), told.across, material, &x);
         }
         if let Some(law) = self.exact_law() {
@@ -187,11 +191,53 @@ impl<const D: usize> Solved<'_, D> {
         self.complete(tensor, None, material, &x)
     }
 
+    /// The name of the field of stresses: linear ones, which a rotation turns to first order only, are called so where there are no others.
+    pub(super) fn stress_name(&self) -> &'static str {
+        match self.has_cauchy_stresses() {
+            true => "stress",
+            false => "linear_stress",
+        }
+    }
+
+    /// Whether stresses of points or of elements turn with the body.
+    pub(super) fn has_cauchy_stresses(&self) -> bool {
+        let model = self.model;
+        let mut materials = 0..self.stresses.0.constants.len() as u16;
+        let elements = materials.any(|m| self.is_objective(m));
+        let points = model.body().is_some_and(|_| self.has_exact_bonds());
+        elements || points
+    }
+
+    /// Whether bonds are geometrically exact.
+    fn has_exact_bonds(&self) -> bool {
+        self.stresses.0.bonds == BondKinematics::Exact
+    }
+
+    /// Whether elements of a material follow a law for strains and rotations of any size.
+    fn is_objective(&self, material: u16) -> bool {
+        let law = (self.model).local_law(&self.stresses.0.local_laws, material);
+        law.is_some_and(|law| law.is_objective())
+    }
+
+    /// 1 where the stress of an element is a Cauchy stress, 0 where it is the linear one.
+    pub(super) fn measure_of_cell(&self, c: usize) -> u8 {
+        self.is_objective(self.model.material_of_cell(c)).into()
+    }
+
+    /// The same of a point.
+    pub(super) fn measure_of_point(&self, p: usize) -> u8 {
+        let turns = match self.model.local_law_at(p) {
+            Some(law) => law.is_objective(),
+            None => self.has_exact_bonds(),
+        };
+        turns.into()
+    }
+
     /// The force states of exact bonds whose stress follows from the displacement alone.
     fn exact_law(&self) -> Option<&dyn ForceState<D>> {
         let law = &self.model.peridynamics.as_ref()?.law;
         let states = law.force_state()?;
-        let is_exact = self.stresses.0.bonds == BondKinematics::Exact && states.is_objective();
+        let is_exact = self.has_exact_bonds() && states.is_objective();
         (is_exact && states.history().is_empty()).then_some(states)
     }
 

@@ -238,6 +238,8 @@ struct SnapshotRows<'a, const D: usize> {
     materials: Vec<i32>,
     strains: Vec<Tensor<D>>,
     stresses: Vec<Stress<D>>,
+    /// The measure of each.
+    measures: Vec<u8>,
     shown_cells: Vec<u32>,
     expansions: Expansions,
     /// Numbers of points and of cells among those of all processes; empty where one shows all.
@@ -258,6 +260,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             materials: Vec::new(),
             strains: Vec::new(),
             stresses: Vec::new(),
+            measures: Vec::new(),
             shown_cells: Vec::new(),
             expansions: Expansions::of(solved),
             identifiers: [const { Vec::new() }; 2],
@@ -302,6 +305,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             self.strains.push(strain(&gradient));
             let stress = solved.cell_stress(c, &gradient, &self.expansions);
             self.stresses.push(stress);
+            self.measures.push(solved.measure_of_cell(c));
             self.shown_cells.push(c as u32);
             if let Shown::Piece(piece) = shown {
                 self.identifiers[1].extend(piece.cell(c).map(i64::from));
@@ -358,6 +362,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             self.materials.extend(material.map(|&m| i32::from(m)));
             self.strains.push(e);
             self.stresses.push(stress);
+            self.measures.push(solved.measure_of_point(p));
         }
     }
 
@@ -417,8 +422,14 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             Field::labels("model", self.zones.clone()),
             Field::scalar("volume", self.volumes.clone()),
             Field::tensor("strain", &self.strains),
-            Field::rows("stress", self.stresses.iter().map(Stress::rows)),
+            Field::rows(
+                self.solved.stress_name(),
+                self.stresses.iter().map(Stress::rows),
+            ),
         ];
+        if self.solved.has_cauchy_stresses() {
+            fields.push(Field::labels("stress_measure", self.measures.clone()));
+        }
         let output = self.solved.stress_output();
         let derived: Vec<Vec<f64>> = match self.solved.has_derived() {
             true => parallel::map(shown, 1, |k| self.stresses[k].derived(output)),

@@ -301,7 +301,9 @@ const STRAIN: f64 = 2e-3;
 
 /// Checks one law one way; returns how often its stress was seen to turn.
 fn checked(kinematics: Kinematics, stuff: &Stuff, elements: bool, bonds: &str, way: Way) -> usize {
-    let text = |states, pace| scene(kinematics, stuff, elements, bonds, way, (states, pace));
+    let text = |states: States<'_>, pace: f64| {
+        scene(kinematics, stuff, elements, bonds, way, (states, pace))
+    };
     let at_pace = |states: States<'_>, pace: f64| match way {
         Way::AtRest => {
             let one = |k: usize| {

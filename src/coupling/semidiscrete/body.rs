@@ -13,8 +13,8 @@ use crate::{
     peridynamics::{
         Accelerator, Families, Law, PdBody,
         bond_force::{
-            BondCriterion, BondForce, BondKinematics, BondPass, BondSetup, DistributedRows, Failure, Layout,
-            Storage, bond_pass,
+            BondCriterion, BondForce, BondKinematics, BondPass, BondSetup, DistributedRows,
+            Failure, Layout, Storage, bond_pass,
         },
         contact::{Contact, ContactSetup, contact_stiffness},
     },

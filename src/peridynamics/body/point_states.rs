@@ -68,8 +68,7 @@ impl<const D: usize> PdBody<D> {
         let (pair, omega) = self.kernel(j);
         let family = self.families.of(j).iter().map(|&l| l as usize);
         let volume = |l: usize| self.cloud.volume[l];
-        let (standing, lost): (Vec<_>, Vec<_>) =
-            family.enumerate().partition(|&(_, l)| stands(l));
+        let (standing, lost): (Vec<_>, Vec<_>) = family.enumerate().partition(|&(_, l)| stands(l));
         let of = |list: &[f64]| -> Vec<f64> {
             let kept = standing.iter().filter_map(|&(k, _)| list.get(k).copied());
             kept.collect()
@@ -87,7 +86,11 @@ impl<const D: usize> PdBody<D> {
             omega: &of(omega),
             state: self.state(j),
             material: self.cloud.material.get(j).copied().unwrap_or(0),
-            damage: if lost > 0.0 { lost / (lost + kept) } else { 0.0 },
+            damage: if lost > 0.0 {
+                lost / (lost + kept)
+            } else {
+                0.0
+            },
         };
         family.cauchy_stress(law, &difference)
     }

@@ -85,8 +85,8 @@ pub(crate) use carried_deformation::{conjugate, felt};
 pub(crate) use list::{extension, ratio, stretched};
 
 use crate::dimension;
-use crate::system::{ExactSum, FailureUpdate, Interval};
 use crate::peridynamics::CauchyStress;
+use crate::system::{ExactSum, FailureUpdate, Interval};
 use crate::tensor::Vector;
 
 /// One sweep over the bonds of a cloud.

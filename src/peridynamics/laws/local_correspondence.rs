@@ -6,8 +6,9 @@ use super::{Correspondence, Parameter};
 use crate::{
     material::LocalLaw,
     peridynamics::{
-        BondEnergy, Calibrate, CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout,
-        KeptDamage, Law, LinearForceState, Past, PointStress, Present, ZeroEnergyControl,
+        BondEnergy, Calibrate, CauchyStress, DeformedFamily, EnergyDensity, ForceState,
+        HistoryLayout, KeptDamage, Law, LinearForceState, Past, PointStress, Present,
+        ZeroEnergyControl,
         bond_force::{conjugate, felt},
         shape_tensor::spanned_inverse,
         softening::{CalibrationError, RegularFamily},

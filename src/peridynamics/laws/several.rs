@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, CauchyStress, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
-        Influence, Law, LinearForceState, Mixture, MomentConditions, Past, PdError, PointStress,
-        Present, ShellTarget, StatePart,
+        Accelerator, BondEnergy, CauchyStress, DeformedFamily, EnergyDensity, Family, ForceState,
+        HistoryLayout, Influence, Law, LinearForceState, Mixture, MomentConditions, Past, PdError,
+        PointStress, Present, ShellTarget, StatePart,
     },
     tensor::{Tensor4, Vector},
 };
