@@ -75,6 +75,10 @@ macro_rules! fields_of {
             self.$system.element_tangent(u, interval)
         }
 
+        fn round_off(&self, u: &[f64]) -> f64 {
+            self.$system.round_off(u)
+        }
+
         fn stresses(&self, u: &[f64]) -> Vec<(u32, [[f64; 3]; 3])> {
             self.$system.stresses(u)
         }
