@@ -401,13 +401,13 @@ fn without_steps(error: QuasiStaticError, positions: &[[f64; 3]]) -> RunError {
     }
 }
 
-/// Whether a body has points alone, whose condition is that of L/δ and not of L/h: conjugate gradients without a matrix then take less time and an eighth of the memory.
+/// Says that a body has points alone, whose condition is that of L/δ and not of L/h: conjugate gradients without a matrix then take less time and an eighth of the memory.
 fn has_points_alone<const D: usize>(model: &Model<D>, symmetry: Symmetry) -> bool {
     let is_point = |site: usize| model.point_of(site).is_some();
     symmetry == Symmetry::Symmetric && (0..model.sites.len()).all(is_point)
 }
 
-/// Whether factors of the stiffness may lead Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone.
+/// Says whether factors of the stiffness may lead Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone.
 pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
     match method {
         Method::Krylov => false,
@@ -416,7 +416,7 @@ pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry:
     }
 }
 
-/// Whether multigrid of the stiffness leads Newton's method: where `[solver]` asks for an iteration, and there are not points alone.
+/// Says whether multigrid of the stiffness leads Newton's method: where `[solver]` asks for an iteration, and there are not points alone.
 pub fn may_coarsen<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
     method == Method::Krylov && !has_points_alone(model, symmetry)
 }

@@ -117,12 +117,12 @@ enum Share<const D: usize> {
 pub(crate) struct Sections<'a, const D: usize> {
     sections: &'a [Section<D>],
     conditions: &'a [Condition<D>],
-    /// Whether the force on each site acts where it has moved to; empty if that of none does.
+    /// Sites whose force acts where they have moved to; empty if that of none does.
     turns: Vec<bool>,
     cuts: Vec<Cut<D>>,
 }
 
-/// Whether the row of each site is one of exact bonds or of elements whose law holds for rotations of any size; empty if none is.
+/// Marks the sites whose row is one of exact bonds or of elements whose law holds for rotations of any size; empty if none is.
 fn turning<const D: usize>(model: &Model<D>, rest: &RunSettings<D>) -> Vec<bool> {
     let turns = |site: usize| match model.point_of(site) {
         Some((_, point)) => !rest.has_linear_point(model, point),
@@ -211,7 +211,7 @@ impl<'a, const D: usize> Sections<'a, D> {
         told.collect()
     }
 
-    /// How far the force on a site has moved.
+    /// Displacement of the force on a site.
     fn way(&self, site: usize, u: &[f64]) -> Vector<D> {
         match self.turns.get(site) {
             Some(true) => Vector::from_column_slice(&u[site * D..][..D]),

@@ -18,7 +18,7 @@ use crate::system::{
 };
 use crate::tensor::padded;
 
-/// What leads Newton's method: factors of this process, factors over all, multigrid, or nothing.
+/// Lead of Newton's method: factors of this process, factors over all, multigrid, or nothing.
 pub(super) struct Leads<'a> {
     own: Option<NewtonFactors>,
     spread: Option<SpreadStiffness<'a>>,
@@ -54,7 +54,7 @@ impl<'a> Leads<'a> {
         })
     }
 
-    /// Collective: what borrows from this, if it is that: the factors over all processes, or multigrid.
+    /// Collective: makes the factors over all processes, or multigrid, which borrow from this.
     ///
     /// # Errors
     /// Those of the solver.
@@ -79,7 +79,7 @@ impl<'a> Leads<'a> {
         }
     }
 
-    /// What leads, with what [`Leads::made`] has made.
+    /// The inverse that leads, if there is one; `made` is that of [`Leads::made`].
     pub fn lead<'b>(&'b self, made: Option<&'b dyn LinearMap>) -> Option<&'b dyn LinearMap> {
         let own = self.own.as_ref().map(|own| &own.factor as &dyn LinearMap);
         own.or(made)

@@ -42,7 +42,7 @@ fn residual(problem: &StaticProblem<'_>, u: &[f64]) -> (Vec<f64>, f64) {
     (r, norm)
 }
 
-/// What residuals are measured by: the first of them, at the displacement `u` of the supports, but no less than what leaves [`SUSPECT`] of it where it is [`BACKWARD`] of `‖|K| |u|‖` on free dofs.
+/// Scale of residuals: the first of them, at the displacement `u` of the supports, but no less than what leaves [`SUSPECT`] of it where it is [`BACKWARD`] of `‖|K| |u|‖` on free dofs.
 ///
 /// Supports that shift the body as a rigid one leave a first residual of nothing but round-off, of which no solution leaves less.
 pub(super) fn scale(first: f64, resisted: f64) -> f64 {
@@ -70,7 +70,7 @@ pub(super) fn resisted_squared(
     (0..d).filter(|&a| is_free(a)).map(|a| of(a).powi(2)).sum()
 }
 
-/// The residual at the displacement of the supports, its norm, and what residuals are measured by.
+/// The residual at the displacement of the supports, its norm, and the scale of residuals.
 fn first_residual(problem: &StaticProblem<'_>, u: &[f64]) -> (Vec<f64>, f64, f64) {
     let matrix = problem.stiffness;
     let d = matrix.block;

@@ -119,7 +119,7 @@ impl SpreadProblem<'_> {
         (r, self.rows.spread.sum(own).sqrt())
     }
 
-    /// Collective: the residual of the own dofs at the displacement of the supports, its norm over all ranks, and what residuals are measured by.
+    /// Collective: the residual of the own dofs at the displacement of the supports, its norm over all ranks, and the scale of residuals.
     fn first_residual(&self, u: &[f64]) -> (Vec<f64>, f64, f64) {
         let (matrix, own) = (self.rows.matrix, self.rows.spread.own());
         let of_row = |row: usize| {

@@ -154,7 +154,7 @@ impl Base {
         }
     }
 
-    /// Whether δ is not one number, as far as the text of the scene tells.
+    /// Says that δ is not one number, as far as the text of the scene tells.
     pub(crate) fn lacks_horizon(&self) -> bool {
         self.horizon.is_none()
     }
