@@ -9,13 +9,14 @@
 //! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | what elements and springs add to the tangent |
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
 //! | `place_stress.rs` | the stress of a place |
-//! | `wrapped.rs` | a system around another one |
+//! | `linear_motion.rs`, `wrapped.rs` | a system of a matrix, and one around another |
 
 use crate::parallel;
 
 mod element_tangent;
 mod exact_sum;
 mod ghosts;
+mod linear_motion;
 mod neighbour_springs;
 mod partition;
 mod place_stress;
@@ -30,6 +31,7 @@ pub(crate) mod wrapped;
 pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
+pub use linear_motion::LinearMotion;
 pub(crate) use neighbour_springs::share_long_rows;
 pub use partition::{NeighbourGraph, Partition};
 pub use place_stress::PlaceStress;
@@ -198,6 +200,11 @@ pub trait SemiDiscrete: Send + Sync {
         self.internal_force_into(u, force, interval, FailureUpdate::Frozen);
     }
 
+    /// Norm of the force \[N\] that rounding of places leaves at a displacement, beside what rounding of the displacement does; none but where forces depend on places (contact).
+    fn round_off(&self, _u: &[f64]) -> f64 {
+        0.0
+    }
+
     /// For every unknown an upper bound of `Σ_b |K_ab|`, with the tangent at rest.
     fn row_sums(&self) -> Vec<f64>;
 
@@ -307,80 +314,6 @@ pub trait SemiDiscrete: Send + Sync {
     /// Puts back what [`SemiDiscrete::damage_state`] gave; false if it belongs to another model.
     fn restore_damage(&mut self, state: &[u64]) -> bool {
         state.is_empty()
-    }
-}
-
-/// A linear system that moves: its stiffness as a matrix, for scenes in which nothing breaks.
-#[derive(Clone, Debug)]
-pub struct LinearMotion {
-    /// `K`.
-    pub stiffness: BlockCsr,
-    /// Lumped mass of each site \[kg\].
-    pub mass: Vec<f64>,
-    /// Whether `K` is symmetric.
-    pub symmetry: Symmetry,
-}
-
-impl SemiDiscrete for LinearMotion {
-    fn block(&self) -> usize {
-        self.stiffness.block
-    }
-
-    fn mass(&self) -> &[f64] {
-        &self.mass
-    }
-
-    fn internal_force_into(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        _interval: Interval,
-        _breakage: FailureUpdate,
-    ) -> u64 {
-        self.stiffness.multiply_into(u, force);
-        0
-    }
-
-    fn commit(&mut self) {}
-
-    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
-        self.stiffness.multiply_into(x, y);
-    }
-
-    fn difference_length(&self) -> Option<f64> {
-        None
-    }
-
-    fn row_sums(&self) -> Vec<f64> {
-        self.stiffness.row_sums()
-    }
-
-    fn tangent_is_constant(&self) -> Vec<bool> {
-        vec![true; self.mass.len()]
-    }
-
-    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
-        let mut rows = BlockCsr {
-            block: self.stiffness.block,
-            row_offsets: vec![0],
-            ..BlockCsr::default()
-        };
-        for &site in sites {
-            let (columns, blocks) = self.stiffness.row(site as usize);
-            rows.columns.extend(columns);
-            rows.values.extend(blocks);
-            rows.row_offsets.push(rows.columns.len());
-        }
-        rows
-    }
-
-    fn symmetry(&self) -> Symmetry {
-        self.symmetry
-    }
-
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        let force = self.stiffness.multiply(u);
-        0.5 * u.iter().zip(&force).map(|(u, f)| u * f).sum::<f64>()
     }
 }
 

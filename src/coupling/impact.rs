@@ -38,6 +38,9 @@ const CHUNK: usize = 1024;
 /// How often contact counts in the bounds of a motion: at least six steps then pass in a period of a site on its penalty spring.
 pub const RESOLVED: f64 = 4.0;
 
+/// Round-off of the depth of a site, over the places that it is a difference of.
+const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
+
 /// The mass of an impactor whose motion is prescribed \[kg\]: it takes a number that can be divided by, and has no energy of its own.
 const MASSLESS: f64 = 1e-150;
 
@@ -200,6 +203,22 @@ impl<const D: usize> Impact<D> {
                 .zip(touch.force.iter())
                 .for_each(|(f, p)| *f += p);
         }
+    }
+
+    /// Norm of the forces \[N\] that rounding of places leaves at sites that touch: a depth is a difference of places. A site that lies on a surface to round-off touches by as much.
+    fn round_off(&self, u: &[f64]) -> f64 {
+        let (u, moved) = u.split_at(self.sites() * D);
+        let parts: Vec<f64> = parallel::map_chunks(u, CHUNK * D, |chunk, own| {
+            let mut squares = 0.0;
+            self.each(chunk, own, moved, |i, number, k, _, _| {
+                let place = self.position[chunk * CHUNK + i].norm();
+                let from = Vector::<D>::from_column_slice(&moved[number * D..][..D]).norm();
+                let size = place + from + self.impactors[number].shape.extent();
+                squares += (k * ROUND_OFF * size).powi(2);
+            });
+            squares
+        });
+        parts.iter().sum::<f64>().sqrt()
     }
 
     /// Energy stored in the contact, `½ k g²` of each pair that touches \[J\].

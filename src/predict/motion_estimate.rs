@@ -13,7 +13,7 @@ use crate::observe::series::Series;
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
 use crate::run::budget::Share;
-use crate::run::equilibrium::may_factorise;
+use crate::run::equilibrium::{may_coarsen, may_factorise};
 use crate::run::motion::STILL;
 use crate::run::motion::breaks::{Breaks, breaks};
 use crate::run::motion::driven_impactors;
@@ -402,7 +402,7 @@ pub(crate) fn load_steps<const D: usize>(
     })
 }
 
-/// Memory and operations of the factors that lead the iteration, if there are any.
+/// Memory and operations of what leads the iteration, if there is anything.
 fn factors<const D: usize>(
     laid_out: &ModelSetup<'_, D>,
     spec: &QuasiStatic,
@@ -411,8 +411,10 @@ fn factors<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
     let symmetry = prediction.symmetry;
+    let (model, method) = (laid_out.model, laid_out.rest.solver.method);
+    let coarsens = may_coarsen(model, method, symmetry);
     if spec.method == LoadStepSpec::Relaxation
-        || !may_factorise(laid_out.model, laid_out.rest.solver.method, symmetry)
+        || !(coarsens || may_factorise(model, method, symmetry))
     {
         return Ok(());
     }
@@ -422,12 +424,13 @@ fn factors<const D: usize>(
     let free = FreeDofs::from_prescribed(&prescribed, D);
     let pattern = laid_out.model.pattern(laid_out.operator, &[], progress);
     let plan = Planned::of(laid_out.model, &pattern, &free, laid_out.rest, symmetry)?;
-    if !matches!(plan.method, MethodUsed::Cholesky | MethodUsed::Lu) {
+    if matches!(plan.method, MethodUsed::Cholesky | MethodUsed::Lu) {
+        prediction.factor_nonzeros = plan.cost.factor_nnz;
+        prediction.operations = plan.cost.flops;
+    } else if !coarsens {
         return Ok(());
     }
     prediction.method = Some(plan.method);
-    prediction.factor_nonzeros = plan.cost.factor_nnz;
-    prediction.operations = plan.cost.flops;
     for (name, bytes) in [("stiffness", plan.stiffness), ("solver", plan.solver)] {
         prediction.memory.push(Share { name, bytes });
         prediction.peak_memory_bytes += bytes;

@@ -17,6 +17,7 @@ use crate::observe::pieces::agreed;
 use crate::observe::summary::{Decision, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
+use crate::scene::expression::Expression;
 use crate::scene::source::read;
 use crate::scene::spec::KinematicsSpec;
 use crate::scene::{Scene, SceneError, SceneErrorKind, SceneSpec, Solve, Source};
@@ -156,6 +157,16 @@ impl AnyScene {
             Self::Solid(s) => &s.solve,
         };
         *solve != Solve::Static
+    }
+
+    /// The horizon \[m\], typed or chosen; none without points, and of one that varies in space.
+    pub fn horizon(&self) -> Option<f64> {
+        let points = match self {
+            Self::Bar(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
+            Self::Plane(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
+            Self::Solid(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
+        };
+        points.and_then(Expression::as_constant)
     }
 
     /// Runs the scene from its beginning and writes its outputs.

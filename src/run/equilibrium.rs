@@ -13,6 +13,7 @@ use crate::run::error::RunError;
 use crate::run::thermal::Thermal;
 use crate::scene::conditions::Condition;
 use crate::scene::validated::Solver;
+use crate::solve::FreeDofs;
 use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{
@@ -307,6 +308,11 @@ fn nonlinear<const D: usize>(
         false => None,
     };
     let refactor = (factors.as_ref()).map(|(_, info)| TangentFactors::new(*problem, *params, info));
+    let free = FreeDofs::from_prescribed(problem.prescribed, D);
+    let multigrid = match may_coarsen(model, params.method, problem.symmetry) {
+        true => statics::multigrid(problem.stiffness, &free, problem.positions, progress),
+        false => None,
+    };
     let factor_seconds = clock.elapsed().as_secs_f64();
     progress.stage("Newton's method", None);
     let held = |value: &Option<f64>| value.is_some();
@@ -329,7 +335,11 @@ fn nonlinear<const D: usize>(
         },
         Aids {
             refactor: refactor.as_ref().map(|made| made as &dyn Refactor),
-            near: factors.as_ref().map(|(factor, _)| factor as &dyn LinearMap),
+            near: match (&factors, &multigrid) {
+                (Some((factor, _)), _) => Some(factor),
+                (None, Some(multigrid)) => Some(multigrid),
+                (None, None) => None,
+            },
             progress,
         },
         &|step| (step == 0).then_some(0.0),
@@ -391,16 +401,24 @@ fn without_steps(error: QuasiStaticError, positions: &[[f64; 3]]) -> RunError {
     }
 }
 
-/// Whether factors of the stiffness may lead Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone, whose condition is that
-/// of L/δ and not of L/h, so that conjugate gradients without a matrix take less time and an eighth of the memory.
-pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
+/// Says that a body has points alone, whose condition is that of L/δ and not of L/h: conjugate gradients without a matrix then take less time and an eighth of the memory.
+fn has_points_alone<const D: usize>(model: &Model<D>, symmetry: Symmetry) -> bool {
     let is_point = |site: usize| model.point_of(site).is_some();
-    let only_points = || symmetry == Symmetry::Symmetric && (0..model.sites.len()).all(is_point);
+    symmetry == Symmetry::Symmetric && (0..model.sites.len()).all(is_point)
+}
+
+/// Says whether factors of the stiffness may lead Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone.
+pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
     match method {
         Method::Krylov => false,
         Method::Direct => true,
-        Method::Auto => !only_points(),
+        Method::Auto => !has_points_alone(model, symmetry),
     }
+}
+
+/// Says whether multigrid of the stiffness leads Newton's method: where `[solver]` asks for an iteration, and there are not points alone.
+pub fn may_coarsen<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
+    method == Method::Krylov && !has_points_alone(model, symmetry)
 }
 
 /// What the solver is asked for, with the memory that is left to it.

@@ -5,11 +5,18 @@
 //! beyond. It knows of no coupling: bonds, elements and seams are all in `F`. Nodal forces of a cell that the plane cuts belong to
 //! both sides; `L − Σ f_i` puts that right, so that the weight of what stands on a section is exact wherever the plane lies. Sites that a
 //! set holds count where the set lies, for the same reason.
+//!
+//! **Moments.** Forces of exact bonds act along the deformed bond, and those of laws for strains of any size turn with the element: they have no moment as a whole about the places that sites have moved to, and one of
+//! the order of the displacement about those at rest. Linear forces have none about the places at rest. So a force acts where its site has moved to if that site's row is of the first kind, and else where the site
+//! was; loads likewise, on the sites around.
 
-use crate::coupling::Model;
+use std::collections::BTreeMap;
+
+use crate::coupling::{Model, Sampler};
 use crate::observe::summary::SectionForce;
 use crate::run::error::RunError;
 use crate::run::loads::{cells_of, holders};
+use crate::run::setup::RunSettings;
 use crate::scene::conditions::{Condition, Prescribed, Support};
 use crate::scene::section::Section;
 use crate::tensor::{Vector, padded};
@@ -56,6 +63,24 @@ impl<const D: usize> Resultant<D> {
             *own += other * factor;
         }
     }
+
+    /// Moves the place of a force that is counted already by `way`.
+    fn shift(&mut self, force: &Vector<D>, way: &Vector<D>) {
+        let mut moved = Self::none();
+        moved.add(force, way);
+        for (own, more) in self.moment.iter_mut().zip(moved.moment) {
+            *own += more;
+        }
+    }
+}
+
+/// A place of a quadrature over what a load acts on.
+struct LoadPoint<const D: usize> {
+    place: Vector<D>,
+    weight: f64,
+    normal: Vector<D>,
+    /// The sites that turn, with their weights, that the place follows.
+    follows: Vec<(u32, f64)>,
 }
 
 /// What lies beyond a section of a model.
@@ -73,20 +98,44 @@ struct LoadBeyond<const D: usize> {
     share: Share<D>,
 }
 
+/// A force at rest, and its parts on the sites that turn.
+struct Acting<const D: usize> {
+    at_rest: Resultant<D>,
+    moved: Vec<(u32, Vector<D>)>,
+}
+
 enum Share<const D: usize> {
     /// It does not change.
-    Steady(Resultant<D>),
-    /// It depends on time alone: the resultants of unit components.
-    ByTime([Resultant<D>; D]),
-    /// It depends on time and place: place, weight and outward normal of each point of a quadrature.
-    Everywhere(Vec<(Vector<D>, f64, Vector<D>)>),
+    Steady(Acting<D>),
+    /// It depends on time alone: those of unit components.
+    ByTime([Acting<D>; D]),
+    /// It depends on time and place.
+    Everywhere(Vec<LoadPoint<D>>),
 }
 
 /// The sections of a scene, and what of its model lies beyond each.
 pub(crate) struct Sections<'a, const D: usize> {
     sections: &'a [Section<D>],
     conditions: &'a [Condition<D>],
+    /// Sites whose force acts where they have moved to; empty if that of none does.
+    turns: Vec<bool>,
     cuts: Vec<Cut<D>>,
+}
+
+/// Marks the sites whose row is one of exact bonds or of elements whose law holds for rotations of any size; empty if none is.
+fn turning<const D: usize>(model: &Model<D>, rest: &RunSettings<D>) -> Vec<bool> {
+    let turns = |site: usize| match model.point_of(site) {
+        Some((_, point)) => !rest.has_linear_point(model, point),
+        None => {
+            let mut cells = model.cells_of_site(site).map(|(cell, _)| cell).peekable();
+            cells.peek().is_some() && cells.all(|cell| rest.is_objective(model, cell))
+        }
+    };
+    let turns: Vec<bool> = (0..model.sites.len()).map(turns).collect();
+    match turns.contains(&true) {
+        true => turns,
+        false => Vec::new(),
+    }
 }
 
 /// The columns of all sections: force, then moment of each.
@@ -105,11 +154,19 @@ impl<'a, const D: usize> Sections<'a, D> {
     ///
     /// # Errors
     /// [`RunError::EmptySection`] for one beyond which no site lies.
-    pub fn new(
-        model: &Model<D>,
-        sections: &'a [Section<D>],
-        conditions: &'a [Condition<D>],
-    ) -> Result<Self, RunError> {
+    pub fn new(model: &Model<D>, rest: &'a RunSettings<D>) -> Result<Self, RunError> {
+        let (sections, conditions) = (&rest.output.sections[..], &rest.conditions[..]);
+        let turns = match sections {
+            [] => Vec::new(),
+            _ => turning(model, rest),
+        };
+        let sampler = (!turns.is_empty()).then(|| Sampler::new(model));
+        let follows = |x: &Vector<D>| {
+            let all = sampler.as_ref().and_then(|sampler| sampler.weights(x));
+            let mut all = all.unwrap_or_default();
+            all.retain(|(site, _)| turns[*site as usize]);
+            all
+        };
         let cut = |section: &Section<D>| -> Result<Cut<D>, RunError> {
             let sites = model.sites.iter().enumerate();
             let beyond = sites.filter(|(_, s)| section.holds(&s.position));
@@ -128,21 +185,23 @@ impl<'a, const D: usize> Sections<'a, D> {
                 sites,
                 moved: moved(model, section, conditions)?,
                 loads: loads
-                    .filter_map(|(number, c)| load_beyond(model, section, number, c))
+                    .filter_map(|(number, c)| load_beyond(model, section, number, c, &follows))
                     .collect(),
             })
         };
+        let cuts = sections.iter().map(cut).collect::<Result<_, _>>()?;
         Ok(Self {
             sections,
             conditions,
-            cuts: sections.iter().map(cut).collect::<Result<_, _>>()?,
+            turns,
+            cuts,
         })
     }
 
-    /// Force and moment of each section at the time `t`; `excess` are internal less external forces \[N\] by dof, the forces of supports and the inertia.
-    pub fn forces(&self, excess: &[f64], t: f64) -> Vec<SectionForce> {
+    /// Force and moment of each section at the displacement `u` \[m\] and the time `t`; `excess` are internal less external forces \[N\] by dof, the forces of supports and the inertia.
+    pub fn forces(&self, excess: &[f64], u: &[f64], t: f64) -> Vec<SectionForce> {
         let told = self.sections.iter().zip(&self.cuts).map(|(section, cut)| {
-            let sum = self.resultant(cut, excess, t);
+            let sum = self.resultant(cut, excess, u, t);
             SectionForce {
                 section: section.name.clone(),
                 force: sum.force.iter().copied().collect(),
@@ -152,11 +211,20 @@ impl<'a, const D: usize> Sections<'a, D> {
         told.collect()
     }
 
-    fn resultant(&self, cut: &Cut<D>, excess: &[f64], t: f64) -> Resultant<D> {
+    /// Displacement of the force on a site.
+    fn way(&self, site: usize, u: &[f64]) -> Vector<D> {
+        match self.turns.get(site) {
+            Some(true) => Vector::from_column_slice(&u[site * D..][..D]),
+            _ => Vector::zeros(),
+        }
+    }
+
+    fn resultant(&self, cut: &Cut<D>, excess: &[f64], u: &[f64], t: f64) -> Resultant<D> {
         let mut sum = Resultant::none();
         for (site, arm) in &cut.sites {
-            let own = &excess[*site as usize * D..][..D];
-            sum.add(&Vector::from_column_slice(own), arm);
+            let site = *site as usize;
+            let own = &excess[site * D..][..D];
+            sum.add(&Vector::from_column_slice(own), &(arm + self.way(site, u)));
         }
         for (dof, arm, sign) in &cut.moved {
             let force = Vector::from_fn(|k, _| {
@@ -166,28 +234,40 @@ impl<'a, const D: usize> Sections<'a, D> {
                     0.0
                 }
             });
-            sum.add(&force, arm);
+            sum.add(&force, &(arm + self.way(dof / D, u)));
         }
         for load in &cut.loads {
             let condition = &self.conditions[load.condition];
             match &load.share {
-                Share::Steady(own) => sum.add_times(own, 1.0),
+                Share::Steady(own) => self.add_acting(own, 1.0, u, &mut sum),
                 Share::ByTime(units) => {
                     let components = &condition.components;
                     for (axis, unit) in units.iter().enumerate() {
                         let value = components.at_time(axis, &Vector::zeros(), t);
-                        sum.add_times(unit, value.unwrap_or(0.0));
+                        self.add_acting(unit, value.unwrap_or(0.0), u, &mut sum);
                     }
                 }
                 Share::Everywhere(points) => {
-                    for (x, weight, normal) in points {
-                        let force = condition.force_density(x, normal, t) * *weight;
+                    for point in points {
+                        let (x, normal) = (&point.place, &point.normal);
+                        let force = condition.force_density(x, normal, t) * point.weight;
                         sum.add(&force, &(x - cut.about));
+                        for &(site, w) in &point.follows {
+                            sum.shift(&force, &(self.way(site as usize, u) * w));
+                        }
                     }
                 }
             }
         }
         sum
+    }
+
+    /// Adds `factor` times a load.
+    fn add_acting(&self, own: &Acting<D>, factor: f64, u: &[f64], sum: &mut Resultant<D>) {
+        sum.add_times(&own.at_rest, factor);
+        for (site, force) in &own.moved {
+            sum.shift(&(force * factor), &self.way(*site as usize, u));
+        }
     }
 }
 
@@ -222,23 +302,32 @@ fn moved<const D: usize>(
     Ok(moved)
 }
 
-/// A load as far as it acts beyond a section; none of a condition that does not load, or not there.
+/// A load as far as it acts beyond a section; none of a condition that does not load, or not there. `follows` gives the sites that turn, with their weights, that a place follows.
 fn load_beyond<const D: usize>(
     model: &Model<D>,
     section: &Section<D>,
     number: usize,
     condition: &Condition<D>,
+    follows: &dyn Fn(&Vector<D>) -> Vec<(u32, f64)>,
 ) -> Option<LoadBeyond<D>> {
-    let points = points_beyond(model, section, condition);
+    let mut points = points_beyond(model, section, condition);
     if points.is_empty() {
         return None;
     }
+    for point in &mut points {
+        point.follows = follows(&point.place);
+    }
     let integral = |density: &dyn Fn(&Vector<D>, &Vector<D>) -> Vector<D>| {
-        let mut sum = Resultant::none();
-        for (x, weight, normal) in &points {
-            sum.add(&(density(x, normal) * *weight), &(x - section.about));
+        let (mut at_rest, mut moved) = (Resultant::none(), BTreeMap::new());
+        for point in &points {
+            let force = density(&point.place, &point.normal) * point.weight;
+            at_rest.add(&force, &(point.place - section.about));
+            for &(site, w) in &point.follows {
+                *moved.entry(site).or_insert_with(Vector::zeros) += force * w;
+            }
         }
-        sum
+        let moved = moved.into_iter().collect();
+        Acting { at_rest, moved }
     };
     let components = &condition.components;
     let share = match (
@@ -257,17 +346,22 @@ fn load_beyond<const D: usize>(
     })
 }
 
-/// Place, weight and outward normal of each point of a quadrature over what a load acts on beyond a section.
+/// The quadrature over what a load acts on beyond a section.
 fn points_beyond<const D: usize>(
     model: &Model<D>,
     section: &Section<D>,
     condition: &Condition<D>,
-) -> Vec<(Vector<D>, f64, Vector<D>)> {
+) -> Vec<LoadPoint<D>> {
     let (mesh, beyond) = (&model.mesh, &section.beyond);
     let mut points = Vec::new();
     let mut add = |x: &Vector<D>, weight: f64, normal: &Vector<D>| {
         if section.inside.contains(x, beyond.tolerance) {
-            points.push((*x, weight, *normal));
+            points.push(LoadPoint {
+                place: *x,
+                weight,
+                normal: *normal,
+                follows: Vec::new(),
+            });
         }
     };
     let none = Vector::zeros();

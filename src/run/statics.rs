@@ -151,7 +151,7 @@ fn solve_chosen<const D: usize>(
     watch = Stopwatch::start();
     choices.extend(body.decisions(equilibrium));
     let residual = equilibrium.residual();
-    let sections = body.section_forces(&residual)?;
+    let sections = body.section_forces(&residual, &equilibrium.solution.displacement)?;
     let solved = Solved {
         model,
         operator: operator.as_ref(),
@@ -369,12 +369,9 @@ impl<const D: usize> StaticBody<'_, D> {
     ///
     /// # Errors
     /// [`RunError::EmptySection`].
-    fn section_forces(&self, residual: &[f64]) -> Result<Vec<SectionForce>, RunError> {
-        let RunSettings {
-            output, conditions, ..
-        } = self.rest;
-        let sections = Sections::new(self.model, &output.sections, conditions)?;
-        Ok(sections.forces(residual, 0.0))
+    fn section_forces(&self, residual: &[f64], u: &[f64]) -> Result<Vec<SectionForce>, RunError> {
+        let sections = Sections::new(self.model, self.rest)?;
+        Ok(sections.forces(residual, u, 0.0))
     }
 
     /// Sizes of a model with so many nodes and cells.

@@ -96,13 +96,18 @@ const UNARY: &[(&str, Unary)] = &[
     ("floor", f64::floor),
     ("ln", f64::ln),
     ("log10", f64::log10),
-    ("sign", f64::signum),
+    ("sign", sign),
     ("sin", f64::sin),
     ("sinh", f64::sinh),
     ("sqrt", f64::sqrt),
     ("tan", f64::tan),
     ("tanh", f64::tanh),
 ];
+
+/// The sign of a number: 0 of zero, of either sign, unlike [`f64::signum`].
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
 
 /// The functions of two arguments, by name.
 const BINARY: &[(&str, Binary)] = &[

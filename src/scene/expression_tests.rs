@@ -27,6 +27,9 @@ fn functions_and_choices() {
     assert_eq!(value("max(x, min(y, z)) + abs(-1)"), 4.0);
     assert!((value("sin(pi / 2)") - 1.0).abs() < 1e-15);
     assert_eq!(value("hypot(3, 4)"), 5.0);
+    let signs = ["sign(y - x)", "sign(x - y)", "sign(x - 2)", "sign(-0)"];
+    assert_eq!(signs.map(value), [1.0, -1.0, 0.0, 0.0]);
+    assert!(value("sign(sqrt(-x))").is_nan());
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::conditions::{Components, components, finite, inside};
 use super::error::{SceneError, SceneErrorKind};
 use super::region::Region;
 use super::solve::{Clock, Pacing, still};
-use super::spec::{InitialFieldSpec, InitialSpec};
+use super::spec::{InitialFieldSpec, InitialSpec, ShapeSpec};
 use super::value::Text;
 use crate::mesh::Mesh;
 
@@ -66,11 +66,16 @@ pub(crate) fn initial<const D: usize>(
             }
         }
         let region = match shape {
+            Some(shape @ ShapeSpec::Set(_)) => {
+                super::region::region(&format!("{place}.inside"), shape, mesh)?
+            }
             Some(shape) => inside(&place, name, shape, mesh)?,
             None => Region::everywhere(),
         };
-        let within = mesh.nodes.iter().filter(|x| region.contains(x, 0.0));
-        finite(&place, name, &components, clock, within.copied())?;
+        let selected = region.select_nodes(mesh);
+        let within = mesh.nodes.iter().zip(selected);
+        let within = within.filter_map(|(x, selected)| selected.then_some(*x));
+        finite(&place, name, &components, clock, within)?;
         found.push(Initial {
             name: name.value.clone(),
             kind,

@@ -61,6 +61,52 @@ impl<const D: usize> Region<D> {
         }
     }
 
+    /// The nodes in the region, those of the cells of a set among them; one entry per node.
+    pub fn select_nodes(&self, mesh: &Mesh<D>) -> Vec<bool> {
+        match self {
+            Self::Cells(cells) => {
+                let mut selected = vec![false; mesh.nodes.len()];
+                let nodes = cells.iter().flat_map(|&c| mesh.cell(c as usize));
+                nodes.for_each(|&n| selected[n as usize] = true);
+                selected
+            }
+            _ => self.combined(
+                mesh.nodes.len(),
+                |n| mesh.nodes[n],
+                |member| member.select_nodes(mesh),
+            ),
+        }
+    }
+
+    /// The places `of` so many numbers in a shape, or in a combination of regions of which `select` gives the places of each; none in a set.
+    pub(crate) fn combined(
+        &self,
+        count: usize,
+        of: impl Fn(usize) -> Vector<D>,
+        select: impl Fn(&Self) -> Vec<bool>,
+    ) -> Vec<bool> {
+        let each = |all: &mut Vec<bool>, more: Vec<bool>, join: fn(bool, bool) -> bool| {
+            let pairs = all.iter_mut().zip(more);
+            pairs.for_each(|(own, other)| *own = join(*own, other));
+        };
+        let mut all = vec![false; count];
+        match self {
+            Self::Shape { .. } => (0..count).map(|k| self.contains(&of(k), 0.0)).collect(),
+            Self::Cells(_) => all,
+            Self::Union(members) => {
+                for member in members {
+                    each(&mut all, select(member), |a, b| a || b);
+                }
+                all
+            }
+            Self::Without(both) => {
+                all = select(&both[0]);
+                each(&mut all, select(&both[1]), |a, b| a && !b);
+                all
+            }
+        }
+    }
+
     /// Whether a position lies in the region, by shapes alone; cells of a set hold none.
     pub fn contains(&self, x: &Vector<D>, tolerance: f64) -> bool {
         match self {

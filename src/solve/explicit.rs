@@ -139,7 +139,7 @@ impl<'a> Explicit<'a> {
             motion.begin();
         }
         motion.look_ahead();
-        motion.add_reactions(Reading::Fresh);
+        motion.resume_reactions();
         motion.energies = motion.energies_at_start();
         if starts {
             let stored = motion.system.stored_energy(&motion.state.u);
@@ -174,6 +174,16 @@ impl<'a> Explicit<'a> {
             .displacement_into(self.state.time + self.params.step, &mut self.next);
     }
 
+    /// As [`Explicit::add_reactions`], with the forces that the steps before ended with, if there were any.
+    fn resume_reactions(&mut self) {
+        let held = std::mem::take(&mut self.state.held);
+        self.add_reactions(Reading::Fresh);
+        if held.len() == self.prescribed.len() {
+            set(&self.prescribed, &held, &mut self.load);
+            self.state.held = held;
+        }
+    }
+
     /// On prescribed dofs, the load becomes all that moves them, `M a + F`.
     fn add_reactions(&mut self, reading: Reading) {
         for (p, &k) in self.prescribed.iter().enumerate() {
@@ -183,6 +193,9 @@ impl<'a> Explicit<'a> {
             }
             self.load[k] = self.state.a[k] / self.inverse_mass[k / self.block] + self.force[k];
         }
+        let moved = self.prescribed.iter().map(|&k| self.load[k as usize]);
+        self.state.held.clear();
+        self.state.held.extend(moved);
     }
 
     fn energies_at_start(&self) -> Energies {

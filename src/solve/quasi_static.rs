@@ -5,9 +5,12 @@
 //!
 //! * **Newton** (`newton.rs`): `u ← u + K⁻¹ (f − F(u))`, with the tangent at rest while that leads quickly, else with that at the present displacement; conjugate gradients or GMRES by
 //!   its symmetry, preconditioned by the factors of the tangent before bonds broke, or by the row sums. One iteration where `F` is linear; where it gets stuck, relaxation goes on.
-//! * **Relaxation**: the motion `M̃ ü + c M̃ u̇ = f − F(u)` in steps of one, with fictitious masses `m̃_a = ¼ Σ_b |K_ab|` that make the step stable, and
+//! * **Relaxation** (`relaxation.rs`): the motion `M̃ ü + c M̃ u̇ = f − F(u)` in steps of one, with fictitious masses `m̃_a = ¼ Σ_b |K_ab|` that make the step stable, and
 //!   the damping that is critical for the mode in motion, `c = 2 √(v·ΔF / v·M̃ v)` (\[Underwood1983\], with the increment in place of the displacement). It needs
 //!   no solve, and needs eigenvalues that are real and not negative.
+//!
+//! Both set out along the linear prediction, which moves all of the body: supports that move alone would strain the bonds beside them far beyond what the body ever sees, and a law that
+//! softens would settle there.
 //!
 //! Pieces that are torn off trouble neither: what acts on them is in balance. Where all is torn apart no force is left to measure a residual by; so it
 //! is measured by the largest of the load step too, and is done at the round-off of the displacement.
@@ -15,14 +18,10 @@
 use std::ops::ControlFlow;
 
 use lead::Lead;
-use residual::{MOVED, Residual, Run, Tangent};
+use residual::{MOVED, Run, Tangent};
 
 use crate::{
-    solve::{
-        FreeDofs,
-        explicit::Drive,
-        krylov::{add_scaled, dot},
-    },
+    solve::{FreeDofs, explicit::Drive},
     system::{FailureUpdate, Halfway, Interval, SemiDiscrete},
 };
 
@@ -32,6 +31,7 @@ mod factors;
 mod lead;
 mod newton;
 mod params;
+mod relaxation;
 mod residual;
 
 pub use error::QuasiStaticError;
@@ -101,9 +101,6 @@ pub struct QuasiStaticInfo {
     /// Factorisations of the tangent.
     pub factorisations: usize,
 }
-
-/// A relaxation whose residual grows by so much will not come back.
-const RAN_AWAY: f64 = 1e6;
 
 /// The work of a load step.
 struct Balance {
@@ -357,57 +354,6 @@ impl Run<'_> {
         };
         self.balanced = residual.scale;
         Ok((iterations, residual.relative()))
-    }
-
-    fn by_relaxation(&mut self, u: &mut [f64]) -> Result<(usize, Residual), QuasiStaticError> {
-        let mut residual = self.evaluate(u)?;
-        let first = residual.size;
-        let mut last = self.force.clone();
-        // `1/m̃`, a tenth heavier than the limit: geometry may stiffen bonds
-        let inverse: Vec<f64> = self.inverse.iter().map(|s| s * 4.0 / 1.1).collect();
-        let mut v = vec![0.0; u.len()];
-        let mut damping = 0.0;
-        let mut iterations = 0;
-        while !residual.is_enough() {
-            if residual.size > RAN_AWAY * first {
-                return Err(QuasiStaticError::RanAway {
-                    step: self.step,
-                    time: self.time,
-                    iterations,
-                    site: self.worst(),
-                });
-            }
-            if iterations >= self.params.max_iterations {
-                return Err(self.no_equilibrium(residual, iterations));
-            }
-            self.go_on()?;
-            // the first half step from rest has the damping 0 and half of the force
-            let (keep, push) = if iterations == 0 {
-                (0.0, 0.5)
-            } else {
-                ((2.0 - damping) / (2.0 + damping), 2.0 / (2.0 + damping))
-            };
-            for ((v, r), w) in v.iter_mut().zip(&self.residual).zip(&inverse) {
-                *v = keep * *v + push * r * w;
-            }
-            add_scaled(1.0, &v, u);
-            last.copy_from_slice(&self.force);
-            residual = self.evaluate(u)?;
-            iterations += 1;
-            let stiffness = dot(&v, &self.force) - dot(&v, &last);
-            let mass: f64 = v
-                .iter()
-                .zip(&inverse)
-                .filter(|(_, w)| **w > 0.0)
-                .map(|(v, w)| v * v / w)
-                .sum();
-            damping = if mass > 0.0 {
-                (2.0 * (stiffness / mass).max(0.0).sqrt()).min(1.9)
-            } else {
-                0.0
-            };
-        }
-        Ok((iterations, residual))
     }
 }
 

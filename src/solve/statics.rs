@@ -11,7 +11,7 @@ use crate::system::{BlockCsr, Symmetry};
 mod methods;
 mod spread;
 
-pub use methods::{expected_method, factors};
+pub use methods::{expected_method, factors, multigrid};
 pub use spread::{SpreadProblem, SpreadRows, solve_spread};
 
 /// A static problem; borrowed, so that assembling it is the caller's to time.

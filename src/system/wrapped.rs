@@ -75,6 +75,10 @@ macro_rules! fields_of {
             self.$system.element_tangent(u, interval)
         }
 
+        fn round_off(&self, u: &[f64]) -> f64 {
+            self.$system.round_off(u)
+        }
+
         fn stress_of_site(&self, site: usize, u: &[f64]) -> Option<$crate::system::PlaceStress> {
             self.$system.stress_of_site(site, u)
         }

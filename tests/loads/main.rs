@@ -5,6 +5,7 @@ use bondline::progress::Silent;
 use bondline::run::AnyScene;
 use bondline::scene::Source;
 
+mod mirrored;
 mod pressure;
 mod rotation;
 mod sections;

@@ -54,3 +54,43 @@ output.vtu = false
         assert!((row[3 + i] - u).abs() < 1e-14, "{i}: {} {u}", row[3 + i]);
     }
 }
+
+/// Supports that shift all of a body along one axis leave nothing but round-off to solve for along the other: by factors, by iteration and in load steps.
+#[test]
+fn a_shift_of_all_sites_is_no_load() {
+    let plate = r#"
+kinematics = "plane-stress"
+mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 8 }, y = { cells = 4 } }
+materials.m.lps = { youngs-modulus = 10, poisson-ratio = 0.2 }
+conditions.d.displacement = { x = 0.5, inside.everywhere = true }
+conditions.g.displacement = { on = "bottom", y = 0 }
+output = { vtu = false, probes.p = { at = [1.1, 0.9] } }
+"#;
+    let points = "peridynamics={horizon=0.5,points={lattice={spacing=0.25,origin=[0.125,0.125]}}}";
+    for (coupling, points) in [("local", "zones={}"), ("nonlocal", points)] {
+        let coupling = format!("coupling={coupling}");
+        for solve in [
+            "solver.method=direct",
+            "solver.method=krylov",
+            "solve.quasi-static.steps=1",
+        ] {
+            let done = run(plate, &[&coupling, points, solve]);
+            let (csv, end) = match solve.contains("steps") {
+                true => ("scene_history.csv", "p_"),
+                false => ("scene_probes.csv", ""),
+            };
+            let u = ["ux", "uy"].map(|name| {
+                let column = done.column(csv, &format!("{end}{name}"));
+                *column.last().unwrap()
+            });
+            let off = (u[0] - 0.5).abs().max(u[1].abs());
+            assert!(off < 1e-14, "{coupling} {solve}: {u:?}");
+            assert!(
+                done.summary
+                    .warnings
+                    .iter()
+                    .all(|w| !w.contains("balance by"))
+            );
+        }
+    }
+}

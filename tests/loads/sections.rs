@@ -231,6 +231,73 @@ sections.far = { point = 1, normal = 1 }
     }
 }
 
+/// A cantilever that is pressed and bent far: the moment is that of the load at the place that it has moved to, and both sides of a plane have the same.
+#[test]
+fn moments_are_those_of_the_deformed_body_where_forces_turn_with_it() {
+    let beam = r#"
+kinematics = "plane-stress"
+mesh.rectangle = { min = [0, 0], max = [4, 1], x = { cells = 16 }, y = { cells = 4 } }
+materials.m.LAW = { youngs-modulus = 1000, poisson-ratio = 0.3, density = 1 }
+conditions.base.displacement = { on = "left", x = 0, y = 0 }
+conditions.end.traction = { on = "right", x = "-5 * t", y = "5 * t * (1 + 0 * y)" }
+conditions.weight.body-force = { y = "t" }
+[output]
+vtu = false
+probes.end = { at = [4, 0.5] }
+sections.beyond = { point = [1.03, 0.5], normal = [1, 0] }
+sections.before = { point = [1.03, 0.5], normal = [-1, 0], about = [1.03, 0.5] }
+"#;
+    let points = "peridynamics={horizon=0.5,bonds=\"exact\",points={lattice={spacing=0.25}}}";
+    let steps = "solve.quasi-static.steps=2";
+    for (coupling, law, rest) in [
+        ("nonlocal", "lps", [points, steps]),
+        ("local", "neo-hooke", ["zones={}", steps]),
+        ("nonlocal", "lps", [points, "zones={}"]),
+    ] {
+        let typed = beam.replace("LAW", law);
+        let typed = match rest[1] == steps {
+            true => typed,
+            // at rest, without a time
+            false => typed.replace("* t", "").replace("\"t\"", "1"),
+        };
+        let coupling = format!("coupling={coupling}");
+        let done = run(&typed, &[&coupling, rest[0], rest[1]]);
+        let (beyond, before) = (section(&done, "beyond"), section(&done, "before"));
+        // between points the displacement of the load is interpolated otherwise than the load is shared out
+        let near = if law == "lps" { 1e-3 } else { 1e-8 };
+        for (a, b) in beyond.numbers().zip(before.numbers()) {
+            assert!(
+                (a + b).abs() < near * beyond.moment[0],
+                "{law} {rest:?}: {beyond:?} {before:?}"
+            );
+        }
+        // a load on the end alone, whose resultant acts in its middle
+        let typed = typed.replace("conditions.weight.body-force = { y = \"t\" }\n", "");
+        let typed = typed.replace("conditions.weight.body-force = { y = 1 }\n", "");
+        let done = run(&typed, &[&coupling, rest[0], rest[1]]);
+        let beyond = section(&done, "beyond");
+        let end: Vec<f64> = match rest[1] == steps {
+            true => ["end_ux", "end_uy"]
+                .map(|name| *done.column("scene_history.csv", name).last().unwrap())
+                .to_vec(),
+            false => ["ux", "uy"]
+                .map(|name| done.column("scene_probes.csv", name)[0])
+                .to_vec(),
+        };
+        let exact = 5.0 * (4.0 + end[0] - 1.03) + 5.0 * end[1];
+        println!(
+            "{law} {rest:?}: {beyond:?}, of the load {exact}, at rest {}",
+            5.0 * 2.97
+        );
+        assert!(end[1] > 1.0, "{end:?}");
+        // the mean of the end is nearly its middle
+        assert!(
+            (beyond.moment[0] / exact - 1.0).abs() < 0.01,
+            "{beyond:?} {exact}"
+        );
+    }
+}
+
 #[test]
 fn sections_that_cut_nothing_are_refused() {
     for (typed, parts) in [

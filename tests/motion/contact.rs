@@ -148,3 +148,57 @@ vtu = false
         "{first:?} {second:?}"
     );
 }
+
+/// Two squares of four elements each, the sets A and B of a deck, of which A moves: as elements and as points.
+#[test]
+fn a_set_of_cells_begins_to_move() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut deck = "*NODE\n".to_owned();
+    for (body, x0) in [0.0, 3.0].iter().enumerate() {
+        for k in 0..9 {
+            let (x, y) = (x0 + (k % 3) as f64, (k / 3) as f64);
+            deck += &format!("{}, {x:?}, {y:?}\n", 9 * body + k + 1);
+        }
+    }
+    for (body, name) in ["A", "B"].iter().enumerate() {
+        deck += &format!("*ELEMENT, TYPE=CPS4, ELSET={name}\n");
+        for e in 0..4 {
+            let a = 9 * body + 3 * (e / 2) + e % 2 + 1;
+            deck += &format!(
+                "{}, {a}, {}, {}, {}\n",
+                4 * body + e + 1,
+                a + 1,
+                a + 4,
+                a + 3
+            );
+        }
+    }
+    write(folder.path(), "two.inp", &deck);
+    let scene = r#"
+kinematics = "plane-stress"
+mesh.file.path = "two.inp"
+materials.m.bond-based = { youngs-modulus = 10, density = 2 }
+initial.a.velocity = { inside.set = "A", x = "3 + 0*y", y = 1 }
+solve.explicit = { duration = 0.01, outputs = 1 }
+output.vtu = false
+"#;
+    for (coupling, points) in [
+        ("local", ""),
+        (
+            "nonlocal",
+            "peridynamics = { horizon = 1.5, points.lattice = { spacing = 0.5, origin = [0.25, 0.25] } }\n",
+        ),
+    ] {
+        write(
+            folder.path(),
+            "bar.toml",
+            &format!("coupling = \"{coupling}\"\n{points}{scene}"),
+        );
+        run(folder.path(), &["bar.toml"]);
+        // the mass of A is ρ A = 8
+        for (name, exact) in [("momentum_x", 24.0), ("momentum_y", 8.0)] {
+            let found = column(&folder.path().join("out/bar_history.csv"), name);
+            assert!((found[0] - exact).abs() < 1e-12, "{coupling}: {found:?}");
+        }
+    }
+}

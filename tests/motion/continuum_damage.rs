@@ -96,30 +96,34 @@ fn load_steps_follow_the_closed_form_up_to_the_largest_stress_and_back() {
     let (young, eta) = (1000.0, 10.0);
     // E ε²/2 = E ε₀²/3
     let onset = 0.01 * (2.0f64 / 3.0).sqrt();
-    let solve =
-        format!("{HELD}[solve.quasi-static]\nduration = 1\nsteps = 20\ntolerance = 1e-11\n");
-    let typed = bar(eta, "0.13*min(2*t, 2 - 2*t)", &solve)
-        .replace("horizon", "bonds = \"linear\"\nhorizon");
-    let found = history(
-        folder.path(),
-        &typed,
-        &["a_ux", "b_ux", "right_reaction_x", "broken_bonds"],
-    );
-    let mut largest: f64 = 0.0;
-    for k in 1..=20 {
-        let strain = (found[1][k] - found[0][k]) / 0.9;
-        largest = largest.max(strain);
-        let damage = (((largest / onset).powi(2) - 1.0) / eta).max(0.0);
-        let stress = young * strain * (1.0 - damage);
-        assert!(
-            (found[2][k] - stress).abs() < 1e-7,
-            "{k}: {} {stress}",
-            found[2][k]
+    // in long steps a relaxation that strained the bonds beside the support first would settle where these are torn
+    for (method, steps, near) in [("implicit", 20, 1e-7), ("relaxation", 4, 1e-6)] {
+        let solve = format!(
+            "{HELD}[solve.quasi-static]\nduration = 1\nsteps = {steps}\nmethod = \"{method}\"\ntolerance = 1e-11\n"
         );
+        let typed = bar(eta, "0.13*min(2*t, 2 - 2*t)", &solve)
+            .replace("horizon", "bonds = \"linear\"\nhorizon");
+        let found = history(
+            folder.path(),
+            &typed,
+            &["a_ux", "b_ux", "right_reaction_x", "broken_bonds"],
+        );
+        let mut largest: f64 = 0.0;
+        for k in 1..=steps {
+            let strain = (found[1][k] - found[0][k]) / 0.9;
+            largest = largest.max(strain);
+            let damage = (((largest / onset).powi(2) - 1.0) / eta).max(0.0);
+            let stress = young * strain * (1.0 - damage);
+            assert!(
+                (found[2][k] - stress).abs() < near,
+                "{method}, {k}: {} {stress}",
+                found[2][k]
+            );
+        }
+        let damage = ((largest / onset).powi(2) - 1.0) / eta;
+        assert!(damage > 0.1 && damage < 0.3, "{method}: {damage}");
+        assert!(found[3].iter().all(|broken| *broken == 0.0), "{method}");
     }
-    let damage = ((largest / onset).powi(2) - 1.0) / eta;
-    assert!(damage > 0.1 && damage < 0.3, "{damage}");
-    assert!(found[3].iter().all(|broken| *broken == 0.0));
 }
 
 #[test]

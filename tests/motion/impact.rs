@@ -380,6 +380,44 @@ fn a_light_impactor_shortens_the_step_and_bounces() {
     assert!(momentum < 0.0, "{momentum}");
 }
 
+/// A plane that touches the surface at t = 0, to round-off or by what a place is typed with, presses as one that comes from afar.
+#[test]
+fn load_steps_begin_with_a_plane_that_touches() {
+    let pressed = |coupling: &str, y: f64, way: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let typed = format!(
+            r#"
+kinematics = "plane-stress"
+coupling = "{coupling}"
+mesh.rectangle = {{ min = [0, 0], max = [2, 1], x = {{ cells = 10 }}, y = {{ cells = 5 }} }}
+materials.m.lps = {{ youngs-modulus = 1000, density = 2, poisson-ratio = 0.3 }}
+conditions.h.displacement = {{ on = "bottom", x = 0, y = 0 }}
+impactors.imp = {{ plane = {{ point = [0, {y:?}], normal = [0, -1] }}, displacement = {{ y = "-{way}*t" }} }}
+solve.quasi-static = {{ steps = 2 }}
+output.vtu = false
+"#
+        );
+        let points = "[peridynamics]\nhorizon = 0.4\npoints.lattice = { spacing = 0.2, origin = [0.1, 0.1] }\n";
+        let typed = match coupling {
+            "local" => typed,
+            _ => typed + points,
+        };
+        write(folder.path(), "bar.toml", &typed);
+        run(folder.path(), &["bar.toml"]);
+        let force = history(folder.path(), "imp_force_y");
+        assert!(force[0].abs() < 1e-4, "{coupling}: {force:?}");
+        *force.last().unwrap()
+    };
+    for coupling in ["nonlocal", "local"] {
+        let afar = pressed(coupling, 1.01, 0.04);
+        for y in [1.0, 1.0 - 1e-10] {
+            let force = pressed(coupling, y, 0.03);
+            let off = (force / afar - 1.0).abs();
+            assert!(off < 1e-6, "{coupling}, {y}: {force} {afar}");
+        }
+    }
+}
+
 /// What a scene with an impactor says where it cannot be run, before any step.
 // One function: the cases are a table and share nothing.
 #[test]

@@ -139,13 +139,6 @@ fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
 
 /// Runs a scene, `bar.toml`, at once and from its last checkpoint but one, with the same bytes; the folder of the first run.
 fn resumes_with_the_same_bytes(typed: &str) -> tempfile::TempDir {
-    let (whole, parts) = whole_and_resumed(typed);
-    same(&whole.path().join("out"), &parts.path().join("out"));
-    whole
-}
-
-/// The folders of a run, and of one that goes on from its checkpoint before the last.
-fn whole_and_resumed(typed: &str) -> (tempfile::TempDir, tempfile::TempDir) {
     let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     for folder in [whole.path(), parts.path()] {
         write(folder, "bar.toml", typed);
@@ -158,7 +151,8 @@ fn whole_and_resumed(typed: &str) -> (tempfile::TempDir, tempfile::TempDir) {
     std::fs::rename(&previous, previous.with_extension("")).unwrap();
     let said = run(parts.path(), &["bar.toml", "--resume"]);
     assert!(said.contains("resumed after step"), "{said}");
-    (whole, parts)
+    same(&whole.path().join("out"), &parts.path().join("out"));
+    whole
 }
 
 /// Numbers between 0 and 1 (splitmix64), the same in every run.

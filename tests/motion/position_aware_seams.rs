@@ -305,3 +305,53 @@ fn a_slit_grows_in_a_blended_zone_as_it_does_in_points_alone() {
         assert!(off.abs() < within, "{k}: {blended:?} {alone:?}");
     }
 }
+
+/// By iteration load steps cost about as many passes as with factors, and end at the same forces: of a viscous solid, whose tangent is not the stiffness.
+#[test]
+fn multigrid_leads_where_an_iteration_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = r#"
+kinematics = "plane-stress"
+coupling = "splice"
+mesh.rectangle = { min = [0, 0], max = [2, 1], cell = "quad8", x = { cells = 20 }, y = { cells = 10 } }
+peridynamics = { horizon = 0.25, points.lattice = { spacing = 0.1, origin = [0.05, 0.05] } }
+zones.nonlocal.box = { min = [0.8, 0.3], max = [1.4, 0.7] }
+conditions.left.displacement = { on = "left", x = 0, y = 0 }
+conditions.pull.traction = { on = "right", x = "3*t", y = "0.9*t" }
+solve.quasi-static = { steps = 2, tolerance = 1e-9 }
+output.vtu = false
+[materials.m.pave]
+youngs-modulus = 1000
+poisson-ratio = 0.3
+density = 1
+relaxing-share = 0.5
+relaxation-time = 0.4
+"#;
+    let by = |method: &str| {
+        let found = summary(
+            folder.path(),
+            &format!("{plate}[solver]\nmethod = \"{method}\"\n"),
+        );
+        let choices = found["choices"].as_array().unwrap();
+        let choice = |what: &str| {
+            let mut all = choices.iter().filter_map(|c| c["choice"].as_str());
+            all.find(|c| c.contains(what))
+                .unwrap_or_default()
+                .to_owned()
+        };
+        let passes = choice("products or passes");
+        let passes = passes.split(' ').next().unwrap().parse::<f64>().unwrap();
+        let force = found["reactions"][0]["force"].clone();
+        let force = [0, 1].map(|k: usize| force[k].as_f64().unwrap());
+        (passes, force, choice("multigrid"))
+    };
+    let (direct, exact, lead) = by("direct");
+    assert_eq!(lead, "");
+    let (krylov, found, lead) = by("krylov");
+    assert!(lead.contains("leads the iteration"), "{lead}");
+    for (a, b) in exact.iter().zip(found) {
+        assert!((a - b).abs() < 1e-6, "{exact:?} {found:?}");
+    }
+    println!("{direct} passes with factors, {krylov} with multigrid");
+    assert!(krylov < 2.0 * direct, "{krylov} {direct}");
+}

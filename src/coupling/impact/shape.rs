@@ -39,6 +39,15 @@ impl<const D: usize> ImpactorShape<D> {
         }
     }
 
+    /// Distance of its place from the origin, and its radius \[m\]: what a depth is rounded by.
+    pub fn extent(&self) -> f64 {
+        let radius = match self {
+            Self::Sphere { radius, .. } | Self::Cylinder { radius, .. } => *radius,
+            Self::Plane { .. } => 0.0,
+        };
+        self.place().norm() + radius
+    }
+
     /// How deep what reaches `clearance` beyond `x` lies inside \[m\], and the unit vector along the shortest way out; none outside, and none on a centre or an axis, from which no way is the shortest.
     #[inline]
     pub fn penetration(&self, x: &Vector<D>, clearance: f64) -> Option<(f64, Vector<D>)> {

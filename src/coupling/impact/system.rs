@@ -97,6 +97,10 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         self.impact.add_force(u, force);
     }
 
+    fn round_off(&self, u: &[f64]) -> f64 {
+        self.body.round_off(self.own(u)) + self.impact.round_off(u)
+    }
+
     fn row_sums(&self) -> Vec<f64> {
         let mut sums = self.body.row_sums();
         self.impact.extend_row_sums(&mut sums);

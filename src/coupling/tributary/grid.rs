@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use nalgebra::DMatrix;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::simplex::Cells;
+use super::{found::Detail, simplex::Cells};
 use crate::{
     coupling::{Bins, FitDegree, Model, SiteKind, least_squares_gradient},
     fem::Locator,
@@ -131,11 +131,11 @@ impl<'a, const D: usize> Grid<'a, D> {
         !self.barriers.is_empty() && self.barriers.cuts(x, y)
     }
 
-    /// Sites and weights of a place: exact for affine fields, from its own side of cracks. Empty if there is no site around.
+    /// Sites and weights of a place: exact for affine fields, from its own side of cracks. Empty if there is no site around. What their gradients are for, `detail` says.
     ///
     /// The cube of lattice points around the place interpolates; where one of its corners is neither a point nor in an element, the nearest whole cube extrapolates. A point that is a corner of no such cube, as on curved surfaces, takes
     /// its neighbours along the axes, or a fit to the points around where it has none along one of them: its own cell is not left to others, or it would stand for nothing.
-    pub fn place(&self, x: &Vector<D>) -> Vec<Follows<D>> {
+    pub fn place(&self, x: &Vector<D>, detail: Detail) -> Vec<Follows<D>> {
         let h = self.cells.spacing;
         let local: Vector<D> = (x - self.cells.origin) / h;
         let base: [i32; D] = std::array::from_fn(|i| (local[i] + NO_WEIGHT).floor() as i32);
@@ -148,8 +148,12 @@ impl<'a, const D: usize> Grid<'a, D> {
         let is_near = |shift: &[i32; D]| {
             (0..D).all(|i| (local[i] - f64::from(base[i] + shift[i]) - 0.5).abs() <= FARTHEST)
         };
+        let even = |found, from: &[i32; D], is_strict| match detail {
+            Detail::Centre => found,
+            Detail::Quadrature => self.evened(found, x, &local, from, is_strict),
+        };
         if let Some(found) = self.in_cube(x, &local, &base, true) {
-            return found;
+            return even(found, &base, true);
         }
         let near = self.shifts.iter().filter(|s| is_near(s));
         let mut order: Vec<(f64, &[i32; D])> = near.map(|s| (away(s), s)).collect();
@@ -166,19 +170,51 @@ impl<'a, const D: usize> Grid<'a, D> {
                     let has =
                         |of: &[Follows<D>], site| of.iter().any(|f| f.0 == site && f.1 != 0.0);
                     let Some(site) = own.filter(|&site| !has(&found, site)) else {
-                        return found;
+                        return even(found, &from, is_strict);
                     };
                     let with_own = self.along_axes(x, &index, site);
                     let with_own = with_own.unwrap_or_else(|| self.fitted(x));
                     return if has(&with_own, site) {
                         with_own
                     } else {
-                        found
+                        even(found, &from, is_strict)
                     };
                 }
             }
         }
         self.fitted(x)
+    }
+
+    /// The weights that the cube from `from` on gives a place, with the mean gradients of all cubes that meet in the planes of the lattice on which the place lies.
+    ///
+    /// The gradients of one of them lean to its side, so that the mirror image of a load would not have the mirror image of its forces. The weights of all are the same.
+    fn evened(
+        &self,
+        found: Vec<Follows<D>>,
+        x: &Vector<D>,
+        local: &Vector<D>,
+        from: &[i32; D],
+        is_strict: bool,
+    ) -> Vec<Follows<D>> {
+        let plane = |i: &usize| (local[*i] - local[*i].round()).abs() <= NO_WEIGHT;
+        let planes: Vec<usize> = (0..D).filter(plane).collect();
+        let mut all = vec![found];
+        for turned in 1..1usize << planes.len() {
+            let mut other = *from;
+            for (k, &i) in planes.iter().enumerate() {
+                if turned >> k & 1 == 1 {
+                    other[i] = 2 * local[i].round() as i32 - 1 - from[i];
+                }
+            }
+            all.extend(self.in_cube(x, local, &other, is_strict));
+        }
+        let share = 1.0 / all.len() as f64;
+        let of_cube = |(k, cube): (usize, Vec<Follows<D>>)| {
+            let factor = if k == 0 { 1.0 } else { 0.0 };
+            let each = cube.into_iter();
+            each.map(move |(site, w, gradient)| (site, w * factor, gradient * share))
+        };
+        all.into_iter().enumerate().flat_map(of_cube).collect()
     }
 
     /// The weights of a place in the cell of a point, from this point and its neighbours along the axes; none if it has no neighbour along an axis.

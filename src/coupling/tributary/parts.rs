@@ -177,7 +177,10 @@ impl<const D: usize> Parts<D> {
                 .collect(),
         };
         for x in positions {
-            let follows = grids.iter().map(|grid| grid.place(x)).next();
+            let follows = grids
+                .iter()
+                .map(|grid| grid.place(x, Detail::Centre))
+                .next();
             parts.push(
                 Found::default(),
                 *x,
@@ -403,7 +406,7 @@ impl<const D: usize> Parts<D> {
                 Some(site) if is_whole && offset.norm() < 1e-10 * h => {
                     (middle, grid.own(index, site))
                 }
-                _ => (middle + offset, grid.place(&(middle + offset))),
+                _ => (middle + offset, grid.place(&(middle + offset), detail)),
             }
         });
         for (index, (x, follows)) in order.iter().zip(places) {

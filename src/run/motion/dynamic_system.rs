@@ -4,7 +4,10 @@ use crate::coupling::semidiscrete::behaviour::{
     BondBehaviour, ContactBehaviour, FailureCriterion, SystemError,
 };
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
-use crate::coupling::{BrokenBonds, Coupling, Definiteness, Interface, Model, Operator};
+use crate::coupling::{
+    BrokenBonds, Coupling, Definiteness, Interface, Model, Operator, Site, SiteKind,
+};
+use crate::fem::Locator;
 use crate::observe::summary::Decision;
 use crate::peridynamics::bond_force::{BondKinematics, Storage};
 use crate::peridynamics::critical_stretch as failure_stretch;
@@ -19,6 +22,7 @@ use crate::run::setup::RunSettings;
 use crate::scene::failure::Breaking;
 use crate::scene::initial::InitialKind;
 use crate::scene::materials::Fracture;
+use crate::scene::region::Region;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
 use crate::system::{LinearMotion, Ranks, SemiDiscrete};
@@ -413,6 +417,22 @@ pub(crate) struct PlaneEnergy {
     pub typed: Option<f64>,
 }
 
+/// The sites in a region: of a set, the nodes of its cells and the points within them.
+fn sites_within<const D: usize>(model: &Model<D>, region: &Region<D>) -> Vec<bool> {
+    let (mesh, sites) = (&model.mesh, &model.sites);
+    let Region::Cells(cells) = region else {
+        let place = |site: usize| sites[site].position;
+        return region.combined(sites.len(), place, |member| sites_within(model, member));
+    };
+    let nodes = region.select_nodes(mesh);
+    let within = Locator::new(mesh, cells.iter().map(|&c| c as usize));
+    let holds = |site: &Site<D>| match site.kind {
+        SiteKind::Node(n) => nodes[n as usize],
+        SiteKind::Point(_) => within.holds(mesh, &site.position, 1e-9),
+    };
+    sites.iter().map(holds).collect()
+}
+
 /// Displacement and velocity at time zero, those of impactors last.
 pub fn start<const D: usize>(model: &Model<D>, rest: &RunSettings<D>) -> State {
     let mut state = State::at_rest(model.sites.len() * D);
@@ -421,8 +441,8 @@ pub fn start<const D: usize>(model: &Model<D>, rest: &RunSettings<D>) -> State {
             InitialKind::Displacement => &mut state.u,
             InitialKind::Velocity => &mut state.v,
         };
-        let inside = |site: &usize| field.region.contains(&model.sites[*site].position, 0.0);
-        let sites: Vec<usize> = (0..model.sites.len()).filter(inside).collect();
+        let inside = sites_within(model, &field.region);
+        let sites: Vec<usize> = (0..model.sites.len()).filter(|&s| inside[s]).collect();
         let places = sites.iter().map(|&site| model.sites[site].position);
         let places: Vec<Vector<D>> = places.collect();
         for k in 0..D {

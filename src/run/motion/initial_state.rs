@@ -146,7 +146,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             written,
         )?;
         recorder.hold(drive.holders());
-        recorder.cut(model, &rest.conditions, self.springs)?;
+        recorder.cut(model, rest, self.springs)?;
         let resumed = saved.is_some();
         let edge = saved.as_ref().and_then(|s| s.edge);
         let (state, zone, seen) = match saved {
@@ -207,7 +207,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let (state, switch) = leaving.arrive(model, system, &drive)?;
         recorder.move_to(&Sampler::new(model));
         recorder.hold(drive.holders());
-        recorder.cut(model, &rest.conditions, self.springs)?;
+        recorder.cut(model, rest, self.springs)?;
         recorder.energy_at_start += switch.left();
         self.watch.lap(self.timings, "state carried over");
         let own = std::mem::replace(self.timings, before);

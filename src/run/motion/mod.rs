@@ -11,7 +11,7 @@
 //! | `initial_state.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
 //! | `step_observer.rs` | what follows each step: what is watched, what is written |
 //! | `quasi_static.rs`, `doubtful_equilibria.rs` | the run under a load that grows; what makes its equilibria doubtful |
-//! | `newton_factors.rs`, `spread_factors.rs` | the factors that lead it, of one process or of several |
+//! | `newton_factors.rs`, `spread_factors.rs` | the factors or multigrid that lead it, of one process or of several |
 //! | `time_step.rs` | the time step, with sub-cycling |
 //! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, what is told of them |
 //! | `way.rs` | the way of a prescribed velocity |

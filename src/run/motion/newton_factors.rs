@@ -1,4 +1,4 @@
-//! The factors that lead Newton's method in load steps.
+//! The factors, or the multigrid, that lead Newton's method in load steps.
 
 use crate::coupling::{Model, Operator};
 use crate::observe::summary::Decision;
@@ -7,7 +7,9 @@ use crate::run::error::RunError;
 use crate::run::setup::RunSettings;
 use crate::run::springs::Springs;
 use crate::run::{equilibrium, loads};
+use crate::solve::FreeDofs;
 use crate::solve::direct::{DirectInfo, Factor};
+use crate::solve::multigrid::Multigrid;
 use crate::solve::quasi_static::TangentFactors;
 use crate::solve::statics::{self, StaticParams, StaticProblem};
 use crate::system::{BlockCsr, Symmetry};
@@ -16,6 +18,58 @@ use crate::tensor::padded;
 /// What is added to the stiffness, as a part of its diagonal, so that pieces that nothing holds have factors too: far above round-off, and too little to
 /// cost an iteration.
 pub(super) const RAISED: f64 = 1e-10;
+
+/// The stiffness before bonds break, with its diagonal raised.
+fn raised<const D: usize>(
+    (model, operator, springs): (&Model<D>, &dyn Operator<D>, &Springs),
+    progress: &dyn Progress,
+) -> BlockCsr {
+    let mut stiffness = model.assemble(operator, progress);
+    springs.all.add_to(&mut stiffness);
+    stiffness.raise_diagonal(RAISED);
+    stiffness
+}
+
+/// The stiffness before bonds break, to lead Newton's method by multigrid.
+pub(super) struct CoarsenedStiffness {
+    matrix: BlockCsr,
+    free: FreeDofs,
+    positions: Vec<[f64; 3]>,
+}
+
+impl CoarsenedStiffness {
+    /// None but where `[solver]` asks for an iteration.
+    ///
+    /// # Errors
+    /// [`RunError`] for supports that meet no site.
+    pub fn new<const D: usize>(
+        body: (&Model<D>, &dyn Operator<D>, &Springs),
+        symmetry: Symmetry,
+        rest: &RunSettings<D>,
+        choices: &mut Vec<Decision>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Self>, RunError> {
+        let model = body.0;
+        if !equilibrium::may_coarsen(model, rest.solver.method, symmetry) {
+            return Ok(None);
+        }
+        let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
+        choices.push(Decision {
+            choice: "multigrid of the stiffness before bonds break leads the iteration".to_owned(),
+            why: "solver.method = \"krylov\"".to_owned(),
+        });
+        Ok(Some(Self {
+            matrix: raised(body, progress),
+            free: FreeDofs::from_prescribed(&prescribed, D),
+            positions: model.sites.iter().map(|s| padded(&s.position)).collect(),
+        }))
+    }
+
+    /// Its hierarchy; none where it has none.
+    pub fn multigrid(&self, progress: &dyn Progress) -> Option<Multigrid<'_>> {
+        statics::multigrid(&self.matrix, &self.free, &self.positions, progress)
+    }
+}
 
 /// Factors of the stiffness before bonds break.
 pub(super) struct NewtonFactors {
@@ -47,9 +101,7 @@ impl NewtonFactors {
         }
         let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
         let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-        let mut stiffness = model.assemble(operator, progress);
-        springs.all.add_to(&mut stiffness);
-        stiffness.raise_diagonal(RAISED);
+        let stiffness = raised((model, operator, springs), progress);
         let problem = StaticProblem {
             stiffness: &stiffness,
             symmetry,
@@ -63,7 +115,7 @@ impl NewtonFactors {
         choices.push(Decision {
             choice: "factors of the stiffness before bonds break lead the iteration".to_owned(),
             why: format!(
-                "{:.1} MB, {:.1e} operations once; solver.method = \"krylov\" does without",
+                "{:.1} MB, {:.1e} operations once; solver.method = \"krylov\" takes multigrid instead",
                 factor.bytes() as f64 * 1e-6,
                 info.cost.flops
             ),

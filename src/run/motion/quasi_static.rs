@@ -80,7 +80,7 @@ fn load_steps<const D: usize>(
     let body = (model, operator, laid_out.springs.as_ref());
     let how = (system.symmetry(), params.equilibrium);
     let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
-    let of_all = leads.factorised()?;
+    let made = leads.made(progress)?;
     leads.time(&mut watch, &mut timings);
     let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
         .with_impactors(&rest.impactors, pace.steps)
@@ -90,7 +90,7 @@ fn load_steps<const D: usize>(
     let breaks = breaks(system.as_ref(), rest);
     let mut recorder = recorder((model, rest), spec, options, (impact, breaks), file, at)?;
     recorder.hold(drive.holders());
-    recorder.cut(model, &rest.conditions, Arc::clone(&laid_out.springs))?;
+    recorder.cut(model, rest, Arc::clone(&laid_out.springs))?;
     let edge = saved.as_ref().and_then(|s| s.edge);
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
@@ -119,7 +119,7 @@ fn load_steps<const D: usize>(
     };
     watch.lap(&mut timings, "start");
     let refactor = leads.of_present_tangents();
-    let lead = leads.lead(of_all.as_ref());
+    let lead = leads.lead(made.as_deref());
     let near = lead.map(|lead| BodyOnly::new(lead, model));
     let near = (near.as_ref(), refactor.as_ref());
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);

@@ -97,6 +97,7 @@ impl<const D: usize> Leaving<D> {
             u: carrying.field::<D>(&self.state.u),
             v: carrying.field::<D>(&self.state.v),
             a: Vec::new(),
+            held: Vec::new(),
             ..self.state
         };
         let held = drive.prescribed();

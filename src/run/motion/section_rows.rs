@@ -4,8 +4,8 @@ use crate::coupling::Model;
 use crate::observe::summary::SectionForce;
 use crate::run::error::RunError;
 use crate::run::sections::{self, Sections};
+use crate::run::setup::RunSettings;
 use crate::run::springs::Springs;
-use crate::scene::conditions::Condition;
 use crate::scene::section::Section;
 
 /// The sections of a scene, and their forces at the last row.
@@ -35,26 +35,22 @@ impl<'a, const D: usize> SectionRows<'a, D> {
     ///
     /// # Errors
     /// [`RunError::EmptySection`].
-    pub fn find(
-        &mut self,
-        model: &Model<D>,
-        conditions: &'a [Condition<D>],
-    ) -> Result<(), RunError> {
+    pub fn find(&mut self, model: &Model<D>, rest: &'a RunSettings<D>) -> Result<(), RunError> {
         if !self.wanted.is_empty() {
-            self.found = Some(Sections::new(model, self.wanted, conditions)?);
+            self.found = Some(Sections::new(model, rest)?);
         }
         Ok(())
     }
 
-    /// Force and moment of each section at the time `t`, zero as long as no model is known.
+    /// Force and moment of each section at the displacement `u` and the time `t`, zero as long as no model is known.
     ///
-    /// Internal and external forces are by dof, those of `springs` to the ground at a displacement are taken from the internal ones; `held` are the prescribed dofs with the loads on them, which take the place of the external forces there.
+    /// Internal and external forces are by dof, those of `springs` to the ground are taken from the internal ones; `held` are the prescribed dofs with the loads on them, which take the place of the external forces there.
     pub fn row<'h>(
         &mut self,
         (internal, external): (&[f64], &[f64]),
-        springs: Option<(&Springs, &[f64])>,
+        springs: Option<&Springs>,
         held: impl Iterator<Item = (u32, &'h f64)>,
-        t: f64,
+        (u, t): (&[f64], f64),
     ) -> Vec<f64> {
         let Some(found) = &self.found else {
             return vec![0.0; self.header().len()];
@@ -64,10 +60,10 @@ impl<'a, const D: usize> SectionRows<'a, D> {
         for (dof, load) in held {
             excess[dof as usize] = internal[dof as usize] - load;
         }
-        if let Some((springs, u)) = springs {
+        if let Some(springs) = springs {
             springs.take_from(&mut excess, u);
         }
-        self.last = found.forces(&excess, t);
+        self.last = found.forces(&excess, u, t);
         let forces = self.last.iter();
         forces.flat_map(SectionForce::numbers).collect()
     }

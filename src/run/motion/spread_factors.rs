@@ -1,8 +1,8 @@
-//! The factors that lead Newton's method in load steps: those of one process, or of several, of which each holds its part.
+//! What leads Newton's method in load steps: factors of one process, or of several, of which each holds its part, or multigrid.
 
 use std::sync::{Mutex, PoisonError};
 
-use super::newton_factors::{NewtonFactors, RAISED};
+use super::newton_factors::{CoarsenedStiffness, NewtonFactors, RAISED};
 use crate::coupling::{Distribution, Model, Operator};
 use crate::observe::summary::{Decision, Stopwatch, Timings};
 use crate::progress::Progress;
@@ -18,10 +18,11 @@ use crate::system::{
 };
 use crate::tensor::padded;
 
-/// What leads Newton's method: factors of this process, factors over all, or nothing.
+/// Lead of Newton's method: factors of this process, factors over all, multigrid, or nothing.
 pub(super) struct Leads<'a> {
     own: Option<NewtonFactors>,
     spread: Option<SpreadStiffness<'a>>,
+    coarsened: Option<CoarsenedStiffness>,
 }
 
 impl<'a> Leads<'a> {
@@ -36,40 +37,52 @@ impl<'a> Leads<'a> {
         choices: &mut Vec<Decision>,
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
-        let (mut own, mut spread) = (None, None);
+        let (mut own, mut spread, mut coarsened) = (None, None, None);
         if equilibrium == Equilibrium::Newton {
             let body = (model, operator, &springs.all);
             spread = SpreadStiffness::new(body, symmetry, rest, ranks, choices, progress)?;
             if spread.is_none() {
                 let body = (model, operator, springs);
                 own = NewtonFactors::new(body, symmetry, rest, choices, progress)?;
+                coarsened = CoarsenedStiffness::new(body, symmetry, rest, choices, progress)?;
             }
         }
-        Ok(Self { own, spread })
+        Ok(Self {
+            own,
+            spread,
+            coarsened,
+        })
     }
 
-    /// Collective: the factors over all processes, if it is these.
+    /// Collective: makes the factors over all processes, or multigrid, which borrow from this.
     ///
     /// # Errors
     /// Those of the solver.
-    pub fn factorised(&self) -> Result<Option<SpreadFactors<'_>>, RunError> {
-        self.spread
-            .as_ref()
-            .map(SpreadStiffness::factorised)
-            .transpose()
+    pub fn made(
+        &self,
+        progress: &dyn Progress,
+    ) -> Result<Option<Box<dyn LinearMap + '_>>, RunError> {
+        if let Some(spread) = &self.spread {
+            return Ok(Some(Box::new(spread.factorised()?)));
+        }
+        let coarsened = self.coarsened.as_ref();
+        let made = coarsened.and_then(|coarsened| coarsened.multigrid(progress));
+        Ok(made.map(|multigrid| Box::new(multigrid) as Box<dyn LinearMap + '_>))
     }
 
-    /// Counts the time since the last lap as that of the factorisation, if there was one.
+    /// Counts the time since the last lap as that of the factorisation, or of the hierarchy, if there was one.
     pub fn time(&self, watch: &mut Stopwatch, timings: &mut Timings) {
         if self.own.is_some() || self.spread.is_some() {
             watch.lap(timings, "factorisation");
+        } else if self.coarsened.is_some() {
+            watch.lap(timings, "multigrid set-up");
         }
     }
 
-    /// The factors, with those that [`Leads::factorised`] has made.
-    pub fn lead<'b>(&'b self, spread: Option<&'b SpreadFactors<'_>>) -> Option<&'b dyn LinearMap> {
+    /// The inverse that leads, if there is one; `made` is that of [`Leads::made`].
+    pub fn lead<'b>(&'b self, made: Option<&'b dyn LinearMap>) -> Option<&'b dyn LinearMap> {
         let own = self.own.as_ref().map(|own| &own.factor as &dyn LinearMap);
-        own.or(spread.map(|spread| spread as &dyn LinearMap))
+        own.or(made)
     }
 
     /// What makes factors of the tangent at a displacement, of this process alone.
@@ -152,7 +165,7 @@ impl<'a> SpreadStiffness<'a> {
 }
 
 /// Factors of which each process has a part, as a map of the numbers of all sites.
-pub(super) struct SpreadFactors<'a> {
+struct SpreadFactors<'a> {
     spread: Spread<'a>,
     solver: Mutex<Box<dyn RankSolver + 'a>>,
 }

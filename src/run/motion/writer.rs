@@ -24,6 +24,7 @@ use crate::observe::summary::{Reaction, SectionForce};
 use crate::run::error::RunError;
 use crate::run::motion::seen::Seen;
 use crate::run::pieces::Piece;
+use crate::run::setup::RunSettings;
 use crate::run::solution::Solved;
 use crate::run::springs::Springs;
 use crate::run::stress_probes;
@@ -180,10 +181,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
     pub(crate) fn cut(
         &mut self,
         model: &Model<D>,
-        conditions: &'a [Condition<D>],
+        rest: &'a RunSettings<D>,
         springs: Arc<Springs>,
     ) -> Result<(), RunError> {
-        self.sections.find(model, conditions)?;
+        self.sections.find(model, rest)?;
         self.supports.spring(springs);
         Ok(())
     }
@@ -280,8 +281,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let supports = self.supports.row(moment.supports, &state.u);
         row.extend(supports.into_iter().map(Entry::from));
         let held = self.supports.dofs().zip(moment.supports.1);
-        let springs = self.supports.springs().map(|s| (s, &state.u[..]));
-        let sections = self.sections.row(moment.forces, springs, held, state.time);
+        let springs = self.supports.springs();
+        let at = (&state.u[..], state.time);
+        let sections = self.sections.row(moment.forces, springs, held, at);
         row.extend(sections.into_iter().map(Entry::from));
         row.extend(probed.iter().map(|&s| Entry::from(s)));
         let impact = self

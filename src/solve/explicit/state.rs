@@ -63,6 +63,9 @@ pub struct State {
     pub supplied: f64,
     /// Bonds broken since the start.
     pub broken: u64,
+    /// Force \[N\] that moved each prescribed dof at the last step, in the order of [`Drive::prescribed`]; empty before the first. To respond to the state once more gives another by rounding, or
+    /// without a drag, and half of a step's work is that of this one.
+    pub held: Vec<f64>,
 }
 
 impl State {

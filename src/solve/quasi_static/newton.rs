@@ -1,8 +1,7 @@
 //! Newton's method without a matrix: products with the tangent are passes over the bonds.
 //!
 //! The tangent at the displacement `u`, `J x = dF/du x`, is the difference of forces `(F(u + εx) − F(u))/ε` with bonds held and the interval of the load step, so that any law has it (\[KnollKeyes2004\]).
-//! Each correction costs a linear solve, as far as it pays, and is halved until the residual falls. A load step sets out along the linear prediction, which
-//! moves all of the body: supports that move alone would strain the bonds beside them far beyond what the body ever sees.
+//! Each correction costs a linear solve, as far as it pays, and is halved until the residual falls.
 
 use super::consistent::add_product;
 use super::error::QuasiStaticError;
@@ -15,7 +14,7 @@ use crate::system::ElementTangent;
 const SLOW: f64 = 0.1;
 
 /// The residual of a linear solve for a force that is not linear: what is solved further is lost to the next correction.
-const FORCING: f64 = 1e-3;
+pub(super) const FORCING: f64 = 1e-3;
 
 /// So many corrections in a row that leave more than half of the residual lead nowhere in a body of which bonds are broken: what hangs by few of them turns too far
 /// with each. In a whole body they are slow where flow spreads, and lead on.
@@ -29,12 +28,12 @@ const SHORTEST: f64 = 1.0 / 1024.0;
 
 /// The most products for one correction of so many dofs: some lengths of the body for a signal that crosses it by one family a product. Fragments that a crack leaves behind
 /// have no stiffness at rest, and more products find none.
-fn leading(dofs: usize) -> usize {
+pub(super) fn leading(dofs: usize) -> usize {
     500 + 5 * dofs.isqrt()
 }
 
 impl Run<'_> {
-    /// Gives prescribed dofs the `values` of a load step, and with Newton's method all others what the tangent at rest predicts; returns iterations.
+    /// Gives prescribed dofs the `values` of a load step, and all others what the tangent at rest predicts; returns iterations.
     pub(super) fn set_out(
         &mut self,
         u: &mut [f64],
@@ -50,12 +49,14 @@ impl Run<'_> {
         }
         let mut iterations = 0;
         // where forces are linear the first correction does the same
-        if self.is_newton() && self.system.difference_length().is_some() {
+        if self.system.difference_length().is_some() {
             let mut residual = self.evaluate(u)?;
             let mut resisted = vec![0.0; u.len()];
             self.system.tangent_into(&change, &mut resisted);
             residual = self.resist(residual, &resisted);
-            if !residual.is_enough() {
+            if !residual.is_enough() && !self.is_newton() {
+                iterations = self.predict_by_relaxation(residual, &mut change)?;
+            } else if !residual.is_enough() {
                 let known = self.system.element_tangent(u, self.interval);
                 let known = known.filter(|elements| elements.is_whole);
                 if let Some(elements) = &known {

@@ -165,7 +165,7 @@ impl Run<'_> {
             });
         }
         let resisted: f64 = (0..u.len()).map(|k| self.resisted(k, u[k])).sum();
-        let mut round_off = ROUND_OFF * resisted.sqrt();
+        let mut round_off = ROUND_OFF * resisted.sqrt() + self.system.round_off(u);
         if self.is_loaded() {
             round_off = round_off.min(HIDDEN * norm(&self.load));
         }

@@ -11,7 +11,7 @@ use crate::solve::statics::{
 };
 use crate::solve::symbolic::FactorCost;
 use crate::solve::{FreeDofs, FreeOperator};
-use crate::system::Symmetry;
+use crate::system::{BlockCsr, Symmetry};
 use std::time::Instant;
 
 /// Refinement stops here: the residual is at round-off.
@@ -40,6 +40,47 @@ fn residual(problem: &StaticProblem<'_>, u: &[f64]) -> (Vec<f64>, f64) {
     }
     let norm = r.iter().map(|x| x * x).sum::<f64>().sqrt();
     (r, norm)
+}
+
+/// Scale of residuals: the first of them, at the displacement `u` of the supports, but no less than what leaves [`SUSPECT`] of it where it is [`BACKWARD`] of `‖|K| |u|‖` on free dofs.
+///
+/// Supports that shift the body as a rigid one leave a first residual of nothing but round-off, of which no solution leaves less.
+pub(super) fn scale(first: f64, resisted: f64) -> f64 {
+    first.max(BACKWARD / SUSPECT * resisted)
+}
+
+/// The square of `|K| |u|` in a block row, summed over its dofs that `is_free`.
+pub(super) fn resisted_squared(
+    matrix: &BlockCsr,
+    row: usize,
+    u: &[f64],
+    is_free: impl Fn(usize) -> bool,
+) -> f64 {
+    let d = matrix.block;
+    let (columns, blocks) = matrix.row(row);
+    let of = |a: usize| -> f64 {
+        let each = columns.iter().zip(blocks.chunks_exact(d * d));
+        each.map(|(&column, block)| {
+            let u = &u[column as usize * d..][..d];
+            let scalars = block[a * d..][..d].iter().zip(u);
+            scalars.map(|(k, u)| (k * u).abs()).sum::<f64>()
+        })
+        .sum()
+    };
+    (0..d).filter(|&a| is_free(a)).map(|a| of(a).powi(2)).sum()
+}
+
+/// The residual at the displacement of the supports, its norm, and the scale of residuals.
+fn first_residual(problem: &StaticProblem<'_>, u: &[f64]) -> (Vec<f64>, f64, f64) {
+    let matrix = problem.stiffness;
+    let d = matrix.block;
+    let of_row = |row: usize| {
+        let is_free = |a: usize| problem.prescribed[row * d + a].is_none();
+        resisted_squared(matrix, row, u, is_free)
+    };
+    let resisted = (0..matrix.rows()).map(of_row).sum::<f64>().sqrt();
+    let (r, norm) = residual(problem, u);
+    (r, norm, scale(norm, resisted))
 }
 
 /// `Auto` factorises while that takes at most this many operations per stored scalar of `K`.
@@ -153,6 +194,18 @@ pub fn factors(
     }
 }
 
+/// Multigrid of the free part of `matrix`, to lead an iteration whose operator is near it; none where the matrix has none.
+pub fn multigrid<'a>(
+    matrix: &'a BlockCsr,
+    free: &'a FreeDofs,
+    positions: &[[f64; 3]],
+    progress: &dyn Progress,
+) -> Option<Multigrid<'a>> {
+    progress.stage("multigrid set-up", None);
+    let made = Multigrid::new(matrix, free, positions, &MultigridParams::default());
+    made.ok().map(|(multigrid, _)| multigrid)
+}
+
 fn krylov(
     problem: &StaticProblem<'_>,
     free: &FreeDofs,
@@ -173,8 +226,7 @@ fn krylov(
     let start = Instant::now();
     progress.stage("iteration", None);
     let operator = FreeOperator::new(problem.stiffness, free);
-    let (mut r, scale) = residual(problem, u);
-    let mut norm = scale;
+    let (mut r, mut norm, scale) = first_residual(problem, u);
     info.method = MethodUsed::ConjugateGradients;
     if problem.symmetry == Symmetry::Unsymmetric {
         info.method = MethodUsed::Gmres;
@@ -267,8 +319,7 @@ fn direct(
     info.factor_seconds = done.factor_seconds;
     let start = Instant::now();
     progress.stage("solve", None);
-    let (mut r, scale) = residual(problem, u);
-    let mut norm = scale;
+    let (mut r, mut norm, scale) = first_residual(problem, u);
     while norm > REFINED * scale && info.iterations <= REFINEMENTS {
         let step = factor.solve(&r);
         let trial: Vec<f64> = u.iter().zip(&step).map(|(u, s)| u + s).collect();

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::{
     Method, MethodUsed, StaticError, StaticInfo, StaticParams, StaticSolution,
-    methods::{BACKWARD, SUSPECT},
+    methods::{BACKWARD, SUSPECT, resisted_squared, scale},
     singular_error,
 };
 use crate::progress::Progress;
@@ -117,6 +117,20 @@ impl SpreadProblem<'_> {
         }
         let own = r.iter().map(|x| x * x).sum::<f64>();
         (r, self.rows.spread.sum(own).sqrt())
+    }
+
+    /// Collective: the residual of the own dofs at the displacement of the supports, its norm over all ranks, and the scale of residuals.
+    fn first_residual(&self, u: &[f64]) -> (Vec<f64>, f64, f64) {
+        let (matrix, own) = (self.rows.matrix, self.rows.spread.own());
+        let of_row = |row: usize| {
+            let first = own[row] as usize * matrix.block;
+            let is_free = |a: usize| self.prescribed[first + a].is_none();
+            resisted_squared(matrix, row, u, is_free)
+        };
+        let resisted = (0..own.len()).map(of_row).sum::<f64>();
+        let resisted = self.rows.spread.sum(resisted).sqrt();
+        let (r, norm) = self.residual(u);
+        (r, norm, scale(norm, resisted))
     }
 
     /// Collective: `‖r‖ / (‖K‖ ‖u‖ + ‖f‖)` in the largest-entry norm; `r` is that of the own dofs.
@@ -276,8 +290,7 @@ fn refine(
     info.factor_seconds += clock.elapsed().as_secs_f64();
     let clock = Instant::now();
     progress.stage("solve", None);
-    let (mut r, scale) = problem.residual(u);
-    let mut norm = scale;
+    let (mut r, mut norm, scale) = problem.first_residual(u);
     let mut step = vec![0.0; r.len()];
     let mut all = vec![0.0; u.len()];
     let mut failure = None;

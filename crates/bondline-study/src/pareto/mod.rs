@@ -37,6 +37,8 @@ use crate::variants::{Base, Measured, measured_keys};
 use bondline::observe::claim::{Claim, Files};
 use bondline::progress::Progress;
 use bondline::regular_file;
+use bondline::run::AnyScene;
+use bondline::scene::spec::PeridynamicsSpec;
 use bondline::scene::{SceneError, SceneSpec, Source};
 use record::{Head, kept, new_record, read_record};
 use study::Study;
@@ -73,11 +75,19 @@ impl Prepared {
         let directory = params.scene.parent().unwrap_or(Path::new(""));
         let chosen = accuracy::completed(&source, directory).map_err(scene_error)?;
         let complete = chosen.as_ref().map_or(&source, |(complete, _)| complete);
-        let spec = SceneSpec::parse(complete).map_err(scene_error)?;
-        let base = Base::of(&spec);
+        let mut spec = SceneSpec::parse(complete).map_err(scene_error)?;
+        let mut base = Base::of(&spec);
+        let typed = horizon_of_cells(&base, &spec, complete, directory).map_err(scene_error)?;
+        if let Some(key) = &typed {
+            let mut complete = complete.clone();
+            complete.push_override(key).map_err(scene_error)?;
+            spec = SceneSpec::parse(&complete).map_err(scene_error)?;
+            base = Base::of(&spec);
+        }
         let knobs = chosen_knobs(&base, params)?;
         let mut common = params.overrides.clone();
         common.extend(chosen.into_iter().flat_map(|c| c.1.overrides));
+        common.extend(typed);
         common.extend(measured_keys(&spec));
         let keys = match &params.reference {
             Reference::Auto if base.breaks && base.moves => vec!["coupling=nonlocal".to_owned()],
@@ -168,6 +178,24 @@ impl Prepared {
             }),
         }
     }
+}
+
+/// The horizon that a scene on the mesh of a file leaves to the program, as a key: knobs turn what is typed.
+///
+/// # Errors
+/// [`SceneError`] of a scene that cannot be run.
+fn horizon_of_cells(
+    base: &Base,
+    spec: &SceneSpec,
+    source: &Source,
+    directory: &Path,
+) -> Result<Option<String>, SceneError> {
+    let is_left_out = |pd: &PeridynamicsSpec| pd.horizon.is_none();
+    if !base.lacks_horizon() || !spec.peridynamics.as_ref().is_some_and(is_left_out) {
+        return Ok(None);
+    }
+    let found = AnyScene::from_source(source, directory, "trade")?.horizon();
+    Ok(found.map(|horizon| format!("peridynamics.horizon={horizon:e}")))
 }
 
 /// What is compared: what is asked for, or all that the reference has.

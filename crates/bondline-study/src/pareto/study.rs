@@ -51,12 +51,24 @@ impl Study<'_> {
         if let Some(end) = self.case(&[], None, progress)? {
             return Ok(end);
         }
-        if let Outcome::Refused { why } = &self.cases[0].outcome {
-            return Err(TradeError::Base {
-                what: "the scene",
-                why: why.clone(),
-                remedy: "try it with `bondline run`",
-            });
+        let base = |what, why: &str, remedy| TradeError::Base {
+            what,
+            why: why.to_owned(),
+            remedy,
+        };
+        match self.cases.first().map(|case| &case.outcome) {
+            Some(Outcome::Refused { why }) => {
+                return Err(base("the scene", why, "try it with `bondline run`"));
+            }
+            // the reference agrees with itself, and is no case
+            None => {
+                return Err(base(
+                    "the reference",
+                    "it is the scene itself, of which nothing can be made finer",
+                    "name a finer one with --reference, or generate the mesh in the scene",
+                ));
+            }
+            Some(Outcome::Ran { .. } | Outcome::OverTime { .. }) => {}
         }
         progress.advance(1);
         for k in 0..self.settings.len() {

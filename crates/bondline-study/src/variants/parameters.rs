@@ -154,6 +154,11 @@ impl Base {
         }
     }
 
+    /// Says that δ is not one number, as far as the text of the scene tells.
+    pub(crate) fn lacks_horizon(&self) -> bool {
+        self.horizon.is_none()
+    }
+
     /// Edge of the first cells along the first axis.
     pub(crate) fn cell(&self) -> Option<f64> {
         self.mesh.as_ref().and_then(Generated::cell)
