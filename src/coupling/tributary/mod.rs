@@ -31,8 +31,9 @@ pub use crate::coupling::tributary::found::{Detail, Moments};
 pub use half_space::HalfSpace;
 pub use parts::Parts;
 
+use self::simplex::{Cells, as_box};
 use crate::{
-    coupling::{CellRole, Model, PointSource, SiteKind},
+    coupling::{CellRole, Interface, Model, PointSource, SiteKind},
     fem,
 };
 
@@ -150,6 +151,42 @@ impl<const D: usize> Model<D> {
         self.tributary = tributary;
     }
 
+    /// Whether the points of an enclosed zone, whose rows are those of a coupling by forces, lie on its nodes, one on each, with elements of the same size around: what the zone has is then shared out as in elements.
+    ///
+    /// Row by row the load is the mean of the body force over the row's own volume there, and `K u = f` is exact for cubic fields. A cell around each point has the same moments up to the first; the second ones differ, by a quarter of `h²` in all from the
+    /// elements to the points, and a strain of `h² b′/4E` would be added to the zone.
+    pub(crate) fn nodes_are_points(&self) -> bool {
+        let Some(p) = &self.peridynamics else {
+            return false;
+        };
+        let PointSource::Lattice { spacing, origin } = p.points else {
+            return false;
+        };
+        let is_hindered = !p.voids.is_empty() || !p.barriers.is_empty();
+        if self.has_energy || self.interface != Interface::Overlap || is_hindered {
+            return false;
+        }
+        let cells = Cells { origin, spacing };
+        let slack = ON_NODE * spacing;
+        let is_cube = |c: usize| {
+            as_box(&self.mesh, c).is_some_and(|(low, high)| {
+                let edges = high - low;
+                let on_lattice = (cells.centre(&cells.index(&low)) - low).amax() <= slack;
+                on_lattice && edges.iter().all(|edge| (edge - spacing).abs() <= slack)
+            })
+        };
+        let (offsets, around) = self.node_cells();
+        let of_node =
+            |n: u32| &around[offsets[n as usize] as usize..offsets[n as usize + 1] as usize];
+        let is_enclosed = |n: &u32| {
+            let cells = of_node(*n);
+            cells.len() == 1 << D && cells.iter().all(|&c| is_cube(c as usize))
+        };
+        (0..self.mesh.cell_count())
+            .filter(|&c| self.roles[c] == CellRole::Points)
+            .all(|c| self.mesh.cell(c).iter().all(is_enclosed))
+    }
+
     /// The volume that each row has as it is: of a node that of its hat, of a point that of its part if the lattice went on in the elements.
     fn row_volumes(&self) -> Vec<f64> {
         let mut own: Vec<f64> = self.sites.iter().map(|s| s.volume).collect();
@@ -157,7 +194,7 @@ impl<const D: usize> Model<D> {
             .peridynamics
             .as_ref()
             .is_some_and(|p| p.points != PointSource::Cells);
-        if !is_lattice {
+        if !is_lattice || self.nodes_are_points() {
             return own;
         }
         let holds = |c: usize| self.roles[c] == CellRole::Points;
@@ -203,6 +240,9 @@ impl<const D: usize> Model<D> {
         (self.roles.iter().zip(counts)).all(|(&role, &counts)| counts || role != CellRole::Points)
     }
 }
+
+/// How far from a node a point may lie that is one with it, in spacings.
+const ON_NODE: f64 = 1e-9;
 
 /// How far around the zone its lattice is continued, in spacings: farther than weights reach.
 const NEAR: f64 = 4.0;
