@@ -20,6 +20,7 @@ mod proof_rows;
 mod q;
 mod r;
 mod s;
+mod short_waves;
 mod t;
 mod u;
 
