@@ -8,6 +8,7 @@
 //! | `marks.rs` | the cells of a lattice that the edge of a region cuts |
 //! | `found.rs` | volumes and moments of parts that were found |
 //! | `half_space.rs` | what of cells and facets lies beyond a plane |
+//! | `shares.rs` | what nodes that follow a fit hand on |
 //! | `parts.rs` | a region of the zone, or of its surface, in parts that follow sites |
 //!
 //! The principle of virtual work gives all of it. The displacement of a finite element is `Σ N_a u_a`; a cell of the lattice that lies in the zone as a whole has that of its point; one that the seam, a surface or a void cuts has
@@ -25,6 +26,7 @@ mod grid;
 mod half_space;
 mod marks;
 mod parts;
+mod shares;
 mod simplex;
 
 pub use crate::coupling::tributary::found::{Detail, Moments};
@@ -59,7 +61,7 @@ impl Tributary {
         for c in (0..mesh.cell_count()).filter(|&c| model.is_element(c)) {
             let material = model.material_of_cell(c);
             fem::for_each_share(mesh, c, |n, part, whole| {
-                for (site, w) in model.node_transfer.row(n as usize) {
+                for (site, w) in model.node_shares(n as usize) {
                     let share = w * part * whole;
                     volume[site as usize] += share;
                     if material != own {
@@ -130,7 +132,14 @@ impl<const D: usize> Model<D> {
 
     /// Finds the part of each site, and what rows are scaled by.
     pub(super) fn share_out(&mut self) {
-        let tributary = Tributary::new(self);
+        let mut tributary = Tributary::new(self);
+        if tributary.volume.iter().any(|v| *v <= 0.0) {
+            // by the volumes that sites have of their own
+            self.shares = shares::shares(self);
+            if self.shares.is_some() {
+                tributary = Tributary::new(self);
+            }
+        }
         if !self.has_energy && self.body().is_some() {
             let factor = |(own, volume): (f64, &f64)| {
                 let ratio = volume / own;
