@@ -96,7 +96,7 @@ impl PartialStressMeshfree {
 
 /// Strength κ of the control.
 ///
-/// The least eigenvalue of the symbol over that of the nearest neighbours, bond-based with `1/|ξ|` and the Gaussian divergence, the worst of six pairs of kernels: in the plane at m = 3 it is −0.010, 0.012 and 0.024 with κ = 0, 0.05 and
+/// The least eigenvalue of the symbol over that of the nearest neighbours, bond-based with `1/|ξ|` and the Gaussian divergence: in the plane at m = 3 it is −0.010, 0.012 and 0.024 with κ = 0, 0.05 and
 /// 0.1, at m = 6 −0.007, 0.003 and 0.006, in space at m = 2 −0.017, 0.015 and 0.037. A long wave is stiffer by `κ (kδ)²/7` in a bar, where bonds make it softer by `(kδ)²/24`.
 const CONTROL: f64 = 0.1;
 

@@ -23,6 +23,7 @@ mod s;
 mod short_waves;
 mod t;
 mod u;
+mod wide_triangles;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -2,8 +2,8 @@
 
 use crate::Case;
 
-/// A line of samples: position and displacement by component.
-fn samples(case: &Case, name: &str, d: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
+/// The samples of a line: position and displacement by component.
+pub(crate) fn samples(case: &Case, name: &str, d: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
     let text = case.read(name);
     let numbers = |line: &str| -> Vec<f64> {
         let words = line.split(',').take(2 * d);
