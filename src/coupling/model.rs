@@ -92,8 +92,6 @@ pub struct Model<const D: usize> {
     pub(super) has_energy: bool,
     pub(super) tributary: Tributary,
     pub(super) row_scale: Option<Vec<f64>>,
-    /// What nodes hand on of loads and masses, where it is not by `node_transfer`.
-    pub(super) shares: Option<Transfer>,
     /// Bond factors and horizon of each lattice.
     pub(super) factors: Vec<(LatticeFactors<D>, f64)>,
     /// The laws of elements that follow the bonds, by the number of a material; empty where elements are linear.
@@ -186,7 +184,6 @@ impl<const D: usize> Model<D> {
             has_energy: coupling.symmetry() == Symmetry::Symmetric,
             tributary: Tributary::default(),
             row_scale: None,
-            shares: None,
             factors: Vec::new(),
             cauchy_born: Vec::new(),
             feet: Vec::new(),

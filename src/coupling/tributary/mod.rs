@@ -8,7 +8,7 @@
 //! | `marks.rs` | the cells of a lattice that the edge of a region cuts |
 //! | `found.rs` | volumes and moments of parts that were found |
 //! | `half_space.rs` | what of cells and facets lies beyond a plane |
-//! | `shares.rs` | what nodes that follow a fit hand on |
+//! | `shares.rs` | shares that nodes hand on which follow a fit |
 //! | `parts.rs` | a region of the zone, or of its surface, in parts that follow sites |
 //!
 //! The principle of virtual work gives all of it. The displacement of a finite element is `Σ N_a u_a`; a cell of the lattice that lies in the zone as a whole has that of its point; one that the seam, a surface or a void cuts has
@@ -35,6 +35,7 @@ pub use parts::Parts;
 
 use self::simplex::{Cells, as_box};
 use crate::{
+    assembly::Transfer,
     coupling::{CellRole, Interface, Model, PointSource, SiteKind},
     fem,
 };
@@ -48,6 +49,8 @@ pub struct Tributary {
     pub mixed: Vec<(u32, u16, f64)>,
     /// Volume of the peridynamic zone, less voids \[m^D\].
     pub zone: f64,
+    /// Weights by which nodes hand on loads and masses, where it is not those of their displacement.
+    pub(super) shares: Option<Transfer>,
 }
 
 impl Tributary {
@@ -90,6 +93,7 @@ impl Tributary {
             volume,
             mixed: by_material,
             zone,
+            shares: None,
         }
     }
 
@@ -135,9 +139,10 @@ impl<const D: usize> Model<D> {
         let mut tributary = Tributary::new(self);
         if tributary.volume.iter().any(|v| *v <= 0.0) {
             // by the volumes that sites have of their own
-            self.shares = shares::shares(self);
-            if self.shares.is_some() {
+            self.tributary.shares = shares::shares(self);
+            if self.tributary.shares.is_some() {
                 tributary = Tributary::new(self);
+                tributary.shares = self.tributary.shares.take();
             }
         }
         if !self.has_energy && self.body().is_some() {
@@ -160,7 +165,7 @@ impl<const D: usize> Model<D> {
         self.tributary = tributary;
     }
 
-    /// Whether the points of an enclosed zone, whose rows are those of a coupling by forces, lie on its nodes, one on each, with elements of the same size around: what the zone has is then shared out as in elements.
+    /// Tells of a coupling by forces that the points of an enclosed zone lie on its nodes, one on each, with elements of the same size around: what the zone has is then shared out as in elements.
     ///
     /// Row by row the load is the mean of the body force over the row's own volume there, and `K u = f` is exact for cubic fields. A cell around each point has the same moments up to the first; the second ones differ, by a quarter of `h²` in all from the
     /// elements to the points, and a strain of `h² b′/4E` would be added to the zone.

@@ -1,4 +1,4 @@
-//! What nodes that are no sites hand on of their loads and masses, where the fit of their displacement cannot say it.
+//! Shares of loads and masses that nodes which are no sites hand on, where the fit of their displacement cannot give them.
 //!
 //! A node of the seam follows a fit to the sites within a horizon: to points alone where elements are wider than that, so that it is extrapolated. The transpose of such weights hands a few points many times the volume
 //! of their cells, and others a negative one, for which no row can stand. Any weights that are exact for affine fields keep totals and first moments, so these are as near as possible to the volumes of the sites around, and none is negative.
@@ -20,7 +20,11 @@ const REACH: [f64; 3] = [1.1, 1.6, 2.4];
 impl<const D: usize> Model<D> {
     /// Sites and weights that a node hands its loads and masses on to: those that it follows, or [`shares`] where these leave a site without a volume.
     pub(crate) fn node_shares(&self, node: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let transfer = self.shares.as_ref().unwrap_or(&self.node_transfer);
+        let transfer = self
+            .tributary
+            .shares
+            .as_ref()
+            .unwrap_or(&self.node_transfer);
         transfer.row(node)
     }
 }
