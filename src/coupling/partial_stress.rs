@@ -8,15 +8,26 @@ use crate::{
     },
     dimension,
     mesh::Mesh,
+    parallel,
     peridynamics::{Influence, LinearForceState, PdBody},
     tensor::{Tensor, Vector},
 };
 
-/// Partial stress with a meshfree divergence.
+/// Partial stress with a meshfree divergence, and a control of the short waves that it does not see.
 ///
 /// Source: [SAND2015-7998] eq. (2.29), with the divergence (2.20) of the partial stress (2.19) as in section 7.2: in the transition zone
 /// `L(x) = Tr(∇ν^ps) = Σ ω {ν(x′) − ν(x)} K⁻¹ ξ V`, with `K = Σ ω ξ⊗ξ V`; peridynamic in the nonlocal zone, finite elements in the local zone.
 /// The horizon may vary in the transition zone.
+///
+/// Differs from it by: the control of [Silling2017], with the gradient `F = Σ ω η⊗ξ V K⁻¹` of either end of a bond,
+///
+/// ```text
+///   + Σ c (2η − {F(x) + F(x′)} ξ) V′ ,     c = κ C₁₁₁₁ ω D / Σ ω |ξ|² V .
+/// ```
+///
+/// Stress and divergence are both differences to either side of a point, `Σ ω ξ sin(k·ξ)`. For waves of two to some spacings they vanish, or have opposite signs: the symbol of their product is
+/// indefinite (−0.015 of that of the nearest neighbours), so that a zone of some lengths holds standing waves which nothing resists. The control vanishes for every affine field on any families, on whole ones of a
+/// lattice for every cubic field, and its symbol is nowhere negative: `(Σ ω ξ sin)ᵀ K⁻¹ (Σ ω ξ sin) ≤ Σ ω sin² ≤ 2 Σ ω (1 − cos)`.
 #[derive(Clone, Copy, Debug)]
 pub struct PartialStressMeshfree {
     /// ω of the divergence.
@@ -69,16 +80,36 @@ impl PartialStressMeshfree {
         &self,
         model: &'a Model<D>,
     ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        Ok(Box::new(Meshfree {
+        let modulus = (model.peridynamics.as_ref())
+            .map_or(0.0, |p| p.law.linearised().tensor().get(0, 0, 0, 0));
+        let points = model.body().map_or(0, |body| body.families.len());
+        let mut rows = Meshfree {
             model,
             influence: self.influence,
-        }))
+            control: CONTROL * modulus,
+            shapes: Vec::new(),
+        };
+        rows.shapes = parallel::map(points, CHUNK, |i| rows.shape(i));
+        Ok(Box::new(rows))
     }
 }
+
+/// Strength κ of the control.
+///
+/// The least eigenvalue of the symbol over that of the nearest neighbours, bond-based with `1/|ξ|` and the Gaussian divergence: in the plane at m = 3 it is −0.010, 0.012 and 0.024 with κ = 0, 0.05 and
+/// 0.1, at m = 6 −0.007, 0.003 and 0.006, in space at m = 2 −0.017, 0.015 and 0.037. A long wave is stiffer by `κ (kδ)²/7` in a bar, where bonds make it softer by `(kδ)²/24`.
+const CONTROL: f64 = 0.1;
+
+/// Points whose shape tensors are computed by one thread at a time.
+const CHUNK: usize = 256;
 
 struct Meshfree<'a, const D: usize> {
     model: &'a Model<D>,
     influence: Influence,
+    /// κ C₁₁₁₁ [Pa].
+    control: f64,
+    /// Of each point `K⁻¹` and the trace of `K`; none where there is no inverse.
+    shapes: Vec<Option<(Tensor<D>, f64)>>,
 }
 
 impl<const D: usize> Operator<D> for Meshfree<'_, D> {
@@ -91,6 +122,7 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
             body.add_force_row(i, |_| 1.0, row);
         } else {
             body.add_partial_stresses(self.divergence(body, i), row);
+            self.add_control(body, i, row);
         }
     }
 
@@ -128,34 +160,85 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
 }
 
 impl<const D: usize> Meshfree<'_, D> {
+    /// The bonds of a point with `ω V′`.
+    fn bonds<'b>(
+        &'b self,
+        body: &'b PdBody<D>,
+        i: usize,
+    ) -> impl Iterator<Item = (usize, Vector<D>, f64)> + 'b {
+        let horizon = body.cloud.horizon.of(i);
+        body.families.of(i).iter().map(move |&j| {
+            let xi = body.bond(i, j as usize);
+            let omega = self.influence.value(xi.norm(), horizon);
+            (j as usize, xi, omega * body.cloud.volume[j as usize])
+        })
+    }
+
+    /// `K⁻¹` and the trace of `K = Σ ω ξ⊗ξ V`.
+    fn shape(&self, i: usize) -> Option<(Tensor<D>, f64)> {
+        let body = self.model.body()?;
+        let mut shape = Tensor::<D>::zeros();
+        for (_, xi, weight) in self.bonds(body, i) {
+            shape += xi * xi.transpose() * weight;
+        }
+        Some((shape.try_inverse()?, shape.trace()))
+    }
+
     /// The points whose stresses the divergence at a transition point takes, with their weights: `∇·ν^ps` of [SAND2015-7998] eq. (2.20), as section 7.2 discretises it.
     fn divergence(&self, body: &PdBody<D>, i: usize) -> Vec<(usize, Vector<D>)> {
-        let horizon = body.cloud.horizon.of(i);
-        let weigh = |j: usize, xi: &Vector<D>| {
-            self.influence.value(xi.norm(), horizon) * body.cloud.volume[j]
-        };
-        let mut shape = Tensor::<D>::zeros();
-        for &j in body.families.of(i) {
-            let xi = body.bond(i, j as usize);
-            shape += xi * xi.transpose() * weigh(j as usize, &xi);
-        }
         // a family whose law could be evaluated has a regular shape tensor (checked in `operator`'s model)
-        let Some(inverse) = shape.try_inverse() else {
+        let Some((inverse, _)) = self.shapes[i] else {
             return Vec::new();
         };
         let mut own = Vector::zeros();
         let mut on: Vec<(usize, Vector<D>)> = Vec::new();
-        for &j in body.families.of(i) {
-            let j = j as usize;
-            let xi = body.bond(i, j);
+        for (j, xi, weight) in self.bonds(body, i) {
             // K u = f is minus the internal force
-            let a = inverse * xi * (-weigh(j, &xi) * body.cloud.volume[i]);
+            let a = inverse * xi * (-weight * body.cloud.volume[i]);
             own -= a;
             on.push((j, a));
         }
-        if own.amax() > 1e-15 * body.cloud.volume[i] / horizon {
+        if own.amax() > 1e-15 * body.cloud.volume[i] / body.cloud.horizon.of(i) {
             on.push((i, own));
         }
         on
+    }
+
+    /// Adds the row of the control, minus its force on the point.
+    fn add_control(&self, body: &PdBody<D>, i: usize, row: &mut Row<D>) {
+        let Some((_, trace)) = self.shapes[i] else {
+            return;
+        };
+        let strength = self.control * D as f64 / trace * body.cloud.volume[i];
+        let transfer = &body.cloud.transfer;
+        let (mut own, mut first) = (0.0, Vector::<D>::zeros());
+        for (j, xi, weight) in self.bonds(body, i) {
+            let c = strength * weight;
+            own += 2.0 * c;
+            first += xi * c;
+            row.gather(transfer, j, &(Tensor::identity() * (-2.0 * c)));
+            self.add_gradient(body, j, &(xi * c), row);
+        }
+        row.gather(transfer, i, &(Tensor::identity() * own));
+        // a whole family has Σ ω ξ V = 0
+        if first.amax() > 1e-15 * own * body.cloud.horizon.of(i) {
+            self.add_gradient(body, i, &first, row);
+        }
+        row.spread(transfer);
+    }
+
+    /// Gathers the row of `F a` at a point.
+    fn add_gradient(&self, body: &PdBody<D>, j: usize, a: &Vector<D>, row: &mut Row<D>) {
+        let Some((inverse, _)) = self.shapes[j] else {
+            return;
+        };
+        let along = inverse * a;
+        let mut own = 0.0;
+        for (l, xi, weight) in self.bonds(body, j) {
+            let w = xi.dot(&along) * weight;
+            own -= w;
+            row.gather(&body.cloud.transfer, l, &(Tensor::identity() * w));
+        }
+        row.gather(&body.cloud.transfer, j, &(Tensor::identity() * own));
     }
 }

@@ -27,7 +27,7 @@ use crate::run::motion::step_observer::moment;
 use crate::run::motion::time_dependent_loads::SceneDrive;
 use crate::run::motion::time_step::{held, paced};
 use crate::run::motion::writer::{Moment, Recorder};
-use crate::run::proof::growth::GrowthQuestion;
+use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
 use crate::run::write::OverSites;
@@ -265,16 +265,17 @@ fn steps<const D: usize>(
 ) -> Result<Prediction, RunError> {
     let (model, rest) = (laid_out.model, laid_out.rest);
     let held = held(model, &rest.conditions)?;
+    let begin = start(model, rest);
+    let choices = &mut laid_out.choices;
+    let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, RESOLVED, choices)?;
     let asked = GrowthQuestion {
         remedy: laid_out.remedy,
         proved: laid_out.proved,
         policy: spec.growing_modes,
         place: &|site| model.sites[site].position.iter().copied().collect(),
         ranks: None,
+        free_from: free_start((model, rest), moving.is_linear, &begin)?,
     };
-    let begin = start(model, rest);
-    let choices = &mut laid_out.choices;
-    let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, RESOLVED, choices)?;
     let mut prescribed = held.clone();
     prescribed.extend(driven_impactors::prescribed(
         &rest.impactors,

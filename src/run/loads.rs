@@ -350,8 +350,8 @@ impl<'a, const D: usize> Loads<'a, D> {
     ) {
         let mesh = &self.model.mesh;
         let mut on_node = |n: u32, f: Vector<D>| {
-            // a node at the seam that is no site hands its force to those that it follows
-            for (site, w) in self.model.node_transfer.row(n as usize) {
+            // a node at the seam that is no site hands its force on
+            for (site, w) in self.model.node_shares(n as usize) {
                 add(site as usize, f * w);
             }
         };

@@ -261,8 +261,8 @@ pub fn eigenvalues(
         .map_err(|_| StepError::Eigenvalues)
 }
 
-/// The operator on its free dofs.
-fn dense(operator: &mut Scaled<'_>) -> Result<faer::Mat<f64>, StepError> {
+/// The operator on its free dofs, as a matrix.
+pub(super) fn dense(operator: &mut Scaled<'_>) -> Result<faer::Mat<f64>, StepError> {
     let free = free_dofs(operator);
     let (mut x, mut y) = (vec![0.0; operator.dofs()], vec![0.0; operator.dofs()]);
     let mut matrix = faer::Mat::zeros(free.len(), free.len());
@@ -283,7 +283,8 @@ fn dense(operator: &mut Scaled<'_>) -> Result<faer::Mat<f64>, StepError> {
     Ok(matrix)
 }
 
-fn free_dofs(operator: &Scaled<'_>) -> Vec<usize> {
+/// The numbers of the free dofs, ascending.
+pub(super) fn free_dofs(operator: &Scaled<'_>) -> Vec<usize> {
     let d = operator.system.block().max(1);
     (0..operator.dofs())
         .filter(|k| operator.free.is_free(k / d, k % d))

@@ -7,7 +7,7 @@
 //! | `quasi_static.rs`, `quasi_static/` | load steps: equilibrium by Newton's method or by relaxation, then breaking bonds |
 //! | `explicit.rs`, `explicit/` | explicit dynamics by velocity Verlet |
 //! | `stable_step.rs`, `sub_cycling.rs` | its stable step; several steps of stiff sites within one of the others |
-//! | `instability_growth.rs` | modes that grow at any step |
+//! | `instability_growth.rs`, `growth_from_start.rs` | modes that grow at any step; what they make of a motion from a known start |
 //! | `direct.rs`, `direct_params.rs` | the multifrontal direct solver; what it is asked and refuses |
 //! | `ordering.rs`, `symbolic.rs` | elimination orders; elimination tree, supernodes and costs |
 //! | `multifrontal.rs`, `frontal_matrix.rs` | numerical factorisation over that tree; of one dense front |
@@ -24,6 +24,7 @@ pub(crate) mod direct_params;
 pub mod explicit;
 pub mod factor_time_estimate;
 mod frontal_matrix;
+pub mod growth_from_start;
 pub mod instability_growth;
 pub mod krylov;
 mod multifrontal;

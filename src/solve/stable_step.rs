@@ -164,6 +164,14 @@ impl<'a> Scaled<'a> {
         self.products += 1;
     }
 
+    /// `√M x` on the free dofs, zero elsewhere.
+    pub(super) fn scaled(&self, x: &[f64]) -> Vec<f64> {
+        let pairs = x.iter().zip(&self.root);
+        let mut scaled: Vec<f64> = pairs.map(|(x, r)| x / r).collect();
+        self.free.clear_prescribed(&mut scaled);
+        scaled
+    }
+
     /// Noise of unit norm on the free dofs, the same in every run.
     pub(super) fn noise(&self) -> Vec<f64> {
         let mut x = normal_numbers(self.dofs());

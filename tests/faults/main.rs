@@ -20,8 +20,10 @@ mod proof_rows;
 mod q;
 mod r;
 mod s;
+mod short_waves;
 mod t;
 mod u;
+mod wide_triangles;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,5 +1,6 @@
 //! The patch test: affine fields through the seam of every method, law, dimension and kind of mesh.
 
+pub mod bar;
 pub mod influence;
 
 use crate::enclosed::{
@@ -438,13 +439,16 @@ pub fn patch(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     patch_on(effort, progress, None)
 }
 
-/// The same; where there are several processes, by all of them, without what it has of influence functions alone.
+/// The same; where there are several processes, by all of them, without what it has of bars and influence functions alone.
 pub fn patch_on(effort: Effort, progress: &dyn Progress, ranks: Option<&dyn Ranks>) -> Vec<Table> {
     let mut tables = vec![
         table::<1>(effort, progress, ranks),
         table::<2>(effort, progress, ranks),
         table::<3>(effort, progress, ranks),
     ];
+    if ranks.is_none() {
+        tables.push(bar::table());
+    }
     if effort == Effort::Full && ranks.is_none() {
         tables.push(influence::table(progress));
     }

@@ -120,7 +120,7 @@ impl<'a, const D: usize> Grid<'a, D> {
         let nodes = mesh.cell(found.cell).iter().zip(&found.shape);
         let nodes = nodes.filter(|(_, w)| **w != 0.0);
         let rows = nodes.flat_map(|(&n, &w)| {
-            let row = self.model.node_transfer.row(n as usize);
+            let row = self.model.node_shares(n as usize);
             row.map(move |(site, v)| (site, v * w))
         });
         Some(rows.collect())

@@ -8,6 +8,7 @@
 //! | `marks.rs` | the cells of a lattice that the edge of a region cuts |
 //! | `found.rs` | volumes and moments of parts that were found |
 //! | `half_space.rs` | what of cells and facets lies beyond a plane |
+//! | `shares.rs` | shares that nodes hand on which follow a fit |
 //! | `parts.rs` | a region of the zone, or of its surface, in parts that follow sites |
 //!
 //! The principle of virtual work gives all of it. The displacement of a finite element is `Σ N_a u_a`; a cell of the lattice that lies in the zone as a whole has that of its point; one that the seam, a surface or a void cuts has
@@ -25,14 +26,17 @@ mod grid;
 mod half_space;
 mod marks;
 mod parts;
+mod shares;
 mod simplex;
 
 pub use crate::coupling::tributary::found::{Detail, Moments};
 pub use half_space::HalfSpace;
 pub use parts::Parts;
 
+use self::simplex::{Cells, as_box};
 use crate::{
-    coupling::{CellRole, Model, PointSource, SiteKind},
+    assembly::Transfer,
+    coupling::{CellRole, Interface, Model, PointSource, SiteKind},
     fem,
 };
 
@@ -45,6 +49,8 @@ pub struct Tributary {
     pub mixed: Vec<(u32, u16, f64)>,
     /// Volume of the peridynamic zone, less voids \[m^D\].
     pub zone: f64,
+    /// Weights by which nodes hand on loads and masses, where it is not those of their displacement.
+    pub(super) shares: Option<Transfer>,
 }
 
 impl Tributary {
@@ -58,7 +64,7 @@ impl Tributary {
         for c in (0..mesh.cell_count()).filter(|&c| model.is_element(c)) {
             let material = model.material_of_cell(c);
             fem::for_each_share(mesh, c, |n, part, whole| {
-                for (site, w) in model.node_transfer.row(n as usize) {
+                for (site, w) in model.node_shares(n as usize) {
                     let share = w * part * whole;
                     volume[site as usize] += share;
                     if material != own {
@@ -87,6 +93,7 @@ impl Tributary {
             volume,
             mixed: by_material,
             zone,
+            shares: None,
         }
     }
 
@@ -129,7 +136,15 @@ impl<const D: usize> Model<D> {
 
     /// Finds the part of each site, and what rows are scaled by.
     pub(super) fn share_out(&mut self) {
-        let tributary = Tributary::new(self);
+        let mut tributary = Tributary::new(self);
+        if tributary.volume.iter().any(|v| *v <= 0.0) {
+            // by the volumes that sites have of their own
+            self.tributary.shares = shares::shares(self);
+            if self.tributary.shares.is_some() {
+                tributary = Tributary::new(self);
+                tributary.shares = self.tributary.shares.take();
+            }
+        }
         if !self.has_energy && self.body().is_some() {
             let factor = |(own, volume): (f64, &f64)| {
                 let ratio = volume / own;
@@ -150,6 +165,42 @@ impl<const D: usize> Model<D> {
         self.tributary = tributary;
     }
 
+    /// Tells of a coupling by forces that the points of an enclosed zone lie on its nodes, one on each, with elements of the same size around: what the zone has is then shared out as in elements.
+    ///
+    /// Row by row the load is the mean of the body force over the row's own volume there, and `K u = f` is exact for cubic fields. A cell around each point has the same moments up to the first; the second ones differ, by a quarter of `h²` in all from the
+    /// elements to the points, and a strain of `h² b′/4E` would be added to the zone.
+    pub(crate) fn nodes_are_points(&self) -> bool {
+        let Some(p) = &self.peridynamics else {
+            return false;
+        };
+        let PointSource::Lattice { spacing, origin } = p.points else {
+            return false;
+        };
+        let is_hindered = !p.voids.is_empty() || !p.barriers.is_empty();
+        if self.has_energy || self.interface != Interface::Overlap || is_hindered {
+            return false;
+        }
+        let cells = Cells { origin, spacing };
+        let slack = ON_NODE * spacing;
+        let is_cube = |c: usize| {
+            as_box(&self.mesh, c).is_some_and(|(low, high)| {
+                let edges = high - low;
+                let on_lattice = (cells.centre(&cells.index(&low)) - low).amax() <= slack;
+                on_lattice && edges.iter().all(|edge| (edge - spacing).abs() <= slack)
+            })
+        };
+        let (offsets, around) = self.node_cells();
+        let of_node =
+            |n: u32| &around[offsets[n as usize] as usize..offsets[n as usize + 1] as usize];
+        let is_enclosed = |n: &u32| {
+            let cells = of_node(*n);
+            cells.len() == 1 << D && cells.iter().all(|&c| is_cube(c as usize))
+        };
+        (0..self.mesh.cell_count())
+            .filter(|&c| self.roles[c] == CellRole::Points)
+            .all(|c| self.mesh.cell(c).iter().all(is_enclosed))
+    }
+
     /// The volume that each row has as it is: of a node that of its hat, of a point that of its part if the lattice went on in the elements.
     fn row_volumes(&self) -> Vec<f64> {
         let mut own: Vec<f64> = self.sites.iter().map(|s| s.volume).collect();
@@ -157,7 +208,7 @@ impl<const D: usize> Model<D> {
             .peridynamics
             .as_ref()
             .is_some_and(|p| p.points != PointSource::Cells);
-        if !is_lattice {
+        if !is_lattice || self.nodes_are_points() {
             return own;
         }
         let holds = |c: usize| self.roles[c] == CellRole::Points;
@@ -203,6 +254,9 @@ impl<const D: usize> Model<D> {
         (self.roles.iter().zip(counts)).all(|(&role, &counts)| counts || role != CellRole::Points)
     }
 }
+
+/// How far from a node a point may lie that is one with it, in spacings.
+const ON_NODE: f64 = 1e-9;
 
 /// How far around the zone its lattice is continued, in spacings: farther than weights reach.
 const NEAR: f64 = 4.0;

@@ -84,6 +84,9 @@ impl<const D: usize> Parts<D> {
         };
         match &p.points {
             PointSource::Cells => parts.add_centroids(model, counts, detail),
+            PointSource::Lattice { .. } if model.nodes_are_points() => {
+                parts.add_cubes(model, counts, detail);
+            }
             _ => {
                 for (number, cells) in lattices(model) {
                     let mine: Vec<bool> = (0..counts.len())
@@ -315,6 +318,31 @@ impl<const D: usize> Parts<D> {
                 false => around().place(model, site, &x),
             };
             self.push(found, x, follows, detail);
+        }
+    }
+
+    /// Cells of the mesh whose corners are neighbouring points of the lattice: each follows its corners, as an element does.
+    fn add_cubes(&mut self, model: &Model<D>, counts: &[bool], detail: Detail) {
+        for (number, cells) in lattices(model) {
+            let grid = Grid::new(model, number, cells, Beyond::Follows, |_| true);
+            let own: Vec<usize> = (0..counts.len()).filter(|&c| counts[c]).collect();
+            let placed = parallel::map_slice(&own, |&c| {
+                let x = model.mesh.centroid(c);
+                (x, grid.place(&x))
+            });
+            let half = Vector::repeat(0.5 * cells.spacing);
+            for (x, follows) in placed {
+                let mut found = Found {
+                    size: cells.spacing.powi(D as i32),
+                    ..Found::default()
+                };
+                if detail == Detail::Quadrature {
+                    box_quadrature(&(x - half), &(x + half), |x, w| {
+                        found.quadrature.push((x, w));
+                    });
+                }
+                self.push(found, x, follows, detail);
+            }
         }
     }
 

@@ -21,7 +21,7 @@ use crate::observe::proof::Part;
 use crate::observe::summary::{Decision, Stopwatch, Timings, bytes_text};
 use crate::run::error::RunError;
 use crate::run::motion::seen::Seen;
-use crate::run::proof::growth::GrowthQuestion;
+use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
 use crate::run::springs::Springs;
 use crate::scene::solve::Explicit as Spec;
@@ -115,6 +115,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             policy: spec.growing_modes,
             place: &|site| model.sites[site].position.iter().copied().collect(),
             ranks: options.ranks,
+            free_from: free_start((model, rest), moving.is_linear, &begin)?,
         };
         let (mut moving, pace, growth) = paced(spec, &asked, moving, &held, known, self.choices)?;
         self.watch.lap(self.timings, "stable step");

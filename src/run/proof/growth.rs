@@ -6,7 +6,12 @@ use crate::observe::report::number;
 use crate::progress::Progress;
 use crate::run::definiteness::factorised;
 use crate::run::error::RunError;
+use crate::run::loads::supports;
+use crate::run::setup::RunSettings;
+use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::spec::{CouplingSpec, GrowingModesSpec};
+use crate::solve::explicit::State;
+use crate::solve::growth_from_start::energy_gained;
 use crate::solve::instability_growth::{
     Evidence, Growth, LARGEST_GAIN, REMEDY, REMEDY_SEAM, growth,
 };
@@ -21,6 +26,12 @@ const LEAST: f64 = 1e-3;
 /// The growth exponent from which on a growing mode is warned of: it gains 1 % of energy.
 const TOLD: f64 = 0.005;
 
+/// Energy of growing modes, over that of a free motion at its start, from which on the motion is warned of.
+const GAINED: f64 = 0.01;
+
+/// The same, from which on a run is refused: the watch on its energy would stop it.
+const STOPPED: f64 = 0.1;
+
 /// What is known before a run of a motion that may grow.
 #[derive(Clone, Copy)]
 pub struct GrowthQuestion<'a> {
@@ -34,6 +45,34 @@ pub struct GrowthQuestion<'a> {
     pub place: &'a dyn Fn(usize) -> Vec<f64>,
     /// The processes that ask together.
     pub ranks: Option<&'a dyn Ranks>,
+    /// Displacement and velocity at the start of a motion that is linear and left to itself; none of another.
+    pub free_from: Option<(&'a [f64], &'a [f64])>,
+}
+
+/// The start of a motion that is left to itself: nothing loads it, and what is held stays at zero.
+pub(crate) fn free_start<'a, const D: usize>(
+    (model, rest): (&Model<D>, &RunSettings<D>),
+    is_linear: bool,
+    begin: &'a State,
+) -> Result<Option<(&'a [f64], &'a [f64])>, RunError> {
+    let is_still = |c: &Condition<D>| match &c.prescribed {
+        Prescribed::Displacement(_) | Prescribed::Field(_) => !c.components.depends_on_time(),
+        Prescribed::Spring(_) => true,
+        Prescribed::Velocity(_)
+        | Prescribed::Traction(_)
+        | Prescribed::Pressure(_)
+        | Prescribed::BodyForce(_) => false,
+    };
+    let is_free = is_linear
+        && rest.impactors.is_empty()
+        && rest.stresses.thermal.is_none()
+        && rest.conditions.iter().all(is_still);
+    if !is_free {
+        return Ok(None);
+    }
+    let (held, _) = supports(model, &rest.conditions, 0.0)?;
+    let is_zero = held.iter().flatten().all(|u| *u == 0.0);
+    Ok(is_zero.then_some((&begin.u[..], &begin.v[..])))
 }
 
 /// What to do about modes that grow with a coupling.
@@ -103,6 +142,23 @@ fn line_of(found: &Growth, exponent: f64, unseen: f64, place: &[f64]) -> String 
     }
 }
 
+/// Energy of all growing modes at the end of a motion, over that at its start; none where it is not known.
+fn gained(
+    asked: &GrowthQuestion<'_>,
+    found: &Growth,
+    system: &dyn SemiDiscrete,
+    held: &[u32],
+    (step, steps): (f64, u64),
+) -> Result<Option<f64>, RunError> {
+    let grows = found.rate * steps as f64 * step > TOLD;
+    match (asked.free_from, asked.ranks, found.evidence) {
+        (Some(start), None, Evidence::Eigenvalues) if grows => {
+            Ok(energy_gained(system, held, (step, steps), start)?)
+        }
+        _ => Ok(None),
+    }
+}
+
 /// Collective: looks for modes that grow over a run of `steps` steps of `step`; at most a tenth of its products, and at least 200.
 ///
 /// # Errors
@@ -132,7 +188,9 @@ pub(crate) fn check(
     } else {
         Vec::new()
     };
-    if exponent > LARGEST_GAIN && asked.policy == GrowingModesSpec::Refuse {
+    let gained = gained(asked, &found, system, held, (step, steps))?;
+    let is_refused = gained.map_or(exponent > LARGEST_GAIN, |gained| gained > STOPPED);
+    if is_refused && asked.policy == GrowingModesSpec::Refuse {
         return Err(RunError::Grows {
             place,
             rate: found.rate,
@@ -142,9 +200,15 @@ pub(crate) fn check(
             remedy: asked.remedy,
         });
     }
-    let line = line_of(&found, exponent, unseen, &place);
+    let of_this_motion = gained.map_or(String::new(), |gained| {
+        format!(
+            "; the motion begins with so little of it that it ends with {} of the energy",
+            number(gained)
+        )
+    });
+    let line = line_of(&found, exponent, unseen, &place) + &of_this_motion;
     let mut findings = Vec::new();
-    if exponent > TOLD {
+    if gained.map_or(exponent > TOLD, |gained| gained > GAINED) {
         findings.push(Finding {
             severity: Severity::Warning,
             value: exponent.exp(),

@@ -39,6 +39,8 @@ pub struct Body {
     pub ratio: f64,
     /// Cells, and spacings, along each edge; a multiple of 3.
     pub cells: usize,
+    /// Width of the transition zone over the length, where a coupling has one.
+    pub transition: f64,
     /// Displacement of the right end over the length.
     pub stretch: f64,
     /// Degree of the influence function of an LPS, or of the micromodulus.
@@ -59,6 +61,7 @@ impl Body {
             coupling,
             ratio: 2.0,
             cells: 24,
+            transition: 0.2,
             stretch: 0.01,
             influence: None,
             more: String::new(),
@@ -115,7 +118,10 @@ impl Body {
             )
         };
         let transition = if matches!(self.coupling, "blending" | "partial-stress" | "balanced") {
-            format!("[zones.transition]\naround = {:e}\n", 0.2 * self.size)
+            format!(
+                "[zones.transition]\naround = {:e}\n",
+                self.transition * self.size
+            )
         } else {
             String::new()
         };

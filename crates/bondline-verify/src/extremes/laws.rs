@@ -68,10 +68,20 @@ pub(super) fn ratio(effort: Effort) -> Vec<TableRow> {
         for &m in ratios {
             // the zone holds families whole, and its surroundings the transition
             let cells = if m > 2.5 { 72 } else { 24 };
+            // the rows of a blending, as far as a collar of one horizon, keep their families off the faces that are held and pulled
+            let (cells, room) = match coupling {
+                "blending" => {
+                    let cells = if m > 8.0 { 96 } else { cells };
+                    (cells, 1.0 / 3.0 - (2.0 * m + 1.0) / cells as f64)
+                }
+                _ => (cells, f64::INFINITY),
+            };
+            let body = Body::new(coupling);
             let result = Body {
                 ratio: m,
                 cells,
-                ..Body::new(coupling)
+                transition: body.transition.min(room),
+                ..body
             }
             .solve();
             let case = format!("{coupling}, m = {m}");

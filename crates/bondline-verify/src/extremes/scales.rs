@@ -24,11 +24,14 @@ pub(super) fn rows(effort: Effort) -> Vec<TableRow> {
     };
     for &dimension in dimensions {
         for coupling in METHODS.iter().chain(&["local", "nonlocal"]) {
-            let base = Body {
+            let mut base = Body {
                 dimension,
-                cells: if dimension == 3 { 15 } else { 24 },
                 ..Body::new(coupling)
             };
+            if dimension == 3 {
+                // two cells, so that the collar of a blending leaves one before the faces that are held and pulled
+                (base.cells, base.transition) = (15, 2.0 / 15.0);
+            }
             let case = format!("{dimension}D {coupling}");
             match base.solve() {
                 Ok(solved) => of(&case, &base, &solved, &mut rows),
