@@ -328,7 +328,7 @@ impl<const D: usize> Parts<D> {
             let own: Vec<usize> = (0..counts.len()).filter(|&c| counts[c]).collect();
             let placed = parallel::map_slice(&own, |&c| {
                 let x = model.mesh.centroid(c);
-                (x, grid.place(&x))
+                (x, grid.place(&x, detail))
             });
             let half = Vector::repeat(0.5 * cells.spacing);
             for (x, follows) in placed {
