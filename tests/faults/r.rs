@@ -1,4 +1,4 @@
-//! Blending and meshfree partial stress whose transition zone reaches the surface of the body: displacements were off by 204 and 508 %.
+//! Blending and meshfree partial stress whose transition zone reaches the surface of the body: displacements were off by 204 and 508 %, the latter by 51 % since short waves have a control.
 
 use crate::{Case, flat};
 
@@ -60,21 +60,18 @@ form="meshfree"
 "#;
 
 #[test]
-fn transition_zones_at_the_surface_are_refused() {
-    for scene in [BLENDING, STRESS] {
-        let case = Case::new(scene);
-        let refusal = flat(&case.run(&[]).expect_err("it is refused"));
-        assert!(
-            refusal.contains("transition zone meets the surface")
-                || refusal.contains("mixes both models"),
-            "{refusal}"
-        );
-        let check = case.command("check", &[]);
-        assert!(!check.status.success());
-    }
-    // whoever wants to see it all the same says so
-    let case = Case::new(STRESS);
-    let summary = case.run(&["--set", "solver.unproven=warn"]).unwrap();
+fn transition_zones_at_the_surface_are_refused_or_told() {
+    let case = Case::new(BLENDING);
+    let refusal = flat(&case.run(&[]).expect_err("it is refused"));
+    assert!(
+        refusal.contains("transition zone meets the surface")
+            || refusal.contains("mixes both models"),
+        "{refusal}"
+    );
+    let check = case.command("check", &[]);
+    assert!(!check.status.success());
+    // displacements are 51 % off, by the prediction 43 %: not beyond what is refused
+    let summary = Case::new(STRESS).run(&[]).expect("it runs");
     let warnings = summary["warnings"].to_string();
     assert!(
         warnings.contains("transition zone meets the surface"),

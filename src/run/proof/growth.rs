@@ -202,7 +202,7 @@ pub(crate) fn check(
     }
     let of_this_motion = gained.map_or(String::new(), |gained| {
         format!(
-            "; the motion begins with so little of it that it ends with {} of the energy",
+            "; the motion begins with so little of such modes that they end with at most {} of its energy",
             number(gained)
         )
     });
