@@ -308,6 +308,7 @@ fn nonlinear<const D: usize>(
         false => None,
     };
     let refactor = (factors.as_ref()).map(|(_, info)| TangentFactors::new(*problem, *params, info));
+    let near = (factors.as_ref()).map(|(factor, _)| factor as &dyn LinearMap);
     let free = FreeDofs::from_prescribed(problem.prescribed, D);
     let multigrid = match may_coarsen(model, params.method, problem.symmetry) {
         true => statics::multigrid(problem.stiffness, &free, problem.positions, progress),
@@ -335,11 +336,7 @@ fn nonlinear<const D: usize>(
         },
         Aids {
             refactor: refactor.as_ref().map(|made| made as &dyn Refactor),
-            near: match (&factors, &multigrid) {
-                (Some((factor, _)), _) => Some(factor),
-                (None, Some(multigrid)) => Some(multigrid),
-                (None, None) => None,
-            },
+            near: near.or(multigrid.as_ref().map(|made| made as &dyn LinearMap)),
             progress,
         },
         &|step| (step == 0).then_some(0.0),

@@ -292,7 +292,7 @@ sections.before = { point = [1.03, 0.5], normal = [-1, 0], about = [1.03, 0.5] }
         assert!(end[1] > 1.0, "{end:?}");
         // the mean of the end is nearly its middle
         assert!(
-            (beyond.moment[0] / exact - 1.0).abs() < 0.01,
+            (beyond.moment[0] / exact - 1.0).abs() < 1e-3,
             "{beyond:?} {exact}"
         );
     }
