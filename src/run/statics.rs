@@ -13,6 +13,7 @@ use crate::run::placed_scene::PlacedScene;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::coupling::semidiscrete::CoupledSystem;
 use crate::coupling::{Coupling, Model, Operator, Problem, SiteKind};
 use crate::dimension;
 use crate::observe::ObserveError;
@@ -25,6 +26,7 @@ use crate::progress::Progress;
 use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::definiteness;
 use crate::run::error::RunError;
+use crate::run::linear_parts::{LinearParts, Passed, RunKind};
 use crate::run::surface_gradient::missed_peak;
 use crate::run::warnings::{indefinite, of_elements, out_of_balance, warnings};
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
@@ -135,6 +137,7 @@ fn solve_chosen<const D: usize>(
         operator: operator.as_ref(),
         rest: &rest,
         ranks,
+        has_exact_seam: system.as_ref().is_some_and(CoupledSystem::has_seam_bonds),
     };
     // what placed the zone was solved with linear forces
     let cached = kept.as_ref().filter(|_| system.is_none());
@@ -175,7 +178,7 @@ fn solve_chosen<const D: usize>(
         peak_memory_bytes: peak_memory_bytes(),
         files,
         sections,
-        ..body.summary(equilibrium, traits, proof)
+        ..body.summary(equilibrium, traits, proof)?
     })
 }
 
@@ -200,6 +203,8 @@ struct StaticBody<'a, const D: usize> {
     operator: &'a dyn Operator<D>,
     rest: &'a RunSettings<D>,
     ranks: Option<&'a dyn Ranks>,
+    /// Whether bonds of the seam turn like others.
+    has_exact_seam: bool,
 }
 
 impl<const D: usize> StaticBody<'_, D> {
@@ -306,12 +311,15 @@ impl<const D: usize> StaticBody<'_, D> {
     }
 
     /// What the summary says of the solution: forces, energy, rotation, warnings.
+    ///
+    /// # Errors
+    /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
     fn summary(
         &self,
         equilibrium: &Equilibrium,
         traits: CouplingTraits,
         proof: Proof,
-    ) -> RunSummary {
+    ) -> Result<RunSummary, RunError> {
         let solution = &equilibrium.solution;
         let info = &solution.info;
         let rotations = Rotations::new(self.model, self.rest, None, self.ranks);
@@ -328,6 +336,7 @@ impl<const D: usize> StaticBody<'_, D> {
         ));
         told.extend(indefinite(equilibrium.symmetry, info.method));
         told.extend(rotation.as_ref().map(Rotation::warning));
+        told.extend(self.passed(&solution.displacement)?);
         // what is left of the forces of a body that only turns is round-off
         let least = round_off(self.model, furthest(&solution.displacement));
         let is_loaded = balance.scale > least;
@@ -347,7 +356,7 @@ impl<const D: usize> StaticBody<'_, D> {
                 skin,
             ));
         }
-        RunSummary {
+        Ok(RunSummary {
             dimension: D,
             coupling: traits.name.to_owned(),
             warnings: told,
@@ -362,7 +371,19 @@ impl<const D: usize> StaticBody<'_, D> {
             reactions: self.reactions(equilibrium),
             energy: equilibrium.energy,
             ..RunSummary::default()
-        }
+        })
+    }
+
+    /// What is linear beyond where its material is, or stays whole where it would break.
+    ///
+    /// # Errors
+    /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
+    fn passed(&self, u: &[f64]) -> Result<Vec<String>, RunError> {
+        let how = (RunKind::Static, self.has_exact_seam);
+        let parts = LinearParts::new(self.model, self.operator, self.rest, how, self.ranks)?;
+        let mut passed = Passed::default();
+        parts.look(u, (0, 0.0), &mut passed);
+        Ok(parts.told(&passed, 0.0).collect())
     }
 
     /// Forces in the sections that the scene asks for.

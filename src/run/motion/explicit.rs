@@ -224,6 +224,7 @@ fn take_segment<'r, const D: usize>(
         progress,
         pace: begin.pace,
         is_linear: begin.moving.is_linear,
+        has_exact_seam: begin.moving.has_exact_seam,
         breaks: breaks(begin.moving.system.as_ref(), rest),
     };
     let watched = Watched {
@@ -323,6 +324,7 @@ impl SegmentRecord {
         told.extend(without_response(motion.system(), &motion.state().u));
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
         told.extend(rotation.as_ref().map(Rotation::warning));
+        told.extend(observer.guard.passed(motion.state().time));
         told.extend(
             observer
                 .recorder

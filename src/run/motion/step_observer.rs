@@ -17,6 +17,7 @@ use crate::observe::ObserveError;
 use crate::observe::summary::{Ended, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
+use crate::run::linear_parts::{LinearParts, RunKind};
 use crate::run::pieces::Piece;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
@@ -57,6 +58,7 @@ pub(super) struct Segment<'a, 'r, const D: usize> {
     pub progress: &'a dyn Progress,
     pub pace: StepChoice,
     pub is_linear: bool,
+    pub has_exact_seam: bool,
     pub breaks: Breaks,
 }
 
@@ -183,7 +185,11 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         } = watched;
         let failing = failing_stretch(model, rest)?;
         let rotations = Rotations::new(model, rest, failing, segment.options.ranks);
-        let guard = Guard::new(rotations, balance, segment.spec, pace.steps, seen);
+        let how = (RunKind::Explicit, segment.has_exact_seam);
+        let ranks = segment.options.ranks;
+        let parts = LinearParts::new(model, segment.operator, rest, how, ranks)?;
+        let watched = (rotations, parts);
+        let guard = Guard::new(watched, balance, segment.spec, pace.steps, seen);
         let monitor = match &rest.follow {
             Some(follow) => {
                 let critical = failure_criterion(model, rest)?.filter(|_| model.body().is_some());
@@ -426,7 +432,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     ) -> Option<Ended> {
         let Segment { rest, options, .. } = *self.segment;
         let gained = energies.and_then(|e| self.guard.look_at_energies(moment, e));
-        let limit = self.guard.look_at_rotation(moment, last).or(gained);
+        let limit = self.guard.look_at_strains(moment, last).or(gained);
         if self.edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
             Some(Ended::DamageAtEdge)
         } else if limit.is_some() {
