@@ -8,7 +8,7 @@ use super::rotation::Rotations;
 use super::sections::Sections;
 use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model};
 use super::solution::{Solved, zone_of_site};
-use super::zone_placement::CachedSolution;
+use super::zone_placement::{CachedSolution, difference_from_elements};
 use crate::run::placed_scene::PlacedScene;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -27,8 +27,8 @@ use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::definiteness;
 use crate::run::error::RunError;
 use crate::run::linear_parts::{LinearParts, Passed, RunKind};
-use crate::run::surface_gradient::missed_peak;
-use crate::run::warnings::{indefinite, of_elements, out_of_balance, warnings};
+use crate::run::surface_gradient::{Asked, steep_stresses};
+use crate::run::warnings::{Imbalance, indefinite, of_elements, out_of_balance, warnings};
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
 use crate::solve::statics::StaticInfo;
@@ -339,22 +339,19 @@ impl<const D: usize> StaticBody<'_, D> {
         told.extend(self.passed(&solution.displacement)?);
         // what is left of the forces of a body that only turns is round-off
         let least = round_off(self.model, furthest(&solution.displacement));
-        let is_loaded = balance.scale > least;
-        told.extend(out_of_balance(force, relative, traits).filter(|_| is_loaded));
+        if balance.scale > least {
+            let known = self.imbalance(&balance, &solution.displacement);
+            told.extend(out_of_balance(&known, traits));
+        }
         let stresses = &self.rest.stresses;
         // strains of free expansion are no stress
         if stresses.thermal.is_none() {
-            let u = &solution.displacement;
-            let uniform = proof.largest("stress error");
-            let skin = "cover the surface (zones.skin = \"free-surfaces\")";
-            told.extend(missed_peak(
-                self.model,
-                self.ranks,
-                stresses.kinematics,
-                u,
-                uniform,
-                skin,
-            ));
+            let asked = Asked {
+                kinematics: stresses.kinematics,
+                displacement: &solution.displacement,
+                uniform: proof.largest("stress error"),
+            };
+            told.extend(steep_stresses(self.model, self.ranks, &asked));
         }
         Ok(RunSummary {
             dimension: D,
@@ -372,6 +369,22 @@ impl<const D: usize> StaticBody<'_, D> {
             energy: equilibrium.energy,
             ..RunSummary::default()
         })
+    }
+
+    /// What is known of forces that do not balance; with a solution by elements alone where they are told of.
+    fn imbalance<'b>(&self, balance: &'b Balance<D>, u: &[f64]) -> Imbalance<'b> {
+        let known = Imbalance {
+            force: balance.force.as_slice(),
+            relative: balance.relative(),
+            difference: None,
+            expands: self.rest.stresses.thermal.is_some(),
+        };
+        let asks = known.is_told() && !known.expands && self.ranks.is_none();
+        let difference = || difference_from_elements(self.model, self.rest, u);
+        Imbalance {
+            difference: asks.then(difference).flatten(),
+            ..known
+        }
     }
 
     /// What is linear beyond where its material is, or stays whole where it would break.
