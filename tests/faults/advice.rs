@@ -7,8 +7,8 @@ use crate::{Case, percent};
 /// The warning with some words, if there is one.
 fn told(text: &str, overrides: &[&str], words: &str) -> Option<String> {
     let summary = Case::new(text).run(overrides).expect("it runs");
-    let list = summary["warnings"].as_array().expect("a list").clone();
-    let mut texts = list.iter().filter_map(|w| w.as_str());
+    let list = summary["warnings"].as_array().into_iter().flatten();
+    let mut texts = list.filter_map(|w| w.as_str());
     texts.find(|w| w.contains(words)).map(str::to_owned)
 }
 

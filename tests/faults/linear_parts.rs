@@ -4,6 +4,14 @@ use crate::Case;
 
 /// A strip under a uniform stress, which every seam holds: the strain is that of its ends.
 fn strip(strain: f64, material: &str, solve: &str) -> String {
+    // a motion begins in equilibrium
+    let initial = match solve == EXPLICIT {
+        true => format!(
+            "[initial.stretched.displacement]\nx = \"{strain}*x\"\ny = \"{}*y\"",
+            -strain / 3.0
+        ),
+        false => String::new(),
+    };
     format!(
         r#"
 kinematics = "plane-stress"
@@ -25,28 +33,25 @@ y = 0
 [conditions.right.displacement]
 on = "right"
 x = {}
-[initial.stretched.displacement]
-x = "{strain}*x"
-y = "{}*y"
 [output]
 vtu = false
 {solve}
+{initial}
 "#,
         12.0 * strain,
-        -strain / 3.0,
     )
 }
 
 const BREAKING: &str = "materials.glass.bond-based = { youngs-modulus = 7e4, density = 1e-9, critical-stretch = 2e-3 }\nno-fail.zone.box = { min = [4, 3], max = [8, 6] }";
-const LOAD_STEPS: &str = "solve.quasi-static.steps = 1";
-const EXPLICIT: &str = "solve.explicit = { duration = 1e-10, outputs = 1 }";
+const LOAD_STEPS: &str = "[solve.quasi-static]\nsteps = 1";
+const EXPLICIT: &str = "[solve.explicit]\nduration = 1e-10\noutputs = 1";
 
 /// The warnings of a run.
 fn warnings(text: &str, overrides: &[&str]) -> Vec<String> {
     let summary = Case::new(text).run(overrides).expect("it runs");
-    let list = summary["warnings"].as_array().expect("a list");
+    let list = summary["warnings"].as_array().into_iter().flatten();
     let text = |w: &serde_json::Value| w.as_str().expect("a text").to_owned();
-    list.iter().map(text).collect()
+    list.map(text).collect()
 }
 
 /// The warning with some words, if there is one.
@@ -66,12 +71,11 @@ fn factor(text: &str) -> f64 {
 
 #[test]
 fn elements_and_whole_bonds_beyond_the_critical_stretch_are_told_in_every_kind_of_run() {
-    let static_scene = strip(4e-3, BREAKING, "").replace(
-        "[initial.stretched.displacement]\nx = \"0.004*x\"\ny = \"-0.0013333333333333333*y\"\n",
-        "",
-    );
     let runs = [
-        (static_scene, "no bond breaks in a static scene"),
+        (
+            strip(4e-3, BREAKING, ""),
+            "no bond breaks in a static scene",
+        ),
         (
             strip(4e-3, BREAKING, LOAD_STEPS),
             "no bond breaks in the regions no-fail",
@@ -99,7 +103,8 @@ fn elements_and_whole_bonds_beyond_the_critical_stretch_are_told_in_every_kind_o
 
 #[test]
 fn nothing_is_told_below_the_limit_or_under_compression() {
-    for strain in [1.9e-3, -8e-3] {
+    // pressed by 5e-3, bonds across are stretched by a third of that
+    for strain in [1.9e-3, -5e-3] {
         for solve in [LOAD_STEPS, EXPLICIT] {
             let all = warnings(&strip(strain, BREAKING, solve), &[]);
             assert_eq!(told(&all, "times"), None, "{all:?}");
