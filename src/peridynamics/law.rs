@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use crate::material::LocalLaw;
 use crate::peridynamics::{
-    BondEnergy, ForceState, LinearForceState,
+    BondEnergy, Departure, ForceState, LinearForceState,
     softening::{CalibrationError, RegularFamily},
 };
+use crate::tensor::Tensor;
 
 /// A fast pass over all bonds that computes what a law's [`ForceState`] says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +66,10 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     fn is_linear(&self) -> bool {
         false
     }
+
+    /// What it does under a uniform mechanical `strain` that is reached at once and then held for a `time` \[s\], and that [`Law::linearised`] does not: finite elements without a [`Law::local_law`] do not either, nor rows at a seam. What breaks bonds by a scene's
+    /// criterion is left out. Every law says so, since nothing else would tell of elements that go on as if they were elastic.
+    fn departure(&self, strain: &Tensor<D>, time: f64) -> Departure;
 
     /// Whether bonds can break: [`Law::force_state`] then takes families that have lost some.
     fn has_breakable_bonds(&self) -> bool;

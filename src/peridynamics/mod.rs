@@ -15,6 +15,7 @@
 //! | `position_aware_influence.rs` | ω and σ of a position-aware family | section 4.2 |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
 //! | `law.rs` | what a law is | |
+//! | `departure.rs` | what a law does that its linearisation does not | |
 //! | `linear_force_state.rs` | its linearisation at rest; the collapsed tensor | eq. (2.10) |
 //! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.6) |
 //! | `laws/` | the laws, one file each | eq. (3.1), (4.11), (5.16), sections 6.2, 7.2 |
@@ -39,6 +40,7 @@ mod cell_list;
 pub mod contact;
 mod crack_area;
 pub mod critical_stretch;
+mod departure;
 pub mod families;
 pub mod force_state;
 mod horizon;
@@ -63,6 +65,7 @@ pub use body::{BondWeights, Cloud, Ends, Factors, PdBody};
 pub use cauchy_born::{CauchyBorn, LatticeBonds};
 pub use crack_area::CrackArea;
 pub use critical_stretch::{BondEnergy, FractureError, critical_stretch, plane_energy};
+pub use departure::{Departure, largest_extension};
 pub use families::{Families, FamilyError, Reversed, TIE_TOLERANCE};
 pub use force_state::{
     CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past,

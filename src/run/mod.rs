@@ -21,6 +21,7 @@
 //! | `springs.rs` | springs between the body and the ground, on the sites of a model |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
 //! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | whether loads and reactions balance; how far elements rotate; stresses that families do not resolve; what of a model makes its results doubtful |
+//! | `linear_parts.rs` | elements, rows and bonds that are linear, or stay whole, beyond where their material is |
 //! | `write.rs` | the files of a run |
 //! | `pieces.rs`, `point_cells.rs` | what a process writes into its piece of a VTU file; the cells shown around points |
 //! | `error.rs` | what cannot be run, with place and remedy |
@@ -36,6 +37,7 @@ mod definiteness;
 pub mod equilibrium;
 pub(crate) mod error;
 mod linear;
+mod linear_parts;
 pub mod loads;
 pub mod motion;
 #[cfg(test)]

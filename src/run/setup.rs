@@ -56,6 +56,8 @@ pub struct RunSettings<const D: usize> {
     pub elements: ElementsSpec,
     /// The local law of each material's elements, of those whose elements are not linear by their material.
     pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
+    /// All materials of the scene.
+    pub materials: Vec<Material<D>>,
     /// Density of each material.
     pub density: Vec<f64>,
     /// What expands, and what of the stress is written.
@@ -228,6 +230,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             fingerprint: scene.fingerprint,
             elements: scene.elements,
             local_laws,
+            materials: scene.materials,
             density,
             stresses,
             chosen,

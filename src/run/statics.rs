@@ -8,11 +8,12 @@ use super::rotation::Rotations;
 use super::sections::Sections;
 use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model};
 use super::solution::{Solved, zone_of_site};
-use super::zone_placement::CachedSolution;
+use super::zone_placement::{CachedSolution, difference_from_elements};
 use crate::run::placed_scene::PlacedScene;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::coupling::semidiscrete::CoupledSystem;
 use crate::coupling::{Coupling, Model, Operator, Problem, SiteKind};
 use crate::dimension;
 use crate::observe::ObserveError;
@@ -25,8 +26,9 @@ use crate::progress::Progress;
 use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::definiteness;
 use crate::run::error::RunError;
-use crate::run::surface_gradient::missed_peak;
-use crate::run::warnings::{indefinite, of_elements, out_of_balance, warnings};
+use crate::run::linear_parts::{LinearParts, Passed, RunKind};
+use crate::run::surface_gradient::{Asked, steep_stresses};
+use crate::run::warnings::{Imbalance, indefinite, of_elements, out_of_balance, warnings};
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
 use crate::solve::statics::StaticInfo;
@@ -135,6 +137,7 @@ fn solve_chosen<const D: usize>(
         operator: operator.as_ref(),
         rest: &rest,
         ranks,
+        has_exact_seam: system.as_ref().is_some_and(CoupledSystem::has_seam_bonds),
     };
     // what placed the zone was solved with linear forces
     let cached = kept.as_ref().filter(|_| system.is_none());
@@ -175,7 +178,7 @@ fn solve_chosen<const D: usize>(
         peak_memory_bytes: peak_memory_bytes(),
         files,
         sections,
-        ..body.summary(equilibrium, traits, proof)
+        ..body.summary(equilibrium, traits, proof)?
     })
 }
 
@@ -200,6 +203,8 @@ struct StaticBody<'a, const D: usize> {
     operator: &'a dyn Operator<D>,
     rest: &'a RunSettings<D>,
     ranks: Option<&'a dyn Ranks>,
+    /// Whether bonds of the seam turn like others.
+    has_exact_seam: bool,
 }
 
 impl<const D: usize> StaticBody<'_, D> {
@@ -306,12 +311,15 @@ impl<const D: usize> StaticBody<'_, D> {
     }
 
     /// What the summary says of the solution: forces, energy, rotation, warnings.
+    ///
+    /// # Errors
+    /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
     fn summary(
         &self,
         equilibrium: &Equilibrium,
         traits: CouplingTraits,
         proof: Proof,
-    ) -> RunSummary {
+    ) -> Result<RunSummary, RunError> {
         let solution = &equilibrium.solution;
         let info = &solution.info;
         let rotations = Rotations::new(self.model, self.rest, None, self.ranks);
@@ -328,26 +336,24 @@ impl<const D: usize> StaticBody<'_, D> {
         ));
         told.extend(indefinite(equilibrium.symmetry, info.method));
         told.extend(rotation.as_ref().map(Rotation::warning));
+        told.extend(self.passed(&solution.displacement)?);
         // what is left of the forces of a body that only turns is round-off
         let least = round_off(self.model, furthest(&solution.displacement));
-        let is_loaded = balance.scale > least;
-        told.extend(out_of_balance(force, relative, traits).filter(|_| is_loaded));
+        if balance.scale > least {
+            let known = self.imbalance(&balance, &solution.displacement);
+            told.extend(out_of_balance(&known, traits));
+        }
         let stresses = &self.rest.stresses;
         // strains of free expansion are no stress
         if stresses.thermal.is_none() {
-            let u = &solution.displacement;
-            let uniform = proof.largest("stress error");
-            let skin = "cover the surface (zones.skin = \"free-surfaces\")";
-            told.extend(missed_peak(
-                self.model,
-                self.ranks,
-                stresses.kinematics,
-                u,
-                uniform,
-                skin,
-            ));
+            let asked = Asked {
+                kinematics: stresses.kinematics,
+                displacement: &solution.displacement,
+                uniform: proof.largest("stress error"),
+            };
+            told.extend(steep_stresses(self.model, self.ranks, &asked));
         }
-        RunSummary {
+        Ok(RunSummary {
             dimension: D,
             coupling: traits.name.to_owned(),
             warnings: told,
@@ -362,7 +368,35 @@ impl<const D: usize> StaticBody<'_, D> {
             reactions: self.reactions(equilibrium),
             energy: equilibrium.energy,
             ..RunSummary::default()
+        })
+    }
+
+    /// What is known of forces that do not balance; with a solution by elements alone where they are told of.
+    fn imbalance<'b>(&self, balance: &'b Balance<D>, u: &[f64]) -> Imbalance<'b> {
+        let known = Imbalance {
+            force: balance.force.as_slice(),
+            relative: balance.relative(),
+            difference: None,
+            expands: self.rest.stresses.thermal.is_some(),
+        };
+        let asks = known.is_told() && !known.expands && self.ranks.is_none();
+        let difference = || difference_from_elements(self.model, self.rest, u);
+        Imbalance {
+            difference: asks.then(difference).flatten(),
+            ..known
         }
+    }
+
+    /// What is linear beyond where its material is, or stays whole where it would break.
+    ///
+    /// # Errors
+    /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
+    fn passed(&self, u: &[f64]) -> Result<Vec<String>, RunError> {
+        let how = (RunKind::Static, self.has_exact_seam);
+        let parts = LinearParts::new(self.model, self.operator, self.rest, how, self.ranks)?;
+        let mut passed = Passed::default();
+        parts.look(u, (0, 0.0), &mut passed);
+        Ok(parts.told(&passed, 0.0).collect())
     }
 
     /// Forces in the sections that the scene asks for.

@@ -71,17 +71,53 @@ pub(crate) fn without_response(system: &dyn SemiDiscrete, u: &[f64]) -> Option<S
 /// displacements 1.2 to 3 %.
 const OUT_OF_BALANCE: f64 = 0.002;
 
+/// What is known of forces that do not balance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Imbalance<'a> {
+    /// Their sum \[N\], by axis.
+    pub force: &'a [f64],
+    /// Its size over that of all loads and reactions.
+    pub relative: f64,
+    /// By how much displacements differ from those of elements alone, over the largest of these; none where that was not computed.
+    pub difference: Option<f64>,
+    /// Whether the body expands under a temperature.
+    pub expands: bool,
+}
+
+impl Imbalance<'_> {
+    /// Whether it is large enough to be told.
+    pub fn is_told(&self) -> bool {
+        self.relative > OUT_OF_BALANCE
+    }
+}
+
 /// A solution whose loads and reactions do not balance.
-pub(crate) fn out_of_balance(
-    force: &[f64],
-    relative: f64,
-    traits: CouplingTraits,
-) -> Option<String> {
-    (relative > OUT_OF_BALANCE).then(|| {
-        let force: Vec<String> = force.iter().map(|f| number(*f)).collect();
+pub(crate) fn out_of_balance(of: &Imbalance<'_>, traits: CouplingTraits) -> Option<String> {
+    let force: Vec<String> = of.force.iter().map(|f| number(*f)).collect();
+    // rows of a seam that cuts bonds balance whatever their displacements are
+    let remedy = match (traits.name, of.expands) {
+        (_, true) => {
+            "the rows of its seam are exact where the temperature is linear over an element, so lay the seam where it bends less, or couple by nonlocal"
+        }
+        ("truncated", false) => {
+            "the rows of its seam balance without a temperature: enclose the zone in more elements, or couple by nonlocal"
+        }
+        _ => {
+            "its seam balances affine fields only: couple by truncated, or enclose the zone in more elements, further from surfaces and supports"
+        }
+    };
+    let displacements = match of.difference {
+        Some(part) => format!(
+            "differ from those of elements alone by up to {} % of the largest",
+            number(100.0 * part)
+        ),
+        None => "may be wrong by three times as much, and by far more where the body bends easily"
+            .to_owned(),
+    };
+    of.is_told().then(|| {
         format!(
-            "loads and reactions are out of balance by {:.2} % of the sum of them all, by the force ({}): the seam of coupling `{}` balances affine fields only, and displacements may be wrong by three times as much; couple by truncated, or enclose the zone in more elements, further from surfaces and supports",
-            100.0 * relative,
+            "loads and reactions are out of balance by {:.2} % of the sum of them all, by the force ({}), and displacements {displacements} (coupling `{}`): {remedy}",
+            100.0 * of.relative,
             force.join(", "),
             traits.name
         )

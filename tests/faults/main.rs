@@ -1,6 +1,7 @@
 //! Scenes that once gave a wrong answer without a word, by the binary: each gives the right one, is warned of with a number, or is refused.
 
 mod a;
+mod advice;
 mod any_faces;
 mod b;
 mod cantilever;
@@ -13,6 +14,7 @@ mod i;
 mod indefinite;
 mod j;
 mod k;
+mod linear_parts;
 mod m;
 mod n;
 mod o;

@@ -2,12 +2,12 @@
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
-        Influence, Law, LinearForceState, Micromodulus, MomentConditions, Past, PdError, Present,
-        ShellTarget, StatePart,
+        Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
+        HistoryLayout, Influence, Law, LinearForceState, Micromodulus, MomentConditions, Past,
+        PdError, Present, ShellTarget, StatePart,
         influence::{Alpha, Degree},
     },
-    tensor::{Tensor4, Vector},
+    tensor::{Tensor, Tensor4, Vector},
 };
 
 /// `P_1/|ξ|`, ω of the divergence of the partial stress beside a triangular micromodulus, which is `P_1/|ξ|` too: stable in motion, where a Gaussian grows. Beside the inverse distance it is the other way round.
@@ -56,6 +56,10 @@ impl<const D: usize> Law<D> for BondBased<D> {
 
     fn is_linear(&self) -> bool {
         true
+    }
+
+    fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {
+        Departure::None
     }
 
     fn has_breakable_bonds(&self) -> bool {

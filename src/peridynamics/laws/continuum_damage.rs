@@ -6,10 +6,11 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Law,
-        LinearForceState, Micromodulus, Past, Present,
+        BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout,
+        KeptDamage, Law, LinearForceState, Micromodulus, Past, Present,
+        departure::DAMAGED_ELEMENTS,
     },
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// What a bond remembers: without weak planes its damage alone.
@@ -133,6 +134,25 @@ impl<const D: usize> Law<D> for ContinuumDamage<D> {
 
     fn is_linear_until_damaged(&self) -> bool {
         true
+    }
+
+    /// By `V₀ μ•w` of a continuous family. With weak planes of the normal m, and ⟨·⟩ the mean over all directions n,
+    /// `⟨(n·ε·n)²⟩ = ((tr ε)² + 2 ε:ε)/(D (D+2))` and `⟨(n·m)² (n·ε·n)²⟩ = ((tr ε)² + 2 ε:ε + 4 tr ε m·ε·m + 8 m·ε²·m)/(D (D+2) (D+4))`.
+    fn departure(&self, strain: &Tensor<D>, _time: f64) -> Departure {
+        let energy = 0.5 * self.linear.tensor().contract(strain).dot(strain);
+        let by_direction = self.weak.map_or(1.0, |(weakness, normal)| {
+            let d = D as f64;
+            let (trace, along) = (strain.trace(), strain * normal);
+            let all = trace * trace + 2.0 * strain.norm_squared();
+            let of_planes = all + 4.0 * trace * normal.dot(&along) + 8.0 * along.norm_squared();
+            let shape = 1.0 + (weakness - 1.0) / d;
+            (1.0 + (weakness - 1.0) * of_planes / (all * (d + 4.0))) / shape
+        });
+        Departure::AtStrain {
+            factor: (energy * by_direction / self.onset).sqrt(),
+            begins: "the energy of its bonds damages them",
+            in_elements: Some(DAMAGED_ELEMENTS),
+        }
     }
 
     /// Not at a stretch: they break by their damage.

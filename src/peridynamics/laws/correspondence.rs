@@ -2,8 +2,8 @@
 
 use crate::{
     peridynamics::{
-        BondEnergy, Family, ForceState, Influence, Law, LinearForceState, MomentConditions,
-        PdError, ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
+        BondEnergy, Departure, Family, ForceState, Influence, Law, LinearForceState,
+        MomentConditions, PdError, ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -65,6 +65,10 @@ impl<const D: usize> Law<D> for Correspondence<D> {
 
     fn is_linear(&self) -> bool {
         true
+    }
+
+    fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {
+        Departure::None
     }
 
     fn has_breakable_bonds(&self) -> bool {

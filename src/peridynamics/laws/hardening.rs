@@ -6,10 +6,11 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Micromodulus, Past, Present,
+        BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout, Law,
+        LinearForceState, Micromodulus, Past, Present, departure::stretch_of_cubic,
+        largest_extension,
     },
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// Nonlinear elastic bonds, `T⟨ξ⟩ = ½ c s (1 + β s²) M` with the stretch `s = e/|ξ|` and the micromodulus `λ = c/|ξ|³`.
@@ -56,6 +57,15 @@ impl<const D: usize> Law<D> for Hardening<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
+    }
+
+    fn departure(&self, strain: &Tensor<D>, _time: f64) -> Departure {
+        let largest = largest_extension(strain).max(largest_extension(&-strain));
+        Departure::AtStrain {
+            factor: largest / stretch_of_cubic(self.beta),
+            begins: "the force of its bonds departs from proportion to their stretch by 5 %",
+            in_elements: Some("peridynamics.elements = \"cauchy-born\""),
+        }
     }
 
     fn has_breakable_bonds(&self) -> bool {

@@ -6,10 +6,11 @@ use super::{Correspondence, Parameter};
 use crate::{
     material::LocalLaw,
     peridynamics::{
-        BondEnergy, Calibrate, CauchyStress, DeformedFamily, EnergyDensity, ForceState,
+        BondEnergy, Calibrate, CauchyStress, DeformedFamily, Departure, EnergyDensity, ForceState,
         HistoryLayout, KeptDamage, Law, LinearForceState, Past, PointStress, Present,
         ZeroEnergyControl,
         bond_force::{conjugate, felt},
+        departure,
         shape_tensor::spanned_inverse,
         softening::{CalibrationError, RegularFamily},
         zero_energy::{control_left, excess_length},
@@ -89,6 +90,10 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
 
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         Some(Arc::clone(&self.local))
+    }
+
+    fn departure(&self, strain: &Tensor<D>, time: f64) -> Departure {
+        departure::of_local_law(self.law(), strain, time)
     }
 
     /// Not of a law that softens: it loses its stiffness before.

@@ -2,9 +2,9 @@
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, DeformedFamily, EnergyDensity, Family, ForceState, HistoryLayout,
-        Influence, Law, LinearForceState, MomentConditions, Past, PdError, Present, ShellTarget,
-        StatePart, moment_fitted_weights,
+        Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
+        HistoryLayout, Influence, Law, LinearForceState, MomentConditions, Past, PdError, Present,
+        ShellTarget, StatePart, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -61,6 +61,10 @@ impl<const D: usize> Law<D> for LinearPeridynamicSolid<D> {
 
     fn is_linear(&self) -> bool {
         true
+    }
+
+    fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {
+        Departure::None
     }
 
     fn has_breakable_bonds(&self) -> bool {

@@ -6,10 +6,10 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Arm, Kinematics},
     peridynamics::{
-        BondEnergy, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
+        BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout, Law,
         LinearForceState, Micromodulus, Past, Present,
     },
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// Standard linear solid, bond by bond: `T = ½ c [(1 − g) s + g q] M`, `q̇ = ṡ − q/τ`.
@@ -71,6 +71,13 @@ impl<const D: usize> Law<D> for Maxwell<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
+    }
+
+    fn departure(&self, _strain: &Tensor<D>, time: f64) -> Departure {
+        Departure::WithTime {
+            lost: self.share * (1.0 - (-time / self.time).exp()),
+            in_elements: Some("the material viscoelastic-correspondence, whose elements relax"),
+        }
     }
 
     fn has_breakable_bonds(&self) -> bool {

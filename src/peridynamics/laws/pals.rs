@@ -6,9 +6,9 @@ use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        BondEnergy, CalibrationFields, DeformedFamily, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, MomentConditions, Past, PdError, Present,
-        ShellTarget, StatePart, StressFit,
+        BondEnergy, CalibrationFields, DeformedFamily, Departure, EnergyDensity, Family,
+        ForceState, HistoryLayout, Influence, Law, LinearForceState, MomentConditions, Past,
+        PdError, Present, ShellTarget, StatePart, StressFit,
         position_aware_influence::{self, PositionAware},
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -146,6 +146,10 @@ impl<const D: usize> Law<D> for PositionAwareSolid<D> {
 
     fn is_linear(&self) -> bool {
         true
+    }
+
+    fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {
+        Departure::None
     }
 
     fn has_breakable_bonds(&self) -> bool {

@@ -7,10 +7,10 @@ use super::{Constants, NamedLaw, Parameter, PositionAwareSolid, Ratio, relaxing}
 use crate::{
     material::{Kinematics, LocalLaw, PronySeries},
     peridynamics::{
-        BondEnergy, CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Past, Present,
+        BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity, ForceState,
+        HistoryLayout, Law, LinearForceState, Past, Present, departure,
     },
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// What a bond remembers, as much as there are arms, and one.
@@ -102,6 +102,10 @@ impl<const D: usize> Law<D> for PositionAwareViscoelasticSolid<D> {
 
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         Some(Arc::clone(&self.local))
+    }
+
+    fn departure(&self, strain: &Tensor<D>, time: f64) -> Departure {
+        departure::of_local_law(&*self.local, strain, time)
     }
 
     fn has_breakable_bonds(&self) -> bool {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::{
     peridynamics::{
-        Accelerator, BondEnergy, CauchyStress, DeformedFamily, EnergyDensity, Family, ForceState,
+        Accelerator, BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity, Family,
+        ForceState,
         HistoryLayout, Influence, Law, LinearForceState, Mixture, MomentConditions, Past, PdError,
         PointStress, Present, ShellTarget, StatePart,
     },
@@ -196,6 +197,18 @@ impl<const D: usize> Law<D> for Several<D> {
 
     fn is_linear(&self) -> bool {
         self.in_use().all(|law| law.is_linear())
+    }
+
+    /// Of the material that departs the furthest.
+    fn departure(&self, strain: &Tensor<D>, time: f64) -> Departure {
+        let size = |departure: &Departure| match departure {
+            Departure::None => 0.0,
+            Departure::AtStrain { factor, .. } => *factor,
+            Departure::WithTime { lost, .. } => *lost,
+        };
+        let all = self.in_use().map(|law| law.departure(strain, time));
+        let largest = all.max_by(|a, b| size(a).total_cmp(&size(b)));
+        largest.unwrap_or(Departure::None)
     }
 
     fn has_breakable_bonds(&self) -> bool {

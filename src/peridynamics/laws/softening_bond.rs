@@ -6,11 +6,13 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::Kinematics,
     peridynamics::{
-        BondEnergy, Calibrate, DeformedFamily, EnergyDensity, ForceState, HistoryLayout,
+        BondEnergy, Calibrate, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout,
         KeptDamage, Law, LinearForceState, Micromodulus, Past, Present,
+        departure::DAMAGED_ELEMENTS,
+        largest_extension,
         softening::{Calibration, CalibrationError, Envelope, RegularFamily, Softening},
     },
-    tensor::Vector,
+    tensor::{Tensor, Vector},
 };
 
 /// Bond-based material whose bonds soften beyond a stretch, for concrete and ceramics.
@@ -89,6 +91,17 @@ impl<const D: usize> Law<D> for SofteningBond<D> {
 
     fn is_linear_until_damaged(&self) -> bool {
         true
+    }
+
+    fn departure(&self, strain: &Tensor<D>, _time: f64) -> Departure {
+        // bonds that act alone, C_1111 = 3 C_1122, and E = C_1111 in a bar
+        let c1111 = self.linear.tensor().get(0, 0, 0, 0);
+        let young = c1111 * [1.0, 8.0 / 9.0, 5.0 / 6.0][D - 1];
+        Departure::AtStrain {
+            factor: largest_extension(strain) * young / self.typed.strength,
+            begins: "its bonds soften, tensile-strength over Young's modulus",
+            in_elements: Some(DAMAGED_ELEMENTS),
+        }
     }
 
     /// Not at a stretch: they break by their damage.

@@ -7,8 +7,8 @@ use crate::coupling::Model;
 use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::setup::RunSettings;
 use crate::run::springs::Springs;
-use crate::run::surface_gradient::missed_peak;
-use crate::run::warnings::out_of_balance;
+use crate::run::surface_gradient::{Asked, steep_stresses};
+use crate::run::warnings::{Imbalance, out_of_balance};
 use crate::scene::spec::CouplingTraits;
 use crate::solve::quasi_static::LoadStep;
 use crate::tensor::Vector;
@@ -28,7 +28,7 @@ pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     furthest: f64,
     /// Whether a load step has been asked for its peak of stress.
     asked: bool,
-    peak: Option<String>,
+    steep: Vec<String>,
 }
 
 impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
@@ -45,7 +45,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
             scale: 0.0,
             furthest: 0.0,
             asked: false,
-            peak: None,
+            steep: Vec::new(),
         }
     }
 
@@ -76,10 +76,12 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
         self.asked = true;
         // strains of free expansion are no stress
         if seen.state.broken == 0 && stresses.thermal.is_none() {
-            // a seam within a horizon of what flows or breaks balances no steep stress: no skin
-            let apart = "carry the surface and what lies within two horizons of it";
-            let kinematics = stresses.kinematics;
-            self.peak = missed_peak(self.model, None, kinematics, u, self.uniform, apart);
+            let asked = Asked {
+                kinematics: stresses.kinematics,
+                displacement: u,
+                uniform: self.uniform,
+            };
+            self.steep = steep_stresses(self.model, None, &asked);
         }
     }
 
@@ -89,8 +91,14 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
         let round_off = round_off(self.model, self.furthest);
         let relative = Balance { force, scale }.relative();
         let is_loaded = scale > round_off;
-        let balance = out_of_balance(force.as_slice(), relative, self.traits);
+        let imbalance = Imbalance {
+            force: force.as_slice(),
+            relative,
+            difference: None,
+            expands: self.rest.stresses.thermal.is_some(),
+        };
+        let balance = out_of_balance(&imbalance, self.traits);
         let balance = balance.filter(|_| is_loaded);
-        balance.into_iter().chain(self.peak)
+        balance.into_iter().chain(self.steep)
     }
 }

@@ -36,6 +36,8 @@ pub struct DynamicSystem<'a> {
     pub bytes: usize,
     /// Whether its force is linear in the displacement.
     pub is_linear: bool,
+    /// Whether bonds of the seam turn and break like others.
+    pub has_exact_seam: bool,
 }
 
 /// What a layout of the zones begins with, beside the scene.
@@ -123,6 +125,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
             );
             Ok(DynamicSystem {
                 bytes: motion.memory_bytes(),
+                has_exact_seam: motion.has_seam_bonds(),
                 system: Box::new(motion),
                 is_linear,
             })
@@ -277,6 +280,7 @@ fn assembled<'a, const D: usize>(
             symmetry,
         }),
         is_linear: true,
+        has_exact_seam: false,
     }
 }
 

@@ -224,6 +224,8 @@ fn take_segment<'r, const D: usize>(
         progress,
         pace: begin.pace,
         is_linear: begin.moving.is_linear,
+        has_exact_seam: begin.moving.has_exact_seam,
+        uniform: record.proof.largest("stress error"),
         breaks: breaks(begin.moving.system.as_ref(), rest),
     };
     let watched = Watched {
@@ -323,6 +325,8 @@ impl SegmentRecord {
         told.extend(without_response(motion.system(), &motion.state().u));
         told.extend(energy_gain.as_ref().and_then(EnergyGain::warning));
         told.extend(rotation.as_ref().map(Rotation::warning));
+        told.extend(observer.guard.passed(motion.state().time));
+        told.extend(observer.steep.iter().cloned());
         told.extend(
             observer
                 .recorder

@@ -1,4 +1,4 @@
-//! What is watched while a run goes on: energy that nobody put in, and elements that rotate.
+//! What is watched while a run goes on: energy that nobody put in, elements that rotate, and what is linear beyond where its material is.
 //!
 //! A model whose stiffness is symmetric and positive, whatever its strain, keeps its energy, and is not asked. Every other may feed its modes at the seam, whatever was computed before the first step:
 //!
@@ -11,6 +11,7 @@
 use super::seen::{Rotated, Seen};
 use super::writer::{EnergyRow, Moment};
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
+use crate::run::linear_parts::LinearParts;
 use crate::run::rotation::Rotations;
 use crate::scene::solve::Explicit as Spec;
 
@@ -41,13 +42,14 @@ pub(crate) struct Guard<'m, const D: usize> {
     largest_rotation: f64,
     every: u64,
     rotations: Rotations<'m, D>,
+    parts: LinearParts<'m, D>,
     pub seen: Seen,
 }
 
 impl<'m, const D: usize> Guard<'m, D> {
     /// For a run of so many steps.
     pub fn new(
-        rotations: Rotations<'m, D>,
+        (rotations, parts): (Rotations<'m, D>, LinearParts<'m, D>),
         balance: Balance,
         spec: &Spec,
         steps: u64,
@@ -59,6 +61,7 @@ impl<'m, const D: usize> Guard<'m, D> {
             largest_rotation: spec.largest_rotation.unwrap_or(f64::INFINITY),
             every: STEPS.max(steps / LOOKS),
             rotations,
+            parts,
             seen,
         }
     }
@@ -104,12 +107,14 @@ impl<'m, const D: usize> Guard<'m, D> {
             .or(gained.map(|_| Ended::EnergyGained))
     }
 
-    /// Looks at the rotation of elements, where that is due; returns why the run has to end.
-    pub fn look_at_rotation(&mut self, moment: &Moment<'_>, is_last: bool) -> Option<Ended> {
+    /// Looks at the rotation of elements, and at the strains of what is linear, where that is due; returns why the run has to end.
+    pub fn look_at_strains(&mut self, moment: &Moment<'_>, is_last: bool) -> Option<Ended> {
         let state = moment.state;
         if !(is_last || state.step.is_multiple_of(self.every)) {
             return None;
         }
+        let now = (state.step, state.time);
+        self.parts.look(&state.u, now, &mut self.seen.passed);
         let found = self.rotations.largest(&state.u)?;
         if self.seen.rotated.is_none_or(|r| found.degrees > r.degrees) {
             self.seen.rotated = Some(Rotated {
@@ -135,6 +140,11 @@ impl<'m, const D: usize> Guard<'m, D> {
             first_told: self.seen.told.map(|_| (told_step, told_time)),
             by_law: self.balance == Balance::WatchedForLaw,
         })
+    }
+
+    /// What is linear or whole beyond where its material is, in a run that ends at a time.
+    pub fn passed(&self, time: f64) -> impl Iterator<Item = String> {
+        self.parts.told(&self.seen.passed, time)
     }
 
     /// What the summary tells of rotation; none where no element has rotated enough to matter.

@@ -64,6 +64,7 @@ pub(crate) fn impacted<'a, const D: usize>(
         bytes: moving.bytes + impact.memory_bytes(),
         system: Box::new(ImpactedSystem::new(moving.system, Arc::clone(&impact))),
         is_linear: false,
+        has_exact_seam: moving.has_exact_seam,
     };
     Ok((moving, Some(impact)))
 }

@@ -27,6 +27,7 @@ use crate::observe::summary::{
 };
 use crate::progress::Progress;
 use crate::run::error::{RunError, explained};
+use crate::run::linear_parts::{LinearParts, RunKind};
 use crate::run::loads;
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
@@ -73,6 +74,8 @@ fn load_steps<const D: usize>(
     let (mut timings, mut watch, mut choices) =
         (laid_out.timings, laid_out.watch, laid_out.choices);
     let begin = start(model, rest);
+    let how = (RunKind::LoadSteps, laid_out.moving.has_exact_seam);
+    let parts = LinearParts::new(model, operator, rest, how, options.ranks)?;
     let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
     let mut system = moving.system;
     let pace = step_choice(spec);
@@ -91,7 +94,9 @@ fn load_steps<const D: usize>(
     let mut recorder = recorder((model, rest), spec, options, (impact, breaks), file, at)?;
     recorder.hold(drive.holders());
     recorder.cut(model, rest, Arc::clone(&laid_out.springs))?;
-    let edge = saved.as_ref().and_then(|s| s.edge);
+    let (edge, seen) = saved
+        .as_ref()
+        .map_or_else(Default::default, |s| (s.edge, s.seen.clone()));
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
     let rotations = Rotations::new(model, rest, failing_stretch(model, rest)?, None);
@@ -107,6 +112,8 @@ fn load_steps<const D: usize>(
         fields: FieldOutput::new(model, operator, rest, options),
         recorder,
         rotations,
+        parts,
+        seen,
         doubts,
         last_damage: system.damage_state(),
         state,
@@ -240,6 +247,8 @@ struct LoadStepObserver<'a, const D: usize> {
     fields: FieldOutput<'a, D>,
     recorder: Recorder<'a, D>,
     rotations: Rotations<'a, D>,
+    parts: LinearParts<'a, D>,
+    seen: Seen,
     doubts: DoubtfulEquilibria<'a, D>,
     /// Fields, time, step, work, broken bonds of the last load step: what a checkpoint keeps.
     state: State,
@@ -341,9 +350,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
 
     /// Writes all that the run needs to go on from the last load step.
     fn checkpoint(&mut self, system: &dyn SemiDiscrete) -> Result<(), ObserveError> {
-        let (pace, edge, seen) = (self.pace, self.edge, Seen::default());
+        let (pace, edge) = (self.pace, self.edge);
         self.recorder
-            .checkpoint(&self.state, system, pace, edge, None, &seen)
+            .checkpoint(&self.state, system, pace, edge, None, &self.seen)
     }
 
     /// Watches and writes a load step; says whether the next is taken.
@@ -351,6 +360,8 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let begins = seen.state.step == 1;
         self.take_state(seen);
         self.doubts.watch(seen);
+        let now = (self.state.step, self.state.time);
+        self.parts.look(&self.state.u, now, &mut self.seen.passed);
         self.find_damage_at_edge(seen);
         self.find_reason_to_end();
         if let Err(error) = self.write(seen, begins) {
@@ -510,6 +521,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
                 )
                 .chain(unusual_stretch(model, self.rest)?)
                 .chain(self.rotation.as_ref().map(Rotation::warning))
+                .chain(self.parts.told(&self.seen.passed, state.time))
                 .chain(self.doubts.told())
                 .collect(),
             dimension: D,

@@ -1,6 +1,8 @@
-//! What a run has seen of its energy and of rotation so far, which a checkpoint keeps.
+//! What a run has seen of its energy, of rotation and of strains so far, which a checkpoint keeps.
 
 use serde::{Deserialize, Serialize};
+
+use crate::run::linear_parts::Passed;
 
 /// What was seen so far: part of a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -13,6 +15,8 @@ pub struct Seen {
     pub(super) most: Option<(f64, u64, f64)>,
     /// The largest rotation: degrees, cell, step, time, and the strain energy that it costs.
     pub(super) rotated: Option<Rotated>,
+    /// What passed the limits of what is linear furthest.
+    pub(super) passed: Passed,
 }
 
 /// An element that has rotated.

@@ -17,12 +17,14 @@ use crate::observe::ObserveError;
 use crate::observe::summary::{Ended, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
+use crate::run::linear_parts::{LinearParts, RunKind};
 use crate::run::pieces::Piece;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
 use crate::run::stress_probes::StressProbes;
 use crate::run::stress_settings::StressSettings;
+use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::solve::explicit::{Explicit, State};
@@ -57,6 +59,9 @@ pub(super) struct Segment<'a, 'r, const D: usize> {
     pub progress: &'a dyn Progress,
     pub pace: StepChoice,
     pub is_linear: bool,
+    pub has_exact_seam: bool,
+    /// The stress error of a uniform field at surfaces of points.
+    pub uniform: f64,
     pub breaks: Breaks,
 }
 
@@ -149,6 +154,8 @@ pub(super) struct StepObserver<'a, 'r, const D: usize> {
     pub recorder: Recorder<'r, D>,
     pub edge: Option<EdgeReached>,
     pub zone: Option<SavedZone>,
+    /// What the first output that shows such tells of steep stresses.
+    pub steep: Vec<String>,
     /// Why the steps were left early.
     pub stop: Option<Stop>,
     /// Whether a checkpoint was due with the change of the zone: of the state in the next layout.
@@ -183,7 +190,11 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         } = watched;
         let failing = failing_stretch(model, rest)?;
         let rotations = Rotations::new(model, rest, failing, segment.options.ranks);
-        let guard = Guard::new(rotations, balance, segment.spec, pace.steps, seen);
+        let how = (RunKind::Explicit, segment.has_exact_seam);
+        let ranks = segment.options.ranks;
+        let parts = LinearParts::new(model, segment.operator, rest, how, ranks)?;
+        let watched = (rotations, parts);
+        let guard = Guard::new(watched, balance, segment.spec, pace.steps, seen);
         let monitor = match &rest.follow {
             Some(follow) => {
                 let critical = failure_criterion(model, rest)?.filter(|_| model.body().is_some());
@@ -202,6 +213,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             recorder,
             edge,
             zone,
+            steep: Vec::new(),
             stop: None,
             is_late: false,
             known_broken: u64::MAX,
@@ -426,7 +438,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     ) -> Option<Ended> {
         let Segment { rest, options, .. } = *self.segment;
         let gained = energies.and_then(|e| self.guard.look_at_energies(moment, e));
-        let limit = self.guard.look_at_rotation(moment, last).or(gained);
+        let limit = self.guard.look_at_strains(moment, last).or(gained);
         if self.edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
             Some(Ended::DamageAtEdge)
         } else if limit.is_some() {
@@ -451,6 +463,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         }
         if due.fields {
             self.fields.write(&mut self.recorder, moment)?;
+            self.look_for_steep_stresses(moment.state);
         }
         if due.must_save || self.recorder.is_checkpoint_due(moment.state.step) {
             if due.changes {
@@ -460,6 +473,25 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             }
         }
         Ok(())
+    }
+
+    /// Looks for stresses that families do not resolve, in a body that stays whole and does not expand.
+    fn look_for_steep_stresses(&mut self, state: &State) {
+        let Segment {
+            model,
+            rest,
+            uniform,
+            ..
+        } = *self.segment;
+        let is_whole = self.segment.breaks == Breaks::Never;
+        if is_whole && rest.stresses.thermal.is_none() && self.steep.is_empty() {
+            let asked = Asked {
+                kinematics: rest.stresses.kinematics,
+                displacement: &state.u,
+                uniform,
+            };
+            self.steep = steep_stresses(model, self.segment.options.ranks, &asked);
+        }
     }
 
     /// Writes a row of the history and of the tables of tips.

@@ -81,6 +81,7 @@ pub fn paced<'a>(
         bytes: moving.bytes + cycled.memory_bytes(),
         system: Box::new(cycled),
         is_linear: moving.is_linear,
+        has_exact_seam: moving.has_exact_seam,
     };
     // sub-steps are for symmetric models: what is proved of one holds of it
     let growth = match known {

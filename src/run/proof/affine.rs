@@ -4,7 +4,7 @@ use super::classes::{Layout, RowClass, Skin, Unbalanced, limits, told};
 use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress};
 use super::loads::centre;
 use super::patch::{Around, PatchField, StressError, stress_errors};
-use super::surface::{self, Boundary, FacetKind};
+use super::surface::{self, Boundary, FacetKind, add_tractions};
 use crate::coupling::{Model, Operator, Site, SiteKind, Zone};
 use crate::observe::proof::Part;
 use crate::progress::Progress;
@@ -442,7 +442,7 @@ fn class<const D: usize>(
     let is_alone = nearest.is_some_and(|(m, _)| {
         let n = &boundary.normals[*m];
         let mut others = near.iter();
-        others.all(|(f, _)| boundary.normals[*f].dot(n) > 0.99)
+        others.all(|(f, _)| boundary.normals[*f].dot(n) > surface::PLANE)
     });
     let facet = nearest.map(|(f, _)| *f);
     // rows that broken bonds are missing from, or in whose families they are missing
@@ -507,14 +507,18 @@ fn predicted<const D: usize>(
             (Some(f), fields.collect())
         }
     };
-    let forces: Vec<Vec<f64>> = list
-        .iter()
-        .map(|g| {
-            let mut force = vec![0.0; model.sites.len() * D];
-            nodal(g, &mut force);
-            force
-        })
-        .collect();
+    let surface = main.map(|f| around.boundary.smooth_surface(f));
+    let curved = main.zip(surface.as_deref());
+    let bent = curved.map(|(f, surface)| around.boundary.bent_parts(f, surface));
+    let of_field = |g: &Tensor<D>| {
+        let mut force = vec![0.0; model.sites.len() * D];
+        nodal(g, &mut force);
+        if let Some(parts) = &bent {
+            add_tractions(parts, &tensor.contract(g), &mut force);
+        }
+        force
+    };
+    let forces: Vec<Vec<f64>> = list.iter().map(of_field).collect();
     let mismatches: Vec<_> = list
         .iter()
         .map(|g| move |dof: usize| mismatch(subject, around.boundary, g, dof))
@@ -532,7 +536,7 @@ fn predicted<const D: usize>(
     if fields.is_empty() {
         return Predicted::NotAsked;
     }
-    let Some(errors) = stress_errors(around, &place, main, &fields) else {
+    let Some(errors) = stress_errors(around, &place, curved, &fields) else {
         return Predicted::Unknown;
     };
     let size = |e: &StressError<D>| e.relative.abs();

@@ -1,6 +1,6 @@
 //! The stress error of a row that an affine field leaves out of balance: the sites around it are released and solved for, everything else keeps the field.
 
-use super::surface::{Boundary, FacetKind};
+use super::surface::{Boundary, FacetKind, PLANE};
 use crate::coupling::{Model, Operator, SiteKind};
 use crate::fem;
 use crate::progress::Silent;
@@ -51,12 +51,12 @@ pub(super) struct PatchField<'a, const D: usize> {
 
 /// Solves for the sites nearest to `place` under each of the fields.
 ///
-/// `main` is the facet whose surface effect is asked for: sites near facets that neither lie in its plane nor hold their normal displacement keep the field, as do all near
+/// `main` is the surface whose effect is asked for, a facet of it and which facets it goes on in: sites near facets that neither are of it, nor lie in the plane of that one, nor hold their normal displacement keep the field, as do all near
 /// cracks. Without one, all sites near the boundary keep it. None if the patch has no unique solution.
 pub(super) fn stress_errors<const D: usize>(
     around: &Around<'_, D>,
     place: &Vector<D>,
-    main: Option<usize>,
+    main: Option<(usize, &[bool])>,
     fields: &[PatchField<'_, D>],
 ) -> Option<Vec<StressError<D>>> {
     let model = around.model;
@@ -126,13 +126,18 @@ pub(super) fn stress_errors<const D: usize>(
 }
 
 /// Whether a site of a patch keeps the field whatever its row asks for.
-fn keeps_field<const D: usize>(around: &Around<'_, D>, site: u32, main: Option<usize>) -> bool {
+fn keeps_field<const D: usize>(
+    around: &Around<'_, D>,
+    site: u32,
+    main: Option<(usize, &[bool])>,
+) -> bool {
     let boundary = around.boundary;
     let x = &around.model.sites[site as usize].position;
     let lies_in = |f: usize| {
         let n = &boundary.normals[f];
-        main.is_some_and(|m| {
-            n.dot(&boundary.normals[m]) > 0.99 || boundary.kinds[f] == FacetKind::Held
+        main.is_some_and(|(m, surface)| {
+            let is_plane = n.dot(&boundary.normals[m]) > PLANE;
+            is_plane || surface[f] || boundary.kinds[f] == FacetKind::Held
         })
     };
     boundary.is_near_crack(x, around.reach)

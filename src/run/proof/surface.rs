@@ -3,11 +3,19 @@
 use rustc_hash::FxHashMap;
 
 use super::classes::Skin;
+use crate::coupling::tributary::{Detail, Parts};
 use crate::coupling::{Model, bin_of};
 use crate::mesh::boundary::BoundaryFacet;
+use crate::mesh::facet_corners;
 use crate::scene::conditions::{Bedding, Condition, Prescribed, Support};
 use crate::shape::{Barrier, Barriers};
-use crate::tensor::Vector;
+use crate::tensor::{Tensor, Vector};
+
+/// The cosine of the angle between the normals of two facets above which they lie in one plane.
+pub(super) const PLANE: f64 = 0.99;
+
+/// And above which one surface goes on from the one to the other without an edge: a circle of six facets is still one.
+const SMOOTH: f64 = 0.49;
 
 /// What the conditions of a scene make of a facet of the outer boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -147,10 +155,66 @@ impl<'a, const D: usize> Boundary<'a, D> {
         })
     }
 
+    /// The facets in which a surface goes on from one of them without an edge, one entry per facet.
+    pub fn smooth_surface(&self, main: usize) -> Vec<bool> {
+        let mut at_node: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
+        for (f, facet) in self.facets.iter().enumerate() {
+            for &n in facet_corners::<D>(&facet.nodes) {
+                at_node.entry(n).or_default().push(f);
+            }
+        }
+        let mut is_found = vec![false; self.facets.len()];
+        is_found[main] = true;
+        let mut last = vec![main];
+        while let Some(f) = last.pop() {
+            let own = facet_corners::<D>(&self.facets[f].nodes);
+            for &other in own.iter().flat_map(|n| &at_node[n]) {
+                let corners = facet_corners::<D>(&self.facets[other].nodes);
+                let shared = corners.iter().filter(|n| own.contains(n)).count();
+                let goes_on = self.normals[f].dot(&self.normals[other]) > SMOOTH;
+                if !is_found[other] && shared + 1 >= D && goes_on {
+                    is_found[other] = true;
+                    last.push(other);
+                }
+            }
+        }
+        is_found
+    }
+
+    /// The parts of a smooth surface that are the points', but for what lies in the plane of its facet `main`.
+    pub fn bent_parts(&self, main: usize, surface: &[bool]) -> Parts<D> {
+        let n = &self.normals[main];
+        let is_bent = |f: usize| surface[f] && self.normals[f].dot(n) <= PLANE;
+        let bent = (0..self.facets.len()).filter(|&f| is_bent(f));
+        let facets = bent.map(|f| self.facets[f].clone());
+        let of_points = facets.filter(|f| !self.model.is_element(f.cell as usize));
+        Parts::of_facets(
+            self.model,
+            &of_points.collect::<Vec<_>>(),
+            Detail::Quadrature,
+        )
+    }
+
     /// Whether a crack or a void is nearer to `x` than `limit`.
     pub fn is_near_crack(&self, x: &Vector<D>, limit: f64) -> bool {
         self.barriers.near(x, limit)
     }
+}
+
+/// Adds the forces \[N\] that the tractions of a uniform stress on parts of a surface exert on sites, `D` numbers each.
+pub(super) fn add_tractions<const D: usize>(
+    parts: &Parts<D>,
+    stress: &Tensor<D>,
+    force: &mut [f64],
+) {
+    parts.each_point(|_, weight, normal, follows| {
+        let traction = stress * normal * weight;
+        for (site, share) in follows {
+            for k in 0..D {
+                force[*site as usize * D + k] += share * traction[k];
+            }
+        }
+    });
 }
 
 /// The boxes around facets between materials, of points that have several, near a box.

@@ -22,7 +22,7 @@ use std::time::Instant;
 
 use self::criteria::CriterionInput;
 use self::shapes::Marked;
-pub(crate) use self::solutions::CachedSolution;
+pub(crate) use self::solutions::{CachedSolution, difference_from_elements};
 use crate::coupling::Zone;
 use crate::coupling::error_indicator::Need;
 use crate::mesh::Mesh;

@@ -152,6 +152,54 @@ fn elements<const D: usize>(
     solved(problem, &scene.conditions, &scene.solver, t)
 }
 
+/// The largest difference of the displacement of a static scene from that of elements alone, at nodes of elements, over the largest of that.
+///
+/// Where no crack or void is, that is what a coupling errs by, and what the nonlocal law adds. None where there are such, where forces are not linear in the displacement, or without a solution.
+pub(crate) fn difference_from_elements<const D: usize>(
+    model: &Model<D>,
+    rest: &setup::RunSettings<D>,
+    displacement: &[f64],
+) -> Option<f64> {
+    let cut = (model.peridynamics.as_ref())
+        .is_some_and(|p| !p.barriers.is_empty() || !p.voids.is_empty());
+    if cut || rest.nonlinear(model).is_some() {
+        return None;
+    }
+    let cells = 0..model.mesh.cell_count();
+    let cell_material: Vec<u16> = cells.clone().map(|c| model.material_of_cell(c)).collect();
+    let tensor = |m: usize| match cell_material.iter().position(|own| usize::from(*own) == m) {
+        Some(cell) => *model.tensor_of_cell(cell),
+        None => rest.materials[m].stiffness(),
+    };
+    let problem = Problem {
+        mesh: model.mesh.clone(),
+        zones: vec![Zone::Local; cells.len()],
+        tensors: (0..rest.materials.len()).map(tensor).collect(),
+        cell_material,
+        peridynamic_material: 0,
+        peridynamics: None,
+        coupling: Box::new(Local),
+    };
+    let alone = solved(problem, &rest.conditions, &rest.solver, 0.0).ok()?;
+    let known = &alone.equilibrium.solution.displacement;
+    let (mut largest, mut difference) = (0.0f64, 0.0f64);
+    for c in cells.filter(|&c| model.is_element(c)) {
+        for &n in model.mesh.cell(c) {
+            let u = alone
+                .model
+                .node_transfer
+                .displacement::<D>(n as usize, known);
+            let own = model
+                .node_transfer
+                .displacement::<D>(n as usize, displacement);
+            largest = largest.max(u.norm());
+            difference = difference.max((own - u).norm());
+        }
+    }
+    let part = difference / largest;
+    part.is_finite().then_some(part)
+}
+
 /// Lays out and solves a problem under what holds and loads it at time `t`.
 fn solved<const D: usize>(
     problem: Problem<D>,
