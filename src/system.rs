@@ -8,13 +8,14 @@
 //! | `shared_blocks.rs`, `spmv.rs`, `exact_sum.rs`, `segments.rs` | rows that share blocks; products, exact sums, ranges of sites |
 //! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | what elements and springs add to the tangent |
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
-//! | `wrapped.rs` | a system around another one |
+//! | `linear_motion.rs`, `wrapped.rs` | a linear system; a system around another one |
 
 use crate::parallel;
 
 mod element_tangent;
 mod exact_sum;
 mod ghosts;
+mod linear_motion;
 mod neighbour_springs;
 mod partition;
 pub mod ranks;
@@ -28,6 +29,7 @@ pub(crate) mod wrapped;
 pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
+pub use linear_motion::LinearMotion;
 pub(crate) use neighbour_springs::share_long_rows;
 pub use partition::{NeighbourGraph, Partition};
 pub use ranks::{Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks, Spread};
@@ -166,6 +168,11 @@ pub trait SemiDiscrete: Send + Sync {
     /// Ends the interval at the displacement of the last call of [`SemiDiscrete::internal_force_into`]: what laws remember is from now on what they remembered there. A trial that is not committed leaves no trace.
     fn commit(&mut self);
 
+    /// The work that changes of temperature have done since it was last asked for \[J\], up to the last [`SemiDiscrete::commit`]: of bonds whose stored energy knows their temperature.
+    fn take_heat_work(&mut self) -> f64 {
+        0.0
+    }
+
     /// The system as one of which each process may move its own sites alone; none where each has to have the numbers of all in every step.
     fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
         None
@@ -216,6 +223,11 @@ pub trait SemiDiscrete: Send + Sync {
     /// Rows of the tangent at rest, in the order of `sites`: those of [`SemiDiscrete::tangent_is_constant`] sites and of sites that these are columns of.
     fn tangent_rows(&self, _sites: &[u32]) -> BlockCsr {
         BlockCsr::default()
+    }
+
+    /// Rows of the tangent at rest, in the order of `sites`, less what does not expand or knows its temperature itself: by these a free expansion loads the sites.
+    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
+        self.tangent_rows(sites)
     }
 
     /// The sites at which rows of the tangent may differ from their columns; all of them if the system does not know.
@@ -304,80 +316,6 @@ pub trait SemiDiscrete: Send + Sync {
     /// Puts back what [`SemiDiscrete::damage_state`] gave; false if it belongs to another model.
     fn restore_damage(&mut self, state: &[u64]) -> bool {
         state.is_empty()
-    }
-}
-
-/// A linear system that moves: its stiffness as a matrix, for scenes in which nothing breaks.
-#[derive(Clone, Debug)]
-pub struct LinearMotion {
-    /// `K`.
-    pub stiffness: BlockCsr,
-    /// Lumped mass of each site \[kg\].
-    pub mass: Vec<f64>,
-    /// Whether `K` is symmetric.
-    pub symmetry: Symmetry,
-}
-
-impl SemiDiscrete for LinearMotion {
-    fn block(&self) -> usize {
-        self.stiffness.block
-    }
-
-    fn mass(&self) -> &[f64] {
-        &self.mass
-    }
-
-    fn internal_force_into(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        _interval: Interval,
-        _breakage: FailureUpdate,
-    ) -> u64 {
-        self.stiffness.multiply_into(u, force);
-        0
-    }
-
-    fn commit(&mut self) {}
-
-    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
-        self.stiffness.multiply_into(x, y);
-    }
-
-    fn difference_length(&self) -> Option<f64> {
-        None
-    }
-
-    fn row_sums(&self) -> Vec<f64> {
-        self.stiffness.row_sums()
-    }
-
-    fn tangent_is_constant(&self) -> Vec<bool> {
-        vec![true; self.mass.len()]
-    }
-
-    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
-        let mut rows = BlockCsr {
-            block: self.stiffness.block,
-            row_offsets: vec![0],
-            ..BlockCsr::default()
-        };
-        for &site in sites {
-            let (columns, blocks) = self.stiffness.row(site as usize);
-            rows.columns.extend(columns);
-            rows.values.extend(blocks);
-            rows.row_offsets.push(rows.columns.len());
-        }
-        rows
-    }
-
-    fn symmetry(&self) -> Symmetry {
-        self.symmetry
-    }
-
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        let force = self.stiffness.multiply(u);
-        0.5 * u.iter().zip(&force).map(|(u, f)| u * f).sum::<f64>()
     }
 }
 

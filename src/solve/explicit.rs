@@ -247,6 +247,9 @@ impl<'a> Explicit<'a> {
         };
         let mut outcome = self.respond();
         self.system.commit();
+        let heat = self.system.take_heat_work();
+        self.state.work += heat;
+        self.state.supplied += heat.abs();
         self.look_ahead();
         self.accelerate_prescribed();
         self.add_reactions(reading);

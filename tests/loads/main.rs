@@ -5,8 +5,10 @@ use bondline::progress::Silent;
 use bondline::run::AnyScene;
 use bondline::scene::Source;
 
+mod heated_bonds;
 mod pressure;
 mod rotation;
+mod second_order;
 mod sections;
 mod springs;
 mod stresses;

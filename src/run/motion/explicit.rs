@@ -201,6 +201,7 @@ fn take_segment<'r, const D: usize>(
     progress.stage("stable step", None);
     let before = PreStep {
         model,
+        operator,
         rest,
         spec,
         moving: laid_out.moving,

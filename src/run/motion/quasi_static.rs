@@ -27,7 +27,7 @@ use crate::observe::summary::{
 };
 use crate::progress::Progress;
 use crate::run::error::{RunError, explained};
-use crate::run::loads;
+use crate::run::loads::{self, BodyForces};
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
@@ -74,7 +74,7 @@ fn load_steps<const D: usize>(
         (laid_out.timings, laid_out.watch, laid_out.choices);
     let begin = start(model, rest);
     let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
-    let mut system = moving.system;
+    let (mut system, is_linear) = (moving.system, moving.is_linear);
     let pace = step_choice(spec);
     let params = equilibrium_params(spec, &mut choices);
     let body = (model, operator, laid_out.springs.as_ref());
@@ -82,9 +82,15 @@ fn load_steps<const D: usize>(
     let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
     let of_all = leads.factorised()?;
     leads.time(&mut watch, &mut timings);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
+    let steps = (pace.step, pace.steps);
+    let at_rest = BodyForces::Consistent;
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, steps, at_rest)?
         .with_impactors(&rest.impactors, pace.steps)
-        .heated(rest.stresses.thermal.as_ref(), system.as_ref());
+        .heated(
+            rest.stresses.thermal.as_ref(),
+            operator,
+            (system.as_ref(), is_linear),
+        )?;
     let at = saved.as_ref();
     restore(system.as_mut(), at, &file)?;
     let breaks = breaks(system.as_ref(), rest);
