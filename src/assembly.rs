@@ -107,6 +107,16 @@ pub struct Row<const D: usize> {
     place_blocks: Vec<Tensor<D>>,
     /// Stiffnesses of elements, each at its number's remainder: nodes that follow each other have elements in common.
     elements: Vec<(u32, Vec<Tensor<D>>)>,
+    counted: Option<Counted>,
+}
+
+/// The material whose elements and bonds alone count in a row; of a bond between two materials each has half.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Counted {
+    /// Its number.
+    pub material: u16,
+    /// The number of the material of points, in a body of one.
+    pub of_points: u16,
 }
 
 const EMPTY: u32 = u32::MAX;
@@ -125,7 +135,32 @@ impl<const D: usize> Row<D> {
             places: Vec::new(),
             place_blocks: Vec::new(),
             elements: Vec::new(),
+            counted: None,
         }
+    }
+
+    /// Counts the elements and bonds of one material alone from now on.
+    pub fn count_only(&mut self, counted: Counted) {
+        self.counted = Some(counted);
+    }
+
+    /// Part of an element of a material that counts.
+    pub fn part_of(&self, material: u16) -> f64 {
+        match self.counted {
+            Some(counted) if counted.material != material => 0.0,
+            _ => 1.0,
+        }
+    }
+
+    /// Part of a bond that counts, by the materials of its ends; none of a body of one.
+    #[inline]
+    pub fn part_between(&self, ends: [Option<&u16>; 2]) -> f64 {
+        let Some(counted) = self.counted else {
+            return 1.0;
+        };
+        let is_its = |end: Option<&u16>| *end.unwrap_or(&counted.of_points) == counted.material;
+        let counting = ends.into_iter().filter(|end| is_its(*end));
+        0.5 * counting.count() as f64
     }
 
     /// Calls `add` with each block of the row of a local node in the stiffness of an element of the one model that the row is for; `stiffness` is asked where the element is not remembered.

@@ -171,6 +171,11 @@ pub trait SemiDiscrete: Send + Sync {
     /// Ends the interval at the displacement of the last call of [`SemiDiscrete::internal_force_into`]: what laws remember is from now on what they remembered there. A trial that is not committed leaves no trace.
     fn commit(&mut self);
 
+    /// The work that changes of temperature have done since it was last asked for \[J\], up to the last [`SemiDiscrete::commit`]: of bonds whose stored energy knows their temperature.
+    fn take_heat_work(&mut self) -> f64 {
+        0.0
+    }
+
     /// The system as one of which each process may move its own sites alone; none where each has to have the numbers of all in every step.
     fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
         None
@@ -226,6 +231,11 @@ pub trait SemiDiscrete: Send + Sync {
     /// Rows of the tangent at rest, in the order of `sites`: those of [`SemiDiscrete::tangent_is_constant`] sites and of sites that these are columns of.
     fn tangent_rows(&self, _sites: &[u32]) -> BlockCsr {
         BlockCsr::default()
+    }
+
+    /// Rows of the tangent at rest, in the order of `sites`, less what does not expand or knows its temperature itself: by these a free expansion loads the sites.
+    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
+        self.tangent_rows(sites)
     }
 
     /// The sites at which rows of the tangent may differ from their columns; all of them if the system does not know.

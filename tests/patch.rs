@@ -311,6 +311,7 @@ fn forces_of_every_law_at_a_truncated_seam_are_derivatives_of_its_energy() {
             contact: None,
             storage: Storage::Double,
             broken: None,
+            heat: None,
         };
         let symmetry = block.coupling.symmetry();
         let system = CoupledSystem::new(model, operator.as_ref(), symmetry, |_| 1.0, &behaviour);

@@ -243,6 +243,11 @@ pub trait Operator<const D: usize>: Sync {
     /// Whether the row of a site is that of the peridynamic body alone, all of its bonds whole: only there may bonds be geometrically exact, and break.
     fn is_body_row(&self, site: usize) -> bool;
 
+    /// Whether rows count elements and bonds by their materials, [`Row::count_only`]: only then do materials expand differently at the seam.
+    fn counts_materials(&self) -> bool {
+        false
+    }
+
     /// The bonds of the body that rows hold among other terms, where the operator has such rows.
     fn mixed_rows(&self) -> Option<&dyn MixedRows<D>>;
 

@@ -554,6 +554,11 @@ impl<const D: usize> Model<D> {
         }
     }
 
+    /// The ends of its edge that a node in the middle follows, by half each, see [`mesh::Tie`](crate::mesh::Tie); none of a free node.
+    pub fn followed_ends(&self, node: u32) -> Option<[u32; 2]> {
+        self.ties.ends(node)
+    }
+
     /// Whether the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.
     pub fn node_takes(&self, cell: usize) -> bool {
         !self.faces_cut_bonds() || self.is_element(cell)

@@ -41,6 +41,10 @@ impl<const D: usize> Model<D> {
 
     /// Adds the row of a local node in the stiffness of cell `c`, times a weight.
     fn add_element_row(&self, c: usize, local: usize, weight: f64, row: &mut Row<D>) {
+        let weight = weight * row.part_of(self.material_of_cell(c));
+        if weight == 0.0 {
+            return;
+        }
         let stiffness = |blocks: &mut Vec<_>| {
             fem::stiffness_into(&self.mesh, c, self.tensor_of_cell(c), blocks);
         };

@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `behaviour.rs` | how bonds deform and break, as a run asks for it |
+//! | `heat.rs` | bonds that know their temperature |
 //! | `body.rs`, `force_states.rs`, `elements.rs` | the points and their bonds, nonlinear force states, nonlinear finite elements |
 //! | `rows.rs`, `tangent_pattern.rs` | linear rows of the sites, blocks of the elements' tangent |
 //! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, what breaking costs |
@@ -24,7 +25,7 @@ use self::{
 use crate::{
     coupling::{ExactStresses, Model, NonlinearSeam, Operator},
     material::LocalLaw,
-    peridynamics::bond_force::{BondKinematics, BondPass},
+    peridynamics::bond_force::{BondKinematics, BondPass, HeatedBonds},
     system::{
         BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, PlaceStress,
         Ranks, SemiDiscrete, SharedSteps, Symmetry,
@@ -34,6 +35,7 @@ use behaviour::NONE;
 pub use behaviour::{
     BondBehaviour, ContactBehaviour, FailureCriterion, StretchOfMaterials, SystemError,
 };
+pub use heat::FreeStretch;
 pub use rows::scale_rows;
 
 pub(crate) mod behaviour;
@@ -42,6 +44,7 @@ mod dissipation;
 mod elements;
 mod energy;
 mod force_states;
+mod heat;
 mod own_steps;
 mod reached_sites;
 mod rows;
@@ -119,8 +122,9 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         let is_linear = behaviour.failure.is_none()
             && behaviour.kinematics == BondKinematics::Linear
             && law.is_none_or(|law| law.is_linear());
-        // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear
-        let follows = (model.peridynamics.as_ref()).is_some_and(|p| p.accelerator().is_some());
+        // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear, and where they expand
+        let follows = behaviour.heat.is_none()
+            && (model.peridynamics.as_ref()).is_some_and(|p| p.accelerator().is_some());
         let of_seam = (!is_linear && follows).then(|| operator.seam_bonds());
         let (mut seam, add_rest) = match of_seam.flatten() {
             Some(of_seam) => (Some(of_seam.bonds), Some(of_seam.add_rest)),
@@ -236,15 +240,6 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             || elements.is_some_and(|e| e.remembers())
     }
 
-    /// Numbers of the account in a checkpoint.
-    fn spends(&self) -> usize {
-        match (self.remembers(), self.breaks()) {
-            (true, _) => 3,
-            (false, true) => 2,
-            (false, false) => 0,
-        }
-    }
-
     /// Puts the bonds of a state back; false, and nothing changed, if they are those of another model.
     fn restore_bonds(&mut self, state: &[u64]) -> bool {
         let Some(body) = &mut self.body else {
@@ -335,6 +330,11 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
         self.linear_rows_and_bonds_into(u, force, interval, FailureUpdate::Frozen);
         self.finish(force);
+    }
+
+    fn take_heat_work(&mut self) -> f64 {
+        let pass = self.body.as_mut().and_then(|body| body.pass.heated());
+        pass.map_or(0.0, HeatedBonds::take_heat_work)
     }
 
     fn commit(&mut self) {
@@ -443,6 +443,13 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
 
     fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
         self.rows_at(sites)
+    }
+
+    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
+        match self.is_heated() {
+            true => self.rows_beside_heated_bonds(sites),
+            false => self.rows_at(sites),
+        }
     }
 
     fn seam_sites(&self) -> Vec<u32> {

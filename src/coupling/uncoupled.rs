@@ -99,6 +99,10 @@ impl<const D: usize> Operator<D> for OwnModel<'_, D> {
         self.model.point_of(site).is_some()
     }
 
+    fn counts_materials(&self) -> bool {
+        true
+    }
+
     fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
         None
     }

@@ -1,8 +1,10 @@
-//! What of a cell's volume and mass each of its nodes has.
+//! What of a cell's volume and mass each of its nodes has, and of a body force on the cell beside lumped masses.
 
 use super::cell::{MAX_NODES, Rule};
 use super::element::for_each_point;
+use super::load::body_force_vector;
 use crate::mesh::Mesh;
+use crate::tensor::Vector;
 
 /// Lumped volume of every node over the given cells \[m^D\], as [`for_each_share`] has it: they add up to the cells' volume.
 pub fn nodal_volumes<const D: usize>(
@@ -63,9 +65,41 @@ pub fn for_each_share<const D: usize>(
     }
 }
 
+/// Nodal forces of a body force in cell `c` for a motion with lumped masses: one (node, force) per node of the cell.
+///
+/// `f_a = ∫ N_a b dV + (s_a − ∫ N_a dV / V) ∫ b dV` with the shares `s_a` of [`for_each_share`]: a body force that is the same everywhere is to all nodes what their masses are, so that all of them
+/// fall alike, and the total of any body force is that of the consistent forces. The first moment is, too, where the lumped volume has that of the cell, as in every affine cell. Cells of first order keep their consistent forces, `s_a V = ∫ N_a dV`.
+///
+/// `body_force` is b(x) [N/m^D]. Forces \[N\].
+pub fn lumped_body_force_vector<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+    body_force: impl Fn(&Vector<D>) -> Vector<D>,
+) -> Vec<(u32, Vector<D>)> {
+    let mut forces = body_force_vector(mesh, c, body_force);
+    if !mesh.shapes[c].is_quadratic() {
+        return forces;
+    }
+    let total: Vector<D> = forces.iter().map(|(_, f)| f).sum();
+    let (mut volume, mut integrals) = (0.0, [0.0; MAX_NODES]);
+    for_each_point(mesh, c, Rule::Mass, |p| {
+        volume += p.weight;
+        for (integral, shape) in integrals.iter_mut().zip(&p.shape) {
+            *integral += shape * p.weight;
+        }
+    });
+    let mut local = 0;
+    // one share per node, in the order of the cell
+    for_each_share(mesh, c, |_, share, _| {
+        forces[local].1 += total * (share - integrals[local] / volume);
+        local += 1;
+    });
+    forces
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::sample::unit_box;
+    use super::super::sample::{boxes, unit_box};
     use super::*;
     use crate::mesh::CellShape;
 
@@ -100,5 +134,49 @@ mod tests {
         close(shares::<3>(CellShape::Tet10), (1.0 / 36.0, 4.0 / 27.0));
         let (corner, side) = shares::<3>(CellShape::Hex20);
         assert!(corner > 0.0 && (8.0 * corner + 12.0 * side - 1.0).abs() < 1e-14);
+    }
+
+    fn forces_of_a_body<const D: usize>() {
+        for mesh in boxes::<D>(3, 0.2) {
+            let mass = lumped_mass(&mesh, |_| 1.0);
+            let mut uniform = vec![0.0; mesh.nodes.len()];
+            let (mut total, mut moment) = (0.0, 0.0);
+            for c in 0..mesh.cell_count() {
+                let along = |b: f64| {
+                    let mut force = Vector::<D>::zeros();
+                    force[0] = b;
+                    force
+                };
+                for (n, f) in lumped_body_force_vector(&mesh, c, |_| along(2.0)) {
+                    uniform[n as usize] += f[0];
+                }
+                // 1 + 2x on the unit box: total 2, first moment in x is 1/2 + 2/3
+                let of_x = |x: &Vector<D>| along(1.0 + 2.0 * x[0]);
+                for (n, f) in lumped_body_force_vector(&mesh, c, of_x) {
+                    total += f[0];
+                    moment += f[0] * mesh.nodes[n as usize][0];
+                }
+            }
+            for (f, m) in uniform.iter().zip(&mass) {
+                assert!((f - 2.0 * m).abs() < 1e-15, "{:?}", mesh.shapes[0]);
+            }
+            assert!((total - 2.0).abs() < 1e-13, "{:?}", mesh.shapes[0]);
+            // jittered quadrilaterals and hexahedra are not affine: their lumped volume lies off the centroid
+            let is_simplex = mesh.shapes[0].linear().node_count() == D + 1;
+            let off = if is_simplex { 1e-13 } else { 3e-3 };
+            assert!(
+                (moment - 7.0 / 6.0).abs() < off,
+                "{:?} {}",
+                mesh.shapes[0],
+                moment - 7.0 / 6.0
+            );
+        }
+    }
+
+    #[test]
+    fn body_forces_are_to_all_nodes_what_their_masses_are() {
+        forces_of_a_body::<1>();
+        forces_of_a_body::<2>();
+        forces_of_a_body::<3>();
     }
 }

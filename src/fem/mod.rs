@@ -43,7 +43,7 @@
 //! | `nonlinear.rs`, `nonlinear/` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
 //! | `locate.rs` | from a point in space to a cell and its shape functions |
-//! | `lumping.rs` | lumped volumes and masses |
+//! | `lumping.rs` | lumped volumes and masses, body forces beside these |
 //! | `body.rs` | the check that elements can live on the cells of a body |
 //!
 //! A new cell is one file, one line in [`CELLS`], and its variant of [`CellShape`].
@@ -86,7 +86,7 @@ pub use load::{
     outward_traction_vector, traction_vector,
 };
 pub use locate::{Located, Locator, reference_of};
-pub use lumping::{for_each_share, lumped_mass, nodal_volumes};
+pub use lumping::{for_each_share, lumped_body_force_vector, lumped_mass, nodal_volumes};
 pub use nonlinear::NonlinearElements;
 pub use superconvergent::{position_in, superconvergent_gradient};
 

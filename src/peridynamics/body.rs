@@ -305,6 +305,7 @@ impl<const D: usize> PdBody<D> {
             if vv == 0.0 && of_state == 0.0 {
                 continue;
             }
+            let vv = vv * self.part_of_bond(i, j, row);
             let mut block = xi * xi.transpose() * (both * vv * pair[k]);
             if !self.pairwise {
                 block += Tensor::identity() * (q * omega[k] * vv);
@@ -333,6 +334,7 @@ impl<const D: usize> PdBody<D> {
                 if vv == 0.0 && of_state == 0.0 {
                     continue;
                 }
+                let vv = vv * self.part_of_bond(i, j, row);
                 let mut block = xi * xi.transpose() * (vv * self.pair[bond]);
                 if let Some(state) = self.state(j) {
                     let omega = self.omega[bond];
@@ -353,13 +355,21 @@ impl<const D: usize> PdBody<D> {
         row.spread(transfer);
     }
 
+    /// Part of a bond that counts in a row.
+    #[inline]
+    fn part_of_bond(&self, i: usize, j: usize, row: &Row<D>) -> f64 {
+        let material = |p: usize| self.cloud.material.get(p);
+        row.part_between([material(i), material(j)])
+    }
+
     /// Gathers the row of `A : Ḡ_j`, where `a[b]` is the block that multiplies column `b` of `Ḡ_j = Σ ω η ⊗ ξ V`.
     fn add_weighted_gradient(&self, j: usize, a: &[Tensor<D>; D], row: &mut Row<D>) {
         let (_, omega) = self.kernel(j);
         let mut own = Tensor::zeros();
         for (k, &l) in self.families.of(j).iter().enumerate() {
             let l = l as usize;
-            let xi = self.bond(j, l) * (omega[k] * self.cloud.volume[l]);
+            let volume = self.cloud.volume[l] * self.part_of_bond(j, l, row);
+            let xi = self.bond(j, l) * (omega[k] * volume);
             let mut block = Tensor::zeros();
             for b in 0..D {
                 block += a[b] * xi[b];
@@ -377,7 +387,7 @@ impl<const D: usize> PdBody<D> {
         for (k, &l) in self.families.of(j).iter().enumerate() {
             let l = l as usize;
             let xi = self.bond(j, l);
-            let v = self.cloud.volume[l];
+            let v = self.cloud.volume[l] * self.part_of_bond(j, l, row);
             let weighted = a * (pair[k] * xi.norm_squared() * v) + b * (omega[k] * v);
             let block = weighted * xi.transpose();
             own -= block;

@@ -14,6 +14,7 @@ use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes
 use crate::progress::Progress;
 use crate::run::budget::Share;
 use crate::run::equilibrium::{may_coarsen, may_factorise};
+use crate::run::loads::BodyForces;
 use crate::run::motion::STILL;
 use crate::run::motion::breaks::{Breaks, breaks};
 use crate::run::motion::driven_impactors;
@@ -288,7 +289,8 @@ fn steps<const D: usize>(
 
     let is_linear = laid_out.moving.is_linear;
     let breaks = breaks(laid_out.moving.system.as_ref(), rest);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
+    let steps = (pace.step, pace.steps);
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, steps, BodyForces::Lumped)?
         .with_impactors(&rest.impactors, pace.steps);
     let state_bytes = 12 * 8 * begin.u.len() as u64;
     let mut motion = Explicit::new(

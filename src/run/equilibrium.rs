@@ -1,5 +1,7 @@
 //! Static equilibrium of a model under its conditions: assembly, loads, supports, solution.
 
+use std::borrow::Cow;
+
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -100,7 +102,13 @@ pub(crate) fn equilibrium<const D: usize>(
     let mut stiffness = model.assemble(at.operator, progress);
     watch.lap(&mut timings, "assembly");
     let (mut load, applied) = loads(model, at.conditions, at.time)?;
-    let expands = (at.thermal).map(|thermal| thermal.forces(model, &stiffness, None, at.time));
+    let of_system = || {
+        system
+            .as_ref()
+            .map(|s| s.rows_that_expand(&all_sites(model)))
+    };
+    let rows = || of_system().map_or(Cow::Borrowed(&stiffness), Cow::Owned);
+    let expands = expansion(at, None, system.is_some(), rows)?;
     expand(&mut load, expands.as_deref());
     let (prescribed, holder) = supports(model, at.conditions, at.time)?;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
@@ -168,18 +176,40 @@ fn given_up(solver: &Solver, info: &StaticInfo) -> Option<Decision> {
     })
 }
 
+/// The numbers of all sites.
+fn all_sites<const D: usize>(model: &Model<D>) -> Vec<u32> {
+    (0..model.sites.len() as u32).collect()
+}
+
+/// The forces of free expansion on all sites, or on those of `own`; none where nothing expands.
+fn expansion<'r, const D: usize>(
+    at: &StaticInput<'_, D>,
+    own: Option<&[u32]>,
+    knows_temperature: bool,
+    rows: impl FnOnce() -> Cow<'r, BlockCsr>,
+) -> Result<Option<Vec<f64>>, RunError> {
+    let Some(thermal) = at.thermal else {
+        return Ok(None);
+    };
+    let rows = thermal.rows(at.model, at.operator, own, knows_temperature, rows)?;
+    Ok(Some(thermal.forces(at.model, &rows, own, at.time)))
+}
+
 /// Collective: the forces of free expansion on all sites, each process from the rows of its own; none where nothing expands.
 fn spread_expansion<const D: usize>(
     at: &StaticInput<'_, D>,
     own_rows: &BlockCsr,
     spread: Spread<'_>,
-) -> Option<Vec<f64>> {
-    let forces = (at.thermal?).forces(at.model, own_rows, Some(spread.own()), at.time);
+) -> Result<Option<Vec<f64>>, RunError> {
+    let own = Some(spread.own());
+    let Some(forces) = expansion(at, own, false, || Cow::Borrowed(own_rows))? else {
+        return Ok(None);
+    };
     let own = spread.own().iter().map(|&site| site as usize * D);
     let own: Vec<f64> = own.flat_map(|dof| forces[dof..dof + D].to_vec()).collect();
     let mut all = vec![0.0; forces.len()];
     spread.gather_sites(&own, &mut all);
-    Some(all)
+    Ok(Some(all))
 }
 
 /// Adds to a load what free expansion takes, if anything expands.
@@ -223,7 +253,7 @@ fn spread<const D: usize>(
     let stiffness = model.assemble_sites(at.operator, spread.own(), progress);
     watch.lap(&mut timings, "assembly");
     let (mut load, applied) = loads(model, at.conditions, at.time)?;
-    let expands = spread_expansion(at, &stiffness, spread);
+    let expands = spread_expansion(at, &stiffness, spread)?;
     expand(&mut load, expands.as_deref());
     let (prescribed, holder) = supports(model, at.conditions, at.time)?;
     let rows = SpreadRows {

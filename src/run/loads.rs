@@ -231,11 +231,22 @@ struct LoadTarget<const D: usize> {
     detail: Detail,
 }
 
+/// How a finite element shares a body force out among its nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BodyForces {
+    /// By its shape functions, as equilibrium asks for.
+    Consistent,
+    /// As motion with lumped masses asks for, [`fem::lumped_body_force_vector`]: a body that falls freely has no stress.
+    Lumped,
+}
+
 /// The loads of a scene on the sites of its model.
 ///
-/// By virtual work: a finite element gives its nodes their consistent forces, a part of the peridynamic zone or of its surface gives the sites that it follows the force on it. Total and first moment are those of the load itself.
+/// By virtual work: a finite element gives its nodes their consistent forces, a part of the peridynamic zone or of its surface gives the sites that it follows the force on it. Total and first moment are those of the load itself. In a motion with lumped
+/// masses body forces are shared out as these are.
 pub(crate) struct Loads<'a, const D: usize> {
     model: &'a Model<D>,
+    body_forces: BodyForces,
     targets: Vec<LoadTarget<D>>,
 }
 
@@ -244,9 +255,14 @@ impl<'a, const D: usize> Loads<'a, D> {
     ///
     /// # Errors
     /// [`RunError::Idle`] for a load that meets no site.
-    pub fn new(model: &'a Model<D>, conditions: &[Condition<D>]) -> Result<Self, RunError> {
+    pub fn new(
+        model: &'a Model<D>,
+        conditions: &[Condition<D>],
+        body_forces: BodyForces,
+    ) -> Result<Self, RunError> {
         let mut loads = Self {
             model,
+            body_forces,
             targets: Vec::new(),
         };
         for (number, condition) in conditions.iter().enumerate() {
@@ -367,7 +383,12 @@ impl<'a, const D: usize> Loads<'a, D> {
             }
         }
         for &c in &target.cells {
-            for (n, f) in fem::body_force_vector(mesh, c, |x| field(x, &none)) {
+            let force = |x: &Vector<D>| field(x, &none);
+            let forces = match self.body_forces {
+                BodyForces::Consistent => fem::body_force_vector(mesh, c, force),
+                BodyForces::Lumped => fem::lumped_body_force_vector(mesh, c, force),
+            };
+            for (n, f) in forces {
                 on_node(n, f);
             }
         }
@@ -419,7 +440,7 @@ pub fn loads<const D: usize>(
     conditions: &[Condition<D>],
     t: f64,
 ) -> Result<(Vec<f64>, Vec<Applied>), RunError> {
-    let loads = Loads::new(model, conditions)?;
+    let loads = Loads::new(model, conditions, BodyForces::Consistent)?;
     let mut load = vec![0.0; model.sites.len() * D];
     let mut applied = Vec::new();
     for number in loads.conditions() {

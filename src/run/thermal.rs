@@ -6,8 +6,14 @@
 //! The thermal force of a site is what its own row makes of that displacement, with the rise of both ends of every pair: `α ξ (τ_i + τ_j)/2` along a bond, so that the extension of a bond less its thermal part is what
 //! stretches it. A finite element takes its own expansion, at its nodes. Every row, of a seam too, is then free of force where the body expands freely under a uniform or a linear temperature.
 
-use crate::coupling::{CellRole, Model, SiteKind};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use crate::assembly::{self, Counted, Row};
+use crate::coupling::semidiscrete::FreeStretch;
+use crate::coupling::{CellRole, Model, Operator, SiteKind};
 use crate::fem;
+use crate::run::error::RunError;
 use crate::scene::temperature::Temperature;
 use crate::system::BlockCsr;
 use crate::tensor::{Tensor, Vector, padded};
@@ -22,6 +28,9 @@ pub struct Thermal<const D: usize> {
     /// Half of the distance over which the temperature is differenced.
     pub reach: f64,
 }
+
+/// Rows that expand, with the expansion per degree of what is in them.
+pub struct ExpandingRows<'r>(Vec<(f64, Cow<'r, BlockCsr>)>);
 
 /// Rise of the temperature at a place, and its gradient.
 #[derive(Clone, Copy, Debug)]
@@ -49,15 +58,33 @@ impl<const D: usize> Thermal<D> {
         }
     }
 
-    /// By how much each node of a cell is displaced where the cell expands freely about its centroid.
+    /// The stretch of points for bonds that know their temperature.
+    pub fn free_stretch(&self) -> FreeStretch<D> {
+        let thermal = self.clone();
+        FreeStretch {
+            varies_in_time: self.temperature.value.depends_on_time(),
+            at: Arc::new(move |x, material, t| {
+                thermal.expansion[usize::from(material)] * thermal.rise_at(x, t)
+            }),
+        }
+    }
+
+    /// By how much each node of a cell is displaced where the cell expands freely about its centroid; one that follows the ends of its edge, by the mean of theirs.
     fn expanded_nodes(&self, model: &Model<D>, c: usize, t: f64) -> Vec<Vector<D>> {
         let mesh = &model.mesh;
         let alpha = self.expansion[model.material_of_cell(c) as usize];
         let middle = mesh.centroid(c);
         let here = self.rise(&middle, t);
-        let nodes = mesh.cell(c).iter().map(|&n| mesh.nodes[n as usize]);
+        let free = |n: u32| {
+            let x = mesh.nodes[n as usize];
+            parted(&here, &self.rise(&x, t), &(x - middle)) * alpha
+        };
+        let nodes = mesh.cell(c).iter();
         nodes
-            .map(|x| parted(&here, &self.rise(&x, t), &(x - middle)) * alpha)
+            .map(|&n| match model.followed_ends(n) {
+                Some([p, q]) => (free(p) + free(q)) * 0.5,
+                None => free(n),
+            })
             .collect()
     }
 
@@ -95,36 +122,36 @@ impl<const D: usize> Thermal<D> {
         parts.map(|part| alpha * part).collect()
     }
 
-    /// Force \[N\] by dof that free expansion would take: `F = K u − f`; `rows` has the row of every site, or those of the sites `own`, of which alone the forces are then right.
-    ///
-    /// All materials of a model with points expand alike.
+    /// Force \[N\] by dof that free expansion would take: `F = K u − f`; `rows` are those of all sites, or of the sites `own`, of which alone the forces are then right.
     pub fn forces(
         &self,
         model: &Model<D>,
-        rows: &BlockCsr,
+        rows: &ExpandingRows<'_>,
         own: Option<&[u32]>,
         t: f64,
     ) -> Vec<f64> {
         let mut forces = vec![0.0; model.sites.len() * D];
         let inner = inner_sites(model);
-        let alpha = self.expansion[model.peridynamic_material() as usize];
         if inner.contains(&false) {
             let rise: Vec<Rise<D>> = (model.sites.iter())
                 .map(|s| self.rise(&s.position, t))
                 .collect();
             let site_of = |row: usize| own.map_or(row, |own| own[row] as usize);
-            for row in (0..rows.rows()).filter(|&row| !inner[site_of(row)]) {
-                let site = site_of(row);
-                let x = &model.sites[site].position;
-                let (columns, blocks) = rows.row(row);
-                let mut sum = Vector::<D>::zeros();
-                for (&column, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
-                    let other = column as usize;
-                    let xi = model.sites[other].position - x;
-                    sum += Tensor::from_row_slice(block) * parted(&rise[site], &rise[other], &xi);
-                }
-                for k in 0..D {
-                    forces[site * D + k] = alpha * sum[k];
+            for (alpha, rows) in &rows.0 {
+                for row in (0..rows.rows()).filter(|&row| !inner[site_of(row)]) {
+                    let site = site_of(row);
+                    let x = &model.sites[site].position;
+                    let (columns, blocks) = rows.row(row);
+                    let mut sum = Vector::<D>::zeros();
+                    for (&column, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
+                        let other = column as usize;
+                        let xi = model.sites[other].position - x;
+                        sum +=
+                            Tensor::from_row_slice(block) * parted(&rise[site], &rise[other], &xi);
+                    }
+                    for k in 0..D {
+                        forces[site * D + k] += alpha * sum[k];
+                    }
                 }
             }
         }
@@ -132,21 +159,79 @@ impl<const D: usize> Thermal<D> {
         forces
     }
 
+    /// The rows by which the sites `own`, or all, expand. Where the materials in them expand alike, `alike` gives their rows; else they are assembled anew, those of each material for itself.
+    ///
+    /// With `knows_temperature` the bonds of rows that are those of the body alone do without.
+    ///
+    /// # Errors
+    /// [`RunError::Later`] for a coupling whose rows are not those of materials.
+    pub fn rows<'r>(
+        &self,
+        model: &Model<D>,
+        operator: &dyn Operator<D>,
+        own: Option<&[u32]>,
+        knows_temperature: bool,
+        alike: impl FnOnce() -> Cow<'r, BlockCsr>,
+    ) -> Result<ExpandingRows<'r>, RunError> {
+        let materials = self.materials_in_rows(model);
+        let alpha = |m: u16| self.expansion[usize::from(m)];
+        let first = materials.first().copied();
+        let first = first.unwrap_or_else(|| model.peridynamic_material());
+        if materials.iter().all(|&m| alpha(m) == alpha(first)) {
+            return Ok(ExpandingRows(vec![(alpha(first), alike())]));
+        }
+        if !operator.counts_materials() {
+            return Err(RunError::Later {
+                what: "materials that expand differently at the seam of this coupling, or among its points (in plane strain (1 + ν) α counts)",
+                remedy: "use coupling = \"splice\" or \"nonlocal\", or enclose the zone in elements of the material of its points",
+            });
+        }
+        let all: Vec<u32> = (0..model.sites.len() as u32).collect();
+        let sites = own.unwrap_or(&all);
+        let of_points = model.peridynamic_material();
+        let of_material = |material: u16| {
+            let rows = assembly::assemble_apart(sites.len(), all.len(), |r, row: &mut Row<D>| {
+                let site = sites[r] as usize;
+                row.count_only(Counted {
+                    material,
+                    of_points,
+                });
+                if !(knows_temperature && operator.is_body_row(site)) {
+                    model.add_scaled_row(operator, site, row);
+                }
+            });
+            (alpha(material), Cow::Owned(rows))
+        };
+        Ok(ExpandingRows(
+            materials.into_iter().map(of_material).collect(),
+        ))
+    }
+
+    /// The materials of points and of the elements in rows that are not those of elements alone, ascending.
+    fn materials_in_rows(&self, model: &Model<D>) -> Vec<u16> {
+        let inner = inner_sites(model);
+        let mut found: Vec<u16> = match model.body() {
+            Some(body) if body.cloud.material.is_empty() => vec![model.peridynamic_material()],
+            Some(body) => body.cloud.material.clone(),
+            None => Vec::new(),
+        };
+        for site in (0..inner.len()).filter(|&site| !inner[site]) {
+            let cells = model.cells_of_site(site);
+            found.extend(cells.map(|(c, _)| model.material_of_cell(c)));
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
     /// Adds what elements exert on the sites whose rows are theirs alone.
     fn add_elements(&self, model: &Model<D>, inner: &[bool], t: f64, forces: &mut [f64]) {
         let mesh = &model.mesh;
         let scale = model.row_scale();
-        let mut site_of = vec![None; mesh.nodes.len()];
-        for (site, s) in model.sites.iter().enumerate() {
-            if let SiteKind::Node(n) = s.kind
-                && inner[site]
-            {
-                site_of[n as usize] = Some(site);
-            }
-        }
+        let takers = takers(model, inner);
         for c in (0..mesh.cell_count()).filter(|&c| model.roles[c] == CellRole::Element) {
             let nodes = mesh.cell(c);
-            if nodes.iter().all(|&n| site_of[n as usize].is_none()) {
+            if nodes.iter().all(|&n| takers[n as usize].is_empty()) {
                 continue;
             }
             let expanded = self.expanded_nodes(model, c, t);
@@ -154,9 +239,9 @@ impl<const D: usize> Thermal<D> {
             fem::for_each_point(mesh, c, fem::Rule::Stiffness, |p| {
                 let stress = tensor.contract(&fem::displacement_gradient(p, |a| expanded[a]));
                 for (a, &n) in nodes.iter().enumerate() {
-                    if let Some(site) = site_of[n as usize] {
+                    for &(site, part) in &takers[n as usize] {
                         let f = stress * p.gradient[a] * p.weight;
-                        let scale = scale.map_or(1.0, |scale| scale[site]);
+                        let scale = part * scale.map_or(1.0, |scale| scale[site]);
                         (0..D).for_each(|k| forces[site * D + k] += scale * f[k]);
                     }
                 }
@@ -191,6 +276,20 @@ fn parted<const D: usize>(here: &Rise<D>, there: &Rise<D>, xi: &Vector<D>) -> Ve
     let slope = (here.slope + there.slope) * 0.5;
     let mean = 0.5 * (here.value + there.value);
     xi * (mean + 0.5 * slope.dot(xi)) - slope * (0.5 * xi.norm_squared())
+}
+
+/// The sites whose rows are those of elements alone that take the force of each node, with the part of it: its own, or the ends of its edge where it follows them.
+fn takers<const D: usize>(model: &Model<D>, inner: &[bool]) -> Vec<Vec<(usize, f64)>> {
+    let mut takers = vec![Vec::new(); model.mesh.nodes.len()];
+    for (site, s) in model.sites.iter().enumerate().filter(|s| inner[s.0]) {
+        if let SiteKind::Node(n) = s.kind {
+            takers[n as usize].push((site, 1.0));
+            for &follower in model.followers_of_site(site) {
+                takers[follower as usize].push((site, 0.5));
+            }
+        }
+    }
+    takers
 }
 
 /// The sites whose rows are those of finite elements alone.

@@ -10,7 +10,6 @@ use super::bounds_checks;
 use super::condition_list;
 use super::conditions::Condition;
 use super::error::{SceneError, SceneErrorKind};
-use super::failure::Breaking;
 use super::impactors::{self, Impactor};
 use super::initial::Initial;
 use super::material_interfaces::MaterialInterface;
@@ -226,13 +225,11 @@ impl<'a, const D: usize> Draft<'a, D> {
     /// Refuses a temperature whose strain is not known.
     fn check_heat(
         &self,
-        breaking: &Breaking<D>,
-        may_have_points: bool,
-        zones: &[Zone],
+        coupling: &CouplingSpec,
+        elements: ElementsSpec,
     ) -> Result<(), SceneError> {
         let (spec, materials) = (self.spec, &self.materials);
-        let has_points = may_have_points && zones.iter().any(|z| *z != Zone::Local);
-        temperature::agrees(spec, materials, breaking, &self.solve, has_points)
+        temperature::agrees(spec, materials, (coupling, elements), &self.solve)
     }
 
     /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
@@ -271,7 +268,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         self.check_laws(&selected.coupling, &used, &zones)?;
         let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
         let elements = self.elements(&selected.coupling, &used, law.as_ref(), breaking.bonds)?;
-        self.check_heat(&breaking, peridynamics.is_some(), &zones)?;
+        self.check_heat(&selected.coupling, elements)?;
         let follow = adaptive_zone::follow(
             spec,
             &mut selected,

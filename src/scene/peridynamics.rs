@@ -428,6 +428,7 @@ y = 0.01
                     contact: None,
                     storage: crate::peridynamics::bond_force::Storage::Double,
                     broken: None,
+                    heat: None,
                 };
                 let operator = solved.operator;
                 let mut motion =

@@ -3,10 +3,11 @@
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
-use super::failure::Breaking;
 use super::materials::Material;
 use super::solve::{Clock, Solve};
-use super::spec::{BondsSpec, MaterialSpec, SceneSpec, TemperatureSpec};
+use super::spec::{
+    CouplingSpec, CutBondsSpec, ElementsSpec, MaterialSpec, SceneSpec, TemperatureSpec,
+};
 use crate::mesh::Mesh;
 use crate::tensor::padded;
 
@@ -54,9 +55,8 @@ pub(super) fn temperature<const D: usize>(
 pub(super) fn agrees<const D: usize>(
     spec: &SceneSpec,
     materials: &[Material<D>],
-    breaking: &Breaking<D>,
+    (coupling, elements): (&CouplingSpec, ElementsSpec),
     solve: &Solve,
-    has_points: bool,
 ) -> Result<(), SceneError> {
     let Some(temperature) = &spec.temperature else {
         return unheated(spec);
@@ -72,37 +72,29 @@ pub(super) fn agrees<const D: usize>(
                 "`temperature`, and the material `{}` has no thermal-expansion",
                 cold.name
             ),
-            "add thermal-expansion = ... to it, which bond-based and lps materials take; 0 is a number too",
-        );
-    }
-    let first = materials.first().and_then(|m| m.expansion);
-    if has_points && materials.iter().any(|m| m.expansion != first) {
-        return refuse(
-            "`temperature`, and materials that expand differently beside peridynamic points"
-                .to_owned(),
-            "give all materials the same thermal-expansion, or let coupling = \"local\"",
-        );
-    }
-    if breaking.breaks() || breaking.contact.is_some() {
-        return refuse(
-            "`temperature`, and bonds that break or touch: their thermal stretch is not known to the pass over exact bonds".to_owned(),
-            "leave out fracture-energy, critical-stretch and contact",
-        );
-    }
-    if breaking.bonds == BondsSpec::Exact && has_points {
-        return refuse(
-            "`temperature`, and bonds = \"exact\"".to_owned(),
-            "let bonds = \"linear\": thermal strain is that of small displacements",
+            "add thermal-expansion = ... to it, 0 is a number too; bond-based, lps, hardening, softening-bond, continuum-damage, viscoelastic-bond and pals take it",
         );
     }
     let has_sub_steps = matches!(solve, Solve::Explicit(e) if e.sub_steps.is_some());
-    if has_sub_steps || spec.zones.auto.is_some() {
+    if has_sub_steps || spec.zones.auto.is_some() || spec.zones.follow.is_some() {
         return refuse(
-            "`temperature`, and sub-steps or a zone that is placed by itself".to_owned(),
-            "leave out sub-steps, and draw zones.nonlocal",
+            "`temperature`, and sub-steps or a zone that is placed or moves by itself".to_owned(),
+            "leave out sub-steps and zones.follow, and draw zones.nonlocal",
         );
     }
-    Ok(())
+    if elements == ElementsSpec::CauchyBorn {
+        return refuse(
+            "`temperature`, and peridynamics.elements = \"cauchy-born\"".to_owned(),
+            "leave out peridynamics.elements: linear elements expand",
+        );
+    }
+    match coupling {
+        CouplingSpec::Truncated(typed) if typed.cut_bonds == Some(CutBondsSpec::Breaking) => refuse(
+            "`temperature`, and cut-bonds = \"breaking\": bonds that a seam cuts know no temperature but linear ones".to_owned(),
+            "let cut-bonds = \"linear\" in [coupling.truncated], or leave it out, and keep damage two horizons away from the seam",
+        ),
+        _ => Ok(()),
+    }
 }
 
 /// Refuses expansion without a temperature: it would do nothing without a word.

@@ -71,7 +71,7 @@ pub struct LoadStep<'a> {
     pub force: &'a [f64],
     /// Applied load \[N\].
     pub load: &'a [f64],
-    /// Work that loads and supports did in this step \[J\]: supports on the way to the first equilibrium, before a bond breaks, by the mean of the forces at its ends; loads all the way.
+    /// Work that loads, supports and heating did in this step \[J\]: supports on the way to the first equilibrium, before a bond breaks, by the mean of the forces at its ends; loads all the way.
     pub work: f64,
     /// Bonds broken in this step.
     pub broken: u64,
@@ -209,6 +209,7 @@ pub fn run(
             residual,
         } = work.settle(&mut state.u, predicted, account.as_mut())?;
         work.system.commit();
+        let heat = work.system.take_heat_work();
         state.step += 1;
         state.broken += broken;
         info.steps += 1;
@@ -220,7 +221,7 @@ pub fn run(
             state,
             force: &work.force,
             load: &work.load,
-            work: account.map_or(0.0, |account| account.work),
+            work: account.map_or(0.0, |account| account.work + heat),
             broken,
             rounds,
             iterations,

@@ -10,6 +10,14 @@ macro_rules! state_of {
             self.$system.commit();
         }
 
+        fn take_heat_work(&mut self) -> f64 {
+            self.$system.take_heat_work()
+        }
+
+        fn rows_that_expand(&self, sites: &[u32]) -> $crate::system::BlockCsr {
+            self.$system.rows_that_expand(sites)
+        }
+
         fn drag_rate_bound(&self) -> f64 {
             self.$system.drag_rate_bound()
         }

@@ -25,6 +25,7 @@ fn behaviour<const D: usize>(
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,
         broken: None,
+        heat: None,
     }
 }
 

@@ -373,6 +373,7 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,
         broken: None,
+        heat: None,
     };
     let mut motion = CoupledSystem::new(
         &e.model,

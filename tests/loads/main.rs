@@ -5,9 +5,11 @@ use bondline::progress::Silent;
 use bondline::run::AnyScene;
 use bondline::scene::Source;
 
+mod heated_bonds;
 mod mirrored;
 mod pressure;
 mod rotation;
+mod second_order;
 mod sections;
 mod springs;
 mod stress_measures;

@@ -212,10 +212,19 @@ fn what_has_no_thermal_strain_is_refused() {
     let refused = |set: &[&str], words: &str| super::refused(&text, set, &[words]);
     refused(
         &[
-            "materials.steel.lps.thermal-expansion=0",
+            "peridynamics.elements=cauchy-born",
             "peridynamics.bonds=exact",
+            "coupling=splice",
         ],
-        "exact",
+        "cauchy-born",
+    );
+    refused(
+        &[
+            "coupling={truncated={cut-bonds=\"breaking\"}}",
+            "materials.steel.lps.critical-stretch=0.1",
+            "solve.quasi-static.steps=1",
+        ],
+        "cut-bonds",
     );
     refused(
         &["materials.steel={lps={youngs-modulus=1,poisson-ratio=0}}"],
@@ -228,4 +237,53 @@ fn what_has_no_thermal_strain_is_refused() {
         ],
         "thermal-expansion",
     );
+}
+
+/// Two points' materials of different ν expand by (1 + ν) α each where plane strain holds their normal: an interface between them errs by its horizon, to first order.
+#[test]
+fn points_of_two_materials_expand_each_by_its_own() {
+    let strip = r#"
+kinematics = "plane-strain"
+coupling = "splice"
+temperature = { value = "40" }
+mesh.rectangle = { min = [0, 0], max = [4, 1], x = { cells = 32 }, y = { cells = 8 } }
+materials.a.lps = { youngs-modulus = 200, poisson-ratio = 0.2, thermal-expansion = 1e-3, cells.box = { min = [-1, -1], max = [2, 2] } }
+materials.b.lps = { youngs-modulus = 200, poisson-ratio = 0.4, thermal-expansion = 1e-3 }
+peridynamics = { horizon = 0.25, points.lattice = { spacing = 0.125, origin = [0.0625, 0.0625] } }
+zones.nonlocal.box = { min = [1, 0.25], max = [3, 0.75] }
+conditions.l.symmetry.on = "left"
+conditions.b.symmetry.on = "bottom"
+conditions.t.symmetry.on = "top"
+output.probes.e = { at = [4, 0.5] }
+output.vtu = false
+"#;
+    // per half (1 + ν)/(1 − ν) α ΔT over a length of 2
+    let expected = 2.0 * 0.04 * (1.2 / 0.8 + 1.4 / 0.6);
+    for slowly in [
+        &[][..],
+        &["temperature.value=40*t", "solve.quasi-static.steps=1"],
+    ] {
+        let done = run(strip, slowly);
+        let u = match slowly.is_empty() {
+            true => done.column("scene_probes.csv", "ux")[0],
+            false => *done.column("scene_history.csv", "e_ux").last().unwrap(),
+        };
+        // 0.0023 here, half as much with half the horizon; one expansion for both gave 0.10
+        assert!((u / expected - 1.0).abs() < 0.004, "{u} {expected}");
+    }
+    // elements of another expansion in a seam that does not count materials
+    let seam = strip
+        .replace("lps", "bond-based")
+        .replace("poisson-ratio = 0.2, ", "");
+    let seam = seam
+        .replace("poisson-ratio = 0.4, ", "")
+        .replacen("1e-3", "2e-3", 1);
+    let mut scene = super::read(&seam, &["coupling=truncated"]).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    scene.set_output_directory(folder.path().to_owned());
+    let refused = scene
+        .run(&bondline::progress::Silent)
+        .unwrap_err()
+        .to_string();
+    assert!(refused.contains("expand differently"), "{refused}");
 }

@@ -129,6 +129,7 @@ fn lay_out<T>(
             contact: None,
             storage: Storage::Double,
             broken: None,
+            heat: None,
         },
         ranks,
     );

@@ -278,6 +278,7 @@ pub fn measured<const D: usize>(
         contact: None,
         storage: Storage::Double,
         broken: None,
+        heat: None,
     };
     let symmetry = laid.coupling.symmetry();
     let system = CoupledSystem::new(

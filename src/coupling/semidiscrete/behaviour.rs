@@ -1,5 +1,6 @@
 //! How the bonds of a moving model deform and break.
 
+use super::heat::FreeStretch;
 use crate::{
     coupling::BrokenBonds,
     peridynamics::{
@@ -26,6 +27,8 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub contact: Option<ContactBehaviour>,
     /// How the weights of bonds are kept; in four bytes, they are listed one by one.
     pub storage: Storage,
+    /// By how much points expand freely; none if nothing does, or if all bonds are linear and expand by their rows.
+    pub heat: Option<FreeStretch<D>>,
     /// Bonds that are broken from the start, in a motion that goes on from another layout.
     pub broken: Option<&'a BrokenBonds<D>>,
 }
@@ -98,6 +101,14 @@ pub enum SystemError {
         "bonds of the material {law} are known to first order only: they can neither break nor turn; use bond-based or lps, or leave fracture-energy, critical-stretch and bonds = \"exact\" out"
     )]
     Law {
+        /// Its name.
+        law: &'static str,
+    },
+    /// Bonds of the law know no temperature.
+    #[error(
+        "bonds of the material {law} break or bend without a temperature of their own; leave [temperature] out"
+    )]
+    Expansion {
         /// Its name.
         law: &'static str,
     },

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::heat::PointHeat;
 use super::split::Split;
 use crate::coupling::semidiscrete::behaviour::{
     BondBehaviour, CHUNK, FailureCriterion, NONE, SystemError,
@@ -27,6 +28,8 @@ pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
     pub kinematics: BondKinematics,
     pub failure: Option<FailureCriterion>,
+    /// How bonds expand that know their temperature; none if they do not.
+    pub heat: Option<PointHeat<D>>,
     /// Whether the law damages bonds.
     pub damages: bool,
     /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
@@ -323,10 +326,11 @@ impl<const D: usize> MovingBody<D> {
             Vec::new()
         };
         let holders = Holders::of(model, families, ranks);
-        let pass = PassInput {
+        let mut pass = PassInput {
             body,
             law: &p.law,
-            accelerator: p.accelerator(),
+            // accelerators know no temperature
+            accelerator: p.accelerator().filter(|_| behaviour.heat.is_none()),
             families,
             is_whole: all_pass,
             rows: &has_force,
@@ -336,6 +340,14 @@ impl<const D: usize> MovingBody<D> {
             shared: holders.as_ref().map(Holders::rows),
         }
         .pass()?;
+        let material = model.peridynamic_material();
+        let heat = match &behaviour.heat {
+            Some(free) => {
+                let law = p.law.name();
+                Some(PointHeat::new(free, body, material, law, pass.as_mut())?)
+            }
+            None => None,
+        };
         let contact = contact_of(behaviour, body, &own_row, model.spacing())?;
         let asks = |i: usize| families.of(i).iter().any(|&j| !is_site[j as usize]);
         let is_asked = contact.is_some() || (0..points).any(|i| is_site[i] && asks(i));
@@ -343,6 +355,7 @@ impl<const D: usize> MovingBody<D> {
         Ok(Some(Self {
             pass,
             kinematics: behaviour.kinematics,
+            heat,
             failure: behaviour.failure.clone(),
             damages: p.law.damages(),
             contact,
@@ -383,6 +396,9 @@ impl<const D: usize> MovingBody<D> {
     ) -> u64 {
         let mut points = std::mem::take(&mut self.displacement);
         self.spread(u, &mut points);
+        if let Some(heat) = &mut self.heat {
+            heat.follow(interval.end, self.pass.as_mut());
+        }
         let mut broken = (self.pass).force_into(&points, &mut self.force, interval, update);
         if let Some(split) = split {
             broken = split.exchange_breaks(self.pass.as_mut(), broken, update);

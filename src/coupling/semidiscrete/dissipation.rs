@@ -8,6 +8,15 @@ use crate::{
 };
 
 impl<const D: usize> CoupledSystem<'_, D> {
+    /// Numbers of the account in a checkpoint.
+    pub(super) fn spends(&self) -> usize {
+        match (self.remembers(), self.breaks()) {
+            (true, _) => 3,
+            (false, true) => 2,
+            (false, false) => 0,
+        }
+    }
+
     /// Energy and area of the bonds that the last pass broke, all removed at once.
     pub(super) fn of_last_breaks(&self, at: &Halfway<'_>) -> Dissipation {
         let lost = self.lost_here(at);

@@ -10,6 +10,7 @@ use super::{
     BondKinematics, BondPass, BondSetup, ForceStates,
     bond_failure::BondFailure,
     carried_deformation::CarriedDeformation,
+    generic_heat::Heat,
     list::{extension, ratio, stretched},
     point_loops::Sites,
     point_state::PointForces,
@@ -77,6 +78,8 @@ pub(super) struct Generic<const D: usize> {
     pub(super) force_state: Vec<Vector<D>>,
     /// Of a law whose points have a stress.
     pub(super) points: Option<PointForces<D>>,
+    /// What temperature does; none where nothing expands.
+    pub(super) heat: Option<Heat>,
 }
 
 /// One deformed family in memory that the next one takes over.
@@ -214,6 +217,7 @@ impl<const D: usize> Generic<D> {
             last: Vec::new(),
             force_state: vec![Vector::zeros(); kept],
             points: by_points,
+            heat: None,
             families,
         };
         pass.recall_intact(None);
@@ -278,6 +282,10 @@ impl<const D: usize> Generic<D> {
                 BondKinematics::Exact => (extension::<true>(t), ratio::<true>(t)),
                 BondKinematics::Linear => (extension::<false>(t), ratio::<false>(t)),
             };
+            let (e, eta) = match self.free_stretch(i, j) {
+                Some(free) => (e - free, eta - self.xi(i, j) * free),
+                None => (e, eta),
+            };
             s.of.push(bond);
             s.bonds.push(self.xi(i, j));
             s.volumes.push(self.volume[j]);
@@ -322,6 +330,14 @@ impl<const D: usize> Generic<D> {
         let scaled = |n: usize| offsets.iter().map(|o| o * n).collect::<Vec<_>>();
         let kept = [self.layout.point.len(), self.layout.bond.len()];
         let points: Vec<usize> = (0..offsets.len()).map(|i| i * kept[0]).collect();
+        let mut heat = self
+            .heat
+            .as_mut()
+            .map(|heat| std::mem::take(&mut heat.present));
+        let resisted: Vec<&mut [f64]> = match &mut heat {
+            Some(resisted) => split_rows(resisted, offsets),
+            None => points.iter().map(|_| Default::default()).collect(),
+        };
         let forces = split_rows(&mut force, offsets);
         let of_bonds = split_rows(&mut present.bonds, &scaled(kept[1]));
         let of_points = split_rows(&mut present.point, &points);
@@ -329,11 +345,12 @@ impl<const D: usize> Generic<D> {
             .into_par_iter()
             .zip(of_bonds)
             .zip(of_points)
+            .zip(resisted)
             .zip(&mut outcome);
         parallel::for_each_with(
             families.enumerate().with_min_len(16),
             Scratch::default,
-            |s, (i, (((force, bonds), point), outcome))| {
+            |s, (i, ((((force, bonds), point), resisted), outcome))| {
                 let range = self.range(i);
                 if range.is_empty() {
                     return;
@@ -345,15 +362,23 @@ impl<const D: usize> Generic<D> {
                 outcome.dissipated = energy.dissipated * self.volume[i];
                 outcome.flow = self.flow(i, s);
                 force.fill(Vector::zeros());
+                resisted.fill(0.0);
                 point.copy_from_slice(&s.point);
                 for (e, &bond) in s.of.iter().enumerate() {
                     let k = bond - range.start;
                     force[k] = s.force[e];
+                    if let Some(resisted) = resisted.get_mut(k) {
+                        let along = s.force[e].dot(&s.direction[e]) * s.bonds[e].norm();
+                        *resisted = self.volume[i] * s.volumes[e] * along;
+                    }
                     bonds[k * kept[1]..(k + 1) * kept[1]]
                         .copy_from_slice(&s.present[e * kept[1]..(e + 1) * kept[1]]);
                 }
             },
         );
+        if let (Some(heat), Some(resisted)) = (&mut self.heat, heat) {
+            heat.present = resisted;
+        }
         self.force_state = force;
         self.present = present;
         self.outcome = outcome;
@@ -420,6 +445,8 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         if breakage == FailureUpdate::Update {
             self.last = self.failing(u);
             if !self.last.is_empty() {
+                // bonds that break have been heated before
+                self.sum_heat();
                 self.break_last(u);
                 let last = std::mem::take(&mut self.last);
                 self.recall_intact(Some(&last));
@@ -437,11 +464,13 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             self.find_damaged_through();
         }
         self.gather(&self.force_state, force);
+        self.begin_heat();
         self.last.len() as u64
     }
 
     fn commit(&mut self) -> f64 {
         self.past.clone_from(&self.present);
+        self.sum_heat();
         if let Some(drag) = self.points.as_mut().and_then(|p| p.drag.as_mut()) {
             drag.commit();
         }
@@ -533,6 +562,13 @@ impl<const D: usize> BondPass<D> for Generic<D> {
 
     fn own_points(&mut self) -> Option<&mut dyn super::OwnPoints> {
         None
+    }
+
+    fn heated(&mut self) -> Option<&mut dyn super::HeatedBonds> {
+        match self.points.is_none() {
+            true => Some(self),
+            false => None,
+        }
     }
 
     fn force_states(&self) -> Option<&dyn ForceStates<D>> {

@@ -4,6 +4,7 @@ use super::{
     bond_failure::BondFailure,
     carried_deformation::CarriedDeformation,
     generic::{Generic, Scratch, at},
+    generic_heat::Heat,
 };
 use crate::{
     parallel,
@@ -40,7 +41,11 @@ impl<const D: usize> Generic<D> {
             BondFailure::Stretch(limit) => {
                 let j = self.neighbour(bond);
                 let s = self.stretched(i, j, &(at(u, j) - at(u, i)));
-                s.excess > limit[bond] * s.length
+                let limit = match self.free_stretch(i, j) {
+                    Some(free) => Heat::limit(self.kinematics, limit[bond], free),
+                    None => limit[bond],
+                };
+                s.excess > limit * s.length
             }
             BondFailure::Tearing(tearing) => tearing.breaks(i, self.neighbour(bond)),
         };
@@ -166,6 +171,9 @@ impl<const D: usize> Generic<D> {
         self.present.clone_from(&self.past);
         self.recall_intact(None);
         self.recall_damaged_through();
+        if let Some(heat) = &mut self.heat {
+            heat.begin();
+        }
         true
     }
 }

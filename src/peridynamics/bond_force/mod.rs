@@ -11,6 +11,7 @@
 //! | `point_loops.rs` | its loops over the bonds |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
 //! | `carried_deformation.rs`, `generic_carried.rs` | the deformation that a point which has flowed keeps where its bonds break |
+//! | `generic_heat.rs` | temperature: the stretch that counts, the work of heating |
 //! | `generic_states.rs` | what it tells of single points |
 //! | `generic_damage.rs` | damage that laws keep of their bonds |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
@@ -41,6 +42,7 @@ mod generic;
 mod generic_carried;
 mod generic_damage;
 mod generic_failure;
+mod generic_heat;
 mod generic_states;
 mod generic_tangent;
 #[cfg(test)]
@@ -168,11 +170,25 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// The pass as one that may leave points to others; none where it computes all of them together.
     fn own_points(&mut self) -> Option<&mut dyn OwnPoints>;
 
+    /// The pass as one whose bonds know a temperature; none of an accelerator, and of laws whose points have a stress.
+    fn heated(&mut self) -> Option<&mut dyn HeatedBonds> {
+        None
+    }
+
     /// The force states that it computes one by one, for what is told of them; none of an accelerator.
     fn force_states(&self) -> Option<&dyn ForceStates<D>>;
 
     /// Bytes that the pass holds.
     fn memory_bytes(&self) -> usize;
+}
+
+/// A pass whose bonds know a temperature.
+pub trait HeatedBonds {
+    /// Sets the stretch `α ΔT` by which each point expands freely; a bond has the mean of its ends. Forces, energies and criteria are those of what is left of its stretch.
+    fn set_free_stretch(&mut self, free: &[f64]);
+
+    /// The work that changes of the free stretch have done since it was last asked for \[J\], up to the last [`BondPass::commit`].
+    fn take_heat_work(&mut self) -> f64;
 }
 
 /// A pass that computes some of its points only.

@@ -339,6 +339,13 @@ macro_rules! named_laws {
                 self.usual().damages()
             }
 
+            /// Whether its bonds may expand freely: its force states follow from their extensions alone, and its elements are linear.
+            pub fn expands(self) -> bool {
+                let law = self.usual();
+                let states = law.force_state();
+                states.is_some_and(|states| states.correspondence(None).is_none()) && law.local_law().is_none()
+            }
+
             /// Whether its points remember a plastic strain.
             pub fn flows(self) -> bool {
                 let law = self.usual();

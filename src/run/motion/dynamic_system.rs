@@ -19,6 +19,7 @@ use crate::run::motion::driven_impactors::extend_start;
 use crate::run::motion::material_stretches::{self, stretches_of_materials};
 use crate::run::motion::sharing::Sharing;
 use crate::run::setup::RunSettings;
+use crate::run::thermal::Thermal;
 use crate::scene::failure::Breaking;
 use crate::scene::initial::InitialKind;
 use crate::scene::materials::Fracture;
@@ -80,6 +81,8 @@ pub(crate) fn dynamic<'a, const D: usize>(
         && breaking.bonds == BondsSpec::Linear
         && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
         && !rest.has_nonlinear_elements(model);
+    let heat = rest.stresses.thermal.as_ref().filter(|_| !is_linear);
+    let heat = heat.map(Thermal::free_stretch);
     let rows = (model, operator, start.ranks);
     definiteness::check(rows, rest.ratio, choices, progress)?;
     let moving = CoupledSystem::of_processes(
@@ -96,6 +99,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
                 stiffness: c.stiffness_factor,
             }),
             storage,
+            heat: heat.clone(),
             broken: start.broken,
         },
         start.ranks,
@@ -237,6 +241,12 @@ fn tell_bonds<const D: usize>(
             why: breaks + at_seam,
         });
     }
+    if motion.is_heated() {
+        choices.push(Decision {
+            choice: "force states of bonds one by one".to_owned(),
+            why: "temperature: laws and criteria see the stretch beyond free expansion, which the faster passes do not know".to_owned(),
+        });
+    }
     if storage == Storage::Single {
         let (choice, why) = match model.body() {
             Some(_) => (
@@ -304,6 +314,7 @@ pub(crate) fn still<'a, const D: usize>(
         no_fail: &|_| false,
         contact: None,
         storage: Storage::Double,
+        heat: rest.stresses.thermal.as_ref().map(Thermal::free_stretch),
         broken: None,
     };
     let density = |material: u16| rest.density[material as usize];

@@ -3,7 +3,7 @@
 use super::RunOptions;
 use super::breaks::{Breaks, breaks};
 use super::dynamic_system::{LayoutStart, PlaneEnergy, plane_energy};
-use super::guard::Balance;
+use super::guard::{Balance, energies_are_apart};
 use super::impact_record::ImpactRecord;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
@@ -165,7 +165,15 @@ fn run_segment<'r, const D: usize>(
 }
 
 /// Whether the balance of energy is watched: what is proved of the undeformed body need not hold of one whose law changes with its strain.
-fn balance_of<const D: usize>(model: &Model<D>, rest: &RunSettings<D>, is_proved: bool) -> Balance {
+fn balance_of<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+    is_proved: bool,
+    is_linear: bool,
+) -> Balance {
+    if energies_are_apart(model, rest.stresses.thermal.is_some(), is_linear) {
+        return Balance::Apart;
+    }
     let points = model.peridynamics.as_ref();
     let follows_law = !rest.impactors.is_empty()
         || rest.has_nonlinear_elements(model)
@@ -201,6 +209,7 @@ fn take_segment<'r, const D: usize>(
     progress.stage("stable step", None);
     let before = PreStep {
         model,
+        operator,
         rest,
         spec,
         moving: laid_out.moving,
@@ -229,7 +238,7 @@ fn take_segment<'r, const D: usize>(
         breaks: breaks(begin.moving.system.as_ref(), rest),
     };
     let watched = Watched {
-        balance: balance_of(model, rest, proved.is_some()),
+        balance: balance_of(model, rest, proved.is_some(), segment.is_linear),
         seen: begin.seen,
         edge: begin.edge,
         zone: begin.zone,

@@ -10,6 +10,7 @@
 
 use super::seen::{Rotated, Seen};
 use super::writer::{EnergyRow, Moment};
+use crate::coupling::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::linear_parts::LinearParts;
 use crate::run::rotation::Rotations;
@@ -33,6 +34,26 @@ pub(crate) enum Balance {
     WatchedForLaw,
     /// Nothing shows that it closes.
     Watched,
+    /// It does not: elements expand by forces that do work, bonds that know their temperature by their stretch, and what passes the seam between them counts on neither side.
+    Apart,
+}
+
+impl Balance {
+    /// Whether a gain of energy says anything.
+    fn is_watched(self) -> bool {
+        matches!(self, Self::WatchedForLaw | Self::Watched)
+    }
+}
+
+/// Whether energies of elements and of heated bonds stand side by side, so that they do not balance.
+pub(crate) fn energies_are_apart<const D: usize>(
+    model: &Model<D>,
+    is_heated: bool,
+    is_linear: bool,
+) -> bool {
+    let cells = 0..model.mesh.cell_count();
+    let has_elements = || cells.into_iter().any(|c| model.is_element(c));
+    is_heated && !is_linear && model.body().is_some() && has_elements()
 }
 
 /// The limits of a run, and what was seen of them.
@@ -73,7 +94,7 @@ impl<'m, const D: usize> Guard<'m, D> {
 
     /// Whether energies are wanted after a step, be there a row of the history or not.
     pub fn wants_energies(&self, step: u64) -> bool {
-        self.balance != Balance::Proved && step.is_multiple_of(self.every)
+        self.balance.is_watched() && step.is_multiple_of(self.every)
     }
 
     /// Looks at the energies of a state; returns why the run has to end.
@@ -83,7 +104,7 @@ impl<'m, const D: usize> Guard<'m, D> {
         seen.largest = seen.largest.max(energy);
         // the first steps from rest under a load have energies of the order of what a step makes of them: 12 % at the first one
         let begins = moment.state.step < STEPS;
-        if self.balance == Balance::Proved || seen.largest == 0.0 || begins {
+        if !self.balance.is_watched() || seen.largest == 0.0 || begins {
             return None;
         }
         let gain = (row.dissipated - row.missing) / seen.largest;

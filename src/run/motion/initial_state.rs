@@ -15,11 +15,12 @@ use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::Recorder;
 use crate::coupling::impact::RESOLVED;
-use crate::coupling::{BrokenBonds, Model, Sampler};
+use crate::coupling::{BrokenBonds, Model, Operator, Sampler};
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
 use crate::observe::summary::{Decision, Stopwatch, Timings, bytes_text};
 use crate::run::error::RunError;
+use crate::run::loads::BodyForces;
 use crate::run::motion::seen::Seen;
 use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
@@ -74,6 +75,7 @@ pub(crate) struct StepState<'r, 'm, const D: usize> {
 /// A layout before its first step, and what is told of it.
 pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
     pub model: &'m Model<D>,
+    pub operator: &'a dyn Operator<D>,
     pub rest: &'r RunSettings<D>,
     pub spec: &'a Spec,
     pub moving: DynamicSystem<'m>,
@@ -119,9 +121,12 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         };
         let (mut moving, pace, growth) = paced(spec, &asked, moving, &held, known, self.choices)?;
         self.watch.lap(self.timings, "stable step");
-        let system = moving.system.as_ref();
-        let drive = driven(model, rest, &begin.u, &pace, spec)?
-            .heated(rest.stresses.thermal.as_ref(), system);
+        let system = (moving.system.as_ref(), moving.is_linear);
+        let drive = driven(model, rest, &begin.u, &pace, spec)?.heated(
+            rest.stresses.thermal.as_ref(),
+            self.operator,
+            system,
+        )?;
         if drive.evaluates_everywhere() {
             self.choices.push(Decision {
                 choice: "loads evaluated at every place and step".to_owned(),
@@ -246,6 +251,7 @@ fn driven<'m, const D: usize>(
         (0, _) => pace.steps,
         _ => (spec.duration / pace.step).ceil() as u64,
     };
-    let drive = SceneDrive::new(model, &rest.conditions, start, pace.step, steps)?;
+    let steps_of = (pace.step, steps);
+    let drive = SceneDrive::new(model, &rest.conditions, start, steps_of, BodyForces::Lumped)?;
     Ok(drive.with_impactors(&rest.impactors, steps))
 }

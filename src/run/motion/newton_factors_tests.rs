@@ -49,7 +49,8 @@ impl Look for Solve {
         let refactor = near.of_present_tangents().expect("nonlinear elements");
         let step = 1.0 / STEPS as f64;
         let begin = start(model, rest);
-        let drive = SceneDrive::new(model, &rest.conditions, &begin.u, step, STEPS)?;
+        let at_rest = BodyForces::Consistent;
+        let drive = SceneDrive::new(model, &rest.conditions, &begin.u, (step, STEPS), at_rest)?;
         let mut state = LoadState::at_rest(begin.u.len());
         let mut found = Vec::new();
         let params = QuasiStaticParams {

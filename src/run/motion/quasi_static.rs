@@ -10,6 +10,7 @@ use super::breaks::{Breaks, breaks};
 use super::doubtful_equilibria::DoubtfulEquilibria;
 use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
+use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
 use super::saved::{EdgeReached, Saved, StepChoice};
@@ -28,7 +29,7 @@ use crate::observe::summary::{
 use crate::progress::Progress;
 use crate::run::error::{RunError, explained};
 use crate::run::linear_parts::{LinearParts, RunKind};
-use crate::run::loads;
+use crate::run::loads::{self, BodyForces};
 use crate::run::motion::seen::Seen;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
@@ -77,7 +78,7 @@ fn load_steps<const D: usize>(
     let how = (RunKind::LoadSteps, laid_out.moving.has_exact_seam);
     let parts = LinearParts::new(model, operator, rest, how, options.ranks)?;
     let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
-    let mut system = moving.system;
+    let (mut system, is_linear) = (moving.system, moving.is_linear);
     let pace = step_choice(spec);
     let params = equilibrium_params(spec, &mut choices);
     let body = (model, operator, laid_out.springs.as_ref());
@@ -85,9 +86,15 @@ fn load_steps<const D: usize>(
     let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
     let made = leads.made(progress)?;
     leads.time(&mut watch, &mut timings);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, pace.step, pace.steps)?
+    let steps = (pace.step, pace.steps);
+    let at_rest = BodyForces::Consistent;
+    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, steps, at_rest)?
         .with_impactors(&rest.impactors, pace.steps)
-        .heated(rest.stresses.thermal.as_ref(), system.as_ref());
+        .heated(
+            rest.stresses.thermal.as_ref(),
+            operator,
+            (system.as_ref(), is_linear),
+        )?;
     let at = saved.as_ref();
     restore(system.as_mut(), at, &file)?;
     let breaks = breaks(system.as_ref(), rest);
@@ -121,6 +128,7 @@ fn load_steps<const D: usize>(
         factorisations: 0,
         edge,
         ended: ended_before(edge, rest),
+        energies_are_apart: energies_are_apart(model, rest.stresses.thermal.is_some(), is_linear),
         rotation: None,
         failed: None,
     };
@@ -258,6 +266,7 @@ struct LoadStepObserver<'a, const D: usize> {
     iterations: usize,
     factorisations: usize,
     edge: Option<EdgeReached>,
+    energies_are_apart: bool,
     ended: Ended,
     rotation: Option<Rotation>,
     failed: Option<ObserveError>,
@@ -513,7 +522,10 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         Ok(RunSummary {
             warnings: warnings
                 .chain(impacts.flat_map(ImpactRecord::warnings))
-                .chain(created_energy(model, &motion, &state.u))
+                .chain(match self.energies_are_apart {
+                    true => None,
+                    false => created_energy(model, &motion, &state.u),
+                })
                 .chain(
                     self.recorder
                         .growth

@@ -106,7 +106,7 @@ pub(crate) fn lay_out<const D: usize, T>(
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;
-    let springs = Arc::new(springs_of(&model, rest)?);
+    let springs = Arc::new(Springs::new(&model, &rest.conditions)?);
     let mut moving = dynamic(
         &model,
         coupling.as_ref(),
@@ -156,24 +156,6 @@ pub(crate) fn lay_out<const D: usize, T>(
     })?;
     drop(operator);
     Ok((done, model.into_problem(coupling)))
-}
-
-/// The springs of a scene in time or load steps.
-///
-/// # Errors
-/// [`RunError::Idle`], and [`RunError::Later`] beside a temperature.
-fn springs_of<const D: usize>(
-    model: &Model<D>,
-    rest: &RunSettings<D>,
-) -> Result<Springs, RunError> {
-    let springs = Springs::new(model, &rest.conditions)?;
-    if !springs.is_empty() && rest.stresses.thermal.is_some() {
-        return Err(RunError::Later {
-            what: "springs beside a temperature in time or load steps",
-            remedy: "solve a static scene for each temperature, or leave one of the two out",
-        });
-    }
-    Ok(springs)
 }
 
 /// Lays a scene out and hands it on; `first` has a say before anything is computed.

@@ -1,15 +1,17 @@
 //! What drives a scene: its loads and prescribed motion as functions of time.
 
+use std::borrow::Cow;
+
 use super::driven_impactors::{DrivenImpactors, prescribed};
 use super::way::Way;
-use crate::coupling::Model;
+use crate::coupling::{Model, Operator};
 use crate::run::error::RunError;
-use crate::run::loads::{Loads, displacement, holders, is_function, values_at_dofs};
-use crate::run::thermal::Thermal;
+use crate::run::loads::{BodyForces, Loads, displacement, holders, is_function, values_at_dofs};
+use crate::run::thermal::{ExpandingRows, Thermal};
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::impactors::Impactor;
 use crate::solve::explicit::Drive;
-use crate::system::{BlockCsr, SemiDiscrete};
+use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
 
 /// The conditions of a scene on the sites of its model.
@@ -27,7 +29,7 @@ pub struct SceneDrive<'a, const D: usize> {
     /// Loads that depend on time and place.
     by_both: Vec<usize>,
     /// Expansion by a temperature that changes, and the rows of all sites.
-    heat: Option<(&'a Thermal<D>, BlockCsr)>,
+    heat: Option<(&'a Thermal<D>, ExpandingRows<'a>)>,
     prescribed: Vec<u32>,
     /// The condition that holds each prescribed dof.
     holder: Vec<u32>,
@@ -91,17 +93,19 @@ struct TimedLoad {
 impl<'a, const D: usize> SceneDrive<'a, D> {
     /// The conditions of a scene over `steps` steps of `step`, from the displacement `start` of all dofs.
     ///
+    /// `body_forces` says how finite elements share body forces out.
+    ///
     /// # Errors
     /// [`RunError::Idle`] for a condition that meets no site.
     pub fn new(
         model: &'a Model<D>,
         conditions: &'a [Condition<D>],
         start: &[f64],
-        step: f64,
-        steps: u64,
+        (step, steps): (f64, u64),
+        body_forces: BodyForces,
     ) -> Result<Self, RunError> {
         let dofs = model.sites.len() * D;
-        let loads = Loads::new(model, conditions)?;
+        let loads = Loads::new(model, conditions, body_forces)?;
         let mut steady = vec![0.0; dofs];
         let (mut by_time, mut by_both) = (Vec::new(), Vec::new());
         for number in loads.conditions() {
@@ -153,14 +157,22 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         })
     }
 
-    /// With the forces of thermal expansion, by the rows of `system`.
-    #[must_use]
-    pub fn heated(mut self, thermal: Option<&'a Thermal<D>>, system: &dyn SemiDiscrete) -> Self {
+    /// With the forces of thermal expansion, by the rows of `operator` and of `system`, the bonds of which know their temperature unless it `is_linear`.
+    ///
+    /// # Errors
+    /// [`RunError::Later`] for materials that expand differently where the coupling does not count them.
+    pub fn heated(
+        mut self,
+        thermal: Option<&'a Thermal<D>>,
+        operator: &dyn Operator<D>,
+        (system, is_linear): (&dyn SemiDiscrete, bool),
+    ) -> Result<Self, RunError> {
         let Some(thermal) = thermal else {
-            return self;
+            return Ok(self);
         };
         let sites: Vec<u32> = (0..self.model.sites.len() as u32).collect();
-        let rows = system.tangent_rows(&sites);
+        let alike = || Cow::Owned(system.rows_that_expand(&sites));
+        let rows = thermal.rows(self.model, operator, None, !is_linear, alike)?;
         if thermal.temperature.value.depends_on_time() {
             self.heat = Some((thermal, rows));
         } else {
@@ -168,7 +180,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             let loads = self.steady.iter_mut().zip(forces);
             loads.for_each(|(load, f)| *load += f);
         }
-        self
+        Ok(self)
     }
 
     /// With the motion of the impactors that have no mass, over `steps` steps.

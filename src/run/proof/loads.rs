@@ -11,7 +11,9 @@ use crate::mesh::boundary::BoundaryFacet;
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
 use crate::run::error::RunError;
-use crate::run::loads::{Loads, cells_of, may_bound_zone, nearest_points, site_of_node};
+use crate::run::loads::{
+    BodyForces, Loads, cells_of, may_bound_zone, nearest_points, site_of_node,
+};
 use crate::scene::Expression;
 use crate::scene::conditions::{Condition, Prescribed, Support};
 use crate::system::Symmetry;
@@ -42,7 +44,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     // in equilibrium masses play no part: a load on a row does, whose scale is that of its part of the body
     let moves = subject.system.is_some();
     let mut is_needed = vec![moves; masses.len()];
-    let loads = Loads::new(model, conditions)?;
+    let loads = Loads::new(model, conditions, BodyForces::Consistent)?;
     let mut count = 0;
     for condition in loads.conditions() {
         let c = &conditions[condition];

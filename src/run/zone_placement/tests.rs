@@ -304,6 +304,7 @@ fn a_scene_allocates_what_it_needs() {
             contact: None,
             storage: crate::peridynamics::bond_force::Storage::Double,
             broken: None,
+            heat: None,
         };
         let symmetry = coupling.symmetry();
         CoupledSystem::new(&model, operator.as_ref(), symmetry, |_| 1.0, &behaviour)

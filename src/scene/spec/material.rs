@@ -39,7 +39,8 @@ impl MaterialSpec {
         match self {
             Self::BondBased(m) => m.thermal_expansion.as_ref(),
             Self::Lps(m) => m.thermal_expansion.as_ref(),
-            _ => None,
+            Self::Named(m) => m.thermal_expansion.as_ref(),
+            Self::Correspondence(_) | Self::Umat(_) => None,
         }
     }
 }

@@ -21,6 +21,8 @@ pub struct NamedSpec {
     pub poisson_ratio: Option<Number>,
     /// Density.
     pub density: Option<Number>,
+    /// Linear thermal expansion per degree, of a law that has any.
+    pub thermal_expansion: Option<Number>,
     /// Energy per area of a new crack.
     pub fracture_energy: Option<Number>,
     /// Stretch at which a bond breaks.
@@ -43,10 +45,14 @@ pub enum Given {
 }
 
 /// Keys that materials of all laws have, with what they are.
-const COMMON: [(&str, &str); 7] = [
+const COMMON: [(&str, &str); 8] = [
     ("youngs-modulus", "Young's modulus E."),
     ("poisson-ratio", "Poisson's ratio."),
     ("density", "Density."),
+    (
+        "thermal-expansion",
+        "Linear thermal expansion α per degree, with `[temperature]`.",
+    ),
     (
         "fracture-energy",
         "Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.",
@@ -82,6 +88,7 @@ fn takes(law: Named, key: &str) -> bool {
         "fracture-energy" => law.has_bond_energy(),
         "critical-stretch" => law.has_breakable_bonds(),
         "tearing-parameter" => law.flows(),
+        "thermal-expansion" => law.expands(),
         _ => true,
     }
 }
@@ -144,6 +151,7 @@ impl<'de> Visitor<'de> for Seed {
             youngs_modulus: taken("youngs-modulus").ok_or_else(|| missing("youngs-modulus"))?,
             poisson_ratio,
             density: taken("density"),
+            thermal_expansion: taken("thermal-expansion"),
             fracture_energy: taken("fracture-energy"),
             critical_stretch: taken("critical-stretch"),
             tearing_parameter: taken("tearing-parameter"),

@@ -220,6 +220,7 @@ fn run_crack(
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,
         broken: None,
+        heat: None,
     };
     let mut motion = CoupledSystem::new(
         &e.model,
