@@ -94,15 +94,19 @@ impl<const D: usize> DeformedFamily<'_, D> {
     /// The virial `σ = J⁻¹ Σ T⟨ξ⟩ ⊗ Y⟨ξ⟩ V` of the deformed bonds with the force state `T` \[Pa\], which is symmetric for an ordinary law: under a uniform deformation `J⁻¹ P Fᵀ` with P of
     /// [SAND2015-7998] eq. (2.19). Linear bonds have no other than the linear stress `Σ T⟨ξ⟩ ⊗ ξ V`, which a rotation turns to first order only.
     pub fn virial_stress(&self, force: &[Vector<D>]) -> Tensor<D> {
-        let mut virial = Tensor::zeros();
-        for (k, force) in force.iter().enumerate() {
-            let arm = match self.kinematics {
-                BondKinematics::Exact => self.bonds[k] + self.difference[k],
-                BondKinematics::Linear => self.bonds[k],
-            };
-            virial += force * arm.transpose() * self.volumes[k];
-        }
+        let virial = force.iter().enumerate();
+        let virial = virial.fold(Tensor::zeros(), |sum, (k, force)| {
+            sum + force * self.deformed_bond(k).transpose() * self.volumes[k]
+        });
         virial / self.volume_ratio()
+    }
+
+    /// `Y⟨ξ⟩` of a bond without its thermal expansion; ξ of a linear one.
+    fn deformed_bond(&self, k: usize) -> Vector<D> {
+        match self.kinematics {
+            BondKinematics::Exact => self.direction[k] * (self.bonds[k].norm() + self.extension[k]),
+            BondKinematics::Linear => self.bonds[k],
+        }
     }
 
     /// Volume over undeformed volume, `J = det F̄` with `F̄ = (Σ Y⟨ξ⟩ ⊗ ξ V/|ξ|²) (Σ ξ ⊗ ξ V/|ξ|²)⁻¹` of the intact bonds; 1 of linear bonds, and of those that do not span the space or are turned inside out.
@@ -111,13 +115,13 @@ impl<const D: usize> DeformedFamily<'_, D> {
             return 1.0;
         }
         let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
-        for ((xi, eta), volume) in self.bonds.iter().zip(self.difference).zip(self.volumes) {
-            let weighed = xi.transpose() * (volume / xi.norm_squared());
+        for (k, xi) in self.bonds.iter().enumerate() {
+            let weighed = xi.transpose() * (self.volumes[k] / xi.norm_squared());
             shape += xi * weighed;
-            moment += eta * weighed;
+            moment += self.deformed_bond(k) * weighed;
         }
         let ratio = match invert_shape_tensor(&shape, self.len()) {
-            Ok(inverse) => determinant(&(Tensor::identity() + moment * inverse)),
+            Ok(inverse) => determinant(&(moment * inverse)),
             Err(_) => 1.0,
         };
         if ratio > 0.0 { ratio } else { 1.0 }

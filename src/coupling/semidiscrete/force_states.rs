@@ -11,7 +11,9 @@ impl<const D: usize> CoupledSystem<'_, D> {
         let states = moving.pass.force_states()?;
         let (body, p) = self.model.point_of(site)?;
         let law = &self.model.peridynamics.as_ref()?.law;
-        let is_linear = law.is_linear() && moving.kinematics == BondKinematics::Linear;
+        let knows_heat = moving.heat.is_some();
+        let is_exact = moving.kinematics == BondKinematics::Exact;
+        let is_linear = law.is_linear() && !is_exact && !knows_heat;
         // a family of which a seam has cut a part is not all of what is strained
         let is_whole = states.family_size(p) == body.families.of(p).len();
         (is_whole && !is_linear).then(|| {

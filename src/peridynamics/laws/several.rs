@@ -5,11 +5,10 @@ use std::sync::Arc;
 use crate::{
     peridynamics::{
         Accelerator, BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity, Family,
-        ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Mixture, MomentConditions, Past, PdError,
-        PointStress, Present, ShellTarget, StatePart,
+        ForceState, HistoryLayout, Influence, Law, LinearForceState, Mixture, MomentConditions,
+        Past, PdError, PointStress, Present, ShellTarget, StatePart,
     },
-    tensor::{Tensor4, Vector},
+    tensor::{Tensor, Tensor4, Vector},
 };
 
 /// The stiffness of a bond between two materials of a law that acts bond by bond.
