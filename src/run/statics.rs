@@ -107,8 +107,7 @@ fn solve_chosen<const D: usize>(
     progress: &dyn Progress,
     visit: Visit<'_, D>,
 ) -> Result<RunSummary, RunError> {
-    let mut timings = Timings::default();
-    let mut watch = Stopwatch::start();
+    let (mut timings, mut watch) = (Timings::default(), Stopwatch::start());
     let (name, traits) = (scene.title.clone(), scene.coupling.traits());
     let counts = [scene.mesh.nodes.len(), scene.mesh.cell_count()];
     if let Some(placement) = &scene.placement {

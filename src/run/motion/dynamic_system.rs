@@ -74,7 +74,6 @@ pub(crate) fn dynamic<'a, const D: usize>(
     };
     let storage = storage(breaking.precision);
     let breaks = failure_text(model, failure.as_ref(), breaking);
-    let density = |material: u16| rest.density[material as usize];
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
     let is_linear = failure.is_none()
         && breaking.contact.is_none()
@@ -89,7 +88,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         model,
         operator,
         coupling.symmetry(),
-        density,
+        |material: u16| rest.density[material as usize],
         &BondBehaviour {
             kinematics,
             failure: failure.clone(),

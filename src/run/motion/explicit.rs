@@ -28,7 +28,7 @@ use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams, State};
-use crate::system::{SemiDiscrete, Traffic};
+use crate::system::SemiDiscrete;
 
 /// The sizes of a model that moves.
 pub fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Sizes {
@@ -264,8 +264,7 @@ fn take_segment<'r, const D: usize>(
         None => Ended::Finished,
     };
     progress.finish();
-    let processes = motion.traffic().unwrap_or_default();
-    let summary = record.summary(observer, &motion, ended, processes)?;
+    let summary = record.summary(observer, &mut motion, ended)?;
     Ok(RunSegment::Ended(Box::new(summary)))
 }
 
@@ -314,9 +313,8 @@ impl SegmentRecord {
     fn summary<const D: usize>(
         mut self,
         observer: StepObserver<'_, '_, D>,
-        motion: &Explicit<'_>,
+        motion: &mut Explicit<'_>,
         ended: Ended,
-        processes: Vec<Traffic>,
     ) -> Result<RunSummary, RunError> {
         let Segment {
             model,
@@ -347,7 +345,7 @@ impl SegmentRecord {
         let reactions = observer.recorder.reactions();
         let sections = observer.recorder.section_forces();
         let motion = MotionSummary {
-            processes,
+            processes: motion.traffic().unwrap_or_default(),
             ..motion_summary(observer, motion, ended, energy_gain, self.taken)?
         };
         Ok(RunSummary {

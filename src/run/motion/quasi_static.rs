@@ -72,15 +72,13 @@ fn load_steps<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
     let doubts = DoubtfulEquilibria::new(&laid_out);
+    let parts = linear_parts(&laid_out, options)?;
     let (mut timings, mut watch, mut choices) =
         (laid_out.timings, laid_out.watch, laid_out.choices);
     let begin = start(model, rest);
-    let how = (RunKind::LoadSteps, laid_out.moving.has_exact_seam);
-    let parts = LinearParts::new(model, operator, rest, how, options.ranks)?;
     let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
     let (mut system, is_linear) = (moving.system, moving.is_linear);
-    let pace = step_choice(spec);
-    let params = equilibrium_params(spec, &mut choices);
+    let (pace, params) = (step_choice(spec), equilibrium_params(spec, &mut choices));
     let body = (model, operator, laid_out.springs.as_ref());
     let how = (system.symmetry(), params.equilibrium);
     let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
@@ -101,12 +99,9 @@ fn load_steps<const D: usize>(
     let mut recorder = recorder((model, rest), spec, options, (impact, breaks), file, at)?;
     recorder.hold(drive.holders());
     recorder.cut(model, rest, Arc::clone(&laid_out.springs))?;
-    let (edge, seen) = saved
-        .as_ref()
-        .map_or_else(Default::default, |s| (s.edge, s.seen.clone()));
+    let (edge, seen) = at.map_or_else(Default::default, |s| (s.edge, s.seen.clone()));
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;
-    let rotations = Rotations::new(model, rest, failing_stretch(model, rest)?, None);
     let mut observer = LoadStepObserver {
         model,
         rest,
@@ -118,7 +113,7 @@ fn load_steps<const D: usize>(
         drive: &drive,
         fields: FieldOutput::new(model, operator, rest, options),
         recorder,
-        rotations,
+        rotations: Rotations::new(model, rest, failing_stretch(model, rest)?, None),
         parts,
         seen,
         doubts,
@@ -134,8 +129,7 @@ fn load_steps<const D: usize>(
     };
     watch.lap(&mut timings, "start");
     let refactor = leads.of_present_tangents();
-    let lead = leads.lead(made.as_deref());
-    let near = lead.map(|lead| BodyOnly::new(lead, model));
+    let near = (leads.lead(made.as_deref())).map(|lead| BodyOnly::new(lead, model));
     let near = (near.as_ref(), refactor.as_ref());
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
     choices.push(observer.spent());
@@ -154,6 +148,15 @@ fn load_steps<const D: usize>(
         proof: laid_out.proof,
         ..summary
     })
+}
+
+/// What of a model stays linear or whole in load steps.
+fn linear_parts<'a, const D: usize>(
+    of: &ModelSetup<'a, D>,
+    options: &RunOptions<'a>,
+) -> Result<LinearParts<'a, D>, RunError> {
+    let how = (RunKind::LoadSteps, of.moving.has_exact_seam);
+    LinearParts::new(of.model, of.operator, of.rest, how, options.ranks)
 }
 
 /// The files of a run, from its beginning or cut back to a checkpoint.
