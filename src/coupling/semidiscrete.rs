@@ -213,15 +213,6 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self.body.as_ref().map(|b| b.pass.as_ref())
     }
 
-    /// Whether the pass over the bonds knows of that between two points of the cloud, or knew of it before it broke.
-    fn is_passed_over(&self, i: usize, j: u32) -> bool {
-        match (&self.seam, &self.body) {
-            (Some(seam), _) => seam.is_whole(i, j as usize),
-            (None, Some(body)) => body.is_passed_over(i, j),
-            (None, None) => false,
-        }
-    }
-
     /// Whether the bonds that a seam cuts turn, stretch and break like others.
     pub fn has_seam_bonds(&self) -> bool {
         self.seam.is_some()
@@ -335,6 +326,16 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     fn take_heat_work(&mut self) -> f64 {
         let pass = self.body.as_mut().and_then(|body| body.pass.heated());
         pass.map_or(0.0, HeatedBonds::take_heat_work)
+    }
+
+    fn force_of_heating_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        from: Option<f64>,
+        to: f64,
+    ) -> bool {
+        self.extrapolate_heating(u, force, from, to)
     }
 
     fn commit(&mut self) {

@@ -109,12 +109,12 @@ fn a_body_that_is_free_expands_without_a_force_whatever_its_bonds_do() {
             (
                 "coupling=nonlocal",
                 "bonds = \"linear\"",
-                "solve.quasi-static.steps=2",
+                "solve.quasi-static={steps=2,tolerance=1e-12}",
             ),
             (
                 "coupling=truncated",
                 "bonds = \"linear\"",
-                "solve.quasi-static.steps=2",
+                "solve.quasi-static={steps=2,tolerance=1e-12}",
             ),
             (
                 "coupling=nonlocal",
@@ -126,7 +126,7 @@ fn a_body_that_is_free_expands_without_a_force_whatever_its_bonds_do() {
             let seams = [(
                 "coupling=splice",
                 "bonds = \"linear\"",
-                "solve.quasi-static.steps=2",
+                "solve.quasi-static={steps=2,tolerance=1e-12}",
             )];
             cases.extend(seams);
         }
@@ -135,12 +135,12 @@ fn a_body_that_is_free_expands_without_a_force_whatever_its_bonds_do() {
                 (
                     "coupling=nonlocal",
                     "bonds = \"exact\"",
-                    "solve.quasi-static.steps=2",
+                    "solve.quasi-static={steps=2,tolerance=1e-12}",
                 ),
                 (
                     "coupling=truncated",
                     "bonds = \"exact\"",
-                    "solve.quasi-static.steps=2",
+                    "solve.quasi-static={steps=2,tolerance=1e-12}",
                 ),
                 (
                     "coupling=nonlocal",
