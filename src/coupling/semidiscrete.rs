@@ -3,7 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `behaviour.rs` | how bonds deform and break, as a run asks for it |
-//! | `heat.rs` | bonds that know their temperature |
+//! | `heat.rs`, `heated_forces.rs` | bonds that know their temperature |
 //! | `body.rs`, `force_states.rs`, `elements.rs` | the points and their bonds, nonlinear force states, nonlinear finite elements |
 //! | `rows.rs`, `tangent_pattern.rs` | linear rows of the sites, blocks of the elements' tangent |
 //! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, what breaking costs |
@@ -33,9 +33,8 @@ use crate::{
 };
 use behaviour::NONE;
 pub use behaviour::{
-    BondBehaviour, ContactBehaviour, FailureCriterion, StretchOfMaterials, SystemError,
+    BondBehaviour, ContactBehaviour, FailureCriterion, FreeStretch, StretchOfMaterials, SystemError,
 };
-pub use heat::FreeStretch;
 pub use rows::scale_rows;
 
 pub(crate) mod behaviour;
@@ -45,6 +44,7 @@ mod elements;
 mod energy;
 mod force_states;
 mod heat;
+mod heated_forces;
 mod own_steps;
 mod reached_sites;
 mod rows;

@@ -1,26 +1,10 @@
 //! Bonds that know their temperature: all but those that break or bend are linear, and expand by their rows.
 
-use std::sync::Arc;
-
-use super::{CoupledSystem, behaviour::SystemError};
+use super::behaviour::{FreeStretch, SystemError};
 use crate::{
-    assembly::{self, Row},
     peridynamics::{PdBody, bond_force::BondPass},
-    system::{BlockCsr, FailureUpdate, Interval, SemiDiscrete},
     tensor::Vector,
 };
-
-/// Part of a change of temperature over which forces are differenced.
-const PART: f64 = 1e-3;
-
-/// The stretch `α ΔT` by which points expand freely.
-#[derive(Clone)]
-pub struct FreeStretch<const D: usize> {
-    /// At a place, of a material's number, at a time.
-    pub at: Arc<dyn Fn(&Vector<D>, u16, f64) -> f64 + Send + Sync>,
-    /// Whether it changes with time.
-    pub varies_in_time: bool,
-}
 
 /// The free stretch of all points of a body.
 pub(super) struct PointHeat<const D: usize> {
@@ -29,12 +13,26 @@ pub(super) struct PointHeat<const D: usize> {
     /// Of when the pass has it.
     time: f64,
     /// Whether the pass has it of a time of its own, and keeps it.
-    is_held: bool,
+    pub is_held: bool,
     /// Whether it has had one.
-    is_stale: bool,
+    pub is_stale: bool,
 }
 
 impl<const D: usize> PointHeat<D> {
+    /// As [`PointHeat::new`], where anything expands.
+    ///
+    /// # Errors
+    /// As [`PointHeat::new`].
+    pub fn of(
+        stretch: Option<&FreeStretch<D>>,
+        body: &PdBody<D>,
+        (material, law): (u16, &'static str),
+        pass: &mut dyn BondPass<D>,
+    ) -> Result<Option<Self>, SystemError> {
+        let of = |stretch| Self::new(stretch, body, material, law, pass);
+        stretch.map(of).transpose()
+    }
+
     /// Of the points of `body`, `material` being that of a body of one; the pass has it at time zero.
     ///
     /// # Errors
@@ -66,7 +64,7 @@ impl<const D: usize> PointHeat<D> {
     }
 
     /// Gives the pass that at a time (none: nothing), and `part` of the change until another; the next force asks anew.
-    fn set_between(
+    pub fn set_between(
         &mut self,
         (from, to, part): (Option<f64>, f64, f64),
         pass: &mut dyn BondPass<D>,
@@ -93,56 +91,5 @@ impl<const D: usize> PointHeat<D> {
         if let Some(heated) = pass.heated() {
             heated.set_free_stretch(&self.at(end));
         }
-    }
-}
-
-impl<const D: usize> CoupledSystem<'_, D> {
-    /// Whether the bonds that are passed over know their temperature.
-    pub fn is_heated(&self) -> bool {
-        self.body.as_ref().is_some_and(|body| body.heat.is_some())
-    }
-
-    /// See [`crate::system::SemiDiscrete::force_of_heating_into`].
-    pub(super) fn extrapolate_heating(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        from: Option<f64>,
-        to: f64,
-    ) -> bool {
-        if !self.is_heated() {
-            return false;
-        }
-        let at_once = Interval {
-            end: to,
-            length: 0.0,
-        };
-        let mut further = vec![0.0; force.len()];
-        for (part, force) in [(0.0, &mut *force), (PART, &mut further[..])] {
-            if let Some(body) = &mut self.body
-                && let Some(heat) = &mut body.heat
-            {
-                heat.set_between((from, to, part), body.pass.as_mut());
-            }
-            self.internal_force_into(u, force, at_once, FailureUpdate::Frozen);
-        }
-        if let Some(heat) = self.body.as_mut().and_then(|body| body.heat.as_mut()) {
-            (heat.is_held, heat.is_stale) = (false, true);
-        }
-        for (force, further) in force.iter_mut().zip(further) {
-            *force += (further - *force) / PART;
-        }
-        true
-    }
-
-    /// Rows of sites without the bonds that are passed over.
-    pub(super) fn rows_beside_heated_bonds(&self, sites: &[u32]) -> BlockCsr {
-        assembly::assemble_apart(sites.len(), self.mass.len(), |r, row: &mut Row<D>| {
-            let site = sites[r] as usize;
-            self.linear.add_row(site, row);
-            if let Some(scale) = self.model.row_scale() {
-                row.scale(scale[site]);
-            }
-        })
     }
 }
