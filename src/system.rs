@@ -176,6 +176,19 @@ pub trait SemiDiscrete: Send + Sync {
         0.0
     }
 
+    /// Overwrites `force` with the internal force at `u` as it was at the time `from` (none: before anything expanded), and what the change of temperature until `to` adds to first order; false, and nothing done, where no bond knows its temperature.
+    ///
+    /// A step sets out by this: bonds that soften must not see the whole change of a temperature before the body has given way to it.
+    fn force_of_heating_into(
+        &mut self,
+        _u: &[f64],
+        _force: &mut [f64],
+        _from: Option<f64>,
+        _to: f64,
+    ) -> bool {
+        false
+    }
+
     /// The system as one of which each process may move its own sites alone; none where each has to have the numbers of all in every step.
     fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
         None

@@ -3,7 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `behaviour.rs` | how bonds deform and break, as a run asks for it |
-//! | `heat.rs` | bonds that know their temperature |
+//! | `heat.rs`, `heated_forces.rs` | bonds that know their temperature |
 //! | `body.rs`, `force_states.rs`, `elements.rs` | the points and their bonds, nonlinear force states, nonlinear finite elements |
 //! | `rows.rs`, `tangent_pattern.rs` | linear rows of the sites, blocks of the elements' tangent |
 //! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, what breaking costs |
@@ -33,9 +33,8 @@ use crate::{
 };
 use behaviour::NONE;
 pub use behaviour::{
-    BondBehaviour, ContactBehaviour, FailureCriterion, StretchOfMaterials, SystemError,
+    BondBehaviour, ContactBehaviour, FailureCriterion, FreeStretch, StretchOfMaterials, SystemError,
 };
-pub use heat::FreeStretch;
 pub use rows::scale_rows;
 
 pub(crate) mod behaviour;
@@ -45,6 +44,7 @@ mod elements;
 mod energy;
 mod force_states;
 mod heat;
+mod heated_forces;
 mod own_steps;
 mod reached_sites;
 mod rows;
@@ -213,15 +213,6 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self.body.as_ref().map(|b| b.pass.as_ref())
     }
 
-    /// Whether the pass over the bonds knows of that between two points of the cloud, or knew of it before it broke.
-    fn is_passed_over(&self, i: usize, j: u32) -> bool {
-        match (&self.seam, &self.body) {
-            (Some(seam), _) => seam.is_whole(i, j as usize),
-            (None, Some(body)) => body.is_passed_over(i, j),
-            (None, None) => false,
-        }
-    }
-
     /// Whether the bonds that a seam cuts turn, stretch and break like others.
     pub fn has_seam_bonds(&self) -> bool {
         self.seam.is_some()
@@ -335,6 +326,16 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     fn take_heat_work(&mut self) -> f64 {
         let pass = self.body.as_mut().and_then(|body| body.pass.heated());
         pass.map_or(0.0, HeatedBonds::take_heat_work)
+    }
+
+    fn force_of_heating_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        from: Option<f64>,
+        to: f64,
+    ) -> bool {
+        self.extrapolate_heating(u, force, from, to)
     }
 
     fn commit(&mut self) {

@@ -175,6 +175,20 @@ where
         broken
     }
 
+    fn force_of_heating_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        from: Option<f64>,
+        to: f64,
+    ) -> bool {
+        let is_heated = self.system.force_of_heating_into(u, force, from, to);
+        if is_heated {
+            self.springs.add_product(u, force);
+        }
+        is_heated
+    }
+
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.system.tangent_into(x, y);
         self.springs.add_product(x, y);

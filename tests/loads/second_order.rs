@@ -117,7 +117,7 @@ fn a_body_of_cells_of_second_order_expands_without_a_force_beside_points() {
             heated.push("temperature.value=40".to_owned());
             let mut slowly = set.clone();
             slowly.push("temperature.value=40*t".to_owned());
-            slowly.push("solve.quasi-static.steps=2".to_owned());
+            slowly.push("solve.quasi-static={steps=2,tolerance=1e-12}".to_owned());
             for set in [heated, slowly] {
                 let set: Vec<&str> = set.iter().map(String::as_str).collect();
                 let done = run(&block(text, cell, ", thermal-expansion = 1e-3"), &set);

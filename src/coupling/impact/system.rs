@@ -69,6 +69,23 @@ impl<const D: usize> SemiDiscrete for ImpactedSystem<'_, D> {
         broken
     }
 
+    fn force_of_heating_into(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        from: Option<f64>,
+        to: f64,
+    ) -> bool {
+        let dofs = self.dofs();
+        let (own, rest) = force.split_at_mut(dofs);
+        let is_heated = (self.body).force_of_heating_into(&u[..dofs], own, from, to);
+        if is_heated {
+            rest.fill(0.0);
+            self.impact.add_force(u, force);
+        }
+        is_heated
+    }
+
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         let (own, rest) = y.split_at_mut(self.dofs());
         rest.fill(0.0);

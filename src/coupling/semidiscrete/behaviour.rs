@@ -1,6 +1,7 @@
 //! How the bonds of a moving model deform and break.
 
-use super::heat::FreeStretch;
+use std::sync::Arc;
+
 use crate::{
     coupling::BrokenBonds,
     peridynamics::{
@@ -31,6 +32,15 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub heat: Option<FreeStretch<D>>,
     /// Bonds that are broken from the start, in a motion that goes on from another layout.
     pub broken: Option<&'a BrokenBonds<D>>,
+}
+
+/// The stretch `α ΔT` by which points expand freely.
+#[derive(Clone)]
+pub struct FreeStretch<const D: usize> {
+    /// At a place, of a material's number, at a time.
+    pub at: Arc<dyn Fn(&Vector<D>, u16, f64) -> f64 + Send + Sync>,
+    /// Whether it changes with time.
+    pub varies_in_time: bool,
 }
 
 /// What breaks bonds: a stretch, or a tearing parameter.

@@ -340,14 +340,8 @@ impl<const D: usize> MovingBody<D> {
             shared: holders.as_ref().map(Holders::rows),
         }
         .pass()?;
-        let material = model.peridynamic_material();
-        let heat = match &behaviour.heat {
-            Some(free) => {
-                let law = p.law.name();
-                Some(PointHeat::new(free, body, material, law, pass.as_mut())?)
-            }
-            None => None,
-        };
+        let known = (model.peridynamic_material(), p.law.name());
+        let heat = PointHeat::of(behaviour.heat.as_ref(), body, known, pass.as_mut())?;
         let contact = contact_of(behaviour, body, &own_row, model.spacing())?;
         let asks = |i: usize| families.of(i).iter().any(|&j| !is_site[j as usize]);
         let is_asked = contact.is_some() || (0..points).any(|i| is_site[i] && asks(i));

@@ -1,23 +1,10 @@
 //! Bonds that know their temperature: all but those that break or bend are linear, and expand by their rows.
 
-use std::sync::Arc;
-
-use super::{CoupledSystem, behaviour::SystemError};
+use super::behaviour::{FreeStretch, SystemError};
 use crate::{
-    assembly::{self, Row},
     peridynamics::{PdBody, bond_force::BondPass},
-    system::BlockCsr,
     tensor::Vector,
 };
-
-/// The stretch `α ΔT` by which points expand freely.
-#[derive(Clone)]
-pub struct FreeStretch<const D: usize> {
-    /// At a place, of a material's number, at a time.
-    pub at: Arc<dyn Fn(&Vector<D>, u16, f64) -> f64 + Send + Sync>,
-    /// Whether it changes with time.
-    pub varies_in_time: bool,
-}
 
 /// The free stretch of all points of a body.
 pub(super) struct PointHeat<const D: usize> {
@@ -25,9 +12,27 @@ pub(super) struct PointHeat<const D: usize> {
     places: Vec<(Vector<D>, u16)>,
     /// Of when the pass has it.
     time: f64,
+    /// Whether the pass has it of a time of its own, and keeps it.
+    pub is_held: bool,
+    /// Whether it has had one.
+    pub is_stale: bool,
 }
 
 impl<const D: usize> PointHeat<D> {
+    /// As [`PointHeat::new`], where anything expands.
+    ///
+    /// # Errors
+    /// As [`PointHeat::new`].
+    pub fn of(
+        stretch: Option<&FreeStretch<D>>,
+        body: &PdBody<D>,
+        (material, law): (u16, &'static str),
+        pass: &mut dyn BondPass<D>,
+    ) -> Result<Option<Self>, SystemError> {
+        let of = |stretch| Self::new(stretch, body, material, law, pass);
+        stretch.map(of).transpose()
+    }
+
     /// Of the points of `body`, `material` being that of a body of one; the pass has it at time zero.
     ///
     /// # Errors
@@ -45,6 +50,8 @@ impl<const D: usize> PointHeat<D> {
             stretch: stretch.clone(),
             places: cloud.position.iter().enumerate().map(of).collect(),
             time: 0.0,
+            is_held: false,
+            is_stale: false,
         };
         let heated = pass.heated().ok_or(SystemError::Expansion { law })?;
         heated.set_free_stretch(&heat.at(0.0));
@@ -56,32 +63,33 @@ impl<const D: usize> PointHeat<D> {
         places.map(|(x, m)| (self.stretch.at)(x, *m, t)).collect()
     }
 
+    /// Gives the pass that at a time (none: nothing), and `part` of the change until another; the next force asks anew.
+    pub fn set_between(
+        &mut self,
+        (from, to, part): (Option<f64>, f64, f64),
+        pass: &mut dyn BondPass<D>,
+    ) {
+        let to = self.at(to);
+        let from = from.map_or_else(|| vec![0.0; to.len()], |t| self.at(t));
+        let free: Vec<f64> = (from.iter().zip(&to))
+            .map(|(from, to)| from + part * (to - from))
+            .collect();
+        if let Some(heated) = pass.heated() {
+            heated.set_free_stretch(&free);
+        }
+        self.is_held = true;
+    }
+
     /// Gives the pass that at the end of an interval.
     pub fn follow(&mut self, end: f64, pass: &mut dyn BondPass<D>) {
-        if !self.stretch.varies_in_time || end == self.time {
+        let is_there = !self.stretch.varies_in_time || end == self.time;
+        if self.is_held || (is_there && !self.is_stale) {
             return;
         }
+        self.is_stale = false;
         self.time = end;
         if let Some(heated) = pass.heated() {
             heated.set_free_stretch(&self.at(end));
         }
-    }
-}
-
-impl<const D: usize> CoupledSystem<'_, D> {
-    /// Whether the bonds that are passed over know their temperature.
-    pub fn is_heated(&self) -> bool {
-        self.body.as_ref().is_some_and(|body| body.heat.is_some())
-    }
-
-    /// Rows of sites without the bonds that are passed over.
-    pub(super) fn rows_beside_heated_bonds(&self, sites: &[u32]) -> BlockCsr {
-        assembly::assemble_apart(sites.len(), self.mass.len(), |r, row: &mut Row<D>| {
-            let site = sites[r] as usize;
-            self.linear.add_row(site, row);
-            if let Some(scale) = self.model.row_scale() {
-                row.scale(scale[site]);
-            }
-        })
     }
 }

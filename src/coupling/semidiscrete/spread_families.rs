@@ -13,6 +13,15 @@ impl<const D: usize> CoupledSystem<'_, D> {
         self.model.spread(ranks)
     }
 
+    /// Whether the pass over the bonds knows of that between two points of the cloud, or knew of it before it broke.
+    pub(super) fn is_passed_over(&self, i: usize, j: u32) -> bool {
+        match (&self.seam, &self.body) {
+            (Some(seam), _) => seam.is_whole(i, j as usize),
+            (None, Some(body)) => body.is_passed_over(i, j),
+            (None, None) => false,
+        }
+    }
+
     /// See [`crate::system::SemiDiscrete::tangent_rows`]. Collective where families are spread.
     pub(super) fn rows_at(&self, sites: &[u32]) -> BlockCsr {
         match self.spread_families() {

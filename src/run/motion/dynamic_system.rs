@@ -75,11 +75,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     let storage = storage(breaking.precision);
     let breaks = failure_text(model, failure.as_ref(), breaking);
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
-    let is_linear = failure.is_none()
-        && breaking.contact.is_none()
-        && breaking.bonds == BondsSpec::Linear
-        && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
-        && !rest.has_nonlinear_elements(model);
+    let is_linear = is_linear(model, rest, failure.as_ref());
     let heat = rest.stresses.thermal.as_ref().filter(|_| !is_linear);
     let heat = heat.map(Thermal::free_stretch);
     let rows = (model, operator, start.ranks);
@@ -138,6 +134,20 @@ pub(crate) fn dynamic<'a, const D: usize>(
         )),
         Err(error) => Err(error.into()),
     }
+}
+
+/// Whether forces are linear in the displacement: nothing breaks, touches or bends.
+fn is_linear<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+    failure: Option<&FailureCriterion>,
+) -> bool {
+    let breaking = &rest.breaking;
+    failure.is_none()
+        && breaking.contact.is_none()
+        && breaking.bonds == BondsSpec::Linear
+        && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
+        && !rest.has_nonlinear_elements(model)
 }
 
 /// Lets processes move their own sites each, where these share so much.

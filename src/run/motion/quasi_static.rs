@@ -61,6 +61,19 @@ pub(crate) fn run<const D: usize>(
     )
 }
 
+/// Loads and supports over the load steps, from the displacement `start`.
+fn driven<'a, const D: usize>(
+    model: &'a Model<D>,
+    rest: &'a RunSettings<D>,
+    start: &[f64],
+    pace: StepChoice,
+) -> Result<SceneDrive<'a, D>, RunError> {
+    let steps = (pace.step, pace.steps);
+    let at_rest = BodyForces::Consistent;
+    let drive = SceneDrive::new(model, &rest.conditions, start, steps, at_rest)?;
+    Ok(drive.with_impactors(&rest.impactors, pace.steps))
+}
+
 /// Load steps from the beginning or a checkpoint.
 fn load_steps<const D: usize>(
     laid_out: ModelSetup<'_, D>,
@@ -84,15 +97,9 @@ fn load_steps<const D: usize>(
     let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
     let made = leads.made(progress)?;
     leads.time(&mut watch, &mut timings);
-    let steps = (pace.step, pace.steps);
-    let at_rest = BodyForces::Consistent;
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, steps, at_rest)?
-        .with_impactors(&rest.impactors, pace.steps)
-        .heated(
-            rest.stresses.thermal.as_ref(),
-            operator,
-            (system.as_ref(), is_linear),
-        )?;
+    let thermal = rest.stresses.thermal.as_ref();
+    let drive = driven(model, rest, &begin.u, pace)?;
+    let drive = drive.heated(thermal, operator, (system.as_ref(), is_linear))?;
     let at = saved.as_ref();
     restore(system.as_mut(), at, &file)?;
     let breaks = breaks(system.as_ref(), rest);
@@ -123,7 +130,7 @@ fn load_steps<const D: usize>(
         factorisations: 0,
         edge,
         ended: ended_before(edge, rest),
-        energies_are_apart: energies_are_apart(model, rest.stresses.thermal.is_some(), is_linear),
+        energies_are_apart: energies_are_apart(model, thermal.is_some(), is_linear),
         rotation: None,
         failed: None,
     };

@@ -8,7 +8,7 @@ use super::error::QuasiStaticError;
 use super::lead::Lead;
 use super::residual::{Residual, Run, Tangent};
 use crate::solve::krylov::{KrylovError, KrylovParams, add_scaled, norm};
-use crate::system::ElementTangent;
+use crate::system::{ElementTangent, Interval};
 
 /// The residual over that before, beyond which the tangent at rest leads too slowly.
 const SLOW: f64 = 0.1;
@@ -51,6 +51,7 @@ impl Run<'_> {
         // where forces are linear the first correction does the same
         if self.system.difference_length().is_some() {
             let mut residual = self.evaluate(u)?;
+            residual = self.heat(u, residual);
             let mut resisted = vec![0.0; u.len()];
             self.system.tangent_into(&change, &mut resisted);
             residual = self.resist(residual, &resisted);
@@ -83,6 +84,24 @@ impl Run<'_> {
             u[k as usize] = *v;
         }
         Ok(iterations)
+    }
+
+    /// The residual with the change of temperature to first order, where bonds know theirs.
+    fn heat(&mut self, u: &[f64], residual: Residual) -> Residual {
+        let Interval { end, length } = self.interval;
+        let from = (length > 0.0).then(|| end - length);
+        let mut force = vec![0.0; u.len()];
+        if !(self.system).force_of_heating_into(u, &mut force, from, end) {
+            return residual;
+        }
+        for ((r, f), k) in self.residual.iter_mut().zip(&self.load).zip(&force) {
+            *r = f - k;
+        }
+        self.free.clear_prescribed(&mut self.residual);
+        Residual {
+            size: norm(&self.residual),
+            ..residual
+        }
     }
 
     /// Takes what a change is resisted by from the residual.

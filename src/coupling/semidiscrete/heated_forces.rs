@@ -1,0 +1,61 @@
+//! Forces of a coupled system whose bonds know their temperature.
+
+use super::CoupledSystem;
+use crate::{
+    assembly::{self, Row},
+    system::{BlockCsr, FailureUpdate, Interval, SemiDiscrete},
+};
+
+/// Part of a change of temperature over which forces are differenced.
+const PART: f64 = 1e-3;
+
+impl<const D: usize> CoupledSystem<'_, D> {
+    /// Whether the bonds that are passed over know their temperature.
+    pub fn is_heated(&self) -> bool {
+        self.body.as_ref().is_some_and(|body| body.heat.is_some())
+    }
+
+    /// See [`crate::system::SemiDiscrete::force_of_heating_into`].
+    pub(super) fn extrapolate_heating(
+        &mut self,
+        u: &[f64],
+        force: &mut [f64],
+        from: Option<f64>,
+        to: f64,
+    ) -> bool {
+        if !self.is_heated() {
+            return false;
+        }
+        let at_once = Interval {
+            end: to,
+            length: 0.0,
+        };
+        let mut further = vec![0.0; force.len()];
+        for (part, force) in [(0.0, &mut *force), (PART, &mut further[..])] {
+            if let Some(body) = &mut self.body
+                && let Some(heat) = &mut body.heat
+            {
+                heat.set_between((from, to, part), body.pass.as_mut());
+            }
+            self.internal_force_into(u, force, at_once, FailureUpdate::Frozen);
+        }
+        if let Some(heat) = self.body.as_mut().and_then(|body| body.heat.as_mut()) {
+            (heat.is_held, heat.is_stale) = (false, true);
+        }
+        for (force, further) in force.iter_mut().zip(further) {
+            *force += (further - *force) / PART;
+        }
+        true
+    }
+
+    /// Rows of sites without the bonds that are passed over.
+    pub(super) fn rows_beside_heated_bonds(&self, sites: &[u32]) -> BlockCsr {
+        assembly::assemble_apart(sites.len(), self.mass.len(), |r, row: &mut Row<D>| {
+            let site = sites[r] as usize;
+            self.linear.add_row(site, row);
+            if let Some(scale) = self.model.row_scale() {
+                row.scale(scale[site]);
+            }
+        })
+    }
+}
