@@ -204,6 +204,7 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
         contact: None,
         storage: crate::peridynamics::bond_force::Storage::Double,
         broken: None,
+        heat: None,
     };
     let mut problem = problem(plate(0.0), layouts[0], Box::<Truncated>::default());
     let mut state: Option<(Carried<2>, State)> = None;

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::*;
 use crate::progress::Silent;
 use crate::run::AnyScene;
+use crate::run::loads::BodyForces;
 use crate::run::motion::dynamic_system::start;
 use crate::run::motion::setup::{ModelSetup, laid_out};
 use crate::run::motion::time_dependent_loads::SceneDrive;
