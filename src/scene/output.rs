@@ -95,15 +95,19 @@ pub(crate) fn output<const D: usize>(
         vtu: o.vtu.unwrap_or(true),
         points: o.points,
         energy_density: o.energy_density.unwrap_or(false),
-        stresses: StressOutput {
-            numbers: o.stresses.iter().map(|s| *s.get_ref()).collect(),
-            across: kinematics == Kinematics::PlaneStrain,
-        },
+        stresses: stress_output(o, kinematics),
         lines,
         probes,
         sections,
         tips,
     })
+}
+
+fn stress_output(spec: &OutputSpec, kinematics: Kinematics) -> StressOutput {
+    StressOutput {
+        numbers: spec.stresses.iter().map(|s| *s.get_ref()).collect(),
+        across: kinematics == Kinematics::PlaneStrain,
+    }
 }
 
 impl<const D: usize> Output<D> {

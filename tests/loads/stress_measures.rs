@@ -105,6 +105,7 @@ fn table(name: &str, values: impl Iterator<Item = f64>, pace: f64) -> String {
 }
 
 /// The scene of a body all of whose displacements are prescribed: strained by `GRADIENT` times the size of each state, and then turned in the plane; at rest it is in the last state.
+// One function: the text of a scene.
 fn scene(
     kinematics: Kinematics,
     stuff: &Stuff,

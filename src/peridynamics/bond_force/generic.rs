@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use super::{
     BondKinematics, BondPass, BondSetup, ForceStates,
     bond_failure::BondFailure,
+    bond_heat::Heat,
     carried_deformation::CarriedDeformation,
-    generic_heat::Heat,
     list::{extension, ratio, stretched},
     point_loops::Sites,
     point_state::PointForces,

@@ -2,9 +2,9 @@
 
 use super::{
     bond_failure::BondFailure,
+    bond_heat::Heat,
     carried_deformation::CarriedDeformation,
     generic::{Generic, Scratch, at},
-    generic_heat::Heat,
 };
 use crate::{
     parallel,

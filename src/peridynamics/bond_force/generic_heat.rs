@@ -3,55 +3,7 @@
 //! A bond expands freely by the mean `s̄ = (α_i τ_i + α_j τ_j)/2` of its ends, which is exact along it where the temperature is linear. Its law has the extension `e − s̄ |ξ|`, and it breaks where `s − s̄` is beyond the critical stretch.
 //! The energy W of the bonds then changes with the temperature too, `∂W/∂s̄ = −Σ T⟨ξ⟩·M |ξ| V V′`: summed by the trapezoidal rule as loads are, this is the work of heating, without which the energy would not balance.
 
-use super::{BondKinematics, HeatedBonds, generic::Generic};
-
-/// What temperature does to the bonds of a pass.
-pub(super) struct Heat {
-    /// Free stretch of each point.
-    pub(super) free: Vec<f64>,
-    /// The same up to which the work has been summed.
-    before: Vec<f64>,
-    /// `V_i V_j |ξ| T_i⟨ξ⟩·M` of each bond there \[J\].
-    past: Vec<f64>,
-    /// The same of the last force.
-    pub(super) present: Vec<f64>,
-    /// Whether the next force is the first of all, from which sums begin.
-    begins: bool,
-    /// Work that nobody has asked for yet \[J\].
-    work: f64,
-}
-
-impl Heat {
-    fn new(free: &[f64], bonds: usize) -> Self {
-        Self {
-            free: free.to_vec(),
-            before: free.to_vec(),
-            past: vec![0.0; bonds],
-            present: vec![0.0; bonds],
-            begins: true,
-            work: 0.0,
-        }
-    }
-
-    /// Free stretch of a bond.
-    pub(super) fn between(&self, i: usize, j: usize) -> f64 {
-        0.5 * (self.free[i] + self.free[j])
-    }
-
-    /// The value of `t` at which a bond breaks that would at `limit` without its free stretch.
-    pub(super) fn limit(kinematics: BondKinematics, limit: f64, free: f64) -> f64 {
-        match kinematics {
-            // (1 + s + s̄)² − 1 with (1 + s)² = 1 + limit
-            BondKinematics::Exact => limit + free * (2.0 * (1.0 + limit).sqrt() + free),
-            BondKinematics::Linear => limit + 2.0 * free,
-        }
-    }
-
-    /// Forgets the temperature before: that of a state which was put back follows.
-    pub(super) fn begin(&mut self) {
-        self.begins = true;
-    }
-}
+use super::{HeatedBonds, bond_heat::Heat, generic::Generic};
 
 impl<const D: usize> Generic<D> {
     /// Free stretch of a bond, if anything expands.

@@ -11,7 +11,7 @@
 //! | `point_loops.rs` | its loops over the bonds |
 //! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
 //! | `carried_deformation.rs`, `generic_carried.rs` | the deformation that a point which has flowed keeps where its bonds break |
-//! | `generic_heat.rs` | temperature: the stretch that counts, the work of heating |
+//! | `bond_heat.rs`, `generic_heat.rs` | temperature: the stretch that counts, the work of heating |
 //! | `generic_states.rs` | what it tells of single points |
 //! | `generic_damage.rs` | damage that laws keep of their bonds |
 //! | `bond_list.rs` | neighbour lists with what their pass reads |
@@ -32,6 +32,7 @@
 //! hence break together without telling each other. Every method gives the same bits for any number of threads.
 
 mod bond_failure;
+mod bond_heat;
 pub(crate) mod bond_list;
 mod breaks;
 mod carried_deformation;

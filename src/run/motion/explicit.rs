@@ -186,6 +186,7 @@ fn balance_of<const D: usize>(
 }
 
 /// The steps of [`run_segment`].
+// One function: what a segment is made of, in the order in which it is found.
 fn take_segment<'r, const D: usize>(
     laid_out: ModelSetup<'_, D>,
     from: From<'r, D>,

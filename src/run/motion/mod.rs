@@ -10,7 +10,7 @@
 //! | `explicit.rs` | the run in time |
 //! | `initial_state.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
 //! | `step_observer.rs` | what follows each step: what is watched, what is written |
-//! | `quasi_static.rs`, `doubtful_equilibria.rs` | the run under a load that grows; what makes its equilibria doubtful |
+//! | `quasi_static.rs`, `inside_step.rs`, `doubtful_equilibria.rs` | the run under a load that grows; progress within a step; what makes its equilibria doubtful |
 //! | `newton_factors.rs`, `spread_factors.rs` | the factors or multigrid that lead it, of one process or of several |
 //! | `time_step.rs` | the time step, with sub-cycling |
 //! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, what is told of them |
@@ -38,6 +38,7 @@ pub(crate) mod guard;
 pub(crate) mod impact;
 pub(crate) mod impact_record;
 pub(crate) mod initial_state;
+mod inside_step;
 mod material_stretches;
 mod newton_factors;
 mod probe_rows;

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::RunOptions;
@@ -13,6 +13,7 @@ use super::explicit::{cracks, inelastic_energy, sizes};
 use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
+use super::inside_step::InsideStep;
 use super::saved::{EdgeReached, Saved, StepChoice};
 use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::spread_factors::Leads;
@@ -75,6 +76,7 @@ fn driven<'a, const D: usize>(
 }
 
 /// Load steps from the beginning or a checkpoint.
+// One function: everything that a step asks for, in the order in which it is found.
 fn load_steps<const D: usize>(
     laid_out: ModelSetup<'_, D>,
     file: CheckpointFile,
@@ -557,30 +559,6 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             ..RunSummary::default()
         })
     }
-}
-
-/// What the solver of a load step reports to: iterations do not count as steps, and an interrupt ends them.
-struct InsideStep<'a> {
-    progress: &'a dyn Progress,
-    interrupt: Option<&'a AtomicBool>,
-}
-
-impl Progress for InsideStep<'_> {
-    fn stage(&self, _name: &str, _total: Option<u64>) {}
-
-    fn advance(&self, _by: u64) {
-        self.progress.advance(0);
-    }
-
-    fn asks_to_end(&self) -> bool {
-        self.interrupt.is_some_and(|i| i.load(Ordering::Relaxed))
-    }
-
-    fn tell(&self, text: &str) {
-        self.progress.tell(text);
-    }
-
-    fn finish(&self) {}
 }
 
 /// Energy that load steps set free by breaking, and that they dissipated \[J\] (per metre of thickness in 2D, per square metre of section in 1D).
