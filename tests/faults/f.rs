@@ -54,8 +54,8 @@ fn rate(said: &str) -> f64 {
 fn a_motion_that_has_hardly_any_of_the_mode_runs_without_a_warning() {
     let case = Case::new(BAR);
     let summary = case.run(&[]).expect("it runs");
-    let warnings = summary["warnings"].as_array().expect("a list");
-    assert!(warnings.is_empty(), "{warnings:?}");
+    let warnings = &summary["warnings"];
+    assert!(warnings.is_null(), "{warnings}");
     let energies = energies(&case);
     let last = energies.last().expect("a row").1 / energies[0].1;
     assert!((last - 1.0).abs() < 1e-3, "{last}");
