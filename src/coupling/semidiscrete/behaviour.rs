@@ -34,11 +34,14 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub broken: Option<&'a BrokenBonds<D>>,
 }
 
+/// A number of a position, a material and a time.
+pub type StretchOf<const D: usize> = dyn Fn(&Vector<D>, u16, f64) -> f64 + Send + Sync;
+
 /// The stretch `α ΔT` by which points expand freely.
 #[derive(Clone)]
 pub struct FreeStretch<const D: usize> {
     /// At a place, of a material's number, at a time.
-    pub at: Arc<dyn Fn(&Vector<D>, u16, f64) -> f64 + Send + Sync>,
+    pub at: Arc<StretchOf<D>>,
     /// Whether it changes with time.
     pub varies_in_time: bool,
 }

@@ -49,12 +49,15 @@ pub struct GrowthQuestion<'a> {
     pub free_from: Option<(&'a [f64], &'a [f64])>,
 }
 
+/// Displacement and velocity of all sites.
+type Pair<'a> = (&'a [f64], &'a [f64]);
+
 /// The start of a motion that is left to itself: nothing loads it, and what is held stays at zero.
 pub(crate) fn free_start<'a, const D: usize>(
     (model, rest): (&Model<D>, &RunSettings<D>),
     is_linear: bool,
     begin: &'a State,
-) -> Result<Option<(&'a [f64], &'a [f64])>, RunError> {
+) -> Result<Option<Pair<'a>>, RunError> {
     let is_still = |c: &Condition<D>| match &c.prescribed {
         Prescribed::Displacement(_) | Prescribed::Field(_) => !c.components.depends_on_time(),
         Prescribed::Spring(_) => true,

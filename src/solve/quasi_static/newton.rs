@@ -89,7 +89,7 @@ impl Run<'_> {
     /// The residual with the change of temperature to first order, where bonds know theirs.
     fn heat(&mut self, u: &[f64], residual: Residual) -> Residual {
         let Interval { end, length } = self.interval;
-        let from = (length > 0.0).then(|| end - length);
+        let from = (length > 0.0).then_some(end - length);
         let mut force = vec![0.0; u.len()];
         if !(self.system).force_of_heating_into(u, &mut force, from, end) {
             return residual;
