@@ -19,7 +19,7 @@ use crate::{
 /// `L(x) = Tr(∇ν^ps) = Σ ω {ν(x′) − ν(x)} K⁻¹ ξ V`, with `K = Σ ω ξ⊗ξ V`; peridynamic in the nonlocal zone, finite elements in the local zone.
 /// The horizon may vary in the transition zone.
 ///
-/// Differs from it by: the control of [Silling2017], with the gradient `F = Σ ω η⊗ξ V K⁻¹` of either end of a bond,
+/// Differs from it by: the control of Silling (2017), with the gradient `F = Σ ω η⊗ξ V K⁻¹` of either end of a bond,
 ///
 /// ```text
 ///   + Σ c (2η − {F(x) + F(x′)} ξ) V′ ,     c = κ C₁₁₁₁ ω D / Σ ω |ξ|² V .

@@ -6,7 +6,7 @@ use bondline::peridynamics::laws::{Named, Parameter, Ratio};
 
 use super::{read, run};
 
-const YOUNG: f64 = 1000.0;
+pub(super) const YOUNG: f64 = 1000.0;
 const POISSON: f64 = 0.3;
 
 /// Turns by which the stress of exact bonds and of laws for large strains is checked \[degrees\].
@@ -16,23 +16,25 @@ const TURNS: [f64; 2] = [20.0, 75.0];
 const SMALL_TURN: f64 = 1e-4;
 
 /// A material of a scene.
-struct Stuff {
-    text: String,
-    poisson: f64,
+pub(super) struct Stuff {
+    pub(super) key: &'static str,
+    pub(super) text: String,
+    pub(super) poisson: f64,
 }
 
 /// A law that has a key of its own in scenes or is among [`Named`], with usual numbers, and once more for each other word that it can be given.
-fn every_law(kinematics: Kinematics) -> Vec<Stuff> {
+pub(super) fn every_law(kinematics: Kinematics) -> Vec<Stuff> {
     let pairwise = match kinematics {
         Kinematics::PlaneStress => 1.0 / 3.0,
         _ => 0.25,
     };
-    let stuff = |key: &str, ratio: Ratio, rest: String| {
+    let stuff = |key: &'static str, ratio: Ratio, rest: String| {
         let poisson = match ratio {
             Ratio::Pairwise => String::new(),
             Ratio::Any => format!("poisson-ratio = {POISSON}, "),
         };
         Stuff {
+            key,
             text: format!(
                 "materials.m.{key} = {{ youngs-modulus = {YOUNG}, density = 1, {poisson}{rest} }}"
             ),

@@ -219,6 +219,74 @@ fn tangents_forces_and_energies_of_every_law_belong_together() {
     consistent([6, 5, 6]);
 }
 
+/// Size of the strain of points whose stress is compared with the derivative of their energy: below what any law flows, softens or is damaged at.
+const STRAIN: f64 = 1e-4;
+
+fn stress_of_energy<const D: usize>(counts: [usize; D]) {
+    let case = case(counts, 0.2, false);
+    let middle = case.position.len() / 2;
+    let gradient =
+        Tensor::<D>::from_fn(|i, j| [0.8, -0.3, 0.5, 0.2, -0.6, 0.9, 0.4][(2 * i + 3 * j) % 7]);
+    let turned = |angle: f64| {
+        let (s, c) = angle.sin_cos();
+        Tensor::<D>::from_fn(|i, j| match (i, j) {
+            (0, 0) | (1, 1) if D > 1 => c,
+            (0, 1) => -s,
+            (1, 0) => s,
+            _ => f64::from(u8::from(i == j)),
+        })
+    };
+    for law in laws_with_states() {
+        for &kinematics in ways(&law) {
+            let angles: &[f64] = match kinematics {
+                BondKinematics::Exact => &[0.0, 20.0, 75.0],
+                BondKinematics::Linear => &[0.0],
+            };
+            for angle in angles {
+                let name = format!("{D}D {} {kinematics:?} {angle}°", law.name());
+                let deformed =
+                    turned(angle.to_radians()) * (Tensor::identity() + gradient * STRAIN);
+                with_law(&case, &law, kinematics, None, false, |pass| {
+                    let states = pass.force_states().unwrap();
+                    let field = |f: &Tensor<D>| -> Vec<f64> {
+                        let moved = case.position.iter().map(|x| f * x - x);
+                        moved.flat_map(|u| (0..D).map(move |a| u[a])).collect()
+                    };
+                    let energy = |f: &Tensor<D>| states.energy_density(middle, &field(f));
+                    let step = 0.1 * STRAIN;
+                    let derivative = Tensor::<D>::from_fn(|i, j| {
+                        let at = |times: f64| {
+                            let mut f = deformed;
+                            f[(i, j)] += times * step;
+                            energy(&f)
+                        };
+                        (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step)
+                    });
+                    let wanted = match kinematics {
+                        BondKinematics::Exact => {
+                            derivative * deformed.transpose()
+                                / crate::tensor::determinant(&deformed)
+                        }
+                        BondKinematics::Linear => derivative,
+                    };
+                    let u = field(&deformed);
+                    let at = |k: usize| Vector::from_fn(|a, _| u[k * D + a]);
+                    let found = states.stress(middle, &at).tensor;
+                    let error = (found - wanted).amax() / wanted.amax();
+                    assert!(error < 1e-8, "{name}: {error:e}\n{found}{wanted}");
+                });
+            }
+        }
+    }
+}
+
+#[test]
+fn stresses_are_derivatives_of_energies() {
+    stress_of_energy([40]);
+    stress_of_energy([9, 8]);
+    stress_of_energy([6, 5, 6]);
+}
+
 fn consistent_when_broken<const D: usize>(counts: [usize; D]) {
     let case = case(counts, 0.2, false);
     let n = case.position.len() * D;

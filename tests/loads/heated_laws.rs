@@ -1,0 +1,225 @@
+//! Every law that expands, heated: free it has no stress, held it has that of Hooke's law. A law that is added runs here unasked.
+
+use bondline::material::Kinematics;
+
+use super::{
+    read, run,
+    stress_measures::{Stuff, YOUNG, every_law},
+};
+
+/// Laws whose points have a stress of their own, and the viscoelastic position-aware solid: nothing tells them a temperature yet, and scenes say so.
+const WITHOUT_EXPANSION: [&str; 8] = [
+    "correspondence",
+    "damage-correspondence",
+    "johnson-cook",
+    "neo-hooke",
+    "pave",
+    "plastic-correspondence",
+    "st-venant-kirchhoff",
+    "viscoelastic-correspondence",
+];
+
+const FREE: f64 = 0.04;
+const HELD: f64 = 1e-6;
+const ALPHA: f64 = 1e-3;
+
+/// How the body is brought to its temperature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    AtRest,
+    LoadSteps,
+    InTime,
+}
+
+/// A body that expands by `stretch`: free but for its planes of symmetry, or held everywhere; in time it begins as it will be.
+fn scene(
+    kinematics: Kinematics,
+    stuff: &Stuff,
+    coupling: &str,
+    bonds: &str,
+    (way, stretch, held): (Way, f64, bool),
+) -> String {
+    let dimension = kinematics.dimension();
+    let axes = &["x", "y", "z"][..dimension];
+    let (mesh, zone, probe) = match dimension {
+        2 => (
+            "rectangle = { min = [0, 0], max = [2.2, 1.8], x = { cells = 11 }, y = { cells = 9 } }",
+            "min = [0.6, 0.6], max = [1.2, 1.2]",
+            "[0.9, 0.9]",
+        ),
+        _ => (
+            "box = { min = [0, 0, 0], max = [1.4, 1.4, 1.2], x = { cells = 7 }, y = { cells = 7 }, z = { cells = 6 } }",
+            "min = [0.4, 0.4, 0.4], max = [0.8, 0.8, 0.8]",
+            "[0.7, 0.7, 0.5]",
+        ),
+    };
+    let peridynamics = match coupling {
+        "local" => String::new(),
+        _ => format!("peridynamics = {{ horizon = 0.4, points.lattice.spacing = 0.2{bonds} }}"),
+    };
+    let zone = match coupling {
+        "local" | "nonlocal" => String::new(),
+        _ => format!("zones.nonlocal.box = {{ {zone} }}"),
+    };
+    // over the shear that plane strain adds where nothing but the plane may expand
+    let across = match kinematics {
+        Kinematics::PlaneStrain => 1.0 + stuff.poisson,
+        _ => 1.0,
+    };
+    let supports: String = match held {
+        true => {
+            let zero = axes.iter().map(|a| format!("{a} = 0"));
+            let zero = zero.collect::<Vec<_>>().join(", ");
+            let held = match way {
+                // some freedom sets the step in time, away from the family of the probe
+                Way::InTime if dimension == 2 => "box = { min = [-1, -1], max = [3, 1.65] }",
+                Way::InTime => "box = { min = [-1, -1, -1], max = [3, 3, 1.1] }",
+                Way::AtRest | Way::LoadSteps => "everywhere = true",
+            };
+            format!("conditions.all.displacement = {{ inside.{held}, {zero} }}\n")
+        }
+        false => {
+            let faces = ["left", "bottom", "back"];
+            let on = faces[..dimension].iter();
+            on.map(|face| format!("conditions.{face}.symmetry.on = \"{face}\"\n"))
+                .collect()
+        }
+    };
+    let moved = match (way, held) {
+        (Way::InTime, false) => {
+            let field = axes
+                .iter()
+                .map(|a| format!("{a} = \"{:?}*{a}\"", across * stretch));
+            format!(
+                "initial.hot.displacement = {{ {} }}",
+                field.collect::<Vec<_>>().join(", ")
+            )
+        }
+        _ => String::new(),
+    };
+    let heat = stretch / ALPHA;
+    let (value, solve) = match way {
+        Way::AtRest => (format!("{heat:?}"), ""),
+        Way::LoadSteps => (
+            format!("{heat:?}*t"),
+            "solve.quasi-static = { steps = 2, tolerance = 1e-12, outputs = 1 }",
+        ),
+        Way::InTime => (
+            format!("{heat:?}"),
+            "solve.explicit = { duration = 1e-3, outputs = 1 }",
+        ),
+    };
+    format!(
+        r#"
+kinematics = "{}"
+coupling = "{coupling}"
+mesh.{mesh}
+{}
+{peridynamics}
+{zone}
+temperature = {{ value = "{value}" }}
+{supports}
+{moved}
+{solve}
+[output]
+vtu = false
+stresses = ["von-mises"]
+probes.p.at = {probe}
+"#,
+        kinematics.name(),
+        stuff
+            .text
+            .replace(" }", &format!(", thermal-expansion = {ALPHA:?} }}")),
+    )
+}
+
+/// The stress at the probe in the end.
+fn stress(text: &str, way: Way) -> Vec<(String, f64)> {
+    let done = run(text, &[]);
+    let (table, prefix) = match way {
+        Way::AtRest => ("scene_probes.csv", ""),
+        Way::LoadSteps | Way::InTime => ("scene_history.csv", "p_"),
+    };
+    let (header, rows) = done.table(table);
+    let last = rows.last().unwrap();
+    let components = ["sxx", "syy", "szz", "sxy", "syz", "sxz"];
+    let find = |name: &&str| {
+        let at = header.iter().position(|h| *h == format!("{prefix}{name}"));
+        at.map(|at| ((*name).to_owned(), last[at]))
+    };
+    components.iter().filter_map(find).collect()
+}
+
+/// The stress that Hooke's law has where the body expands by `stretch`.
+fn closed(kinematics: Kinematics, poisson: f64, component: &str, stretch: f64, held: bool) -> f64 {
+    let pressed = YOUNG * stretch;
+    match (kinematics, component, held) {
+        (_, "sxy" | "syz" | "sxz", _) => 0.0,
+        (Kinematics::PlaneStress, _, true) => -pressed / (1.0 - poisson),
+        (_, _, true) => -pressed / (1.0 - 2.0 * poisson),
+        (Kinematics::PlaneStrain, "szz", false) => -pressed,
+        (_, _, false) => 0.0,
+    }
+}
+
+fn check(kinematics: Kinematics) {
+    for stuff in every_law(kinematics) {
+        let mut ways = 0;
+        for coupling in ["local", "nonlocal", "splice", "truncated"] {
+            for bonds in ["", ", bonds = \"exact\""] {
+                if coupling == "local" && !bonds.is_empty() {
+                    continue;
+                }
+                for way in [Way::AtRest, Way::LoadSteps, Way::InTime] {
+                    for held in [false, true] {
+                        let stretch = if held { HELD } else { FREE };
+                        let text = scene(kinematics, &stuff, coupling, bonds, (way, stretch, held));
+                        let what =
+                            format!("{coupling} {bonds} {way:?} held {held}\n{}", stuff.text);
+                        if let Err(e) = read(&text, &[]) {
+                            if ways == 0 {
+                                println!("REFUSED {} {what}: {e}", stuff.key);
+                            }
+                            continue;
+                        }
+                        ways += 1;
+                        for (component, found) in stress(&text, way) {
+                            let wanted =
+                                closed(kinematics, stuff.poisson, &component, stretch, held);
+                            // exact bonds and relaxation know of the size and the time of it
+                            let bound = if held { 1e-5 } else { 1e-9 };
+                            if (found - wanted).abs() > bound * YOUNG * stretch {
+                                println!(
+                                    "BAD {component} {found:e} {wanted:e} {kinematics:?} {what}"
+                                );
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        println!("{ways} {}", stuff.key);
+        assert_eq!(
+            ways == 0,
+            WITHOUT_EXPANSION.contains(&stuff.key),
+            "{} {}",
+            ways,
+            stuff.text
+        );
+    }
+}
+
+#[test]
+fn heated_laws_in_plane_stress() {
+    check(Kinematics::PlaneStress);
+}
+
+#[test]
+fn heated_laws_in_plane_strain() {
+    check(Kinematics::PlaneStrain);
+}
+
+#[test]
+fn heated_laws_of_solids() {
+    check(Kinematics::Solid);
+}
