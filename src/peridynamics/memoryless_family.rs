@@ -37,7 +37,7 @@ impl<const D: usize> MemorylessFamily<'_, D> {
         kinematics: BondKinematics,
         difference: &[Vector<D>],
     ) -> (Tensor<D>, EnergyDensity) {
-        self.deformed(law, kinematics, difference, |family, force, energy| {
+        self.deformed(law, kinematics, difference, &[], |family, force, energy| {
             let forces = force.iter().zip(family.bonds).zip(family.volumes);
             let stress = forces.fold(Tensor::zeros(), |sum, ((force, xi), volume)| {
                 sum + force * xi.transpose() * *volume
@@ -46,14 +46,15 @@ impl<const D: usize> MemorylessFamily<'_, D> {
         })
     }
 
-    /// The Cauchy stress of exact bonds, [`ForceState::stress`], likewise.
+    /// The Cauchy stress of exact bonds, [`ForceState::stress`], likewise; bonds expand freely by the stretches `free`.
     pub fn cauchy_stress(
         &self,
         law: &dyn ForceState<D>,
         difference: &[Vector<D>],
+        free: &[f64],
     ) -> CauchyStress<D> {
         let exact = BondKinematics::Exact;
-        self.deformed(law, exact, difference, |family, force, _| {
+        self.deformed(law, exact, difference, free, |family, force, _| {
             law.stress(family, NO_PAST, force)
         })
     }
@@ -63,6 +64,7 @@ impl<const D: usize> MemorylessFamily<'_, D> {
         law: &dyn ForceState<D>,
         kinematics: BondKinematics,
         difference: &[Vector<D>],
+        free: &[f64],
         told: impl FnOnce(&DeformedFamily<'_, D>, &[Vector<D>], EnergyDensity) -> T,
     ) -> T {
         let bonds = self.bonds.len();
@@ -83,6 +85,7 @@ impl<const D: usize> MemorylessFamily<'_, D> {
                     direction[k] /= length;
                 }
             }
+            extension[k] -= free.get(k).map_or(0.0, |stretch| stretch * length);
         }
         let mut force = vec![Vector::zeros(); bonds];
         let family = DeformedFamily {

@@ -169,8 +169,11 @@ impl<const D: usize> Solved<'_, D> {
             return Stress::zero();
         };
         let x = model.sites[site].position;
-        let material = body.cloud.material.get(p).copied();
-        let material = material.unwrap_or(model.peridynamic_material());
+        let material_of = |p: usize| {
+            let material = body.cloud.material.get(p).copied();
+            material.unwrap_or(model.peridynamic_material())
+        };
+        let material = material_of(p);
         let u = self.displacement;
         if let Some(told) = self
             .system
@@ -179,7 +182,13 @@ impl<const D: usize> Solved<'_, D> {
             return self.complete(told.tensor(), told.across, material, &x);
         }
         if let Some(law) = self.exact_law() {
-            let told = body.exact_stress(p, law, u, |j| stands(p, j));
+            let free = |j: usize| {
+                let at = |(thermal, t): (&Thermal<D>, f64)| {
+                    thermal.stretch_at(&body.cloud.position[j], material_of(j), t)
+                };
+                self.thermal().map_or(0.0, at)
+            };
+            let told = body.exact_stress(p, law, u, |j| stands(p, j), free);
             return self.complete(told.tensor, told.across, material, &x);
         }
         let of = |u: &[f64]| body.partial_stress_of(p, u, |j| stands(p, j));

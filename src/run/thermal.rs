@@ -58,14 +58,17 @@ impl<const D: usize> Thermal<D> {
         }
     }
 
+    /// The stretch `α ΔT` of a material at a place.
+    pub fn stretch_at(&self, x: &Vector<D>, material: u16, t: f64) -> f64 {
+        self.expansion[usize::from(material)] * self.rise_at(x, t)
+    }
+
     /// The stretch of points for bonds that know their temperature.
     pub fn free_stretch(&self) -> FreeStretch<D> {
         let thermal = self.clone();
         FreeStretch {
             varies_in_time: self.temperature.value.depends_on_time(),
-            at: Arc::new(move |x, material, t| {
-                thermal.expansion[usize::from(material)] * thermal.rise_at(x, t)
-            }),
+            at: Arc::new(move |x, material, t| thermal.stretch_at(x, material, t)),
         }
     }
 

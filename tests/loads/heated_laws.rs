@@ -23,6 +23,17 @@ const FREE: f64 = 0.04;
 const HELD: f64 = 1e-6;
 const ALPHA: f64 = 1e-3;
 
+/// Couplings, and kinematics of bonds where there are some.
+const COUPLINGS: [(&str, &str); 7] = [
+    ("local", ""),
+    ("nonlocal", ""),
+    ("nonlocal", ", bonds = \"exact\""),
+    ("splice", ""),
+    ("splice", ", bonds = \"exact\""),
+    ("truncated", ""),
+    ("truncated", ", bonds = \"exact\""),
+];
+
 /// How the body is brought to its temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
@@ -164,48 +175,32 @@ fn closed(kinematics: Kinematics, poisson: f64, component: &str, stretch: f64, h
 
 fn check(kinematics: Kinematics) {
     for stuff in every_law(kinematics) {
-        let mut ways = 0;
-        for coupling in ["local", "nonlocal", "splice", "truncated"] {
-            for bonds in ["", ", bonds = \"exact\""] {
-                if coupling == "local" && !bonds.is_empty() {
-                    continue;
-                }
-                for way in [Way::AtRest, Way::LoadSteps, Way::InTime] {
-                    for held in [false, true] {
-                        let stretch = if held { HELD } else { FREE };
-                        let text = scene(kinematics, &stuff, coupling, bonds, (way, stretch, held));
-                        let what =
-                            format!("{coupling} {bonds} {way:?} held {held}\n{}", stuff.text);
-                        if let Err(e) = read(&text, &[]) {
-                            if ways == 0 {
-                                println!("REFUSED {} {what}: {e}", stuff.key);
-                            }
-                            continue;
-                        }
-                        ways += 1;
-                        for (component, found) in stress(&text, way) {
-                            let wanted =
-                                closed(kinematics, stuff.poisson, &component, stretch, held);
-                            // exact bonds and relaxation know of the size and the time of it
-                            let bound = if held { 1e-5 } else { 1e-9 };
-                            if (found - wanted).abs() > bound * YOUNG * stretch {
-                                println!(
-                                    "BAD {component} {found:e} {wanted:e} {kinematics:?} {what}"
-                                );
-                            }
-                        }
+        let mut ran = 0;
+        for (coupling, bonds) in COUPLINGS {
+            for way in [Way::AtRest, Way::LoadSteps, Way::InTime] {
+                // what relaxes is pressed less and less
+                let relaxes = way != Way::AtRest && stuff.text.contains("relax");
+                for (stretch, held) in [(FREE, false), (HELD, true)] {
+                    let text = scene(kinematics, &stuff, coupling, bonds, (way, stretch, held));
+                    if (held && relaxes) || read(&text, &[]).is_err() {
+                        continue;
+                    }
+                    ran += 1;
+                    for (component, found) in stress(&text, way) {
+                        let wanted = closed(kinematics, stuff.poisson, &component, stretch, held);
+                        // the square of the strain is in what exact bonds and nonlinear laws do
+                        let bound = if held { 1e-5 } else { 1e-9 };
+                        assert!(
+                            (found - wanted).abs() < bound * YOUNG * stretch,
+                            "{component} {found:e} {wanted:e} {coupling} {bonds} {way:?} held {held}\n{}",
+                            stuff.text
+                        );
                     }
                 }
             }
         }
-        println!("{ways} {}", stuff.key);
-        assert_eq!(
-            ways == 0,
-            WITHOUT_EXPANSION.contains(&stuff.key),
-            "{} {}",
-            ways,
-            stuff.text
-        );
+        let expands = !WITHOUT_EXPANSION.contains(&stuff.key);
+        assert_eq!(ran > 0, expands, "{}", stuff.text);
     }
 }
 

@@ -57,13 +57,14 @@ impl<const D: usize> PdBody<D> {
         self.stress_of(j, self.differences(j, u), is_intact, shape)
     }
 
-    /// The Cauchy stress of point `j` by its exact bonds to neighbours that `stands` names, of a law without memory \[Pa\].
+    /// The Cauchy stress of point `j` by its exact bonds to neighbours that `stands` names, of a law without memory \[Pa\]; points expand freely by the stretch `free`.
     pub fn exact_stress(
         &self,
         j: usize,
         law: &dyn ForceState<D>,
         u: &[f64],
         stands: impl Fn(usize) -> bool,
+        free: impl Fn(usize) -> f64,
     ) -> CauchyStress<D> {
         let (pair, omega) = self.kernel(j);
         let family = self.families.of(j).iter().map(|&l| l as usize);
@@ -77,6 +78,9 @@ impl<const D: usize> PdBody<D> {
         let bonds: Vec<Vector<D>> = standing.iter().map(|&(_, l)| self.bond(j, l)).collect();
         let volumes: Vec<f64> = standing.iter().map(|&(_, l)| volume(l)).collect();
         let difference: Vec<Vector<D>> = standing.iter().map(|&(_, l)| differ(l)).collect();
+        let here = free(j);
+        let expansion = |&(_, l): &(usize, usize)| 0.5 * (here + free(l));
+        let expansion: Vec<f64> = standing.iter().map(expansion).collect();
         let lost: f64 = lost.iter().map(|&(_, l)| volume(l)).sum();
         let kept: f64 = volumes.iter().sum();
         let family = MemorylessFamily {
@@ -92,7 +96,7 @@ impl<const D: usize> PdBody<D> {
                 0.0
             },
         };
-        family.cauchy_stress(law, &difference)
+        family.cauchy_stress(law, &difference, &expansion)
     }
 
     /// The energy density of point `j` under displacements `u` of the sites, by the bonds to neighbours that `stands` names: that whose derivative the linear force state is \[J/m^D\].

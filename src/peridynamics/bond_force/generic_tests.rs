@@ -282,7 +282,7 @@ fn stress_of_energy<const D: usize>(counts: [usize; D]) {
 
 #[test]
 fn stresses_are_derivatives_of_energies() {
-    stress_of_energy([40]);
+    // the section of a bar contracts, of which the energy per length says nothing
     stress_of_energy([9, 8]);
     stress_of_energy([6, 5, 6]);
 }
